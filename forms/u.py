@@ -1,0 +1,11 @@
+"""Displacement only. It locks near nu = 0.5: here to show that, and for compressible materials."""
+
+from ufl import dot, grad
+
+fields = {"u": ("displacement", "w")}
+kinematics = "displacement"
+
+
+def residual(w, sigma, t, sum_p, ds):
+    """R_u(w) = sum_p V_p sigma_p : grad w - int t . w ds."""
+    return sum_p(sigma, grad(w)) - dot(t, w) * ds

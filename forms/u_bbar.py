@@ -1,0 +1,14 @@
+"""B-bar: volumetric part at the centre of the particle's cell, deviator at the particle.
+
+Talbot et al. 2024; the three-dimensional (factor 1/3) form of plane strain.
+"""
+
+from ufl import div, dot, grad
+
+fields = {"u": ("displacement", "w")}
+kinematics = "cell"
+
+
+def residual(w, s, sigma_m, t, sum_p, sum_c, ds):
+    """R_u(w) = sum_p V_p { s_p : grad w + sigma_m,p (div w at the cell centre) } - int t . w ds."""
+    return sum_p(s, grad(w)) + sum_c(sigma_m, div(w)) - dot(t, w) * ds

@@ -1,0 +1,32 @@
+"""Mixed u-eps_v form of Okagawa, Hashimoto and Higo: their eqs. (1) and (2).
+
+`stabilisation` chooses the term that replaces alpha h^2 (K/mu) lap(eps_v) of eq. (2):
+
+laplacian       the paper's; imposes d eps_v/dn = 0 weakly on the border of the body
+residual_based  the same with the whole momentum residual grad p + div s, p = K eps_v: consistent,
+                unsymmetric, small strain, for scenes without body force and inertia
+projection      Dohrmann and Bochev 2004: the part of eps_v that varies within a cell; needs no h^2
+"""
+
+from ufl import Identity, div, dot, grad, sym
+
+fields = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
+kinematics = "mixed"
+parameters = {"alpha": {"default": 0.1, "minimum": 0.0}}
+options = {"stabilisation": ("laplacian", "residual_based", "projection")}
+
+
+def residual(
+    u, eps_v, w, q, sigma, K, mu, t, h, sum_p, cell_mean, dx, dx_c, ds, alpha, stabilisation
+):
+    """R_u(w) = sum_p V_p sigma_p : grad w - int t . w ds;  R_q(q) = sum_p V_p K_p { q (div u - eps_v) } - S."""
+    R_u = sum_p(sigma, grad(w)) - dot(t, w) * ds
+    R_q = sum_p(K, q * (div(u) - eps_v))
+    if stabilisation == "projection":
+        c = alpha * cell_mean(K**2 / mu)
+        return R_u + R_q - c * q * eps_v * dx + c * q * eps_v * dx_c
+    S = sum_p(K**2 / mu, alpha * h**2 * dot(grad(q), grad(eps_v)))
+    if stabilisation == "residual_based":
+        s_over_mu = 2 * (sym(grad(u)) - div(u) / 3 * Identity(2))
+        S += sum_p(K, alpha * h**2 * dot(grad(q), div(s_over_mu)))
+    return R_u + R_q - S

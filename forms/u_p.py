@@ -1,0 +1,14 @@
+"""Mixed u-p form: Commend, Truty and Zimmermann 2004. Takes nu = 0.5 exactly (1/K = 0)."""
+
+from ufl import div, dot, grad
+
+fields = {"u": ("displacement", "w"), "p": ("pressure", "q")}
+kinematics = "deviatoric"
+parameters = {"alpha": {"default": 0.1, "minimum": 0.0}}
+
+
+def residual(u, p, w, q, sigma, K, mu, t, h, sum_p, ds, alpha):
+    """sigma = s + p I;  R_q(q) = sum_p V_p { q (div u - p/K) - alpha h^2/mu grad q . grad p }."""
+    R_u = sum_p(sigma, grad(w)) + sum_p(p * div(w)) - dot(t, w) * ds
+    R_q = sum_p(q * div(u)) - sum_p(1 / K, q * p)
+    return R_u + R_q - sum_p(1 / mu, alpha * h**2 * dot(grad(q), grad(p)))

@@ -1,0 +1,35 @@
+"""tawami: implicit material point method with the mixed displacement - volumetric strain form."""
+
+from tawami.body import Body, box
+from tawami.errors import (
+    ConvergenceError,
+    FormError,
+    InputError,
+    MissingDependencyError,
+    OutputError,
+    SingularError,
+    SupportError,
+    TawamiError,
+)
+from tawami.formulation import Form
+from tawami.grid import Grid
+from tawami.materials import linear_elastic
+from tawami.scene import Scene, Solution
+
+__all__ = [
+    "Body",
+    "ConvergenceError",
+    "Form",
+    "FormError",
+    "Grid",
+    "InputError",
+    "MissingDependencyError",
+    "OutputError",
+    "Scene",
+    "SingularError",
+    "Solution",
+    "SupportError",
+    "TawamiError",
+    "box",
+    "linear_elastic",
+]

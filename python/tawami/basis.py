@@ -1,0 +1,60 @@
+"""Bases on the grid as subspaces of continuous Lagrange elements: the extraction matrices.
+
+Quadratic splines, bilinear and biquadratic Lagrange functions are all biquadratic on a cell, so the
+field problem is assembled once, on biquadratic nodes: nodal values = E coefficients (formulation.md,
+section 3). E is the Kronecker product of one-dimensional matrices whose rows sum to 1.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+from tawami import _rust
+
+Array = npt.NDArray[np.float64]
+Basis = Literal["quadratic_spline", "bilinear", "biquadratic"]
+BASES: tuple[Basis, ...] = ("quadratic_spline", "bilinear", "biquadratic")
+
+
+def values_1d(basis: Basis, n: int, cell: npt.ArrayLike, t: npt.ArrayLike) -> sp.csr_matrix:
+    """Values of the functions on a row of `n` cells: positions x functions.
+
+    Args:
+        basis: Name of the basis.
+        n: Number of cells.
+        cell: Cell of each position.
+        t: Position in the cell, 0 to 1.
+    """
+    cells = np.atleast_1d(np.asarray(cell, dtype=np.int64))
+    first, values = _rust.basis_1d(basis, n, cells, np.atleast_1d(np.asarray(t, dtype=float)))
+    width = 2 if basis == "bilinear" else 3
+    rows = np.repeat(np.arange(len(cells)), width)
+    columns = (first[:, None] + np.arange(width)).ravel()
+    shape = (len(cells), _rust.basis_len(basis, n))
+    matrix = sp.csr_matrix((values[:, :width].ravel(), (rows, columns)), shape=shape)
+    matrix.eliminate_zeros()
+    return matrix
+
+
+def extraction_1d(basis: Basis, n: int, degree: int) -> sp.csr_matrix:
+    """Values at the Lagrange nodes (`degree` per cell) of a row of `n` cells."""
+    node = np.arange(degree * n + 1)
+    cell = np.minimum(node // degree, n - 1)
+    return values_1d(basis, n, cell, (node - degree * cell) / degree)
+
+
+def extraction(basis: Basis, cells: tuple[int, int], degree: int) -> sp.csr_matrix:
+    """E of a scalar field: nodes x functions, x fastest in both."""
+    ex, ey = (extraction_1d(basis, n, degree) for n in cells)
+    return sp.kron(ey, ex, format="csr")
+
+
+def greville_1d(basis: Basis, n: int) -> Array:
+    """Greville points in cells: the coefficients of the function x, by which it is reproduced."""
+    if basis == "quadratic_spline":
+        return np.concatenate([[0.0], np.arange(n) + 0.5, [float(n)]])
+    return np.linspace(0.0, n, _rust.basis_len(basis, n))

@@ -1,0 +1,82 @@
+"""Filling a body with particles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami import _rust
+from tawami.errors import InputError
+from tawami.grid import Grid
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Body:
+    """Positions and volumes of the particles of a body.
+
+    Attributes:
+        x: Positions [m], particles x 2.
+        volume: Volumes per metre depth [m2], one per particle.
+    """
+
+    x: Array
+    volume: Array
+
+
+def box(
+    grid: Grid,
+    lower: Sequence[float],
+    upper: Sequence[float],
+    *,
+    per_axis: int = 2,
+    gauss: bool = False,
+) -> Body:
+    """A rectangle filled with `per_axis` x `per_axis` particles in every cell of the grid.
+
+    The sides must lie on lines of the grid, so that every cell is full or empty.
+
+    Args:
+        grid: The grid.
+        lower: Lower left corner [m].
+        upper: Upper right corner [m].
+        per_axis: Particles per cell and axis.
+        gauss: Put them at the Gauss points, with the Gauss weights, instead of evenly (the
+            quarter points for two).
+
+    Raises:
+        InputError: Sides off the lines of the grid or outside the grid, or no particle.
+    """
+    if per_axis < 1:
+        raise InputError(f"per_axis = {per_axis}: expected at least 1 particle per cell and axis")
+    if gauss:
+        points, weights = _rust.gauss(per_axis)
+    else:
+        points, weights = (np.arange(per_axis) + 0.5) / per_axis, np.full(per_axis, 1 / per_axis)
+    positions, widths = [], []
+    for axis in range(2):
+        ends = (np.array([lower[axis], upper[axis]]) - grid.origin[axis]) / grid.h
+        first, last = np.rint(ends).astype(int)
+        if not np.allclose(ends, [first, last], atol=1e-6) or first < 0 or last > grid.cells[axis]:
+            raise InputError(
+                f"box: its {'xy'[axis]} range [{lower[axis]:g}, {upper[axis]:g}] m must lie on "
+                f"lines of the grid (every {grid.h:g} m from {grid.origin[axis]:g} to "
+                f"{grid.upper[axis]:g}); change h or the box"
+            )
+        if last <= first:
+            raise InputError(
+                f"box: its {'xy'[axis]} range [{lower[axis]:g}, {upper[axis]:g}] m holds no cell: "
+                "a body without particles. Expected lower < upper"
+            )
+        cell = np.arange(first, last)
+        positions.append(grid.axis_positions(axis, cell[:, None], points).ravel())
+        widths.append(np.tile(weights * grid.h, len(cell)))
+    (x, y), (wx, wy) = positions, widths
+    return Body(
+        x=np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))]),
+        volume=np.outer(wy, wx).ravel(),
+    )

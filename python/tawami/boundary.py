@@ -1,0 +1,164 @@
+"""Supports and loads, as linear constraints on the coefficients of the displacement."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami import _rust
+from tawami.basis import Basis, values_1d
+from tawami.errors import InputError, SupportError
+from tawami.grid import Edge, Grid
+
+Array = npt.NDArray[np.float64]
+Component = Literal["x", "y"]
+#: A number, or a function of the position along an edge: f(x, y) on arrays.
+Profile = float | Callable[[Array, Array], Any]
+
+
+@dataclass(frozen=True)
+class Held:
+    """Coefficients that are prescribed: `indices` of one displacement component take `values`."""
+
+    indices: npt.NDArray[np.int64]
+    values: Array
+
+
+@dataclass(frozen=True)
+class PointHeld:
+    """One multi-point constraint: `weights . coefficients[indices] = value`."""
+
+    indices: npt.NDArray[np.int64]
+    weights: Array
+    value: float
+    where: str
+
+
+def component_index(component: str) -> int:
+    """0 for 'x', 1 for 'y'.
+
+    Raises:
+        InputError: Anything else.
+    """
+    if component not in ("x", "y"):
+        raise InputError(f"component '{component}': expected 'x' or 'y'")
+    return "xy".index(component)
+
+
+def evaluate(profile: Profile, x: Array, y: Array, what: str) -> Array:
+    """Values of a number or function at points.
+
+    Raises:
+        InputError: A function that fails, returns the wrong shape, or something not finite.
+    """
+    try:
+        value = profile(x, y) if callable(profile) else profile
+        values = np.broadcast_to(np.asarray(value, dtype=float), x.shape)
+    except Exception as error:
+        raise InputError(
+            f"{what}: expected a number or a function f(x, y) on arrays of shape {x.shape}, got "
+            f"{profile!r}, which gave {error!r}"
+        ) from error
+    if not np.isfinite(values).all():
+        bad = np.flatnonzero(~np.isfinite(values))[0]
+        raise InputError(f"{what}: {values[bad]} at ({x[bad]}, {y[bad]}): expected a finite number")
+    return values
+
+
+def held_edge(
+    grid: Grid, basis: Basis, active: npt.NDArray[np.bool_], edge: Edge, component: int, value: Profile
+) -> Held:
+    """One displacement component on an edge of the grid, the profile projected in L2.
+
+    Only cells with particles count; functions that vanish on all of these are left out.
+
+    Args:
+        grid: The grid.
+        basis: Basis of the displacement.
+        active: Whether each cell holds particles, ny x nx.
+        edge: Name of the edge.
+        component: 0 or 1.
+        value: Displacement [m] along the edge.
+
+    Raises:
+        SupportError: No cell along the edge holds particles.
+    """
+    axis, end = grid.edge(edge)
+    along = 1 - axis
+    touched = np.flatnonzero(np.take(active, end, axis=1 - axis))
+    if len(touched) == 0:
+        raise SupportError(
+            f"fix(edge='{edge}'): no cell along that edge of the grid holds particles: the support "
+            "would not touch the body. Let the grid end where the body is held"
+        )
+    n = grid.cells[along]
+    points, weights = _rust.gauss(5)
+    cell, t = np.repeat(touched, 5), np.tile(points, len(touched))
+    position = grid.axis_positions(along, cell, t)
+    fixed = np.full_like(position, grid.upper[axis] if end else grid.origin[axis])
+    x, y = (fixed, position) if axis == 0 else (position, fixed)
+    prescribed = evaluate(value, x, y, f"fix(edge='{edge}')")
+    values = values_1d(basis, n, cell, t)
+    used = np.unique(values.indices)
+    values = values[:, used].toarray()
+    weighted = values * np.tile(weights, len(touched))[:, None]
+    coefficients = np.linalg.solve(weighted.T @ values, weighted.T @ prescribed)
+    width = _rust.basis_len(basis, grid.cells[0])
+    across = 0 if end == 0 else _rust.basis_len(basis, grid.cells[axis]) - 1
+    function = across + width * used if axis == 0 else used + width * across
+    return Held(2 * function + component, coefficients)
+
+
+def held_point(
+    grid: Grid,
+    basis: Basis,
+    active: npt.NDArray[np.bool_],
+    point: Sequence[float],
+    component: int,
+    value: float,
+) -> PointHeld:
+    """One displacement component at a point: a constraint on the interpolated value.
+
+    Raises:
+        InputError: The point is outside the grid.
+        SupportError: The point is in a cell without particles.
+    """
+    where = f"hold(point=({point[0]:g}, {point[1]:g}))"
+    location = locate_point(grid, point, where)
+    i, j = divmod(int(location.cell[0]), grid.cells[0])[::-1]
+    # On an edge between cells the point belongs to any of those it touches.
+    a, b = location.xi[0]
+    near = [(i + di, j + dj) for di in _touching(a) for dj in _touching(b)]
+    inside = [(k, m) for k, m in near if 0 <= k < grid.cells[0] and 0 <= m < grid.cells[1]]
+    if not any(active[m, k] for k, m in inside):
+        raise SupportError(f"{where}: the point lies in a cell without particles; move it into the body")
+    wx, wy = values_1d(basis, grid.cells[0], i, a), values_1d(basis, grid.cells[1], j, b)
+    width = _rust.basis_len(basis, grid.cells[0])
+    functions = (wx.indices[None, :] + width * wy.indices[:, None]).ravel().astype(np.int64)
+    return PointHeld(2 * functions + component, np.outer(wy.data, wx.data).ravel(), value, where)
+
+
+def _touching(t: float) -> tuple[int, ...]:
+    return (0, -1) if t < 1e-9 else (0, 1) if t > 1 - 1e-9 else (0,)
+
+
+def locate_point(grid: Grid, point: Sequence[float], what: str) -> _rust.Location:
+    """Cell and position of one point.
+
+    Raises:
+        InputError: The point is outside the grid, or not two finite numbers.
+    """
+    x = np.asarray(point, dtype=float)
+    if x.shape != (2,):
+        raise InputError(f"{what}: expected a point (x, y)")
+    try:
+        return grid.rust.locate(x[None, :])
+    except InputError:
+        raise InputError(
+            f"{what}: expected a point within the grid, [{grid.origin[0]:g}, {grid.upper[0]:g}] x "
+            f"[{grid.origin[1]:g}, {grid.upper[1]:g}]"
+        ) from None

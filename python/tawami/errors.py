@@ -1,0 +1,49 @@
+"""What can go wrong, as a small hierarchy: every message says which input, what came, what to do."""
+
+from __future__ import annotations
+
+from tawami._rust import InputError, TawamiError
+
+
+class FormError(TawamiError):
+    """A weak form that cannot be used as it stands."""
+
+
+class SupportError(TawamiError):
+    """Supports that leave a rigid motion free, contradict each other, or miss the body."""
+
+
+class SingularError(TawamiError):
+    """A tangent that cannot be solved; the message names the cells."""
+
+
+class ConvergenceError(TawamiError):
+    """A Newton iteration that did not converge. `history` holds its measures.
+
+    Attributes:
+        history: One (measure of momentum, measure of volume or None) per residual evaluated.
+    """
+
+    def __init__(self, message: str, history: list[tuple[float, float | None]]) -> None:
+        super().__init__(message)
+        self.history = history
+
+
+class OutputError(TawamiError):
+    """A result that cannot be written."""
+
+
+class MissingDependencyError(TawamiError, ImportError):
+    """A package that tawami needs is not there; the message says how to install it."""
+
+
+__all__ = [
+    "ConvergenceError",
+    "FormError",
+    "InputError",
+    "MissingDependencyError",
+    "OutputError",
+    "SingularError",
+    "SupportError",
+    "TawamiError",
+]

@@ -1,0 +1,191 @@
+"""The seam between particles and field problem (contract 3 of the design).
+
+(form, particle densities on active cells, reduction P) -> reduced residual and tangent. This is the
+reference: plain dolfinx assembly over the active cells, then P^T r and P^T K P by PETSc.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+from petsc4py import PETSc
+
+from tawami import _dolfinx, _rust
+from tawami.basis import Basis
+from tawami.formulation import DEGREE, CompiledForm, Integral, Rule
+from tawami.grid import Edge, Grid
+from tawami.reduction import Layout, Reduction
+from tawami.stopwatch import Stopwatch
+
+Array = npt.NDArray[np.float64]
+
+
+class Field:
+    """A compiled form on the active cells of a grid.
+
+    Args:
+        grid: The grid.
+        compiled: The form.
+        basis: Basis of the displacement.
+        location: Where the particles are.
+        volume: Their volumes [m2 per metre depth].
+        parameters: Numbers that the form names (alpha, ...).
+        stopwatch: Where the time of each stage goes.
+
+    Attributes:
+        layout: Where the coefficients of the fields stand.
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        compiled: CompiledForm,
+        basis: Basis,
+        location: _rust.Location,
+        volume: Array,
+        parameters: Mapping[str, float],
+        stopwatch: Stopwatch,
+    ) -> None:
+        self.grid, self.compiled, self.stopwatch = grid, compiled, stopwatch
+        self._location, self._volume = location, volume
+        self._values = {"h": grid.h, **parameters}
+        rectangle = grid.rectangle
+        self._space = grid.space(len(compiled.form.fields), compiled.element)
+        index = rectangle.ij[:, 0] + grid.cells[0] * rectangle.ij[:, 1]
+        position = np.searchsorted(location.active, index)
+        position[position == len(location.active)] = 0
+        self._cells = np.flatnonzero(location.active[position] == index).astype(np.int32)
+        self._rows = position[self._cells].astype(np.uint32)
+        self.active = np.zeros(grid.cells[::-1], dtype=bool)
+        self.active.ravel()[location.active] = True
+        self.layout = Layout(grid, basis, self._space, self.active)
+        self._points = {rule: self._point_indices(rule) for rule in DEGREE}
+        self._packed: dict[int, Array] = {}
+        entities = rectangle.entities(self._cells, None)
+        self._residual = self._space.form(compiled.residual.kernel, 1, entities)
+        self._tangent = self._space.form(compiled.tangent.kernel, 2, entities)
+        self._matrix: Any = None
+        self._reduced: Any = None
+
+    def _point_indices(self, rule: Rule) -> list[tuple[int, int]]:
+        """Indices along x and y, in the Gauss rule, of each point of dolfinx' rule."""
+        reference = _dolfinx.reference_points(DEGREE[rule])
+        points = self.grid.rectangle.to_grid_axes(reference)
+        gauss, _ = _rust.gauss(round(len(points) ** 0.5))
+        near = np.abs(points[:, :, None] - gauss[None, None, :])
+        if near.min(axis=2).max() > 1e-12:
+            raise RuntimeError("internal: dolfinx' quadrature is not the tensor Gauss rule")
+        return [(int(a), int(b)) for a, b in near.argmin(axis=2)]
+
+    def _pack(self, integral: Integral, nodal: Array, data: Mapping[Rule, Array]) -> Array:
+        """Coefficients of the integral, one row per active cell."""
+        width = integral.width
+        if id(integral) not in self._packed:
+            self._packed[id(integral)] = np.zeros((len(self._cells), width))
+        packed = self._packed[id(integral)]
+        offset = 0
+        for slot in integral.slots:
+            if slot.kind == "fields":
+                packed[:, offset : offset + slot.width] = nodal[self._space.dofs[self._cells]]
+            else:
+                rule, mean = slot.kind, slot.kind == "mean"
+                points = [(0, 0)] if mean else self._points[rule]
+                _rust.densities(
+                    self._location, self._volume, data[rule], points, self._rows,
+                    list(slot.columns), offset, mean, packed,
+                )  # fmt: skip
+            offset += slot.width
+        return packed
+
+    def _constants(self, integral: Integral) -> Array:
+        return np.array([self._values[name] for name in integral.constants], dtype=float)
+
+    def residual(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
+        """Internal forces and volume residual on all coefficients, before supports.
+
+        Args:
+            coefficients: Increments of all fields.
+            data: Particle data per rule, particles x columns.
+        """
+        integral = self.compiled.residual
+        with self.stopwatch("pack"):
+            nodal = self.layout.extraction @ coefficients
+            packed = self._pack(integral, nodal, data)
+        with self.stopwatch("residual"):
+            vector = _dolfinx.assemble_vector(
+                self._residual, integral.kernel, self._constants(integral), packed, self._space.size
+            )
+            return np.asarray(self.layout.extraction.T @ vector)
+
+    def traction(self, edge: Edge, values: Array) -> Array:
+        """External forces on all coefficients of a traction on an edge of the grid.
+
+        Args:
+            edge: Name of the edge; only its cells with particles are loaded.
+            values: Traction [Pa] at the nodes of :meth:`edge_nodes`, cells x 9 x 2.
+        """
+        integral = self.compiled.traction
+        assert integral is not None
+        cells, local = self._edge_cells(edge), self.grid.rectangle.facet_of_edge(edge)
+        order = self.grid.rectangle.facet_order(cells, local)
+        packed = np.zeros((len(cells), integral.width))
+        offset = 0
+        for slot in integral.slots:
+            assert slot.kind == "traction"
+            packed[:, offset : offset + slot.width] = values.reshape(len(cells), 18)[order]
+            offset += slot.width
+        form = self._space.form(
+            integral.kernel, 1, self.grid.rectangle.entities(cells[order], local)
+        )
+        vector = _dolfinx.assemble_vector(
+            form, integral.kernel, self._constants(integral), packed, self._space.size
+        )
+        return -np.asarray(self.layout.extraction.T @ vector)
+
+    def _edge_cells(self, edge: Edge) -> npt.NDArray[np.int32]:
+        axis, end = self.grid.edge(edge)
+        last = self.grid.cells[axis] - 1 if end else 0
+        return self._cells[self.grid.rectangle.ij[self._cells, axis] == last]
+
+    def edge_nodes(self, edge: Edge) -> Array:
+        """Positions [m] of the biquadratic nodes of the loaded cells, cells x 9 x 2."""
+        nodes = self.grid.rectangle.to_grid_axes(_dolfinx.reference_nodes(2))
+        ij = self.grid.rectangle.ij[self._edge_cells(edge)]
+        return np.asarray(self.grid.origin + self.grid.h * (ij[:, None, :] + nodes))
+
+    def tangent(self, coefficients: Array, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
+        """P^T K P as a PETSc matrix; it is overwritten by the next call."""
+        integral = self.compiled.tangent
+        with self.stopwatch("pack"):
+            nodal = self.layout.extraction @ coefficients
+            packed = self._pack(integral, nodal, data)
+        with self.stopwatch("tangent"):
+            matrix = self.full_tangent(packed)
+        with self.stopwatch("reduction"):
+            if self._reduced is None or self._reduced[0] is not reduction:
+                p = _petsc(self.layout.extraction @ reduction.selection, self.grid.comm)
+                self._reduced = (reduction, p, matrix.ptap(p))
+            else:
+                matrix.ptap(self._reduced[1], result=self._reduced[2])
+        return self._reduced[2]
+
+    def full_tangent(self, packed: Array) -> Any:
+        """K on the degrees of freedom of the mesh."""
+        integral = self.compiled.tangent
+        if self._matrix is None:
+            self._matrix = self._space.create_matrix(self._cells)
+        _dolfinx.assemble_matrix(
+            self._matrix, self._tangent, integral.kernel, self._constants(integral), packed
+        )
+        return self._matrix
+
+
+def _petsc(matrix: sp.spmatrix, comm: Any) -> Any:
+    rows: sp.csr_matrix = sp.csr_matrix(matrix)
+    rows.sort_indices()
+    csr = (rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), rows.data)
+    return PETSc.Mat().createAIJ(size=rows.shape, csr=csr, comm=comm)

@@ -1,0 +1,79 @@
+"""The background grid: squares on a communicator, and its dolfinx mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami import _dolfinx, _rust
+from tawami.errors import InputError
+
+Array = npt.NDArray[np.float64]
+Edge = Literal["left", "right", "bottom", "top"]
+EDGES: tuple[Edge, ...] = ("left", "right", "bottom", "top")
+
+
+class Grid:
+    """Uniform grid of squares; all scenes on it share its dolfinx mesh.
+
+    Args:
+        comm: Communicator, as MPI.COMM_WORLD; one rank for now.
+        origin: Lower left corner [m].
+        h: Side of a cell [m].
+        cells: Number of cells in x and y.
+
+    Raises:
+        InputError: A parameter out of its range, or a communicator of more than one rank.
+    """
+
+    def __init__(
+        self, comm: Any, *, origin: Sequence[float], h: float, cells: Sequence[int]
+    ) -> None:
+        if comm.size > 1:
+            raise InputError(
+                f"the communicator has {comm.size} ranks: tawami runs on one rank for now. Start it "
+                "without mpirun, or give every rank a grid on MPI.COMM_SELF"
+            )
+        self.comm = comm
+        self.origin = (float(origin[0]), float(origin[1]))
+        self.h = float(h)
+        self.cells = (int(cells[0]), int(cells[1]))
+        self.rust = _rust.Grid(self.origin, self.h, self.cells)
+        self._rectangle: _dolfinx.Rectangle | None = None
+        self._spaces: dict[int, _dolfinx.Space] = {}
+
+    @property
+    def upper(self) -> tuple[float, float]:
+        """Upper right corner [m]."""
+        (x, y), (nx, ny) = self.origin, self.cells
+        return (x + self.h * nx, y + self.h * ny)
+
+    @property
+    def rectangle(self) -> _dolfinx.Rectangle:
+        """The dolfinx mesh, made when it is first needed."""
+        if self._rectangle is None:
+            self._rectangle = _dolfinx.Rectangle(self.comm, self.origin, self.h, self.cells)
+        return self._rectangle
+
+    def space(self, num_fields: int, element: Any) -> _dolfinx.Space:
+        """The function space of displacement and `num_fields - 1` bilinear fields."""
+        if num_fields not in self._spaces:
+            self._spaces[num_fields] = self.rectangle.space(element)
+        return self._spaces[num_fields]
+
+    def edge(self, name: Edge) -> tuple[int, int]:
+        """Axis normal to an edge of the grid, and 0 for its lower or -1 for its upper end.
+
+        Raises:
+            InputError: No such edge.
+        """
+        if name not in EDGES:
+            raise InputError(f"edge '{name}': expected 'left', 'right', 'bottom' or 'top'")
+        return EDGES.index(name) // 2, -(EDGES.index(name) % 2)
+
+    def axis_positions(self, axis: int, cell: Any, t: Any) -> Array:
+        """Coordinates [m] along an axis of positions `t` (0 to 1) in cells."""
+        return np.asarray(self.origin[axis] + self.h * (np.asarray(cell) + np.asarray(t)))

@@ -1,0 +1,220 @@
+"""Newton's method for one step, stopped by the two measures of formulation.md, section 1.
+
+momentum   |R_u| / max(|f_int|, |f_ext|), norms over all displacement coefficients
+volume     |R_q| / |sum_p V_p W_p q (max(|div u|, |eps_v|) + p_ref/K_p + floor)|, W = K for a field
+           eps_v and 1 for a field p (then eps_v is p/K)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami import _rust
+from tawami.errors import ConvergenceError, SingularError
+from tawami.field import Field
+from tawami.formulation import CompiledForm, Density, LawQuantity, ParticleScalar, Rule
+from tawami.linear import LinearSystem
+from tawami.reduction import Reduction
+from tawami.stopwatch import Stopwatch
+
+Array = npt.NDArray[np.float64]
+History = list[tuple[float, float | None]]
+
+#: Volumetric strain below which the volume equation need not be solved any better.
+STRAIN_FLOOR = 1e-7
+
+
+@dataclass(frozen=True)
+class Converged:
+    """A converged step.
+
+    Attributes:
+        coefficients: Increments of all fields.
+        history: (momentum, volume) measures of every residual, the first before any solve.
+        condition: Lower estimate of the condition number of the last scaled tangent; 1 if none
+            was needed.
+        symmetric: Whether the last tangent was symmetric, so that LDL^T served.
+    """
+
+    coefficients: Array
+    history: History
+    condition: float
+    symmetric: bool
+
+    @property
+    def iterations(self) -> int:
+        """Number of linear solves."""
+        return len(self.history) - 1
+
+
+class Newton:
+    """The nonlinear problem of one step.
+
+    Args:
+        field: The field side.
+        compiled: The form.
+        stage: The particle side.
+        particles: The particles, with volumes, stresses and constants.
+        constants: K and mu of each particle [Pa].
+        stopwatch: Where the time goes.
+        tolerance: Both measures must fall below it.
+        max_iterations: Linear solves before giving up.
+    """
+
+    def __init__(
+        self,
+        field: Field,
+        compiled: CompiledForm,
+        stage: _rust.Stage,
+        particles: _rust.Particles,
+        location: _rust.Location,
+        constants: Mapping[str, Array],
+        stopwatch: Stopwatch,
+        *,
+        tolerance: float,
+        max_iterations: int,
+    ) -> None:
+        self.field, self.compiled, self.stage = field, compiled, stage
+        self.particles, self.location, self.constants = particles, location, constants
+        self.stopwatch = stopwatch
+        self.tolerance, self.max_iterations = tolerance, max_iterations
+        self.data = {
+            rule: np.zeros((len(particles), compiled.columns(rule)))
+            for rule in compiled.densities
+        }
+        self._requests: dict[Rule, list[tuple[str, str, int]]] = {r: [] for r in self.data}
+        for rule, densities in compiled.densities.items():
+            for density, column in densities.items():
+                self._place(rule, density, column)
+        volumetric = list(compiled.form.fields.values())[1:]
+        self.kind = volumetric[0][0] if volumetric else None
+        self.p_ref = float(np.sqrt(np.mean(particles.stress[:, :3].mean(axis=1) ** 2)))
+
+    def _place(self, rule: Rule, density: Density, column: int) -> None:
+        if isinstance(density.quantity, LawQuantity):
+            self._requests[rule].append((density.quantity.name, density.part, column))
+        elif isinstance(density.quantity, ParticleScalar):
+            self.data[rule][:, column] = density.quantity.evaluate(self.constants)
+
+    def _evaluate(self, coefficients: Array) -> None:
+        with self.stopwatch("law"):
+            for rule, requests in self._requests.items():
+                if requests:
+                    fields = self.field.layout.split(coefficients)
+                    self.stage.evaluate(*fields, requests, self.data[rule])
+
+    def _measures(
+        self, internal: Array, external: Array, coefficients: Array, reduction: Reduction
+    ) -> tuple[float, float | None]:
+        n = self.field.layout.num_displacement
+        free = reduction.selection.T @ (internal - external)
+        of_u = reduction.unknowns < n
+        scale = max(np.linalg.norm(internal[:n]), np.linalg.norm(external[:n]), 1e-300)
+        momentum = float(np.linalg.norm(free[of_u]) / scale)
+        if self.kind is None:
+            return momentum, None
+        weight, volume = self._volume_scale(coefficients)
+        column = (weight * volume)[:, None]
+        sums = _rust.nodal_sums(self.location, self.particles.volume, column, "bilinear")
+        return momentum, float(np.linalg.norm(free[~of_u]) / np.linalg.norm(sums))
+
+    def _volume_scale(self, coefficients: Array) -> tuple[Array, Array]:
+        """Weight of the volume equation and the strains it is compared with, per particle."""
+        bulk = self.constants["K"]
+        strains = self.stage.volume_strains(*self.field.layout.split(coefficients))
+        pressure = self.kind == "pressure"
+        eps_v = strains[:, 1] / bulk if pressure else strains[:, 1]
+        scale = np.maximum(np.abs(strains[:, 0]), np.abs(eps_v)) + self.p_ref / bulk + STRAIN_FLOOR
+        return (np.ones_like(bulk) if pressure else bulk), scale
+
+    def _scale(self, matrix: Any, reduction: Reduction) -> Array:
+        """Factors of the unknowns: displacement by 1/sqrt(diagonal); eps_v and p are solved as
+        p/mu, over the square root of mu times the volume of their function (formulation.md, 3).
+        """
+        layout = self.field.layout
+        of_u = reduction.unknowns < layout.num_displacement
+        diagonal = matrix.getDiagonal().array
+        scale = np.ones(reduction.size)
+        # A zero diagonal (a function that no particle strains) is left for the solver to report.
+        positive = of_u & (diagonal > 0)
+        scale[positive] = 1 / np.sqrt(diagonal[positive])
+        if self.kind is None:
+            return scale
+        bulk, mu = self.constants["K"], self.constants["mu"]
+        columns = np.column_stack([np.ones_like(mu), 1 / bulk, 1 / mu])
+        sums = _rust.nodal_sums(self.location, self.particles.volume, columns, "bilinear")
+        sums = sums[reduction.unknowns[~of_u] - layout.num_displacement]
+        volume = np.maximum(sums[:, 0], 1e-14 * self.field.grid.h**2)
+        mu_i = volume / np.maximum(sums[:, 2], 1e-14 * self.field.grid.h**2 / mu.max())
+        to_field = mu_i * sums[:, 1] / volume if self.kind == "volumetric_strain" else mu_i
+        scale[~of_u] = np.where(to_field > 0, to_field, 1) / np.sqrt(mu_i * volume)
+        return scale
+
+    def solve(self, reduction: Reduction, external: Array) -> Converged:
+        """Increments that balance the external forces.
+
+        Args:
+            reduction: What the supports leave free.
+            external: External forces on all coefficients.
+
+        Raises:
+            ConvergenceError: Not below the tolerance within `max_iterations`, or not finite.
+            SingularError: The tangent cannot be solved; the message names the cells.
+        """
+        unknowns = np.zeros(reduction.size)
+        condition, symmetric = 1.0, True
+        history: History = []
+        while True:
+            coefficients = reduction.selection @ unknowns + reduction.offset
+            self._evaluate(coefficients)
+            internal = self.field.residual(coefficients, self.data)
+            history.append(self._measures(internal, external, coefficients, reduction))
+            worst = max(m for m in history[-1] if m is not None)
+            if worst < self.tolerance:
+                return Converged(coefficients, history, condition, symmetric)
+            if not np.isfinite(worst) or len(history) > self.max_iterations:
+                self._fail(history)
+            matrix = self.field.tangent(coefficients, self.data, reduction)
+            scale = self._scale(matrix, reduction)
+            system = LinearSystem(matrix, scale, self.stopwatch)
+            condition, symmetric = system.condition, system.symmetric
+            if system.singular:
+                self._report_singular(system, reduction)
+            right = reduction.selection.T @ (external - internal)
+            unknowns += system.solve(right)
+
+    def _fail(self, history: History) -> None:
+        rows = "; ".join(
+            f"{k}: {u:.2e}" + ("" if q is None else f", {q:.2e}") for k, (u, q) in enumerate(history)
+        )
+        raise ConvergenceError(
+            f"Newton did not converge in {len(history) - 1} iterations to {self.tolerance:g}; "
+            f"measures of momentum and volume by iteration: {rows}. Nothing was changed in the "
+            "particles. Take a smaller load, or check material and supports",
+            history,
+        )
+
+    def _report_singular(self, system: LinearSystem, reduction: Reduction) -> None:
+        layout, grid = self.field.layout, self.field.grid
+        cells = []
+        for unknown in system.suspects[:200]:
+            coefficient = reduction.unknowns[unknown]
+            cell = layout.cell_of(coefficient)
+            if cell not in cells:
+                cells.append(cell)
+        counts = np.bincount(self.location.cell, minlength=grid.cells[0] * grid.cells[1])
+        named = ", ".join(
+            f"({i}, {j}) with {counts[i + grid.cells[0] * j]}" for i, j in cells[:4]
+        )
+        raise SingularError(
+            "the tangent is singular (condition number of the scaled matrix above "
+            f"{system.condition:.1e} by one solve with a random right-hand side): the particles "
+            f"do not stiffen every function of the grid. Weakest at the cells (i, j): {named} "
+            f"particles. The displacement basis is '{layout.basis}': use more particles per cell, "
+            "the basis 'quadratic_spline', alpha > 0, or supports for every separate part"
+        )

@@ -1,0 +1,250 @@
+"""fields = P unknowns + g: extraction, supports, point constraints and inactive functions as one matrix.
+
+Coefficients of all fields stand in one vector: the displacement (function, then component), then the
+bilinear field. `nodal = E coefficients` are the degrees of freedom of the mesh, `coefficients =
+S unknowns + offset` are what supports leave free, P = E S (formulation.md, section 3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+from tawami import _dolfinx, _rust
+from tawami.basis import Basis, extraction, greville_1d
+from tawami.boundary import Held, PointHeld
+from tawami.errors import SupportError
+from tawami.grid import Grid
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+Indices = npt.NDArray[np.int64]
+
+
+class Layout:
+    """Where the coefficients of the fields stand, and E.
+
+    Args:
+        grid: The grid.
+        basis: Basis of the displacement.
+        space: Function space on the mesh: biquadratic displacement, then a bilinear field or none.
+        active: Whether each cell holds particles, ny x nx.
+
+    Attributes:
+        num_displacement: Number of displacement coefficients; the bilinear field's follow.
+        size: Number of coefficients.
+        extraction: E, degrees of freedom of the mesh x coefficients.
+        active: Whether each coefficient belongs to a function with a particle in its support.
+    """
+
+    def __init__(self, grid: Grid, basis: Basis, space: _dolfinx.Space, active: Mask) -> None:
+        self.grid, self.basis = grid, basis
+        num_bilinear_dofs = space.dofs.shape[1] - 18
+        blocks = [_place(grid, space, np.arange(18).reshape(9, 2), basis, degree=2)]
+        masks = [np.repeat(_active_functions(basis, grid.cells, active), 2)]
+        if num_bilinear_dofs:
+            blocks.append(_place(grid, space, 18 + np.arange(4).reshape(4, 1), "bilinear", degree=1))
+            masks.append(_active_functions("bilinear", grid.cells, active))
+        self.extraction = sp.hstack(blocks, format="csr")
+        self.num_displacement = blocks[0].shape[1]
+        self.size = self.extraction.shape[1]
+        self.active = np.concatenate(masks)
+
+    def split(self, coefficients: Array) -> tuple[Array, Array | None]:
+        """Coefficients of the displacement and of the bilinear field (None if there is none)."""
+        n = self.num_displacement
+        return coefficients[:n], coefficients[n:] if n < self.size else None
+
+    def cell_of(self, coefficient: int) -> tuple[int, int]:
+        """The cell (i, j) in the middle of the support of a coefficient's function."""
+        displacement = coefficient < self.num_displacement
+        basis: Basis = self.basis if displacement else "bilinear"
+        function = coefficient // 2 if displacement else coefficient - self.num_displacement
+        nx, ny = self.grid.cells
+        row, column = divmod(function, _rust.basis_len(basis, nx))
+        i = min(int(greville_1d(basis, nx)[column]), nx - 1)
+        return i, min(int(greville_1d(basis, ny)[row]), ny - 1)
+
+    def rigid_modes(self) -> tuple[Array, Array, float]:
+        """Coefficients of the translations in x and y and of the rotation (coefficients x 3), the
+        centre [m] and the length [m] of the rotation, which is scaled to order 1.
+        """
+        grid = self.grid
+        x, y = (
+            grid.origin[axis] + grid.h * greville_1d(self.basis, grid.cells[axis])
+            for axis in range(2)
+        )
+        points = np.stack([np.tile(x, len(y)), np.repeat(y, len(x))], axis=1)
+        held = points[self.active[: self.num_displacement : 2]]
+        centre = held.mean(axis=0)
+        length = float(np.ptp(held, axis=0).max())
+        modes = np.zeros((self.num_displacement, 3))
+        modes[0::2, 0] = modes[1::2, 1] = 1.0
+        modes[0::2, 2] = -(points[:, 1] - centre[1]) / length
+        modes[1::2, 2] = (points[:, 0] - centre[0]) / length
+        return modes, centre, length
+
+
+def _place(
+    grid: Grid, space: _dolfinx.Space, local: Indices, basis: Basis, *, degree: int
+) -> sp.csr_matrix:
+    """E of one field, its rows moved to the degrees of freedom of the mesh.
+
+    Args:
+        grid: The grid.
+        space: Space of all fields.
+        local: Position in a cell of the degree of freedom of each node and component.
+        basis: Basis of the field.
+        degree: Degree of its Lagrange nodes on the mesh.
+    """
+    scalar = extraction(basis, grid.cells, degree).tocoo()
+    num_nodes, num_functions = scalar.shape
+    components = local.shape[1]
+    nodes = np.rint(degree * grid.rectangle.to_grid_axes(_dolfinx.reference_nodes(degree)))
+    i, j = (degree * grid.rectangle.ij[:, axis, None] + nodes[:, axis] for axis in range(2))
+    node = (i + (degree * grid.cells[0] + 1) * j).astype(np.int64)
+    dof = np.empty((num_nodes, components), dtype=np.int64)
+    dof[node] = space.dofs[:, local]
+    rows = dof[scalar.row].ravel()
+    columns = (components * scalar.col[:, None].astype(np.int64) + np.arange(components)).ravel()
+    shape = (space.size, components * num_functions)
+    return sp.csr_matrix((np.repeat(scalar.data, components), (rows, columns)), shape=shape)
+
+
+def _active_functions(basis: Basis, cells: tuple[int, int], active: Mask) -> Mask:
+    width = 2 if basis == "bilinear" else 3
+    step = 2 if basis == "biquadratic" else 1
+    mask = np.zeros([_rust.basis_len(basis, n) for n in reversed(cells)], dtype=bool)
+    j, i = np.nonzero(active)
+    for b in range(width):
+        for a in range(width):
+            mask[step * j + b, step * i + a] = True
+    return mask.ravel()
+
+
+class Reduction:
+    """What the supports leave free.
+
+    Args:
+        layout: The coefficients.
+        held: Prescribed coefficients.
+        points: Multi-point constraints.
+
+    Attributes:
+        size: Number of unknowns.
+        unknowns: Coefficient that each unknown is.
+        selection: S, coefficients x unknowns.
+        offset: Coefficients at zero unknowns.
+
+    Raises:
+        SupportError: Supports that contradict each other, or that leave a rigid motion free.
+    """
+
+    def __init__(self, layout: Layout, held: Sequence[Held], points: Sequence[PointHeld]) -> None:
+        self.layout = layout
+        self.offset = np.zeros(layout.size)
+        fixed = np.zeros(layout.size, dtype=bool)
+        for support in held:
+            self._hold(support, fixed)
+        _check_rigid_motions(layout, fixed, points)
+        dependent, involved, weights, values = _eliminate(points, fixed, self.offset)
+        free = layout.active & ~fixed
+        free[dependent] = False
+        self.unknowns = np.flatnonzero(free)
+        self.size = len(self.unknowns)
+        number = np.full(layout.size, -1)
+        number[self.unknowns] = np.arange(self.size)
+        row, column = np.nonzero(weights)
+        entries = np.concatenate([np.ones(self.size), -weights[row, column]])
+        rows = np.concatenate([self.unknowns, dependent[row]])
+        columns = np.concatenate([np.arange(self.size), number[involved[column]]])
+        shape = (layout.size, self.size)
+        self.selection = sp.csr_matrix((entries, (rows, columns)), shape=shape)
+        self.offset[dependent] = values
+
+    def _hold(self, support: Held, fixed: Mask) -> None:
+        twice = fixed[support.indices]
+        change = np.abs(self.offset[support.indices] - support.values)[twice]
+        if change.size and change.max() > 1e-9 * np.abs(support.values).max(initial=1e-300):
+            raise SupportError(
+                "two supports prescribe different displacements where they meet (an end of an "
+                "edge?): expected supports that agree there"
+            )
+        self.offset[support.indices] = support.values
+        fixed[support.indices] = True
+
+
+def _eliminate(
+    points: Sequence[PointHeld], fixed: Mask, offset: Array
+) -> tuple[Indices, Indices, Array, Array]:
+    """Solve the multi-point constraints for one coefficient each (the one with the largest weight).
+
+    Returns:
+        The dependent coefficients, the others involved, and A, b with
+        `c[dependent] = b - A c[others]`.
+    """
+    all_indices = [point.indices for point in points]
+    involved = np.unique(np.concatenate([*all_indices, np.empty(0, dtype=np.int64)]))
+    involved = involved[~fixed[involved]]
+    a = np.zeros((len(points), len(involved)))
+    b = np.zeros(len(points))
+    for k, point in enumerate(points):
+        loose = ~fixed[point.indices]
+        a[k, np.searchsorted(involved, point.indices[loose])] = point.weights[loose]
+        b[k] = point.value - point.weights[~loose] @ offset[point.indices[~loose]]
+    pivots: dict[int, int] = {}
+    for k, point in enumerate(points):
+        pivot = int(np.argmax(np.abs(a[k]))) if len(involved) else -1
+        if pivot < 0 or abs(a[k, pivot]) < 1e-10:
+            if abs(b[k]) > 1e-9 * max(abs(point.value), 1e-300):
+                raise SupportError(
+                    f"{point.where}: other supports already give this point another displacement; "
+                    "expected supports that agree, or one of them only"
+                )
+            continue
+        b[k] /= a[k, pivot]
+        a[k] /= a[k, pivot]
+        for other in set(range(len(points))) - {k}:
+            b[other] -= a[other, pivot] * b[k]
+            a[other] -= a[other, pivot] * a[k]
+        pivots[k] = pivot
+    rows, columns = list(pivots), list(pivots.values())
+    others = np.setdiff1d(np.arange(len(involved)), columns)
+    return involved[columns].astype(np.int64), involved[others], a[rows][:, others], b[rows]
+
+
+def _check_rigid_motions(layout: Layout, fixed: Mask, points: Sequence[PointHeld]) -> None:
+    """Name the rigid motions that no support prevents."""
+    modes, centre, length = layout.rigid_modes()
+    held = modes[fixed[: layout.num_displacement]]
+    rows = [point.weights @ modes[point.indices] for point in points]
+    matrix = np.vstack([held.T @ held, *rows, np.zeros((3, 3))])
+    _, singular, vectors = np.linalg.svd(matrix)
+    free = vectors[singular < 1e-10 * max(singular[0], 1e-300)]
+    if len(free):
+        raise SupportError(
+            f"the supports leave the body free to move: {', '.join(_names(free, centre, length))}. "
+            "A static scene needs supports that prevent it: add scene.fix(...) or scene.hold(...)"
+        )
+
+
+def _names(free: Array, centre: Array, length: float) -> list[str]:
+    """Words for the rigid motions spanned by the rows (translation x, y, rotation)."""
+    names, rest = [], free
+    for axis, name in enumerate("xy"):
+        unit = np.eye(3)[axis]
+        if np.linalg.norm(free @ unit) > 1 - 1e-8:
+            names.append(f"translation in {name}")
+            rest = rest - np.outer(rest @ unit, unit)
+    _, singular, vectors = np.linalg.svd(rest)
+    for motion in vectors[: len(singular)][singular > 1e-8]:
+        if abs(motion[2]) < 1e-8:
+            names.append(f"translation along ({motion[0]:.3g}, {motion[1]:.3g})")
+        else:
+            # u = a + w (-(y - yc), x - xc) / L vanishes at this point
+            x, y = centre + length * np.array([-motion[1], motion[0]]) / motion[2]
+            names.append(f"rotation about ({x:.3g}, {y:.3g})")
+    return names

@@ -1,0 +1,253 @@
+"""A scene: particles on a grid, a weak form, supports and loads; what a driver script builds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami import _rust, boundary
+from tawami.basis import BASES, Basis
+from tawami.body import Body
+from tawami.boundary import Component, Profile
+from tawami.errors import InputError, SupportError
+from tawami.field import Field
+from tawami.formulation import Form, compile_form
+from tawami.grid import Edge, Grid
+from tawami.newton import Converged, History, Newton
+from tawami.reduction import Reduction
+from tawami.stopwatch import Stopwatch
+
+Array = npt.NDArray[np.float64]
+
+
+class Scene:
+    """A static scene of small strain.
+
+    Args:
+        grid: The background grid.
+        body: Positions and volumes of the particles, as `box(...)` or `Body(x, volume)`.
+        material: The material law, or several.
+        material_of: Number of the law of each particle; the first for all by default.
+        form: Weak form: the name of a shipped one ('u_epsv', 'u_p', 'u_bbar', 'u'), the path of a
+            file, a module, or a `Form`.
+        basis: Basis of the displacement: 'quadratic_spline', 'bilinear' or 'biquadratic'.
+        tolerance: Newton stops when both measures of `tawami.newton` are below it.
+        max_iterations: Newton iterations before the step is given up.
+        parameters: What the form names: alpha, stabilisation, ...
+
+    Attributes:
+        particles: The particles; their arrays are views of the storage, not copies: `x` [m],
+            `volume` [m2], `stress` [Pa] (xx, yy, zz, xy; tension positive), `displacement` [m], and
+            `eps_v` with forms that have that field (None otherwise).
+
+    Raises:
+        InputError: Particles outside the grid, a body without particles, NaN, an incompressible
+            material with a form that cannot take it, an unknown parameter.
+        FormError: A form that cannot be used as it stands.
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        body: Body,
+        material: _rust.Material | Sequence[_rust.Material],
+        *,
+        material_of: npt.ArrayLike | None = None,
+        form: str | Path | ModuleType | Form = "u_epsv",
+        basis: Basis = "quadratic_spline",
+        tolerance: float = 1e-6,
+        max_iterations: int = 20,
+        **parameters: Any,
+    ) -> None:
+        if basis not in BASES:
+            raise InputError(f"basis '{basis}': expected one of {', '.join(map(repr, BASES))}")
+        if not 0 < tolerance < 1:
+            raise InputError(f"tolerance = {tolerance}: expected a number between 0 and 1")
+        self.grid, self.basis = grid, basis
+        self.tolerance, self.max_iterations = tolerance, max_iterations
+        self.form = Form.load(form)
+        values, options = self.form.settings(parameters)
+        materials = list(material) if isinstance(material, Sequence) else [material]
+        x = _array(body.x, "x", 2)
+        numbers = np.zeros(len(x)) if material_of is None else np.asarray(material_of)
+        volume = _array(body.volume, "volume", 1)
+        self.particles = _rust.Particles(x, volume, numbers.astype(np.uint32))
+        self.particles.check_materials(materials, self.form.kinematics)
+        self._location = grid.rust.locate(self.particles.x)
+        self._compiled = compile_form(grid.comm, self.form, options)
+        if self.form.kinematics == "mixed":
+            self.particles.add_eps_v()
+        of = self.particles.material
+        self._constants = {
+            "K": np.array([m.bulk_modulus for m in materials])[of],
+            "mu": np.array([m.shear_modulus for m in materials])[of],
+        }
+        self.stopwatch = Stopwatch()
+        with self.stopwatch("set-up"):
+            self._field = Field(
+                grid, self._compiled, basis, self._location, self.particles.volume, values,
+                self.stopwatch,
+            )  # fmt: skip
+        self._stage = _rust.Stage(
+            self.particles, self._location, materials, self.form.kinematics, basis
+        )
+        self._edges: list[tuple[Edge, int, Profile]] = []
+        self._points: list[tuple[Sequence[float], int, float]] = []
+        self._tractions: list[tuple[Edge, Profile, Profile]] = []
+        self._total = np.zeros(self._field.layout.size)
+
+    def fix(self, edge: Edge, component: Component, value: Profile = 0.0) -> None:
+        """Prescribe a displacement component along an edge of the grid.
+
+        Args:
+            edge: 'left', 'right', 'bottom' or 'top'.
+            component: 'x' or 'y'.
+            value: Displacement [m] from the start: a number, or a function f(x, y) on arrays,
+                which is projected in L2 on the functions of the edge.
+
+        Raises:
+            InputError: An unknown edge or component.
+        """
+        self.grid.edge(edge)
+        self._edges.append((edge, boundary.component_index(component), value))
+
+    def hold(self, point: Sequence[float], component: Component, value: float = 0.0) -> None:
+        """Prescribe a displacement component at a point: a constraint on the interpolated value.
+
+        Args:
+            point: Position (x, y) [m].
+            component: 'x' or 'y'.
+            value: Displacement [m] from the start.
+
+        Raises:
+            InputError: A point outside the grid, or an unknown component.
+        """
+        boundary.locate_point(self.grid, point, f"hold(point={tuple(point)})")
+        self._points.append((point, boundary.component_index(component), float(value)))
+
+    def traction(self, edge: Edge, value: tuple[Profile, Profile]) -> None:
+        """Load an edge of the grid where the body touches it.
+
+        Args:
+            edge: 'left', 'right', 'bottom' or 'top'.
+            value: Traction (t_x, t_y) [Pa]: numbers, or functions f(x, y) on arrays, taken at the
+                biquadratic nodes of the grid (exact up to parabolas).
+
+        Raises:
+            InputError: An unknown edge, or a form without a term `dot(t, w) * ds`.
+        """
+        self.grid.edge(edge)
+        if self._compiled.traction is None:
+            raise InputError(
+                f"traction(edge='{edge}'): form {self.form.name} has no edge term; add "
+                "- dot(t, w) * ds to its residual"
+            )
+        self._tractions.append((edge, value[0], value[1]))
+
+    def _reduction(self) -> Reduction:
+        field, total = self._field, self._total
+        held = [
+            boundary.held_edge(self.grid, self.basis, field.active, edge, component, value)
+            for edge, component, value in self._edges
+        ]
+        points = [
+            boundary.held_point(self.grid, self.basis, field.active, point, component, value)
+            for point, component, value in self._points
+        ]
+        # Supports are given from the start; the unknowns are increments.
+        held = [boundary.Held(h.indices, h.values - total[h.indices]) for h in held]
+        points = [
+            boundary.PointHeld(
+                p.indices, p.weights, p.value - p.weights @ total[p.indices], p.where
+            )
+            for p in points
+        ]
+        return Reduction(field.layout, held, points)
+
+    def _external(self) -> Array:
+        force = np.zeros(self._field.layout.size)
+        for edge, *components in self._tractions:
+            nodes = self._field.edge_nodes(edge)
+            if len(nodes) == 0:
+                raise SupportError(
+                    f"traction(edge='{edge}'): no cell along that edge of the grid holds particles; "
+                    "let the grid end where the body is loaded"
+                )
+            x, y = nodes[..., 0].ravel(), nodes[..., 1].ravel()
+            what = f"traction(edge='{edge}')"
+            values = [boundary.evaluate(c, x, y, what) for c in components]
+            force += self._field.traction(edge, np.stack(values, axis=-1))
+        return force
+
+    def solve(self) -> Solution:
+        """Find equilibrium under the present supports and loads, and store it in the particles.
+
+        May be called again after more supports or loads were added.
+
+        Raises:
+            SupportError: Supports that leave a rigid motion free or contradict each other.
+            ConvergenceError: Newton did not converge; the particles are as they were.
+            SingularError: The tangent cannot be solved; the message names the cells.
+            InputError: NaN or infinity in an array of the particles.
+        """
+        self.particles.check()
+        with self.stopwatch("set-up"):
+            reduction = self._reduction()
+            external = self._external()
+        newton = Newton(
+            self._field, self._compiled, self._stage, self.particles, self._location,
+            self._constants, self.stopwatch, tolerance=self.tolerance,
+            max_iterations=self.max_iterations,
+        )  # fmt: skip
+        step = newton.solve(reduction, external)
+        self._stage.commit(*self._field.layout.split(step.coefficients))
+        self._total = self._total + step.coefficients
+        return Solution(self, step, reduction.size, self._total)
+
+
+class Solution:
+    """Equilibrium of a scene.
+
+    Attributes:
+        unknowns: Number of reduced unknowns.
+        iterations: Newton iterations of the last step.
+        history: (momentum, volume) measures of every residual of the last step.
+        condition: Lower estimate of the condition number of the scaled tangent.
+    """
+
+    def __init__(self, scene: Scene, step: Converged, unknowns: int, total: Array) -> None:
+        self._scene = scene
+        self._u, self._volumetric = scene._field.layout.split(total)
+        self.unknowns, self.iterations = unknowns, step.iterations
+        self.history: History = step.history
+        self.condition, self.symmetric = step.condition, step.symmetric
+
+    def displacement(self, point: Sequence[float]) -> Array:
+        """Displacement (u_x, u_y) [m] of the grid at a point.
+
+        Raises:
+            InputError: The point is outside the grid.
+        """
+        location = boundary.locate_point(self._scene.grid, point, "displacement(...)")
+        value = _rust.interpolate(location, self._scene.basis, 2, self._u)[0]
+        return np.asarray(value)
+
+    @property
+    def mean_stress(self) -> Array:
+        """Mean stress [Pa] at the particles, (xx + yy + zz)/3, tension positive."""
+        return np.asarray(self._scene.particles.stress[:, :3].mean(axis=1))
+
+
+def _array(values: npt.ArrayLike, name: str, dimensions: int) -> Array:
+    try:
+        array = np.ascontiguousarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name}: expected an array of numbers: {error}") from None
+    if array.ndim != dimensions:
+        raise InputError(f"{name} has shape {array.shape}: expected {dimensions} dimensions")
+    return array

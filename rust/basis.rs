@@ -1,0 +1,99 @@
+//! One-dimensional bases on a row of cells; the two-dimensional functions are their products.
+
+use std::str::FromStr;
+
+use crate::error::Error;
+
+/// A family of functions on a row of `n` unit cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Basis {
+    /// Quadratic B-splines, C1, knots on the cell edges, open (clamped) at both ends.
+    QuadraticSpline,
+    /// Linear Lagrange.
+    Bilinear,
+    /// Quadratic Lagrange, nodes on cell edges and middles.
+    Biquadratic,
+}
+
+/// Functions that do not vanish in one cell: `first`, `first + 1`, ... with values and derivatives
+/// with respect to the position in the cell (0 to 1). Entries past [`Basis::per_cell`] are zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Local {
+    /// Index of the first function.
+    pub first: usize,
+    /// Values.
+    pub value: [f64; 3],
+    /// Derivatives per cell (divide by h for derivatives per metre).
+    pub derivative: [f64; 3],
+}
+
+impl Basis {
+    /// Number of functions on `n` cells.
+    #[must_use]
+    pub fn len(self, n: usize) -> usize {
+        match self {
+            Self::QuadraticSpline => n + 2,
+            Self::Bilinear => n + 1,
+            Self::Biquadratic => 2 * n + 1,
+        }
+    }
+
+    /// Number of functions that do not vanish in a cell.
+    #[must_use]
+    pub fn per_cell(self) -> usize {
+        match self {
+            Self::Bilinear => 2,
+            Self::QuadraticSpline | Self::Biquadratic => 3,
+        }
+    }
+
+    /// Index of the first function that does not vanish in `cell`.
+    #[must_use]
+    pub fn first(self, cell: usize) -> usize {
+        match self {
+            Self::QuadraticSpline | Self::Bilinear => cell,
+            Self::Biquadratic => 2 * cell,
+        }
+    }
+
+    /// The functions at position `t` (0 to 1) of `cell` among `n` cells.
+    ///
+    /// Quadratic splines: the first function of a cell is `l (1-t)^2`, the last `r t^2`, and they
+    /// sum to 1; l = r = 1/2 inside (C1 across the edge), 1 at an open end.
+    #[must_use]
+    pub fn at(self, n: usize, cell: usize, t: f64) -> Local {
+        let s = 1.0 - t;
+        let (value, derivative) = match self {
+            Self::QuadraticSpline => {
+                let l = if cell == 0 { 1.0 } else { 0.5 };
+                let r = if cell + 1 == n { 1.0 } else { 0.5 };
+                let (a, b) = (l * s * s, r * t * t);
+                let (da, db) = (-2.0 * l * s, 2.0 * r * t);
+                ([a, 1.0 - a - b, b], [da, -da - db, db])
+            }
+            Self::Bilinear => ([s, t, 0.0], [-1.0, 1.0, 0.0]),
+            Self::Biquadratic => (
+                [s * (s - t), 4.0 * s * t, t * (t - s)],
+                [t - 3.0 * s, 4.0 * (s - t), 3.0 * t - s],
+            ),
+        };
+        Local { first: self.first(cell), value, derivative }
+    }
+}
+
+impl FromStr for Basis {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self, Error> {
+        match name {
+            "quadratic_spline" => Ok(Self::QuadraticSpline),
+            "bilinear" => Ok(Self::Bilinear),
+            "biquadratic" => Ok(Self::Biquadratic),
+            _ => Err(Error::UnknownName {
+                what: "basis",
+                name: name.to_owned(),
+                expected: "'quadratic_spline', 'bilinear', 'biquadratic'",
+            }),
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! The particle stage of a Newton iteration: strain, material law, and the values and derivatives
+//! that the weak form asks for; and the commit of a converged step.
+
+use std::sync::Arc;
+
+use ndarray::ArrayViewMut2;
+use rayon::prelude::*;
+
+use crate::error::{Error, Result};
+use crate::grid::Location;
+use crate::kinematics::{Increments, Kinematics};
+use crate::material::{Material, Moduli, Strain, Stress};
+use crate::particles::Particles;
+use crate::tensor::{deviator, mean, Sym, COMPONENTS, IN_PLANE, UNIT};
+
+/// A quantity of the law that a form may name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Operator {
+    /// In-plane stress (xx, yy, xy) [Pa].
+    Sigma,
+    /// In-plane part (xx, yy, xy) of the three-dimensional deviator [Pa].
+    Deviator,
+    /// Mean stress [Pa].
+    Mean,
+}
+
+impl Operator {
+    /// Number of components.
+    #[must_use]
+    pub fn len(self) -> usize {
+        match self {
+            Self::Sigma | Self::Deviator => 3,
+            Self::Mean => 1,
+        }
+    }
+
+    /// The operator's components of a stress (or of its derivative in some direction).
+    fn of(self, s: &Sym, m: f64, out: &mut [f64]) {
+        match self {
+            Self::Sigma => IN_PLANE.iter().zip(out).for_each(|(&i, o)| *o = s[i] + m * UNIT[i]),
+            Self::Deviator => IN_PLANE.iter().zip(out).for_each(|(&i, o)| *o = s[i]),
+            Self::Mean => out[0] = m,
+        }
+    }
+}
+
+/// What of an operator is wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// Its value.
+    Value,
+    /// Its derivative with respect to the in-plane strain (xx, yy, gamma_xy) of `sym grad u`:
+    /// 3 numbers per component, strain fastest.
+    Strain,
+    /// Its derivative with respect to the volumetric strain: 1 number per component.
+    Volume,
+}
+
+/// One entry of the particle data: `part` of `operator`, from `column` on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Request {
+    /// The operator.
+    pub operator: Operator,
+    /// Value or derivative.
+    pub part: Part,
+    /// First column of the particle data that is written.
+    pub column: usize,
+}
+
+/// The deviators of unit in-plane strains xx, yy and gamma_xy.
+const UNIT_DEVIATORS: [Sym; 3] = [
+    [2.0 / 3.0, -1.0 / 3.0, -1.0 / 3.0, 0.0],
+    [-1.0 / 3.0, 2.0 / 3.0, -1.0 / 3.0, 0.0],
+    [0.0, 0.0, 0.0, 1.0],
+];
+
+fn dot(a: &Sym, b: &Sym) -> f64 {
+    (0..COMPONENTS).map(|i| a[i] * b[i]).sum()
+}
+
+fn write(request: &Request, kinematics: Kinematics, stress: &Stress, c: &Moduli, row: &mut [f64]) {
+    let n = request.operator.len();
+    let out = &mut row[request.column..];
+    match request.part {
+        Part::Value => request.operator.of(&stress.deviator, stress.mean, out),
+        Part::Volume => request.operator.of(&c.dev_vol, c.mean_vol, out),
+        Part::Strain => {
+            for (j, e) in UNIT_DEVIATORS.iter().enumerate() {
+                let mut ds: Sym = std::array::from_fn(|i| dot(&c.dev_dev[i], e));
+                let mut dm = dot(&c.mean_dev, e);
+                if kinematics == Kinematics::Displacement && j < 2 {
+                    ds.iter_mut().zip(&c.dev_vol).for_each(|(d, v)| *d += v);
+                    dm += c.mean_vol;
+                }
+                let mut column = [0.0; 3];
+                request.operator.of(&ds, dm, &mut column[..n]);
+                (0..n).for_each(|i| out[3 * i + j] = column[i]);
+            }
+        }
+    }
+}
+
+/// Whether mean stress and deviator depend on each other beyond round-off.
+fn couples(c: &Moduli) -> bool {
+    let cross = c.dev_vol.iter().chain(&c.mean_dev).fold(0.0_f64, |a, b| a.max(b.abs()));
+    let own = c.dev_dev.iter().flatten().fold(0.0_f64, |a, b| a.max(b.abs()));
+    cross > 1e-12 * own
+}
+
+/// What the particle stage works on.
+#[derive(Clone, Copy)]
+pub struct Stage<'a> {
+    /// Where the particles are.
+    pub location: &'a Location,
+    /// The laws; `particles.material` counts them from 0.
+    pub materials: &'a [Arc<dyn Material>],
+    /// How the strain follows from the increments.
+    pub kinematics: Kinematics,
+    /// The increments of the current Newton iterate.
+    pub increments: Increments<'a>,
+}
+
+impl Stage<'_> {
+    /// Strain, stress and tangent of particle `p`.
+    fn respond(&self, particles: &Particles, p: usize) -> (Strain, Stress, Moduli) {
+        let strain = self.increments.strain(self.kinematics, self.location, p);
+        let old: Sym = std::array::from_fn(|i| particles.stress[[p, i]]);
+        let old = Stress { deviator: deviator(&old), mean: mean(&old) };
+        let law = &self.materials[particles.material[p] as usize];
+        let (stress, moduli) = law.respond(&strain, &old);
+        (strain, stress, moduli)
+    }
+
+    /// Write what is requested into the particle data (particles x columns).
+    ///
+    /// # Errors
+    /// [`Error::CoupledLaw`] where B-bar meets a law it has no tangent for.
+    ///
+    /// # Panics
+    /// If a request reaches outside the columns; callers check at the border.
+    pub fn evaluate(
+        &self,
+        particles: &Particles,
+        requests: &[Request],
+        mut data: ArrayViewMut2<f64>,
+    ) -> Result<()> {
+        data.outer_iter_mut().into_par_iter().enumerate().try_for_each(|(p, mut row)| {
+            let (_, stress, moduli) = self.respond(particles, p);
+            if self.kinematics == Kinematics::Cell && couples(&moduli) {
+                return Err(Error::CoupledLaw { index: p });
+            }
+            let row = row.as_slice_mut().expect("rows are contiguous");
+            for request in requests {
+                write(request, self.kinematics, &stress, &moduli, row);
+            }
+            Ok(())
+        })
+    }
+
+    /// Accept the increments: stress, displacement and (where stored) eps_v of the particles.
+    pub fn commit(&self, particles: &mut Particles) {
+        for p in 0..particles.len() {
+            let (strain, stress, _) = self.respond(particles, p);
+            let mut sigma_m = stress.mean;
+            if self.kinematics == Kinematics::Deviatoric {
+                sigma_m += self.increments.volumetric_at(self.location, p);
+            }
+            for (i, unit) in UNIT.iter().enumerate() {
+                particles.stress[[p, i]] = stress.deviator[i] + sigma_m * unit;
+            }
+            let u = self.increments.u.value(self.location.cell[p] as usize, self.location.xi[p]);
+            particles.displacement[[p, 0]] += u[0];
+            particles.displacement[[p, 1]] += u[1];
+            if let Some(eps_v) = &mut particles.eps_v {
+                eps_v[p] += strain.volume;
+            }
+        }
+    }
+}
+
+/// Check that every particle names a material, and that incompressible ones meet kinematics that
+/// can take them.
+///
+/// # Errors
+/// [`Error::UnknownMaterial`] or [`Error::Incompressible`], naming the first such particle.
+pub fn check_materials(
+    particles: &Particles,
+    materials: &[Arc<dyn Material>],
+    kinematics: Kinematics,
+) -> Result<()> {
+    for (index, &m) in particles.material.iter().enumerate() {
+        let Some(law) = materials.get(m as usize) else {
+            let (material, count) = (m as usize, materials.len());
+            return Err(Error::UnknownMaterial { index, material, count });
+        };
+        if law.bulk_modulus().is_infinite() && kinematics != Kinematics::Deviatoric {
+            return Err(Error::Incompressible { index });
+        }
+    }
+    Ok(())
+}

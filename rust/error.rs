@@ -1,0 +1,138 @@
+//! The one error type of the crate: every variant is a sentence for the person at the keyboard.
+
+use thiserror::Error;
+
+/// What can be wrong with the input. Python sees each of these as `tawami.InputError`.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum Error {
+    /// A scalar parameter out of its range.
+    #[error("{name} = {value}: expected {expected}")]
+    Parameter {
+        /// Name of the parameter as the user typed it.
+        name: &'static str,
+        /// What came.
+        value: f64,
+        /// What would have been right, as the end of a sentence.
+        expected: &'static str,
+    },
+    /// Particles outside the grid.
+    #[error(
+        "{count} of {total} particles lie outside the grid; the first is particle {index} at \
+         ({x}, {y}), the grid covers [{x0}, {x1}] x [{y0}, {y1}]. Enlarge the grid or move the body"
+    )]
+    OutsideGrid {
+        /// How many are outside.
+        count: usize,
+        /// How many particles there are.
+        total: usize,
+        /// Index of the first one outside.
+        index: usize,
+        /// Its position [m].
+        x: f64,
+        /// Its position [m].
+        y: f64,
+        /// Left end of the grid [m].
+        x0: f64,
+        /// Right end of the grid [m].
+        x1: f64,
+        /// Lower end of the grid [m].
+        y0: f64,
+        /// Upper end of the grid [m].
+        y1: f64,
+    },
+    /// A NaN or an infinity in an array.
+    #[error(
+        "{name}: {count} entries are not finite; the first is {value} at particle {index}. \
+         Check where the array was made"
+    )]
+    NotFinite {
+        /// Name of the array.
+        name: &'static str,
+        /// How many entries are not finite.
+        count: usize,
+        /// The first such entry.
+        value: f64,
+        /// Its particle.
+        index: usize,
+    },
+    /// A volume that is zero or negative.
+    #[error("volume of particle {index} is {value} m2: expected a positive number")]
+    Volume {
+        /// The particle.
+        index: usize,
+        /// Its volume per metre depth.
+        value: f64,
+    },
+    /// An array with the wrong shape.
+    #[error("{name} has shape {got:?}: expected {expected}")]
+    Shape {
+        /// Name of the array.
+        name: &'static str,
+        /// Shape that came.
+        got: Vec<usize>,
+        /// Shape that was expected.
+        expected: String,
+    },
+    /// A body without particles.
+    #[error("the body has no particles: expected at least one; check its region and the number of particles per cell")]
+    NoParticles,
+    /// A particle that names a material which is not there.
+    #[error("particle {index} names material {material}, but there are {count} materials (numbered from 0)")]
+    UnknownMaterial {
+        /// The particle.
+        index: usize,
+        /// The material it names.
+        material: usize,
+        /// How many materials there are.
+        count: usize,
+    },
+    /// A name that is not one of a fixed set.
+    #[error("{what} '{name}' is unknown: expected one of {expected}")]
+    UnknownName {
+        /// What kind of thing is named.
+        what: &'static str,
+        /// The name that came.
+        name: String,
+        /// The names that exist.
+        expected: &'static str,
+    },
+    /// An incompressible material met kinematics that need K.
+    #[error(
+        "particle {index} is of an incompressible material (nu = 0.5, K infinite): \
+         only a form with the kinematics 'deviatoric' takes it. Use form 'u_p', or nu < 0.5"
+    )]
+    Incompressible {
+        /// The first such particle.
+        index: usize,
+    },
+    /// A law whose mean stress and deviator depend on each other met B-bar.
+    #[error(
+        "the law of particle {index} couples mean stress and deviator: the tangent of the \
+         kinematics 'cell' (B-bar) has no such terms. Use form 'u_epsv'"
+    )]
+    CoupledLaw {
+        /// The first such particle.
+        index: usize,
+    },
+}
+
+/// Result with this crate's [`enum@Error`].
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Index and value of the first entry that is not finite, and how many there are.
+pub(crate) fn check_finite(
+    name: &'static str,
+    values: &[f64],
+    per_particle: usize,
+) -> Result<()> {
+    let mut bad = values.iter().enumerate().filter(|(_, v)| !v.is_finite());
+    match bad.next() {
+        None => Ok(()),
+        Some((entry, &value)) => Err(Error::NotFinite {
+            name,
+            count: 1 + bad.count(),
+            value,
+            index: entry / per_particle,
+        }),
+    }
+}

@@ -1,0 +1,93 @@
+//! Isotropic linear elasticity: `s += 2 mu dev(d_eps)`, `sigma_m += K d_eps_v`.
+
+use super::{Material, Moduli, Strain, Stress};
+use crate::error::{Error, Result};
+use crate::tensor::COMPONENTS;
+
+/// Isotropic linear elasticity with shear modulus mu and bulk modulus K.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinearElastic {
+    mu: f64,
+    bulk: f64,
+}
+
+fn positive(name: &'static str, value: f64) -> Result<()> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    Err(Error::Parameter { name, value, expected: "a positive, finite modulus in Pa" })
+}
+
+impl LinearElastic {
+    /// From Young's modulus [Pa] and Poisson's ratio, -1 < nu <= 0.5.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming the parameter that is out of range.
+    pub fn from_e_nu(e: f64, nu: f64) -> Result<Self> {
+        if !(nu > -1.0 && nu <= 0.5) {
+            return Err(Error::Parameter {
+                name: "nu",
+                value: nu,
+                expected: "-1 < nu <= 0.5 (an isotropic material has no other Poisson's ratios)",
+            });
+        }
+        Self::from_e_one_minus_2nu(e, 1.0 - 2.0 * nu)
+    }
+
+    /// From Young's modulus [Pa] and 1 - 2 nu, 0 <= 1 - 2 nu < 3: near nu = 0.5 the digits of nu
+    /// that matter do not fit into a floating-point nu.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming the parameter that is out of range.
+    pub fn from_e_one_minus_2nu(e: f64, one_minus_2nu: f64) -> Result<Self> {
+        positive("E", e)?;
+        if !(0.0..3.0).contains(&one_minus_2nu) {
+            return Err(Error::Parameter {
+                name: "one_minus_2nu",
+                value: one_minus_2nu,
+                expected: "0 <= 1 - 2 nu < 3 (that is -1 < nu <= 0.5)",
+            });
+        }
+        // mu = E / (2 (1 + nu)), K = E / (3 (1 - 2 nu)); infinite at nu = 0.5
+        Ok(Self { mu: e / (3.0 - one_minus_2nu), bulk: e / (3.0 * one_minus_2nu) })
+    }
+
+    /// From bulk and shear modulus [Pa].
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming the modulus that is not positive and finite.
+    pub fn from_k_mu(k: f64, mu: f64) -> Result<Self> {
+        positive("K", k)?;
+        positive("mu", mu)?;
+        Ok(Self { mu, bulk: k })
+    }
+}
+
+impl Material for LinearElastic {
+    fn shear_modulus(&self) -> f64 {
+        self.mu
+    }
+
+    fn bulk_modulus(&self) -> f64 {
+        self.bulk
+    }
+
+    fn respond(&self, increment: &Strain, old: &Stress) -> (Stress, Moduli) {
+        // The strain holds gamma_xy = 2 eps_xy, hence mu and not 2 mu for the shear.
+        let stiffness = [2.0 * self.mu, 2.0 * self.mu, 2.0 * self.mu, self.mu];
+        let deviator = std::array::from_fn(|i| old.deviator[i] + stiffness[i] * increment.deviator[i]);
+        // An incompressible material has no volume change: 0 times infinity must stay 0.
+        let d_mean = if increment.volume == 0.0 { 0.0 } else { self.bulk * increment.volume };
+        let mut dev_dev = [[0.0; COMPONENTS]; COMPONENTS];
+        for i in 0..COMPONENTS {
+            dev_dev[i][i] = stiffness[i];
+        }
+        let moduli = Moduli {
+            dev_dev,
+            dev_vol: [0.0; COMPONENTS],
+            mean_dev: [0.0; COMPONENTS],
+            mean_vol: self.bulk,
+        };
+        (Stress { deviator, mean: old.mean + d_mean }, moduli)
+    }
+}

@@ -1,0 +1,103 @@
+//! Particle storage: structure of arrays, and only the arrays that the scene needs.
+
+use ndarray::{Array1, Array2};
+
+use crate::error::{check_finite, Error, Result};
+use crate::tensor::COMPONENTS;
+
+/// The particles of a scene. Volumes are per metre depth.
+#[derive(Debug, Clone)]
+pub struct Particles {
+    /// Positions [m], n x 2.
+    pub x: Array2<f64>,
+    /// Volumes V_p [m2], n.
+    pub volume: Array1<f64>,
+    /// Number of the material, n.
+    pub material: Array1<u32>,
+    /// Stress [Pa], n x 4, order of [`crate::tensor`].
+    pub stress: Array2<f64>,
+    /// Displacement since the start [m], n x 2.
+    pub displacement: Array2<f64>,
+    /// Volumetric strain eps_v, n; only with forms that have this field.
+    pub eps_v: Option<Array1<f64>>,
+}
+
+impl Particles {
+    /// Particles at rest, free of stress.
+    ///
+    /// # Errors
+    /// [`Error::NoParticles`], [`Error::Shape`], [`Error::NotFinite`] or [`Error::Volume`].
+    pub fn new(x: Array2<f64>, volume: Array1<f64>, material: Array1<u32>) -> Result<Self> {
+        let n = x.nrows();
+        if n == 0 {
+            return Err(Error::NoParticles);
+        }
+        if x.ncols() != 2 {
+            let expected = "(particles, 2)".to_owned();
+            return Err(Error::Shape { name: "x", got: x.shape().to_vec(), expected });
+        }
+        for (name, got) in [("volume", volume.len()), ("material", material.len())] {
+            if got != n {
+                let expected = format!("({n},), one entry per particle of x");
+                return Err(Error::Shape { name, got: vec![got], expected });
+            }
+        }
+        let particles = Self {
+            stress: Array2::zeros((n, COMPONENTS)),
+            displacement: Array2::zeros((n, 2)),
+            eps_v: None,
+            x,
+            volume,
+            material,
+        };
+        particles.check()?;
+        Ok(particles)
+    }
+
+    /// Check what a user may have written into the arrays: finite values, positive volumes.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] or [`Error::Volume`], naming array and particle.
+    pub fn check(&self) -> Result<()> {
+        fn flat<D: ndarray::Dimension>(a: &ndarray::Array<f64, D>) -> &[f64] {
+            a.as_slice().unwrap_or_default()
+        }
+        check_finite("x", flat(&self.x), 2)?;
+        check_finite("volume", flat(&self.volume), 1)?;
+        check_finite("stress", flat(&self.stress), COMPONENTS)?;
+        check_finite("displacement", flat(&self.displacement), 2)?;
+        if let Some(eps_v) = &self.eps_v {
+            check_finite("eps_v", flat(eps_v), 1)?;
+        }
+        match self.volume.iter().position(|&v| v <= 0.0) {
+            Some(index) => Err(Error::Volume { index, value: self.volume[index] }),
+            None => Ok(()),
+        }
+    }
+
+    /// Number of particles.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.volume.len()
+    }
+
+    /// Whether there are no particles (never true after [`Particles::new`]).
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.volume.is_empty()
+    }
+
+    /// Make room for the volumetric strain, zero at first.
+    pub fn add_eps_v(&mut self) {
+        if self.eps_v.is_none() {
+            self.eps_v = Some(Array1::zeros(self.len()));
+        }
+    }
+
+    /// Bytes that one particle takes.
+    #[must_use]
+    pub fn bytes_per_particle(&self) -> usize {
+        let doubles = 2 + 1 + COMPONENTS + 2 + usize::from(self.eps_v.is_some());
+        8 * doubles + 4
+    }
+}
