@@ -122,9 +122,9 @@ def reference_nodes(degree: int) -> Array:
     return np.asarray(element.points, dtype=np.float64)
 
 
-def _table(connectivity: Any, width: int) -> Integers:
+def _table(connectivity: Any, rows: int) -> Integers:
     array = connectivity if isinstance(connectivity, np.ndarray) else connectivity.array
-    return np.asarray(array, dtype=np.int32).reshape(-1, width)
+    return np.asarray(array, dtype=np.int32).reshape(rows, -1)
 
 
 # -- kernels -----------------------------------------------------------------
@@ -205,8 +205,8 @@ class Rectangle:
         self.mesh = dolfinx.mesh.create_rectangle(comm, corners, cells, kind, ghost_mode=none)
         self.cpp = self.mesh._mesh if OLD else self.mesh._cpp_object
         x = np.asarray(self.mesh.geometry.x)[:, :2]
-        # vertices of each cell in reference order (0, 0), (1, 0), (0, 1), (1, 1): axis 0 first
-        vertices = x[_table(self.mesh.geometry.dofmap, 4)]
+        # the vertices of each cell in reference order (0, 0), (1, 0), (0, 1), (1, 1): axis 0 first
+        vertices = x[_table(self.mesh.geometry.dofmap, cells[0] * cells[1])]
         axis0 = (vertices[:, 1] - vertices[:, 0]) / h
         self.swapped = bool(abs(axis0[0, 1]) > 0.5)
         expected = np.array([0.0, 1.0]) if self.swapped else np.array([1.0, 0.0])
@@ -240,7 +240,7 @@ class Rectangle:
         topology = self.mesh.topology
         topology.create_connectivity(2, 1)
         topology.create_connectivity(1, 2)
-        return _table(topology.connectivity(2, 1), 4)[cells, local]
+        return _table(topology.connectivity(2, 1), len(self.ij))[cells, local]
 
     def entities(self, cells: Integers, local: int | None) -> Any:
         """Integration domain: cells, or facets `local` of cells (both in assembly order)."""
@@ -268,8 +268,8 @@ class Space:
         dofmap = self._space.dofmap
         bs = dofmap.index_map_bs
         num_cells = len(rectangle.ij)
-        blocks = _table(dofmap.list, -1) if not OLD else dofmap.list.array.reshape(num_cells, -1)
-        self.dofs = (bs * np.asarray(blocks)[:, :, None] + np.arange(bs)).reshape(num_cells, -1)
+        blocks = _table(dofmap.list, num_cells)
+        self.dofs = (bs * blocks[:, :, None] + np.arange(bs)).reshape(num_cells, -1)
         self.size = int(dofmap.index_map.size_local) * bs
         self._map, self._bs = dofmap.index_map, bs
 
