@@ -14,6 +14,7 @@ from tawami.errors import (
 from tawami.formulation import Form
 from tawami.grid import Grid
 from tawami.materials import linear_elastic
+from tawami._rust import Material
 from tawami.scene import Scene, Solution
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "FormError",
     "Grid",
     "InputError",
+    "Material",
     "MissingDependencyError",
     "OutputError",
     "Scene",

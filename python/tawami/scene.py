@@ -184,6 +184,16 @@ class Scene:
             force += self._field.traction(edge, np.stack(values, axis=-1))
         return force
 
+    def split(self, coefficients: Array) -> tuple[Array, Array | None]:
+        """Coefficients of the displacement and of the bilinear field (None if there is none)."""
+        return self._field.layout.split(coefficients)
+
+    @property
+    def particles_per_cell(self) -> npt.NDArray[np.int64]:
+        """Number of particles in each cell, x fastest."""
+        nx, ny = self.grid.cells
+        return np.bincount(self._location.cell, minlength=nx * ny)
+
     def solve(self) -> Solution:
         """Find equilibrium under the present supports and loads, and store it in the particles.
 
@@ -214,15 +224,19 @@ class Solution:
     """Equilibrium of a scene.
 
     Attributes:
+        scene: What was solved.
+        u: Coefficients of the displacement [m] since the start, two per function, x fastest.
+        volumetric: Coefficients of eps_v, or of p [Pa]; None with forms that have neither.
         unknowns: Number of reduced unknowns.
         iterations: Newton iterations of the last step.
         history: (momentum, volume) measures of every residual of the last step.
         condition: Lower estimate of the condition number of the scaled tangent.
+        symmetric: Whether the tangent was symmetric.
     """
 
     def __init__(self, scene: Scene, step: Converged, unknowns: int, total: Array) -> None:
-        self._scene = scene
-        self._u, self._volumetric = scene._field.layout.split(total)
+        self.scene = scene
+        self.u, self.volumetric = scene.split(total)
         self.unknowns, self.iterations = unknowns, step.iterations
         self.history: History = step.history
         self.condition, self.symmetric = step.condition, step.symmetric
@@ -233,14 +247,14 @@ class Solution:
         Raises:
             InputError: The point is outside the grid.
         """
-        location = boundary.locate_point(self._scene.grid, point, "displacement(...)")
-        value = _rust.interpolate(location, self._scene.basis, 2, self._u)[0]
+        location = boundary.locate_point(self.scene.grid, point, "displacement(...)")
+        value = _rust.interpolate(location, self.scene.basis, 2, self.u)[0]
         return np.asarray(value)
 
     @property
     def mean_stress(self) -> Array:
         """Mean stress [Pa] at the particles, (xx + yy + zz)/3, tension positive."""
-        return np.asarray(self._scene.particles.stress[:, :3].mean(axis=1))
+        return np.asarray(self.scene.particles.stress[:, :3].mean(axis=1))
 
 
 def _array(values: npt.ArrayLike, name: str, dimensions: int) -> Array:

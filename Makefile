@@ -1,0 +1,98 @@
+# make cantilever   set up what is missing, run the study of the cantilever
+# make test         set up what is missing, pass every test
+# make bench        speed and memory, stage by stage
+# make lint, make format, make clean
+#
+# Set-up needs Debian 12, 13 or sid (root or sudo for the packages that are missing) and Rust.
+
+SHELL := /bin/sh
+PYTHON := .venv/bin/python
+STAMPS := .venv/stamps
+RUST_MINIMUM := 1.83
+DEBIAN := python3-dolfinx-real python3-petsc4py-real python3-mpi4py python3-scipy python3-cffi \
+	libopenblas0-serial python3-venv python3-dev g++ openmpi-bin ca-certificates
+
+# One thread per process in BLAS: the assembly and the particles use the other cores.
+export OMP_NUM_THREADS ?= 1
+# Open MPI refuses to start ranks as root, which containers and fresh machines are.
+export OMPI_ALLOW_RUN_AS_ROOT := 1
+export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
+
+.PHONY: cantilever test bench lint format setup clean
+.NOTPARALLEL:
+.DELETE_ON_ERROR:
+
+cantilever: setup
+	$(PYTHON) -m cases.cantilever
+
+test: setup
+	cargo test --locked --quiet
+	$(PYTHON) -m pytest --quiet
+
+bench: setup
+	$(PYTHON) -m cases.cantilever.bench
+
+lint: setup $(STAMPS)/lint
+	cargo fmt --check
+	cargo clippy --locked --all-targets --quiet -- -D warnings
+	PYO3_PYTHON=$(CURDIR)/$(PYTHON) cargo clippy --locked --features python --quiet -- -D warnings
+	.venv/bin/ruff check .
+	.venv/bin/ruff format --check .
+	.venv/bin/mypy
+	$(PYTHON) -m mypy.stubtest tawami._rust --ignore-disjoint-bases
+
+format: setup $(STAMPS)/lint
+	cargo fmt
+	.venv/bin/ruff check --fix .
+	.venv/bin/ruff format .
+
+clean:
+	rm -rf .venv target results
+
+setup: $(STAMPS)/wheel
+
+# The one prerequisite comes first, before anything is installed.
+$(STAMPS)/rust:
+	@found=$$(cargo --version 2>/dev/null | cut -d' ' -f2); \
+	if [ -z "$$found" ]; then \
+		echo "tawami needs a Rust toolchain >= $(RUST_MINIMUM), and cargo was not found: install it with rustup (or Debian's cargo, from Debian 13 on) and run make again" >&2; exit 1; \
+	elif [ "$$(printf '%s\n' $(RUST_MINIMUM) $$found | sort -V | head -n 1)" != $(RUST_MINIMUM) ]; then \
+		echo "tawami needs a Rust toolchain >= $(RUST_MINIMUM), and cargo is $$found: run rustup update and make again" >&2; exit 1; \
+	fi
+	@mkdir -p $(STAMPS) && touch $@
+
+$(STAMPS)/debian: $(STAMPS)/rust Makefile
+	@command -v apt-get >/dev/null || { echo "tawami takes dolfinx from Debian's packages, and apt-get was not found: expected Debian 12, 13 or sid" >&2; exit 1; }
+	@missing=; for package in $(DEBIAN); do \
+		dpkg-query -W -f '$${Status}' $$package 2>/dev/null | grep -q 'ok installed' || missing="$$missing $$package"; \
+	done; \
+	if [ -n "$$missing" ]; then \
+		echo "Installing from Debian:$$missing"; \
+		if [ "$$(id -u)" = 0 ]; then root=; elif command -v sudo >/dev/null; then root=sudo; \
+		else echo "Installing needs root: run 'apt-get install$$missing' as root, then make again" >&2; exit 1; fi; \
+		$$root apt-get update -qq </dev/null && \
+		$$root env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends $$missing </dev/null >/dev/null || \
+		{ echo "Debian's packages could not be installed: see the message of apt-get above" >&2; exit 1; }; \
+	fi
+	@touch $@
+
+# The system's Python, because dolfinx lives in its dist-packages; NumPy and SciPy must stay the
+# ones that dolfinx was built with.
+.venv/constraints.txt: $(STAMPS)/debian
+	/usr/bin/python3 -m venv --system-site-packages .venv
+	$(PYTHON) -c "import numpy, scipy; print(f'numpy=={numpy.__version__}\nscipy=={scipy.__version__}')" > $@.part
+	mv $@.part $@
+
+PIP = $(PYTHON) -m pip install --quiet --disable-pip-version-check --constraint .venv/constraints.txt
+
+$(STAMPS)/python: .venv/constraints.txt pyproject.toml
+	$(PIP) 'maturin>=1.12.1,<2' 'meshio>=5.3' 'matplotlib>=3.7' 'tqdm>=4.60' 'hypothesis>=6.80' 'pytest>=7.4'
+	@mkdir -p $(STAMPS) && touch $@
+
+$(STAMPS)/lint: $(STAMPS)/python
+	$(PIP) 'ruff>=0.6' 'mypy>=1.10'
+	@mkdir -p $(STAMPS) && touch $@
+
+$(STAMPS)/wheel: $(STAMPS)/python Cargo.toml Cargo.lock $(shell find rust -name '*.rs')
+	VIRTUAL_ENV=$(CURDIR)/.venv PIP_CONSTRAINT=$(CURDIR)/.venv/constraints.txt .venv/bin/maturin develop --release --locked --quiet
+	@touch $@

@@ -1,0 +1,152 @@
+"""The cantilever by finite elements, in plain dolfinx (0.5 to 0.11): what the MPM is compared with.
+
+fem_q2            biquadratic displacement, 3 x 3 Gauss points
+fem_taylor_hood   biquadratic displacement, bilinear p, 3 x 3 Gauss points; Herrmann's form,
+                  sigma = 2 mu eps + p I, div u = p/lambda
+fem_q1_bbar       bilinear displacement, volumetric part at the cell's centre
+
+python -m cases.cantilever.fem
+"""
+
+from __future__ import annotations
+
+import inspect
+import logging
+from collections.abc import Callable
+from time import perf_counter
+from typing import Any
+
+import dolfinx.fem.petsc
+import numpy as np
+import ufl
+from mpi4py import MPI
+
+from cases.cantilever.beam import (
+    D, K, L, LAMBDA, MU, P, Row, mean_stress, root_displacement_x, shear, table,
+)  # fmt: skip
+
+METHODS = ("fem_q2", "fem_taylor_hood", "fem_q1_bbar")
+
+try:
+    from basix.ufl import element, mixed_element
+
+    function_space = dolfinx.fem.functionspace
+
+    def lagrange(degree: int, *shape: int) -> Any:
+        """Lagrange element on squares."""
+        return element("Lagrange", "quadrilateral", degree, shape=shape)
+except ImportError:  # dolfinx 0.5
+    function_space = dolfinx.fem.FunctionSpace
+
+    def lagrange(degree: int, *shape: int) -> Any:
+        """Lagrange element on squares."""
+        kind = ufl.VectorElement if shape else ufl.FiniteElement
+        return kind("Lagrange", "quadrilateral", degree)
+
+    def mixed_element(elements: list[Any]) -> Any:
+        """Mixed element."""
+        return ufl.MixedElement(*elements)
+
+
+def solve(method: str, support: str, n: int) -> Row:
+    """Solve the beam on 2n x n squares."""
+    start = perf_counter()
+    corners = [np.array([0.0, -D / 2]), np.array([L, D / 2])]
+    squares = dolfinx.mesh.CellType.quadrilateral
+    mesh = dolfinx.mesh.create_rectangle(MPI.COMM_WORLD, corners, [2 * n, n], squares)
+    mixed = method == "fem_taylor_hood"
+    degree = 1 if method == "fem_q1_bbar" else 2
+    displacement = lagrange(degree, 2)
+    elements = mixed_element([displacement, lagrange(1)]) if mixed else displacement
+    W = function_space(mesh, elements)
+    V = W.sub(0) if mixed else W
+
+    # -- weak form; the unknown of the mixed form is p/mu, which is of the size of a strain
+    dx = ufl.dx(domain=mesh, metadata={"quadrature_degree": 2 * degree})
+    dx_volume = ufl.dx(domain=mesh, metadata={"quadrature_degree": 1 if degree == 1 else 4})
+    trial, test = ufl.TrialFunction(W), ufl.TestFunction(W)
+    (u, p), (w, q) = (ufl.split(f) if mixed else (f, None) for f in (trial, test))
+    a = 2 * MU * ufl.inner(ufl.sym(ufl.grad(u)), ufl.grad(w)) * dx
+    if mixed:
+        a += MU * (p * ufl.div(w) + q * ufl.div(u) - MU / LAMBDA * p * q) * dx
+    else:
+        a += -2 / 3 * MU * ufl.div(u) * ufl.div(w) * dx + K * ufl.div(u) * ufl.div(w) * dx_volume
+    x = ufl.SpatialCoordinate(mesh)
+    tip, root = at_end(mesh, L, 1), at_end(mesh, 0.0, 2)
+    tags = dolfinx.mesh.meshtags(mesh, 1, *(np.concatenate(c) for c in zip(tip, root, strict=True)))
+    ds = ufl.ds(domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": 4})
+    if support == "exact":
+        load = shear(x[1]) * w[1] * ds(2) - shear(x[1]) * w[1] * ds(1)
+    else:
+        load = -P / D * w[1] * ds(1)
+
+    # -- supports
+    on_root: Callable[[Any], Any] = lambda x: np.isclose(x[0], 0.0)  # noqa: E731
+    at_centre: Callable[[Any], Any] = lambda x: on_root(x) & np.isclose(x[1], 0.0)  # noqa: E731
+    profile = root_displacement_x if support == "exact" else np.zeros_like
+    supports = [
+        support_of(V, 0, on_root, lambda x: profile(x[1])),
+        support_of(V, 1, on_root if support == "clamped" else at_centre, lambda x: 0 * x[0]),
+    ]
+
+    options = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
+    problem_class = dolfinx.fem.petsc.LinearProblem
+    prefix = "petsc_options_prefix" in inspect.signature(problem_class).parameters
+    extra = {"petsc_options_prefix": "cantilever_"} if prefix else {}
+    problem = problem_class(a, load, bcs=supports, petsc_options=options, **extra)
+    solution = problem.solve()
+    assert isinstance(solution, dolfinx.fem.Function)
+
+    # -- results
+    V1, _ = V.sub(1).collapse()
+    tip_centre = dolfinx.fem.locate_dofs_geometrical(
+        (V.sub(1), V1), lambda x: np.isclose(x[0], L) & np.isclose(x[1], 0.0)
+    )[0]
+    error = None
+    if support == "exact":
+        uh, ph = ufl.split(solution) if mixed else (solution, None)
+        sigma_m = MU * (ph + 2 / 3 * ufl.div(uh)) if mixed else K * ufl.div(uh)
+        exact = mean_stress(x[0], x[1])
+        error = float(np.sqrt(
+            integral((sigma_m - exact) ** 2 * dx_volume) / integral(exact**2 * dx_volume)
+        ))  # fmt: skip
+    size = W.dofmap.index_map.size_global * W.dofmap.index_map_bs
+    held = sum(len(bc.dof_indices()[0]) for bc in supports)
+    return Row(
+        method=method,
+        support=support,
+        n=n,
+        alpha=None,
+        particles_per_cell=None,
+        deflection_m=-float(solution.x.array[tip_centre[0]]),
+        mean_stress_l2=error,
+        newton_iterations=1,
+        unknowns=size - held,
+        wall_s=perf_counter() - start,
+    )
+
+
+def at_end(mesh: Any, x: float, tag: int) -> tuple[Any, Any]:
+    """Facets at one end of the beam, ascending, and their tags."""
+    facets = dolfinx.mesh.locate_entities_boundary(mesh, 1, lambda y: np.isclose(y[0], x))
+    return np.sort(facets), np.full(len(facets), tag, dtype=np.int32)
+
+
+def support_of(V: Any, component: int, where: Callable[[Any], Any], value: Any) -> Any:
+    """A displacement component prescribed at the nodes of a region."""
+    Vi, _ = V.sub(component).collapse()
+    prescribed = dolfinx.fem.Function(Vi)
+    prescribed.interpolate(value)
+    dofs = dolfinx.fem.locate_dofs_geometrical((V.sub(component), Vi), where)
+    return dolfinx.fem.dirichletbc(prescribed, dofs, V.sub(component))
+
+
+def integral(form: Any) -> float:
+    """Value of a form without arguments."""
+    return float(dolfinx.fem.assemble_scalar(dolfinx.fem.form(form)))
+
+
+if __name__ == "__main__":
+    logging.disable(logging.INFO)  # the compilation of forms is talkative
+    for kind in ("paper", "exact", "clamped"):
+        print(table([solve(m, kind, n) for m in METHODS for n in (2, 4, 8, 16)]))

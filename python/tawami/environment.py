@@ -1,0 +1,51 @@
+"""What a run depends on beyond its input: versions, the BLAS that is loaded, threads."""
+
+from __future__ import annotations
+
+import os
+import platform
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+from petsc4py import PETSc
+
+from tawami import _dolfinx
+
+
+def blas() -> tuple[str, bool]:
+    """The BLAS library that PETSc's solvers use, and whether it is the slow reference one.
+
+    The loaded libraries are read from the process itself (Linux); 'unknown' elsewhere.
+    """
+    try:
+        maps = Path("/proc/self/maps").read_text().splitlines()
+    except OSError:
+        return "unknown", False
+    loaded = {Path(line.split()[-1]) for line in maps if ".so" in line}
+    for path in sorted(loaded):
+        if path.name.startswith("libblas.so"):
+            # Debian links libblas.so.3 to the chosen implementation, in a folder of its name.
+            kind = path.resolve().parent.name
+            return (f"reference BLAS ({path})", True) if kind == "blas" else (kind, False)
+    for path in sorted(loaded):
+        if any(name in path.name for name in ("openblas", "blis", "mkl")):
+            return path.name, False
+    return "unknown", False
+
+
+def header() -> str:
+    """A line for the start of a run, and a warning below it where the BLAS is slow."""
+    name, slow = blas()
+    petsc = ".".join(map(str, PETSc.Sys.getVersion()))
+    line = (
+        f"tawami {version('tawami')}, dolfinx {_dolfinx.version}, PETSc {petsc}, Python "
+        f"{platform.python_version()}, NumPy {np.__version__}, BLAS {name}, OMP_NUM_THREADS="
+        f"{os.environ.get('OMP_NUM_THREADS', 'unset')}, {os.cpu_count()} processors"
+    )
+    if slow:
+        line += (
+            "\nWarning: the reference BLAS makes the factorisation 3 to 5 times slower. On Debian: "
+            "apt install libopenblas0-serial"
+        )
+    return line

@@ -1,0 +1,125 @@
+"""Results as files: particles and grid as VTU. Nothing is half written: a file appears when whole."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import meshio
+import numpy as np
+import numpy.typing as npt
+
+from tawami.basis import extraction
+from tawami.errors import OutputError
+from tawami.scene import Solution
+
+Array = npt.NDArray[np.float64]
+
+
+def result_folder(path: str | Path) -> Path:
+    """A folder that can be written, made if it is not there.
+
+    Raises:
+        OutputError: It cannot be made or written.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / f".probe-{os.getpid()}"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise OutputError(
+            f"result folder '{folder}' cannot be written ({error.strerror}): expected a folder with "
+            "write permission; choose another one"
+        ) from error
+    return folder
+
+
+@contextmanager
+def whole_file(path: str | Path) -> Iterator[Path]:
+    """A temporary path beside `path` that takes its name when the block ends well.
+
+    Raises:
+        OutputError: The file cannot be written; what was at `path` before is still there.
+    """
+    target = Path(path)
+    part = target.with_name(f".{os.getpid()}-{target.name}")
+    try:
+        yield part
+        part.replace(target)
+    except OSError as error:
+        raise OutputError(f"'{target}' cannot be written: {error.strerror or error}") from error
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def write_particles(path: str | Path, solution: Solution) -> None:
+    """Particles as VTU vertices with displacement [m], stress and mean stress [Pa], volume [m2].
+
+    Args:
+        path: File to write, ending in .vtu.
+        solution: What was solved.
+
+    Raises:
+        OutputError: The file cannot be written.
+    """
+    particles = solution.scene.particles
+    n = len(particles)
+    data: dict[str, Array] = {
+        "displacement [m]": _with_z(particles.displacement),
+        "stress xx yy zz xy [Pa]": np.array(particles.stress),
+        "mean stress [Pa]": solution.mean_stress,
+        "volume [m2 per m]": np.array(particles.volume),
+    }
+    if particles.eps_v is not None:
+        data["eps_v [-]"] = np.array(particles.eps_v)
+    mesh = meshio.Mesh(_with_z(particles.x), [("vertex", np.arange(n)[:, None])], point_data=data)
+    _write(path, mesh)
+
+
+def write_grid(path: str | Path, solution: Solution) -> None:
+    """Cells of the grid as VTU squares: displacement [m] and the bilinear field at the vertices,
+    number of particles in each cell.
+
+    Args:
+        path: File to write, ending in .vtu.
+        solution: What was solved.
+
+    Raises:
+        OutputError: The file cannot be written.
+    """
+    scene = solution.scene
+    grid = scene.grid
+    (nx, ny), (x0, y0) = grid.cells, grid.origin
+    x, y = x0 + grid.h * np.arange(nx + 1), y0 + grid.h * np.arange(ny + 1)
+    points = np.column_stack([np.tile(x, ny + 1), np.repeat(y, nx + 1)])
+    corner = (np.arange(nx) + (nx + 1) * np.arange(ny)[:, None]).ravel()
+    squares = corner[:, None] + np.array([0, 1, nx + 2, nx + 1])
+    vertex = extraction(scene.basis, grid.cells, 1)
+    data: dict[str, Array] = {
+        "displacement [m]": _with_z(vertex @ solution.u.reshape(-1, 2)),
+    }
+    if solution.volumetric is not None:
+        name, unit = list(scene.form.fields.items())[1][0], "-" if scene.form.kinematics == "mixed" else "Pa"
+        data[f"{name} [{unit}]"] = np.asarray(solution.volumetric)
+    mesh = meshio.Mesh(
+        _with_z(points),
+        [("quad", squares)],
+        point_data=data,
+        cell_data={"particles [-]": [scene.particles_per_cell.astype(float)]},
+    )
+    _write(path, mesh)
+
+
+def _with_z(values: npt.ArrayLike) -> Array:
+    return np.pad(np.asarray(values, dtype=float), ((0, 0), (0, 1)))
+
+
+def _write(path: str | Path, mesh: meshio.Mesh) -> None:
+    if Path(path).suffix != ".vtu":
+        raise OutputError(f"'{path}': expected a file name ending in .vtu")
+    with whole_file(path) as part:
+        meshio.write(part, mesh, file_format="vtu")
