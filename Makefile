@@ -36,7 +36,7 @@ lint: setup $(STAMPS)/lint
 	cargo fmt --check
 	cargo clippy --locked --all-targets --quiet -- -D warnings
 	PYO3_PYTHON=$(CURDIR)/$(PYTHON) cargo clippy --locked --features python --quiet -- -D warnings
-	.venv/bin/ruff check .
+	.venv/bin/ruff check --quiet .
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
 	$(PYTHON) -m mypy.stubtest tawami._rust --ignore-disjoint-bases
@@ -94,5 +94,5 @@ $(STAMPS)/lint: $(STAMPS)/python
 	@mkdir -p $(STAMPS) && touch $@
 
 $(STAMPS)/wheel: $(STAMPS)/python Cargo.toml Cargo.lock $(shell find rust -name '*.rs')
-	VIRTUAL_ENV=$(CURDIR)/.venv PIP_CONSTRAINT=$(CURDIR)/.venv/constraints.txt .venv/bin/maturin develop --release --locked --quiet
+	VIRTUAL_ENV=$(CURDIR)/.venv PIP_CONSTRAINT=$(CURDIR)/.venv/constraints.txt .venv/bin/maturin develop --release --locked --quiet >/dev/null
 	@touch $@

@@ -19,7 +19,7 @@ options = {"stabilisation": ("laplacian", "residual_based", "projection")}
 def residual(
     u, eps_v, w, q, sigma, K, mu, t, h, sum_p, cell_mean, dx, dx_c, ds, alpha, stabilisation
 ):
-    """R_u(w) = sum_p V_p sigma_p : grad w - int t . w ds;  R_q(q) = sum_p V_p K_p { q (div u - eps_v) } - S."""
+    """R_u = sum_p V_p sigma_p : grad w - int t . w ds;  R_q = sum_p V_p K_p q (div u - eps_v) - S."""
     R_u = sum_p(sigma, grad(w)) - dot(t, w) * ds
     R_q = sum_p(K, q * (div(u) - eps_v))
     if stabilisation == "projection":

@@ -90,7 +90,8 @@ pub fn cell_means(
         let particles = location.particles_of(a as usize);
         let total: f64 = particles.iter().map(|&p| volume[p as usize]).sum();
         for (k, &c) in packing.columns.iter().enumerate() {
-            let sum: f64 = particles.iter().map(|&p| volume[p as usize] * data[[p as usize, c]]).sum();
+            let sum: f64 =
+                particles.iter().map(|&p| volume[p as usize] * data[[p as usize, c]]).sum();
             row[packing.offset + k] = sum / total;
         }
     }

@@ -72,10 +72,9 @@ impl Basis {
                 ([a, 1.0 - a - b, b], [da, -da - db, db])
             }
             Self::Bilinear => ([s, t, 0.0], [-1.0, 1.0, 0.0]),
-            Self::Biquadratic => (
-                [s * (s - t), 4.0 * s * t, t * (t - s)],
-                [t - 3.0 * s, 4.0 * (s - t), 3.0 * t - s],
-            ),
+            Self::Biquadratic => {
+                ([s * (s - t), 4.0 * s * t, t * (t - s)], [t - 3.0 * s, 4.0 * (s - t), 3.0 * t - s])
+            }
         };
         Local { first: self.first(cell), value, derivative }
     }

@@ -27,7 +27,7 @@ pub enum Operator {
 impl Operator {
     /// Number of components.
     #[must_use]
-    pub fn len(self) -> usize {
+    pub fn components(self) -> usize {
         match self {
             Self::Sigma | Self::Deviator => 3,
             Self::Mean => 1,
@@ -79,7 +79,7 @@ fn dot(a: &Sym, b: &Sym) -> f64 {
 }
 
 fn write(request: &Request, kinematics: Kinematics, stress: &Stress, c: &Moduli, row: &mut [f64]) {
-    let n = request.operator.len();
+    let n = request.operator.components();
     let out = &mut row[request.column..];
     match request.part {
         Part::Value => request.operator.of(&stress.deviator, stress.mean, out),

@@ -120,11 +120,7 @@ pub enum Error {
 pub type Result<T> = std::result::Result<T, Error>;
 
 /// Index and value of the first entry that is not finite, and how many there are.
-pub(crate) fn check_finite(
-    name: &'static str,
-    values: &[f64],
-    per_particle: usize,
-) -> Result<()> {
+pub(crate) fn check_finite(name: &'static str, values: &[f64], per_particle: usize) -> Result<()> {
     let mut bad = values.iter().enumerate().filter(|(_, v)| !v.is_finite());
     match bad.next() {
         None => Ok(()),

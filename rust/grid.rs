@@ -25,7 +25,11 @@ impl Grid {
     /// [`Error::Parameter`] naming the parameter that is out of range.
     pub fn new(origin: [f64; 2], h: f64, cells: [usize; 2]) -> Result<Self> {
         if !(h.is_finite() && h > 0.0) {
-            return Err(Error::Parameter { name: "h", value: h, expected: "a positive cell size in m" });
+            return Err(Error::Parameter {
+                name: "h",
+                value: h,
+                expected: "a positive cell size in m",
+            });
         }
         for (name, value) in [("origin[0]", origin[0]), ("origin[1]", origin[1])] {
             if !value.is_finite() {
@@ -86,7 +90,9 @@ impl Grid {
         let mut xi = Vec::with_capacity(n);
         let mut outside = Vec::new();
         for (p, xp) in x.chunks_exact(2).enumerate() {
-            if let (Some((i, a)), Some((j, b))) = (self.locate_1d(0, xp[0]), self.locate_1d(1, xp[1])) {
+            if let (Some((i, a)), Some((j, b))) =
+                (self.locate_1d(0, xp[0]), self.locate_1d(1, xp[1]))
+            {
                 cell.push((i + j * self.cells[0]) as u32);
                 xi.push([a, b]);
             } else {

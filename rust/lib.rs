@@ -11,8 +11,10 @@
     clippy::cast_precision_loss,
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
+    clippy::cast_possible_wrap,
     clippy::module_name_repetitions,
-    clippy::doc_markdown
+    clippy::doc_markdown,
+    clippy::needless_pass_by_value
 )]
 
 pub mod adjoint;

@@ -282,7 +282,7 @@ impl PyStage {
         let requests: Vec<Request> = requests.iter().map(request).collect::<PyResult<_>>()?;
         let fits = |r: &Request| {
             let per_component = if r.part == Part::Strain { 3 } else { 1 };
-            r.column + r.operator.len() * per_component <= data.ncols()
+            r.column + r.operator.components() * per_component <= data.ncols()
         };
         require(requests.iter().all(fits), "a request reaches outside the particle data")?;
         Ok(self.with(&u, volumetric.as_ref(), |s| s.evaluate(&particles.0, &requests, data))??)
@@ -386,7 +386,7 @@ fn basis_len(basis: &str, n: usize) -> PyResult<usize> {
 
 /// Points on [0, 1] and weights of the Gauss-Legendre rule.
 #[pyfunction]
-fn gauss<'py>(py: Python<'py>, n: usize) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
+fn gauss(py: Python<'_>, n: usize) -> (Bound<'_, PyArray1<f64>>, Bound<'_, PyArray1<f64>>) {
     let rule = Rule::gauss(n);
     (rule.points.to_pyarray(py), rule.weights.to_pyarray(py))
 }

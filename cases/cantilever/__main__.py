@@ -14,16 +14,22 @@ from pathlib import Path
 from time import perf_counter
 
 import matplotlib
-from tqdm import tqdm
-
 import tawami
-from cases.cantilever import figures, mpm
-from cases.cantilever.beam import (
-    COLUMNS, SUPPORTS, V_THEORY, P, Row, point_support_growth, table,
-)  # fmt: skip
-from cases.cantilever.study import CELLS, runs
 from tawami.environment import header
 from tawami.output import result_folder, whole_file, write_grid, write_particles
+from tqdm import tqdm
+
+from cases.cantilever import figures, mpm
+from cases.cantilever.beam import (
+    COLUMNS,
+    SUPPORTS,
+    V_THEORY,
+    P,
+    Row,
+    point_support_growth,
+    table,
+)  # fmt: skip
+from cases.cantilever.study import CELLS, runs
 
 FIELDS = {
     "displacement only": ("u", None),

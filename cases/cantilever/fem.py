@@ -22,7 +22,17 @@ import ufl
 from mpi4py import MPI
 
 from cases.cantilever.beam import (
-    D, K, L, LAMBDA, MU, P, Row, mean_stress, root_displacement_x, shear, table,
+    LAMBDA,
+    MU,
+    D,
+    K,
+    L,
+    P,
+    Row,
+    mean_stress,
+    root_displacement_x,
+    shear,
+    table,
 )  # fmt: skip
 
 METHODS = ("fem_q2", "fem_taylor_hood", "fem_q1_bbar")

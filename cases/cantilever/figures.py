@@ -8,14 +8,21 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
+import tawami
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
-
-import tawami
-from cases.cantilever.beam import (
-    SUPPORTS, V_CLAMPED, V_THEORY, D, L, Row, mean_stress, point_support_growth,
-)  # fmt: skip
 from tawami.output import whole_file
+
+from cases.cantilever.beam import (
+    SUPPORTS,
+    V_CLAMPED,
+    V_THEORY,
+    D,
+    L,
+    Row,
+    mean_stress,
+    point_support_growth,
+)  # fmt: skip
 
 Values = npt.NDArray[np.float64]
 #: Largest mean stress of the closed form [Pa]: the range of the colours.
@@ -38,7 +45,11 @@ TITLES = {
 #: Scale of the error axis, its ticks and its label.
 SCALES = {
     "paper": ("log", (2, 5, 10, 20, 50, 100), "error of the tip deflection [%]"),
-    "exact": ("log", (1e-5, 1e-4, 1e-3, 0.01, 0.1, 1, 10, 100), "|error| of the tip deflection [%]"),
+    "exact": (
+        "log",
+        (1e-5, 1e-4, 1e-3, 0.01, 0.1, 1, 10, 100),
+        "|error| of the tip deflection [%]",
+    ),
     "clamped": ("symlog", (-20, -10, -5, 0, 5, 10, 20, 50, 100), "error [%], linear within 10 %"),
 }
 
@@ -129,7 +140,9 @@ def mean_stress_exact(solutions: Mapping[str, tawami.Solution], path: Path) -> N
         right.set_title(f"{title}: minus closed form   (L2 {relative:.2g} %)", fontsize=10)
         left.set_ylabel("$y$ [m]")
         column = x == x[np.argmin(np.abs(x - L / 4))]
-        profile.plot(solution.mean_stress[column] / 1e3, y[column], ".-", linewidth=0.8, label=title)
+        profile.plot(
+            solution.mean_stress[column] / 1e3, y[column], ".-", linewidth=0.8, label=title
+        )
     _field(closed, solution, exact, ROOT_STRESS)
     closed.set_title(_titled("closed form", exact), fontsize=10)
     closed.set_ylabel("$y$ [m]")

@@ -8,11 +8,20 @@ from __future__ import annotations
 from time import perf_counter
 
 import numpy as np
+import tawami
 from mpi4py import MPI
 
-import tawami
 from cases.cantilever.beam import (
-    D, E, L, NU, P, Row, mean_stress, root_displacement_x, shear, table,
+    NU,
+    D,
+    E,
+    L,
+    P,
+    Row,
+    mean_stress,
+    root_displacement_x,
+    shear,
+    table,
 )  # fmt: skip
 
 

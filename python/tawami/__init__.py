@@ -1,5 +1,6 @@
 """tawami: implicit material point method with the mixed displacement - volumetric strain form."""
 
+from tawami._rust import Material
 from tawami.body import Body, box
 from tawami.errors import (
     ConvergenceError,
@@ -14,7 +15,6 @@ from tawami.errors import (
 from tawami.formulation import Form
 from tawami.grid import Grid
 from tawami.materials import linear_elastic
-from tawami._rust import Material
 from tawami.scene import Scene, Solution
 
 __all__ = [

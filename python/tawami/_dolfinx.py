@@ -240,7 +240,8 @@ class Rectangle:
         topology = self.mesh.topology
         topology.create_connectivity(2, 1)
         topology.create_connectivity(1, 2)
-        return _table(topology.connectivity(2, 1), len(self.ij))[cells, local]
+        facets: Integers = _table(topology.connectivity(2, 1), len(self.ij))[cells, local]
+        return facets
 
     def entities(self, cells: Integers, local: int | None) -> Any:
         """Integration domain: cells, or facets `local` of cells (both in assembly order)."""
@@ -278,8 +279,8 @@ class Space:
         kind = _integral.exterior_facet if kernel.facets else _integral.cell
         if OLD:
             spaces = [self._space._cpp_object] * rank
-            integrals = {kind: ([(0, kernel.address)], entities)}
-            return cpp.fem.Form_float64(spaces, integrals, [], [], False, self.rectangle.cpp)
+            old = {kind: ([(0, kernel.address)], entities)}
+            return cpp.fem.Form_float64(spaces, old, [], [], False, self.rectangle.cpp)
         spaces = [self._space._cpp_object] * rank
         none = np.empty(0, dtype=np.int8)
         integrals = {kind: [(0, kernel.address, entities, none)]}
@@ -296,7 +297,9 @@ class Space:
         return cpp.la.petsc.create_matrix(self.rectangle.mesh.comm, pattern)
 
 
-def assemble_matrix(matrix: Any, form: Any, kernel: Kernel, constants: Array, packed: Array) -> None:
+def assemble_matrix(
+    matrix: Any, form: Any, kernel: Kernel, constants: Array, packed: Array
+) -> None:
     """Fill the matrix; `packed` has one row of coefficients per entity of the form."""
     matrix.zeroEntries()
     coefficients = {(_key(kernel), 0): packed}

@@ -1,8 +1,8 @@
 """Bases on the grid as subspaces of continuous Lagrange elements: the extraction matrices.
 
 Quadratic splines, bilinear and biquadratic Lagrange functions are all biquadratic on a cell, so the
-field problem is assembled once, on biquadratic nodes: nodal values = E coefficients (formulation.md,
-section 3). E is the Kronecker product of one-dimensional matrices whose rows sum to 1.
+field problem is assembled once, on biquadratic nodes: nodal values = E coefficients. E is the
+Kronecker product of one-dimensional matrices whose rows sum to 1.
 """
 
 from __future__ import annotations

@@ -70,7 +70,12 @@ def evaluate(profile: Profile, x: Array, y: Array, what: str) -> Array:
 
 
 def held_edge(
-    grid: Grid, basis: Basis, active: npt.NDArray[np.bool_], edge: Edge, component: int, value: Profile
+    grid: Grid,
+    basis: Basis,
+    active: npt.NDArray[np.bool_],
+    edge: Edge,
+    component: int,
+    value: Profile,
 ) -> Held:
     """One displacement component on an edge of the grid, the profile projected in L2.
 
@@ -135,7 +140,9 @@ def held_point(
     near = [(i + di, j + dj) for di in _touching(a) for dj in _touching(b)]
     inside = [(k, m) for k, m in near if 0 <= k < grid.cells[0] and 0 <= m < grid.cells[1]]
     if not any(active[m, k] for k, m in inside):
-        raise SupportError(f"{where}: the point lies in a cell without particles; move it into the body")
+        raise SupportError(
+            f"{where}: the point lies in a cell without particles; move it into the body"
+        )
     wx, wy = values_1d(basis, grid.cells[0], i, a), values_1d(basis, grid.cells[1], j, b)
     width = _rust.basis_len(basis, grid.cells[0])
     functions = (wx.indices[None, :] + width * wy.indices[:, None]).ravel().astype(np.int64)

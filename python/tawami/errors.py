@@ -1,4 +1,4 @@
-"""What can go wrong, as a small hierarchy: every message says which input, what came, what to do."""
+"""What can go wrong: every message says which input, what came, what was expected, what to do."""
 
 from __future__ import annotations
 

@@ -89,10 +89,10 @@ class Field:
         packed = self._packed[id(integral)]
         offset = 0
         for slot in integral.slots:
-            if slot.kind == "fields":
+            if slot.source == "fields":
                 packed[:, offset : offset + slot.width] = nodal[self._space.dofs[self._cells]]
-            else:
-                rule, mean = slot.kind, slot.kind == "mean"
+            elif slot.source != "traction":
+                rule, mean = slot.source, slot.source == "mean"
                 points = [(0, 0)] if mean else self._points[rule]
                 _rust.densities(
                     self._location, self._volume, data[rule], points, self._rows,
@@ -135,7 +135,7 @@ class Field:
         packed = np.zeros((len(cells), integral.width))
         offset = 0
         for slot in integral.slots:
-            assert slot.kind == "traction"
+            assert slot.source == "traction"
             packed[:, offset : offset + slot.width] = values.reshape(len(cells), 18)[order]
             offset += slot.width
         form = self._space.form(
@@ -149,7 +149,10 @@ class Field:
     def _edge_cells(self, edge: Edge) -> npt.NDArray[np.int32]:
         axis, end = self.grid.edge(edge)
         last = self.grid.cells[axis] - 1 if end else 0
-        return self._cells[self.grid.rectangle.ij[self._cells, axis] == last]
+        cells: npt.NDArray[np.int32] = self._cells[
+            self.grid.rectangle.ij[self._cells, axis] == last
+        ]
+        return cells
 
     def edge_nodes(self, edge: Edge) -> Array:
         """Positions [m] of the biquadratic nodes of the loaded cells, cells x 9 x 2."""

@@ -58,6 +58,11 @@ _PLACEHOLDERS = 1000
 LAW = {"sigma": 3, "s": 3, "sigma_m": 1}
 
 
+OPERATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
+    "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power
+}  # fmt: skip
+
+
 @dataclass(frozen=True)
 class ParticleScalar:
     """A constant of the particle, as K or K**2/mu: an expression to be evaluated at the particles.
@@ -81,9 +86,7 @@ class ParticleScalar:
             number = float(other)
             other = ParticleScalar(repr(other), lambda _: number)
         a, b = (other, self) if swap else (self, other)
-        operation = {
-            "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power
-        }[symbol]  # fmt: skip
+        operation = OPERATIONS[symbol]
         return ParticleScalar(
             f"({a.text} {symbol} {b.text})", lambda v: operation(a.evaluate(v), b.evaluate(v))
         )
@@ -225,7 +228,9 @@ class Form:
                 parameters[name] = self._number(name, value)
             elif name in options:
                 if value not in self.options[name]:
-                    raise InputError(f"{name} = {value!r}: expected one of {_list(self.options[name])}")
+                    raise InputError(
+                        f"{name} = {value!r}: expected one of {_list(self.options[name])}"
+                    )
                 options[name] = value
             else:
                 known = [*parameters, *options]
@@ -250,10 +255,11 @@ def shipped() -> list[str]:
     return sorted(path.stem for path in (Path(__file__).parent / "forms").glob("[!_]*.py"))
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def _from_file(path: Path, _modified: int) -> Form:
     specification = importlib.util.spec_from_file_location(f"tawami_form_{path.stem}", path)
-    assert specification is not None and specification.loader is not None
+    assert specification is not None
+    assert specification.loader is not None
     module = importlib.util.module_from_spec(specification)
     try:
         specification.loader.exec_module(module)
@@ -262,7 +268,7 @@ def _from_file(path: Path, _modified: int) -> Form:
     return _from_module(module, f"'{path.stem}'")
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def _from_module(module: ModuleType, name: str | None = None) -> Form:
     missing = [n for n in ("fields", "kinematics", "residual") if not hasattr(module, n)]
     name = name or f"'{module.__name__}'"
@@ -290,12 +296,12 @@ class Slot:
     """One coefficient of a kernel, in packed order.
 
     Attributes:
-        kind: 'fields' (the increments), 'traction', or the rule of particle densities.
+        source: 'fields' (the increments), 'traction', or the rule of particle densities.
         width: Entries per cell.
         columns: Columns of the rule's particle data (densities only).
     """
 
-    kind: str
+    source: Literal["fields", "traction"] | Rule
     width: int
     columns: tuple[int, ...] = ()
 
@@ -356,9 +362,7 @@ class _Symbols:
         self.trials = self._split(self.trial)
         tests = self._split(test)
         self.tests = {form.fields[name][1]: tests[name] for name in form.fields}
-        self.traction = ufl.Coefficient(
-            ufl.FunctionSpace(domain, _dolfinx.lagrange(2, 2)), count=1
-        )
+        self.traction = ufl.Coefficient(ufl.FunctionSpace(domain, _dolfinx.lagrange(2, 2)), count=1)
         self.constants = {
             name: ufl.Constant(domain, count=k) for k, name in enumerate(("h", *form.parameters))
         }
@@ -391,9 +395,7 @@ class _Symbols:
 
     def space(self, rule: Rule, size: int) -> Any:
         element = (
-            _dolfinx.per_cell(size)
-            if rule == "mean"
-            else _dolfinx.at_points(DEGREE[rule], size)
+            _dolfinx.per_cell(size) if rule == "mean" else _dolfinx.at_points(DEGREE[rule], size)
         )
         return ufl.FunctionSpace(self.domain, element)
 
@@ -425,7 +427,11 @@ class _Symbols:
             )
         quantity = self._quantity(arguments[0], caller) if len(arguments) == 2 else ONE
         expression = ufl.as_ufl(arguments[-1])
-        if rule == "centre" and isinstance(quantity, LawQuantity) and self.form.kinematics != "cell":
+        if (
+            rule == "centre"
+            and isinstance(quantity, LawQuantity)
+            and self.form.kinematics != "cell"
+        ):
             raise FormError(
                 f"form {self.form.name}: sum_c({quantity.name}, ...) needs kinematics 'cell': "
                 "elsewhere the stress depends on the strain at the particle"

@@ -84,8 +84,7 @@ class Newton:
         self.stopwatch = stopwatch
         self.tolerance, self.max_iterations = tolerance, max_iterations
         self.data = {
-            rule: np.zeros((len(particles), compiled.columns(rule)))
-            for rule in compiled.densities
+            rule: np.zeros((len(particles), compiled.columns(rule))) for rule in compiled.densities
         }
         self._requests: dict[Rule, list[tuple[str, str, int]]] = {r: [] for r in self.data}
         for rule, densities in compiled.densities.items():
@@ -114,8 +113,8 @@ class Newton:
         n = self.field.layout.num_displacement
         free = reduction.selection.T @ (internal - external)
         of_u = reduction.unknowns < n
-        scale = max(np.linalg.norm(internal[:n]), np.linalg.norm(external[:n]), 1e-300)
-        momentum = float(np.linalg.norm(free[of_u]) / scale)
+        scale = max(float(np.linalg.norm(f[:n])) for f in (internal, external)) or 1.0
+        momentum = float(np.linalg.norm(free[of_u])) / scale
         if self.kind is None:
             return momentum, None
         weight, volume = self._volume_scale(coefficients)
@@ -190,7 +189,8 @@ class Newton:
 
     def _fail(self, history: History) -> None:
         rows = "; ".join(
-            f"{k}: {u:.2e}" + ("" if q is None else f", {q:.2e}") for k, (u, q) in enumerate(history)
+            f"{k}: {u:.2e}" + ("" if q is None else f", {q:.2e}")
+            for k, (u, q) in enumerate(history)
         )
         raise ConvergenceError(
             f"Newton did not converge in {len(history) - 1} iterations to {self.tolerance:g}; "
@@ -208,9 +208,7 @@ class Newton:
             if cell not in cells:
                 cells.append(cell)
         counts = np.bincount(self.location.cell, minlength=grid.cells[0] * grid.cells[1])
-        named = ", ".join(
-            f"({i}, {j}) with {counts[i + grid.cells[0] * j]}" for i, j in cells[:4]
-        )
+        named = ", ".join(f"({i}, {j}) with {counts[i + grid.cells[0] * j]}" for i, j in cells[:4])
         raise SingularError(
             "the tangent is singular (condition number of the scaled matrix above "
             f"{system.condition:.1e} by one solve with a random right-hand side): the particles "

@@ -1,4 +1,4 @@
-"""Results as files: particles and grid as VTU. Nothing is half written: a file appears when whole."""
+"""Results as files: particles and grid as VTU. A file appears when it is whole, or not at all."""
 
 from __future__ import annotations
 
@@ -103,7 +103,10 @@ def write_grid(path: str | Path, solution: Solution) -> None:
         "displacement [m]": _with_z(vertex @ solution.u.reshape(-1, 2)),
     }
     if solution.volumetric is not None:
-        name, unit = list(scene.form.fields.items())[1][0], "-" if scene.form.kinematics == "mixed" else "Pa"
+        name, unit = (
+            list(scene.form.fields.items())[1][0],
+            "-" if scene.form.kinematics == "mixed" else "Pa",
+        )
         data[f"{name} [{unit}]"] = np.asarray(solution.volumetric)
     mesh = meshio.Mesh(
         _with_z(points),

@@ -1,8 +1,8 @@
-"""fields = P unknowns + g: extraction, supports, point constraints and inactive functions as one matrix.
+"""fields = P unknowns + g: extraction, supports, point constraints, inactive functions in one P.
 
-Coefficients of all fields stand in one vector: the displacement (function, then component), then the
-bilinear field. `nodal = E coefficients` are the degrees of freedom of the mesh, `coefficients =
-S unknowns + offset` are what supports leave free, P = E S (formulation.md, section 3).
+Coefficients of all fields stand in one vector: the displacement (function, then component), then
+the bilinear field. `nodal = E coefficients` are the degrees of freedom of the mesh, `coefficients =
+S unknowns + offset` are what supports leave free, P = E S.
 """
 
 from __future__ import annotations
@@ -46,7 +46,9 @@ class Layout:
         blocks = [_place(grid, space, np.arange(18).reshape(9, 2), basis, degree=2)]
         masks = [np.repeat(_active_functions(basis, grid.cells, active), 2)]
         if num_bilinear_dofs:
-            blocks.append(_place(grid, space, 18 + np.arange(4).reshape(4, 1), "bilinear", degree=1))
+            blocks.append(
+                _place(grid, space, 18 + np.arange(4).reshape(4, 1), "bilinear", degree=1)
+            )
             masks.append(_active_functions("bilinear", grid.cells, active))
         self.extraction = sp.hstack(blocks, format="csr")
         self.num_displacement = blocks[0].shape[1]

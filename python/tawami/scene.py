@@ -163,7 +163,7 @@ class Scene:
         held = [boundary.Held(h.indices, h.values - total[h.indices]) for h in held]
         points = [
             boundary.PointHeld(
-                p.indices, p.weights, p.value - p.weights @ total[p.indices], p.where
+                p.indices, p.weights, p.value - float(p.weights @ total[p.indices]), p.where
             )
             for p in points
         ]
@@ -175,8 +175,8 @@ class Scene:
             nodes = self._field.edge_nodes(edge)
             if len(nodes) == 0:
                 raise SupportError(
-                    f"traction(edge='{edge}'): no cell along that edge of the grid holds particles; "
-                    "let the grid end where the body is loaded"
+                    f"traction(edge='{edge}'): no cell along that edge of the grid holds "
+                    "particles; let the grid end where the body is loaded"
                 )
             x, y = nodes[..., 0].ravel(), nodes[..., 1].ravel()
             what = f"traction(edge='{edge}')"

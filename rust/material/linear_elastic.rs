@@ -75,7 +75,8 @@ impl Material for LinearElastic {
     fn respond(&self, increment: &Strain, old: &Stress) -> (Stress, Moduli) {
         // The strain holds gamma_xy = 2 eps_xy, hence mu and not 2 mu for the shear.
         let stiffness = [2.0 * self.mu, 2.0 * self.mu, 2.0 * self.mu, self.mu];
-        let deviator = std::array::from_fn(|i| old.deviator[i] + stiffness[i] * increment.deviator[i]);
+        let deviator =
+            std::array::from_fn(|i| old.deviator[i] + stiffness[i] * increment.deviator[i]);
         // An incompressible material has no volume change: 0 times infinity must stay 0.
         let d_mean = if increment.volume == 0.0 { 0.0 } else { self.bulk * increment.volume };
         let mut dev_dev = [[0.0; COMPONENTS]; COMPONENTS];

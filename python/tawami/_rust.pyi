@@ -1,0 +1,123 @@
+"""Types of the compiled module."""
+
+from collections.abc import Sequence
+from typing import final
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = [
+    "Grid",
+    "InputError",
+    "Location",
+    "Material",
+    "Particles",
+    "Stage",
+    "TawamiError",
+    "basis_1d",
+    "basis_len",
+    "densities",
+    "gauss",
+    "interpolate",
+    "nodal_sums",
+]
+
+_Floats = npt.NDArray[np.float64]
+_Numbers = npt.NDArray[np.uint32]
+
+class TawamiError(Exception):
+    """Base of every error that tawami raises."""
+
+class InputError(TawamiError):
+    """An input is wrong; the message says which."""
+
+@final
+class Grid:
+    def __new__(cls, origin: Sequence[float], h: float, cells: Sequence[int]) -> Grid: ...
+    def locate(self, x: _Floats) -> Location: ...
+
+@final
+class Location:
+    @property
+    def active(self) -> _Numbers: ...
+    @property
+    def cell(self) -> _Numbers: ...
+    @property
+    def xi(self) -> _Floats: ...
+    def __len__(self) -> int: ...
+
+@final
+class Particles:
+    def __new__(cls, x: _Floats, volume: _Floats, material: _Numbers) -> Particles: ...
+    @property
+    def x(self) -> _Floats: ...
+    @property
+    def volume(self) -> _Floats: ...
+    @property
+    def material(self) -> _Numbers: ...
+    @property
+    def stress(self) -> _Floats: ...
+    @property
+    def displacement(self) -> _Floats: ...
+    @property
+    def eps_v(self) -> _Floats | None: ...
+    @property
+    def bytes_per_particle(self) -> int: ...
+    def add_eps_v(self) -> None: ...
+    def check(self) -> None: ...
+    def check_materials(self, materials: Sequence[Material], kinematics: str) -> None: ...
+    def __len__(self) -> int: ...
+
+@final
+class Material:
+    @staticmethod
+    def linear_elastic_e_nu(e: float, nu: float) -> Material: ...
+    @staticmethod
+    def linear_elastic_e_one_minus_2nu(e: float, one_minus_2nu: float) -> Material: ...
+    @staticmethod
+    def linear_elastic_k_mu(k: float, mu: float) -> Material: ...
+    @property
+    def bulk_modulus(self) -> float: ...
+    @property
+    def shear_modulus(self) -> float: ...
+
+@final
+class Stage:
+    def __new__(
+        cls,
+        particles: Particles,
+        location: Location,
+        materials: Sequence[Material],
+        kinematics: str,
+        basis: str,
+    ) -> Stage: ...
+    def evaluate(
+        self,
+        u: _Floats,
+        volumetric: _Floats | None,
+        requests: Sequence[tuple[str, str, int]],
+        data: _Floats,
+    ) -> None: ...
+    def commit(self, u: _Floats, volumetric: _Floats | None) -> None: ...
+    def volume_strains(self, u: _Floats, volumetric: _Floats | None) -> _Floats: ...
+
+def interpolate(
+    location: Location, basis: str, components: int, coefficients: _Floats
+) -> _Floats: ...
+def basis_1d(
+    basis: str, n: int, cell: npt.NDArray[np.int64], t: _Floats
+) -> tuple[npt.NDArray[np.int64], _Floats]: ...
+def basis_len(basis: str, n: int) -> int: ...
+def gauss(n: int) -> tuple[_Floats, _Floats]: ...
+def densities(
+    location: Location,
+    volume: _Floats,
+    data: _Floats,
+    points: Sequence[tuple[int, int]],
+    rows: _Numbers,
+    columns: Sequence[int],
+    offset: int,
+    mean: bool,
+    out: _Floats,
+) -> None: ...
+def nodal_sums(location: Location, volume: _Floats, data: _Floats, basis: str) -> _Floats: ...
