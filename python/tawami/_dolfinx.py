@@ -297,21 +297,15 @@ class Space:
         return cpp.la.petsc.create_matrix(self.rectangle.mesh.comm, pattern)
 
 
-def assemble_matrix(
-    matrix: Any, form: Any, kernel: Kernel, constants: Array, packed: Array
-) -> None:
-    """Fill the matrix; `packed` has one row of coefficients per entity of the form."""
-    matrix.zeroEntries()
+def add_matrix(matrix: Any, form: Any, kernel: Kernel, constants: Array, packed: Array) -> None:
+    """Add to a matrix; `packed` has one row of coefficients per entity of the form."""
     coefficients = {(_key(kernel), 0): packed}
     cpp.fem.petsc.assemble_matrix(matrix, form, constants, coefficients, [])
-    matrix.assemble()
 
 
-def assemble_vector(form: Any, kernel: Kernel, constants: Array, packed: Array, size: int) -> Array:
-    """The assembled vector; `packed` as in :func:`assemble_matrix`."""
-    vector = np.zeros(size)
+def add_vector(vector: Array, form: Any, kernel: Kernel, constants: Array, packed: Array) -> None:
+    """Add to a vector; `packed` as in :func:`add_matrix`."""
     cpp.fem.assemble_vector(vector, form, constants, {(_key(kernel), 0): packed})
-    return vector
 
 
 def _key(kernel: Kernel) -> Any:

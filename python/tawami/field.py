@@ -66,8 +66,11 @@ class Field:
         self._points = {rule: self._point_indices(rule) for rule in DEGREE}
         self._packed: dict[int, Array] = {}
         entities = rectangle.entities(self._cells, None)
-        self._residual = self._space.form(compiled.residual.kernel, 1, entities)
-        self._tangent = self._space.form(compiled.tangent.kernel, 2, entities)
+        self._forms = {
+            id(integral): self._space.form(integral.kernel, rank, entities)
+            for rank, integrals in ((1, compiled.residual), (2, compiled.tangent))
+            for integral in integrals
+        }
         self._matrix: Any = None
         self._reduced: Any = None
 
@@ -111,15 +114,18 @@ class Field:
             coefficients: Increments of all fields.
             data: Particle data per rule, particles x columns.
         """
-        integral = self.compiled.residual
-        with self.stopwatch("pack"):
-            nodal = self.layout.extraction @ coefficients
-            packed = self._pack(integral, nodal, data)
-        with self.stopwatch("residual"):
-            vector = _dolfinx.assemble_vector(
-                self._residual, integral.kernel, self._constants(integral), packed, self._space.size
-            )
-            return np.asarray(self.layout.extraction.T @ vector)
+        vector = np.zeros(self._space.size)
+        nodal = self.layout.extraction @ coefficients
+        for integral in self.compiled.residual:
+            with self.stopwatch("pack"):
+                packed = self._pack(integral, nodal, data)
+            with self.stopwatch("residual"):
+                self._add_vector(vector, self._forms[id(integral)], integral, packed)
+        return np.asarray(self.layout.extraction.T @ vector)
+
+    def _add_vector(self, vector: Array, form: Any, integral: Integral, packed: Array) -> None:
+        constants = self._constants(integral)
+        _dolfinx.add_vector(vector, form, integral.kernel, constants, packed)
 
     def traction(self, edge: Edge, values: Array) -> Array:
         """External forces on all coefficients of a traction on an edge of the grid.
@@ -141,9 +147,8 @@ class Field:
         form = self._space.form(
             integral.kernel, 1, self.grid.rectangle.entities(cells[order], local)
         )
-        vector = _dolfinx.assemble_vector(
-            form, integral.kernel, self._constants(integral), packed, self._space.size
-        )
+        vector = np.zeros(self._space.size)
+        self._add_vector(vector, form, integral, packed)
         return -np.asarray(self.layout.extraction.T @ vector)
 
     def _edge_cells(self, edge: Edge) -> npt.NDArray[np.int32]:
@@ -162,12 +167,7 @@ class Field:
 
     def tangent(self, coefficients: Array, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
         """P^T K P as a PETSc matrix; it is overwritten by the next call."""
-        integral = self.compiled.tangent
-        with self.stopwatch("pack"):
-            nodal = self.layout.extraction @ coefficients
-            packed = self._pack(integral, nodal, data)
-        with self.stopwatch("tangent"):
-            matrix = self.full_tangent(packed)
+        matrix = self._assemble_tangent(coefficients, data)
         with self.stopwatch("reduction"):
             if self._reduced is None or self._reduced[0] is not reduction:
                 p = _petsc(self.layout.extraction @ reduction.selection, self.grid.comm)
@@ -176,14 +176,27 @@ class Field:
                 matrix.ptap(self._reduced[1], result=self._reduced[2])
         return self._reduced[2]
 
-    def full_tangent(self, packed: Array) -> Any:
+    def unreduced_tangent(self, coefficients: Array, data: Mapping[Rule, Array]) -> sp.csr_matrix:
+        """E^T K E, the tangent of :meth:`residual`."""
+        rows, columns, values = self._assemble_tangent(coefficients, data).getValuesCSR()
+        shape = (self._space.size, self._space.size)
+        matrix = sp.csr_matrix((values, columns, rows), shape=shape)
+        return sp.csr_matrix(self.layout.extraction.T @ matrix @ self.layout.extraction)
+
+    def _assemble_tangent(self, coefficients: Array, data: Mapping[Rule, Array]) -> Any:
         """K on the degrees of freedom of the mesh."""
-        integral = self.compiled.tangent
-        if self._matrix is None:
-            self._matrix = self._space.create_matrix(self._cells)
-        _dolfinx.assemble_matrix(
-            self._matrix, self._tangent, integral.kernel, self._constants(integral), packed
-        )
+        with self.stopwatch("tangent"):
+            if self._matrix is None:
+                self._matrix = self._space.create_matrix(self._cells)
+            self._matrix.zeroEntries()
+        nodal = self.layout.extraction @ coefficients
+        for integral in self.compiled.tangent:
+            with self.stopwatch("pack"):
+                packed = self._pack(integral, nodal, data)
+            with self.stopwatch("tangent"):
+                form, constants = self._forms[id(integral)], self._constants(integral)
+                _dolfinx.add_matrix(self._matrix, form, integral.kernel, constants, packed)
+        self._matrix.assemble()
         return self._matrix
 
 

@@ -327,17 +327,17 @@ class CompiledForm:
     Attributes:
         form: What it was compiled from.
         element: Element of all fields on the mesh: biquadratic displacement, bilinear others.
-        residual: Its integrals over cells.
-        traction: Its integrals over loaded edges, if it has any.
-        tangent: Derivative of `residual`.
+        residual: Its integrals over cells, one per quadrature rule.
+        traction: Its integral over loaded edges, if it has one.
+        tangent: Derivative of `residual`, one per quadrature rule.
         densities: Particle data per rule: each density with its first column.
     """
 
     form: Form
     element: Any
-    residual: Integral
+    residual: tuple[Integral, ...]
     traction: Integral | None
-    tangent: Integral
+    tangent: tuple[Integral, ...]
     densities: Mapping[Rule, Mapping[Density, int]]
 
     def columns(self, rule: Rule) -> int:
@@ -529,10 +529,26 @@ def _of_type(form: Any, kind: str) -> Any | None:
     return ufl.Form(integrals) if integrals else None
 
 
+def _by_rule(form: Any) -> list[Any]:
+    """One form per quadrature rule. FFCx 0.5 puts several rules into one kernel, but a field that is
+    evaluated under the rule with one point is then taken from there under the other rule as well,
+    and UFL 2022 takes two integrals of one integrand under two rules for one.
+    """
+    rules: dict[int, list[Any]] = {}
+    for integral in form.integrals():
+        rules.setdefault(integral.metadata()["quadrature_degree"], []).append(integral)
+    return [ufl.Form(rules[degree]) for degree in sorted(rules, reverse=True)]
+
+
 def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
     symbols = _Symbols(form, options)
     residual = symbols.residual()
     cells, edges = _of_type(residual, "cell"), _of_type(residual, "exterior_facet")
+    if edges is not None and symbols.increments in edges.coefficients():
+        raise FormError(
+            f"form {form.name}: the unknown fields in a term with ds: expected edge terms of the "
+            "traction t and the test functions only"
+        )
     if cells is None or len(residual.integrals()) > len(cells.integrals()) + (
         len(edges.integrals()) if edges is not None else 0
     ):
@@ -580,9 +596,9 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
     return CompiledForm(
         form=form,
         element=symbols.element,
-        residual=integral(cells),
+        residual=tuple(integral(part) for part in _by_rule(cells)),
         traction=integral(edges, facets=True) if edges is not None else None,
-        tangent=integral(tangent),
+        tangent=tuple(integral(part) for part in _by_rule(tangent)),
         densities=densities,
     )
 

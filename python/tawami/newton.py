@@ -92,7 +92,7 @@ class Newton:
                 self._place(rule, density, column)
         volumetric = list(compiled.form.fields.values())[1:]
         self.kind = volumetric[0][0] if volumetric else None
-        self.p_ref = float(np.sqrt(np.mean(particles.stress[:, :3].mean(axis=1) ** 2)))
+        self._p_ref = 0.0
 
     def _place(self, rule: Rule, density: Density, column: int) -> None:
         if isinstance(density.quantity, LawQuantity):
@@ -100,12 +100,14 @@ class Newton:
         elif isinstance(density.quantity, ParticleScalar):
             self.data[rule][:, column] = density.quantity.evaluate(self.constants)
 
-    def _evaluate(self, coefficients: Array) -> None:
+    def internal(self, coefficients: Array) -> Array:
+        """Internal forces and volume residual on all coefficients, at given increments."""
         with self.stopwatch("law"):
             for rule, requests in self._requests.items():
                 if requests:
                     fields = self.field.layout.split(coefficients)
                     self.stage.evaluate(*fields, requests, self.data[rule])
+        return self.field.residual(coefficients, self.data)
 
     def _measures(
         self, internal: Array, external: Array, coefficients: Array, reduction: Reduction
@@ -128,7 +130,7 @@ class Newton:
         strains = self.stage.volume_strains(*self.field.layout.split(coefficients))
         pressure = self.kind == "pressure"
         eps_v = strains[:, 1] / bulk if pressure else strains[:, 1]
-        scale = np.maximum(np.abs(strains[:, 0]), np.abs(eps_v)) + self.p_ref / bulk + STRAIN_FLOOR
+        scale = np.maximum(np.abs(strains[:, 0]), np.abs(eps_v)) + self._p_ref / bulk + STRAIN_FLOOR
         return (np.ones_like(bulk) if pressure else bulk), scale
 
     def _scale(self, matrix: Any, reduction: Reduction) -> Array:
@@ -165,13 +167,14 @@ class Newton:
             ConvergenceError: Not below the tolerance within `max_iterations`, or not finite.
             SingularError: The tangent cannot be solved; the message names the cells.
         """
+        mean_stress = self.particles.stress[:, :3].mean(axis=1)
+        self._p_ref = float(np.sqrt(np.mean(mean_stress**2)))
         unknowns = np.zeros(reduction.size)
         condition, symmetric = 1.0, True
         history: History = []
         while True:
             coefficients = reduction.selection @ unknowns + reduction.offset
-            self._evaluate(coefficients)
-            internal = self.field.residual(coefficients, self.data)
+            internal = self.internal(coefficients)
             history.append(self._measures(internal, external, coefficients, reduction))
             worst = max(m for m in history[-1] if m is not None)
             if worst < self.tolerance:

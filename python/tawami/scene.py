@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import scipy.sparse as sp
 
 from tawami import _rust, boundary
 from tawami.basis import BASES, Basis
@@ -69,7 +70,6 @@ class Scene:
         if not 0 < tolerance < 1:
             raise InputError(f"tolerance = {tolerance}: expected a number between 0 and 1")
         self.grid, self.basis = grid, basis
-        self.tolerance, self.max_iterations = tolerance, max_iterations
         self.form = Form.load(form)
         values, options = self.form.settings(parameters)
         materials = list(material) if isinstance(material, Sequence) else [material]
@@ -82,11 +82,9 @@ class Scene:
         self._compiled = compile_form(grid.comm, self.form, options)
         if self.form.kinematics == "mixed":
             self.particles.add_eps_v()
-        of = self.particles.material
-        self._constants = {
-            "K": np.array([m.bulk_modulus for m in materials])[of],
-            "mu": np.array([m.shear_modulus for m in materials])[of],
-        }
+        moduli = np.array([(m.bulk_modulus, m.shear_modulus) for m in materials])
+        of_particle = moduli[self.particles.material]
+        self._constants = {"K": of_particle[:, 0], "mu": of_particle[:, 1]}
         self.stopwatch = Stopwatch()
         with self.stopwatch("set-up"):
             self._field = Field(
@@ -96,6 +94,10 @@ class Scene:
         self._stage = _rust.Stage(
             self.particles, self._location, materials, self.form.kinematics, basis
         )
+        self._newton = Newton(
+            self._field, self._compiled, self._stage, self.particles, self._location,
+            self._constants, self.stopwatch, tolerance=tolerance, max_iterations=max_iterations,
+        )  # fmt: skip
         self._edges: list[tuple[Edge, int, Profile]] = []
         self._points: list[tuple[Sequence[float], int, float]] = []
         self._tractions: list[tuple[Edge, Profile, Profile]] = []
@@ -194,6 +196,26 @@ class Scene:
         nx, ny = self.grid.cells
         return np.bincount(self._location.cell, minlength=nx * ny)
 
+    def residual(self, coefficients: Array) -> Array:
+        """The form's integrals over particles and cells, for every test function, before supports.
+
+        Args:
+            coefficients: Increments of all fields: displacement (two per function, x fastest),
+                then the bilinear field, as `split` takes them apart.
+        """
+        return self._newton.internal(np.asarray(coefficients, dtype=float))
+
+    def tangent(self, coefficients: Array) -> sp.csr_matrix:
+        """Derivative of :meth:`residual` as the form's tangent gives it, before supports."""
+        coefficients = np.asarray(coefficients, dtype=float)
+        self._newton.internal(coefficients)
+        return self._field.unreduced_tangent(coefficients, self._newton.data)
+
+    @property
+    def num_coefficients(self) -> int:
+        """Number of coefficients of all fields, supports and empty cells included."""
+        return self._field.layout.size
+
     def solve(self) -> Solution:
         """Find equilibrium under the present supports and loads, and store it in the particles.
 
@@ -209,12 +231,7 @@ class Scene:
         with self.stopwatch("set-up"):
             reduction = self._reduction()
             external = self._external()
-        newton = Newton(
-            self._field, self._compiled, self._stage, self.particles, self._location,
-            self._constants, self.stopwatch, tolerance=self.tolerance,
-            max_iterations=self.max_iterations,
-        )  # fmt: skip
-        step = newton.solve(reduction, external)
+        step = self._newton.solve(reduction, external)
         self._stage.commit(*self._field.layout.split(step.coefficients))
         self._total = self._total + step.coefficients
         return Solution(self, step, reduction.size, self._total)

@@ -1,0 +1,86 @@
+"""What several test files share: small scenes and an independent sum over particles."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import tawami
+
+logging.disable(logging.INFO)  # the compilation of forms is talkative
+
+FORMS: dict[str, dict[str, Any]] = {
+    "u": {"form": "u"},
+    "u_bbar": {"form": "u_bbar"},
+    "u_epsv": {"form": "u_epsv", "alpha": 0.1},
+    "u_epsv_alpha0": {"form": "u_epsv", "alpha": 0.0},
+    "u_epsv_residual_based": {"form": "u_epsv", "alpha": 0.1, "stabilisation": "residual_based"},
+    "u_epsv_projection": {"form": "u_epsv", "alpha": 0.1, "stabilisation": "projection"},
+    "u_p": {"form": "u_p", "alpha": 0.1},
+}
+BASES = ("quadratic_spline", "bilinear", "biquadratic")
+
+
+def grid_of(cells: tuple[int, int] = (4, 3), h: float = 0.5) -> tawami.Grid:
+    """A grid away from the origin."""
+    return tawami.Grid(MPI.COMM_WORLD, origin=(-1.0, 0.5), h=h, cells=cells)
+
+
+def greville(basis: str, n: int) -> np.ndarray:
+    """Coordinates, in cells, of the coefficients that reproduce x; written out once more here."""
+    if basis == "quadratic_spline":
+        return np.array([0.0, *(np.arange(n) + 0.5), n])
+    return np.linspace(0, n, n + 1 if basis == "bilinear" else 2 * n + 1)
+
+
+def linear_field(
+    grid: tawami.Grid, basis: str, a: np.ndarray, gradient: np.ndarray
+) -> np.ndarray:
+    """Displacement coefficients of u = a + gradient (x - origin)."""
+    x, y = (grid.h * greville(basis, n) for n in grid.cells)
+    points = np.stack([np.tile(x, len(y)), np.repeat(y, len(x))], axis=1)
+    return (a + points @ np.asarray(gradient).T).ravel()
+
+
+@pytest.fixture(params=FORMS)
+def form(request: pytest.FixtureRequest) -> dict[str, Any]:
+    """Each shipped form with each of its stabilisations."""
+    return FORMS[request.param]
+
+
+@pytest.fixture(params=BASES)
+def basis(request: pytest.FixtureRequest) -> str:
+    """Each basis of the displacement."""
+    return str(request.param)
+
+
+@pytest.fixture
+def random_scene() -> Callable[..., tawami.Scene]:
+    """A scene of random particles of two materials; see `make`."""
+
+    def make(
+        count: int = 60,
+        seed: int = 0,
+        x: np.ndarray | None = None,
+        cells: tuple[int, int] = (4, 3),
+        **options: Any,
+    ) -> tawami.Scene:
+        random = np.random.default_rng(seed)
+        grid = grid_of(cells)
+        if x is None:
+            size = grid.h * np.array(cells)
+            x = grid.origin + size * random.random((count, 2))
+        body = tawami.Body(x, random.uniform(0.01, 0.1, len(x)))
+        materials = [
+            tawami.linear_elastic(E=2.0, nu=0.3),
+            tawami.linear_elastic(E=7.0, nu=0.49),
+        ]
+        numbers = random.integers(0, 2, len(x))
+        return tawami.Scene(grid, body, materials, material_of=numbers, **options)
+
+    return make

@@ -1,0 +1,161 @@
+//! Interpolation to particles reproduces polynomials; the particle stage commits what it computes.
+
+use std::sync::Arc;
+
+use ndarray::{Array1, Array2};
+use proptest::prelude::*;
+use tawami::basis::Basis;
+use tawami::constitutive::{check_materials, Operator, Part, Request, Stage};
+use tawami::error::Error;
+use tawami::grid::Grid;
+use tawami::interpolation::Field;
+use tawami::kinematics::{Increments, Kinematics};
+use tawami::material::{LinearElastic, Material};
+use tawami::particles::Particles;
+
+const CELLS: [usize; 2] = [4, 3];
+
+fn grid() -> Grid {
+    Grid::new([-1.0, 0.5], 0.5, CELLS).unwrap()
+}
+
+/// Coordinates, in cells, of the coefficients that reproduce a linear function.
+fn greville(basis: Basis, n: usize) -> Vec<f64> {
+    match basis {
+        Basis::QuadraticSpline => {
+            let inner = (0..n).map(|i| i as f64 + 0.5);
+            std::iter::once(0.0).chain(inner).chain(std::iter::once(n as f64)).collect()
+        }
+        Basis::Bilinear => (0..=n).map(|i| i as f64).collect(),
+        Basis::Biquadratic => (0..=2 * n).map(|i| 0.5 * i as f64).collect(),
+    }
+}
+
+/// Coefficients of u = a + G (x - origin).
+fn linear(grid: &Grid, basis: Basis, a: [f64; 2], g: [[f64; 2]; 2]) -> Vec<f64> {
+    let [xs, ys] = [0, 1].map(|axis| greville(basis, grid.cells[axis]));
+    let mut u = Vec::new();
+    for y in &ys {
+        for x in &xs {
+            u.extend((0..2).map(|k| a[k] + grid.h * (g[k][0] * x + g[k][1] * y)));
+        }
+    }
+    u
+}
+
+proptest! {
+    #[test]
+    fn linear_fields_and_their_gradients_are_reproduced(
+        a in [-1.0..1.0_f64, -1.0..1.0_f64],
+        g in [[-1.0..1.0_f64, -1.0..1.0_f64], [-1.0..1.0_f64, -1.0..1.0_f64]],
+        cell in 0usize..12, xi in [0.0..=1.0_f64, 0.0..=1.0_f64],
+    ) {
+        let grid = grid();
+        let ij = grid.cell_ij(cell);
+        for basis in [Basis::QuadraticSpline, Basis::Bilinear, Basis::Biquadratic] {
+            let coefficients = linear(&grid, basis, a, g);
+            let field: Field<2> = Field { grid, basis, coefficients: &coefficients };
+            let (value, gradient) = (field.value(cell, xi), field.gradient(cell, xi));
+            for k in 0..2 {
+                let offset: f64 = (0..2).map(|b| g[k][b] * grid.h * (ij[b] as f64 + xi[b])).sum();
+                prop_assert!((value[k] - a[k] - offset).abs() < 1e-13);
+                for b in 0..2 {
+                    prop_assert!((gradient[k][b] - g[k][b]).abs() < 1e-12);
+                }
+            }
+        }
+    }
+}
+
+fn one_particle(kinematics: Kinematics, p: f64) -> Particles {
+    let grid = grid();
+    let basis = Basis::QuadraticSpline;
+    let g = [[1e-3, 4e-4], [-2e-4, 5e-4]];
+    let u = linear(&grid, basis, [0.25, -0.5], g);
+    let v = vec![p; 5 * 4];
+    let mut particles = Particles::new(
+        Array2::from_shape_vec((1, 2), vec![0.3, 0.9]).unwrap(),
+        Array1::from_elem(1, 0.1),
+        Array1::zeros(1),
+    )
+    .unwrap();
+    let materials: Vec<Arc<dyn Material>> =
+        vec![Arc::new(LinearElastic::from_k_mu(5e3, 1e3).unwrap())];
+    if kinematics == Kinematics::Mixed {
+        particles.add_eps_v();
+    }
+    let location = grid.locate(particles.x.as_slice().unwrap()).unwrap();
+    let stage = Stage {
+        location: &location,
+        materials: &materials,
+        kinematics,
+        increments: Increments {
+            u: Field { grid, basis, coefficients: &u },
+            volumetric: Some(Field { grid, basis: Basis::Bilinear, coefficients: &v }),
+        },
+    };
+    let mut data = Array2::zeros((1, 3));
+    let request = Request { operator: Operator::Sigma, part: Part::Value, column: 0 };
+    stage.evaluate(&particles, &[request], data.view_mut()).unwrap();
+    stage.commit(&mut particles);
+    if kinematics != Kinematics::Deviatoric {
+        for (k, i) in [(0, 0), (1, 1), (2, 3)] {
+            assert_eq!(data[[0, k]], particles.stress[[0, i]]);
+        }
+    }
+    particles
+}
+
+#[test]
+fn each_kinematics_gives_its_stress() {
+    // eps = (1e-3, 5e-4, 0), gamma = 2e-4: div u = 1.5e-3, third of it 5e-4
+    let deviator = [1.0, 0.0, -1.0, 0.2]; // 2 mu dev [Pa], mu gamma
+    for (kinematics, field, mean) in [
+        (Kinematics::Displacement, 0.0, 7.5),
+        (Kinematics::Cell, 0.0, 7.5),
+        (Kinematics::Mixed, 2e-3, 10.0),
+        (Kinematics::Deviatoric, -3.0, -3.0),
+    ] {
+        let particles = one_particle(kinematics, field);
+        for (i, s) in deviator.iter().enumerate() {
+            let expected = s + if i < 3 { mean } else { 0.0 };
+            let got = particles.stress[[0, i]];
+            assert!((got - expected).abs() < 1e-12, "{kinematics:?} {i}: {got} {expected}");
+        }
+        assert!((particles.displacement[[0, 0]] - 0.25 - 1e-3 * 1.3 - 4e-4 * 0.4).abs() < 1e-15);
+        assert_eq!(particles.eps_v.is_some(), kinematics == Kinematics::Mixed);
+    }
+}
+
+#[test]
+fn materials_are_checked_before_anything_runs() {
+    let n = |k: u32| {
+        let x = Array2::from_elem((2, 2), 1.0);
+        Particles::new(x, Array1::ones(2), Array1::from_vec(vec![0, k])).unwrap()
+    };
+    let laws: Vec<Arc<dyn Material>> = vec![
+        Arc::new(LinearElastic::from_k_mu(1.0, 1.0).unwrap()),
+        Arc::new(LinearElastic::from_e_nu(1.0, 0.5).unwrap()),
+    ];
+    let check = |k, kinematics| check_materials(&n(k), &laws, kinematics);
+    assert_eq!(check(0, Kinematics::Mixed), Ok(()));
+    assert_eq!(check(1, Kinematics::Deviatoric), Ok(()));
+    assert_eq!(check(1, Kinematics::Mixed), Err(Error::Incompressible { index: 1 }));
+    let unknown = Error::UnknownMaterial { index: 1, material: 2, count: 2 };
+    assert_eq!(check(2, Kinematics::Mixed), Err(unknown));
+}
+
+#[test]
+fn particle_arrays_are_checked() {
+    let make = |x: f64, v: f64| {
+        let x = Array2::from_elem((2, 2), x);
+        Particles::new(x, Array1::from_vec(vec![1.0, v]), Array1::zeros(2))
+    };
+    assert!(make(0.0, 1.0).is_ok());
+    assert!(matches!(make(f64::NAN, 1.0), Err(Error::NotFinite { name: "x", count: 4, .. })));
+    assert!(matches!(make(0.0, -1.0), Err(Error::Volume { index: 1, .. })));
+    let empty = Particles::new(Array2::zeros((0, 2)), Array1::zeros(0), Array1::zeros(0));
+    assert_eq!(empty.unwrap_err(), Error::NoParticles);
+    let short = Particles::new(Array2::zeros((2, 2)), Array1::ones(3), Array1::zeros(2));
+    assert!(matches!(short, Err(Error::Shape { name: "volume", .. })));
+}

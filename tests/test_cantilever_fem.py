@@ -1,0 +1,39 @@
+"""The FEM-only beam: reference values, and that it shares nothing with tawami."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from cases.cantilever import fem
+
+
+@pytest.mark.parametrize(
+    ("support", "n", "error", "tolerance"),
+    [
+        ("exact", 8, -0.0015, 0.0002),
+        ("paper", 8, 9.55, 0.01),
+        ("clamped", 8, -5.857, 0.002),
+        ("clamped", 16, -5.674, 0.002),
+        ("clamped", 32, -5.593, 0.002),
+    ],
+)
+def test_taylor_hood(support, n, error, tolerance):
+    assert fem.solve("fem_taylor_hood", support, n).error_percent == pytest.approx(
+        error, abs=tolerance
+    )
+
+
+@pytest.mark.parametrize("method", fem.METHODS)
+def test_orders_on_the_smooth_beam(method):
+    coarse, fine = (fem.solve(method, "exact", n) for n in (4, 8))
+    order = {"fem_q2": 3.5, "fem_taylor_hood": 2.5, "fem_q1_bbar": 1.9}[method]
+    assert abs(coarse.error_percent / fine.error_percent) > 2**order
+    assert coarse.mean_stress_l2 / fine.mean_stress_l2 > 2**1.9
+
+
+def test_it_imports_nothing_of_tawami():
+    code = "import sys, cases.cantilever.fem; sys.exit(any(m.startswith('tawami') for m in sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

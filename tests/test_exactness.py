@@ -1,0 +1,167 @@
+"""The dolfinx matrix equals a sum over particles that shares no code with it, to round-off."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import BASES, FORMS, grid_of
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import BSpline
+
+import tawami
+
+UNIT = np.array([1.0, 1.0, 1.0, 0.0])
+#: Work-conjugate metric: the fourth strain is gamma = 2 eps_xy.
+ISOTROPIC = np.diag([2.0, 2.0, 2.0, 1.0])
+DEV = np.eye(4) - np.outer(UNIT, UNIT) / 3
+
+
+def functions_1d(basis: str, n: int, s: float, cell: int) -> np.ndarray:
+    """Values, first and second derivatives (3 x functions) at s, in cells; `cell` picks the side."""
+    if basis == "quadratic_spline":
+        knots = np.array([0, 0, *range(n + 1), n, n], dtype=float)
+        return np.array([
+            [BSpline(knots, np.eye(n + 2)[i], 2).derivative(d)(s) if d < 2 else
+             BSpline(knots, np.eye(n + 2)[i], 2).derivative(2)(cell + 0.5) for i in range(n + 2)]
+            for d in range(3)
+        ])  # fmt: skip
+    degree = 1 if basis == "bilinear" else 2
+    nodes = np.linspace(0, 1, degree + 1)
+    out = np.zeros((3, degree * n + 1))
+    for a in range(degree + 1):
+        others = np.delete(nodes, a)
+        polynomial = np.poly1d(others, r=True) / np.prod(nodes[a] - others)
+        for d in range(3):
+            out[d, degree * cell + a] = (polynomial.deriv(d) if d else polynomial)(s - cell)
+    return out
+
+
+class Sum:
+    """The bilinear form of elasticity, particle by particle."""
+
+    def __init__(self, scene: tawami.Scene, options: dict[str, object]) -> None:
+        self.scene, self.options = scene, options
+        grid, self.h = scene.grid, scene.grid.h
+        self.cells = [
+            np.minimum(np.floor((x - grid.origin) / grid.h + 1e-12), np.array(grid.cells) - 1)
+            for x in scene.particles.x
+        ]
+
+    def at(self, basis: str, s: np.ndarray, cell: np.ndarray) -> list[list[np.ndarray]]:
+        """Table [dx][dy] of the derivatives (per metre) of all products, x fastest."""
+        fx, fy = (
+            functions_1d(basis, self.scene.grid.cells[a], s[a], int(cell[a])) for a in range(2)
+        )
+        return [
+            [np.outer(fy[b], fx[a]).ravel() / self.h ** (a + b) for b in range(3)]
+            for a in range(3)
+        ]
+
+    def matrix(self) -> np.ndarray:
+        form, alpha = self.options["form"], float(self.options.get("alpha", 0.0))
+        grid, particles = self.scene.grid, self.scene.particles
+        materials = [(2 / 2.6, 2 / 1.2), (7 / 2.98, 7 / 0.06)]  # mu, K of (2, 0.3), (7, 0.49)
+        total = None
+        mean_ratio = {}
+        for p, cell in enumerate(self.cells):
+            mu, bulk = materials[particles.material[p]]
+            entry = mean_ratio.setdefault(tuple(cell), [0.0, 0.0])
+            entry[0] += particles.volume[p]
+            entry[1] += particles.volume[p] * bulk**2 / mu
+        for p, cell in enumerate(self.cells):
+            mu, bulk = materials[particles.material[p]]
+            s = (particles.x[p] - grid.origin) / self.h
+            n = self.at(self.scene.basis, s, cell)
+            centre = self.at(self.scene.basis, cell + 0.5, cell)
+            m = self.at("bilinear", s, cell)
+            size_u, size_v = 2 * len(n[0][0]), len(m[0][0])
+            strain = np.zeros((4, size_u))
+            strain[0, 0::2], strain[1, 1::2] = n[1][0], n[0][1]
+            strain[3, 0::2], strain[3, 1::2] = n[0][1], n[1][0]
+            div = UNIT @ strain
+            div_centre = np.zeros(size_u)
+            div_centre[0::2], div_centre[1::2] = centre[1][0], centre[0][1]
+            deviatoric = mu * (DEV @ strain).T @ ISOTROPIC @ (DEV @ strain)
+            if total is None:
+                total = np.zeros((size_u + size_v,) * 2 if form in ("u_epsv", "u_p") else (size_u,) * 2)
+            volume = particles.volume[p]
+            uu = deviatoric.copy()
+            if form == "u":
+                uu += bulk * np.outer(div, div)
+            if form == "u_bbar":
+                uu += bulk * np.outer(div_centre, div_centre)
+            total[:size_u, :size_u] += volume * uu
+            if form not in ("u_epsv", "u_p"):
+                continue
+            weight, mass = (bulk, bulk) if form == "u_epsv" else (1.0, 1 / bulk)
+            value, gradient = m[0][0], np.array([m[1][0], m[0][1]])
+            total[:size_u, size_u:] += volume * weight * np.outer(div, value)
+            total[size_u:, :size_u] += volume * weight * np.outer(value, div)
+            total[size_u:, size_u:] -= volume * mass * np.outer(value, value)
+            factor = bulk**2 / mu if form == "u_epsv" else 1 / mu
+            kind = self.options.get("stabilisation", "laplacian")
+            if kind != "projection":
+                total[size_u:, size_u:] -= (
+                    volume * alpha * self.h**2 * factor * gradient.T @ gradient
+                )
+            if kind == "residual_based":
+                div_s = np.zeros((2, size_u))  # div(2 dev sym grad u), in the plane
+                div_s[0, 0::2] = 2 * n[2][0] + n[0][2] - 2 / 3 * n[2][0]
+                div_s[0, 1::2] = n[1][1] - 2 / 3 * n[1][1]
+                div_s[1, 1::2] = 2 * n[0][2] + n[2][0] - 2 / 3 * n[0][2]
+                div_s[1, 0::2] = n[1][1] - 2 / 3 * n[1][1]
+                total[size_u:, :size_u] -= (
+                    volume * bulk * alpha * self.h**2 * gradient.T @ div_s
+                )
+        if self.options.get("stabilisation") == "projection":
+            points, weights = np.polynomial.legendre.leggauss(3)
+            for cell, (volume, ratio) in mean_ratio.items():
+                middle = self.at("bilinear", np.array(cell) + 0.5, np.array(cell))[0][0]
+                for a, wa in zip(points, weights, strict=True):
+                    for b, wb in zip(points, weights, strict=True):
+                        s = np.array(cell) + 0.5 + 0.5 * np.array([a, b])
+                        part = self.at("bilinear", s, np.array(cell))[0][0] - middle
+                        area = wa * wb / 4 * self.h**2
+                        total[size_u:, size_u:] -= alpha * ratio / volume * area * np.outer(part, part)
+        return total
+
+
+def compare(scene: tawami.Scene, options: dict[str, object]) -> None:
+    mine = scene.tangent(np.zeros(scene.num_coefficients)).toarray()
+    reference = Sum(scene, options).matrix()
+    assert mine.shape == reference.shape
+    assert np.abs(mine - reference).max() < 1e-12 * np.abs(reference).max()
+
+
+def test_random_particles_of_two_materials(random_scene, form, basis):
+    compare(random_scene(basis=basis, **form), form)
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_one_particle_in_a_cell(random_scene, name):
+    x = np.array([[-0.9, 0.6], [-0.9, 1.9], [0.95, 1.27], [0.1, 0.77], [0.2, 0.83]])
+    compare(random_scene(x=x, **FORMS[name]), FORMS[name])
+
+
+@pytest.mark.parametrize("name", ["u_epsv", "u_bbar", "u_epsv_projection"])
+def test_particles_on_edges_and_corners_of_cells(random_scene, name):
+    x = np.array([[-1, 0.5], [1, 2], [-0.5, 1], [0, 1.2], [-0.3, 1.5], [1, 0.5], [0.25, 2.0]])
+    compare(random_scene(x=x, **FORMS[name]), FORMS[name])
+
+
+@settings(max_examples=15, deadline=None)
+@given(data=st.data())
+def test_any_cloud_of_particles(data):
+    cells = (data.draw(st.integers(1, 4)), data.draw(st.integers(1, 3)))
+    coordinate = st.one_of(st.floats(0, 1), st.sampled_from([0.0, 0.25, 0.5, 1.0]))
+    points = data.draw(st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=12))
+    basis = data.draw(st.sampled_from(BASES))
+    grid = grid_of(cells)
+    x = grid.origin + grid.h * np.array(cells) * np.array(points)
+    laws = [tawami.linear_elastic(E=2.0, nu=0.3), tawami.linear_elastic(E=7.0, nu=0.49)]
+    numbers = data.draw(st.lists(st.integers(0, 1), min_size=len(x), max_size=len(x)))
+    volumes = np.linspace(0.01, 0.2, len(x))
+    body = tawami.Body(x, volumes)
+    scene = tawami.Scene(grid, body, laws, material_of=numbers, basis=basis, form="u_epsv", alpha=0.3)
+    compare(scene, {"form": "u_epsv", "alpha": 0.3})

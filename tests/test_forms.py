@@ -1,0 +1,197 @@
+"""The contract of a weak form: written anywhere, checked with a sentence, compiled once."""
+
+from __future__ import annotations
+
+import sys
+import textwrap
+
+import numpy as np
+import pytest
+from conftest import FORMS
+from ufl import div, dot, grad, inner, sym
+
+import tawami
+from tawami.formulation import Form, ParticleScalar, shipped
+
+# A form in a driver script: this module is one. It is the shipped u_epsv, written differently.
+fields = {"v": ("displacement", "w"), "theta": ("volumetric_strain", "r")}
+kinematics = "mixed"
+parameters = {"beta": {"default": 0.2, "minimum": 0.0}}
+
+
+def residual(v, theta, w, r, s, sigma_m, K, mu, h, t, ds, sum_p, beta):
+    """As eqs. (1) and (2), stress split into deviator and mean, stabilisation from two constants."""
+    momentum = sum_p(s, grad(w)) + sum_p(sigma_m, div(w)) - dot(t, w) * ds
+    volume = sum_p(K, r * div(v)) - sum_p(K, r * theta)
+    return momentum + volume - beta * h**2 * sum_p(K * K / mu, inner(grad(r), grad(theta)))
+
+
+def test_a_form_in_a_driver_script_works_like_a_shipped_one(random_scene):
+    mine = random_scene(form=sys.modules[__name__], beta=0.3)
+    shipped_one = random_scene(form="u_epsv", alpha=0.3)
+    c = np.random.default_rng(0).standard_normal(mine.num_coefficients)
+    np.testing.assert_allclose(mine.residual(c), shipped_one.residual(c), rtol=1e-11, atol=1e-11)
+    difference = abs(mine.tangent(c) - shipped_one.tangent(c)).max()
+    assert difference < 1e-13 * abs(mine.tangent(c)).max()
+
+
+def test_a_form_in_a_file_works_like_a_shipped_one(random_scene, tmp_path):
+    path = tmp_path / "my_form.py"
+    path.write_text(
+        textwrap.dedent(
+            """
+            from ufl import dot, grad
+            fields = {"u": ("displacement", "w")}
+            kinematics = "displacement"
+            def residual(w, sigma, t, sum_p, ds):
+                return sum_p(sigma, grad(w)) - dot(t, w) * ds
+            """
+        )
+    )
+    scenes = [random_scene(form=f) for f in (path, "u")]
+    c = np.random.default_rng(0).standard_normal(scenes[0].num_coefficients)
+    np.testing.assert_array_equal(*[s.residual(c) for s in scenes])
+
+
+def test_every_shipped_form_is_in_the_tests():
+    assert {options["form"] for options in FORMS.values()} == set(shipped())
+
+
+def test_a_form_nonlinear_in_the_fields_has_the_right_tangent(random_scene):
+    """The derivative is UFL's: a penalty on (div u)^3 added to the displacement form."""
+
+    def cubic(u, w, sigma, K, sum_p, cell_mean, dx, dx_c):
+        extra = cell_mean(K) * div(u) ** 2 * dot(u, w)
+        return (
+            sum_p(sigma, grad(w))
+            + sum_p(K, div(u) ** 3 * div(w))
+            + sum_p(inner(sym(grad(u)), sym(grad(w))) * dot(u, u))
+            + extra * dx
+            + extra * dx_c
+        )
+
+    form = Form({"u": ("displacement", "w")}, "displacement", cubic)
+    scene = random_scene(form=form)
+    random = np.random.default_rng(3)
+    c, d = random.standard_normal((2, scene.num_coefficients))
+    step = 1e-5
+    difference = (scene.residual(c + step * d) - scene.residual(c - step * d)) / (2 * step)
+    predicted = scene.tangent(c) @ d
+    assert np.abs(difference - predicted).max() < 1e-8 * np.abs(predicted).max()
+
+
+def test_newton_converges_quadratically_on_a_nonlinear_form():
+    """Stiffening spring on div u: the iterations are more than one and the last ones square."""
+    from conftest import grid_of
+
+    def stiff(u, w, sigma, mu, sum_p, t, ds):
+        return sum_p(sigma, grad(w)) + sum_p(3e3 * mu, div(u) ** 3 * div(w)) - dot(t, w) * ds
+
+    form = Form({"u": ("displacement", "w")}, "displacement", stiff)
+    grid = grid_of()
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=3)
+    material = tawami.linear_elastic(E=1e3, nu=0.2)
+    scene = tawami.Scene(grid, body, material, form=form, tolerance=1e-12)
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    scene.traction("right", (120.0, 20.0))
+    solution = scene.solve()
+    measures = [m for m, _ in solution.history]
+    assert 3 < solution.iterations < 12
+    assert measures[-1] < 1e-12
+    quadratic = [b for a, b in zip(measures, measures[1:], strict=False) if a < 1e-2 and b > 1e-11]
+    assert quadratic
+    assert measures[-2] < 1e-5
+
+
+def form_of(function, fields=None, kinematics="displacement", **more):
+    return Form(fields or {"u": ("displacement", "w")}, kinematics, function, **more)
+
+
+BOTH = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
+WRONG = [
+    (lambda: Form.load("u_eps"), r"'u_eps' is not shipped: expected one of 'u', 'u_bbar'"),
+    (lambda: Form.load("nowhere.py"), "'nowhere.py' does not exist"),
+    (lambda: Form.load(textwrap), "'textwrap' declares no 'fields', 'kinematics', 'residual'"),
+    (lambda: form_of(None, {"u": ("velocity", "w")}), "kind 'velocity': expected one of"),
+    (lambda: form_of(None, kinematics="large"), "kinematics = 'large': expected one of"),
+    (lambda: form_of(None, kinematics="mixed"), "'mixed' needs fields of the kinds"),
+    (lambda: form_of(None, BOTH), "'displacement' needs fields of the kinds 'displacement'"),
+]
+
+
+@pytest.mark.parametrize(("make", "message"), WRONG)
+def test_wrong_declarations(make, message):
+    with pytest.raises(tawami.FormError, match=message):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (lambda w, sigma, porosity: 0, r"asks for 'porosity', which is neither a field nor .* 'K'"),
+        (lambda w, sigma: 3.0, "residual returned float: expected a UFL form"),
+        (lambda u, sum_p, K: sum_p(K, div(u)), "test function 'w' of field 'u' does not appear"),
+        (lambda u, w, sum_p, K: sum_p(K, div(u)), "test function 'w' of field 'u' does not appear"),
+        (lambda w, sum_p, sigma: sum_p(sigma, w), r"shape \(2, 2\) and an expression of shape \(2,\)"),
+        (lambda w, sum_p: sum_p(1, 2, 3), "not 3 arguments"),
+        (lambda w, sum_p: sum_p(w, div(w)), "takes a particle quantity"),
+        (lambda w, sum_c, sigma_m: sum_c(sigma_m, div(w)), "needs kinematics 'cell'"),
+        (lambda w, sum_p, sigma: sum_p(sigma * 2, grad(w)), "its residual raised"),
+        (lambda w, sum_p, K: sum_p(K * div(w), div(w)), "a particle constant combines with numbers"),
+        (lambda w, cell_mean, sigma, dx: cell_mean(sigma) * div(w) * dx, "cell_mean takes constants"),
+        (lambda u, w, sum_p: sum_p(div(w) ** 2 * div(u)), "linear in one test function"),
+        (lambda u, w, sigma, sum_p, ds: sum_p(sigma, grad(w)) + dot(u, w) * ds, "the unknown fields in"),
+        (lambda t, w, ds: dot(t, w) * ds, "expected integrals over particles or cells"),
+    ],
+)
+def test_wrong_residuals(random_scene, function, message):
+    with pytest.raises(tawami.FormError, match=message):
+        random_scene(form=form_of(function))
+
+
+def test_a_forgotten_test_function_of_the_second_field(random_scene):
+    form = form_of(lambda w, q, sigma, sum_p: sum_p(sigma, grad(w)), BOTH, "mixed")
+    with pytest.raises(tawami.FormError, match="'q' of field 'eps_v' does not appear"):
+        random_scene(form=form)
+
+
+def test_a_file_with_a_mistake_is_named(tmp_path):
+    path = tmp_path / "broken.py"
+    path.write_text("fields = {")
+    with pytest.raises(tawami.FormError, match=r"'broken.py' cannot be read: SyntaxError"):
+        Form.load(path)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"alpha": -0.1}, "alpha = -0.1: expected a finite number from 0"),
+        ({"alpha": float("nan")}, "alpha = nan"),
+        ({"alpha": "much"}, "alpha = 'much': expected a number"),
+        ({"stabilisation": "pspg"}, "stabilisation = 'pspg': expected one of 'laplacian'"),
+        ({"gamma": 1}, "form 'u_epsv' has no parameter 'gamma': it has 'alpha', 'stabilisation'"),
+    ],
+)
+def test_wrong_parameters(random_scene, given, message):
+    with pytest.raises(tawami.InputError, match=message):
+        random_scene(form="u_epsv", **given)
+
+
+def test_parameters_change_without_compiling_again(random_scene):
+    a, b = (random_scene(form="u_epsv", alpha=alpha) for alpha in (0.1, 0.7))
+    assert a._compiled is b._compiled
+    c = np.ones(a.num_coefficients)
+    c[::3] = 0
+    assert np.abs(a.residual(c) - b.residual(c)).max() > 1e-3
+
+
+def test_arithmetic_of_particle_constants():
+    values = {"a": np.array([1.0, 2.0]), "b": np.array([4.0, 0.5])}
+    a, b = (ParticleScalar(n, lambda v, n=n: v[n]) for n in "ab")
+    expression = (2 * a + b**2 / a - 1) / (3 - b) + 1 / a
+    x, y = values["a"], values["b"]
+    expected = (2 * x + y**2 / x - 1) / (3 - y) + 1 / x
+    np.testing.assert_allclose(expression.evaluate(values), expected)
+    assert a * b == a * b
+    assert a * b != a / b

@@ -1,0 +1,211 @@
+"""Supports: elimination, projection, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from conftest import grid_of
+from hypothesis import given
+from hypothesis import strategies as st
+from mpi4py import MPI
+
+import tawami
+from tawami import _rust, boundary
+from tawami.basis import values_1d
+from tawami.errors import SupportError
+from tawami.reduction import Reduction
+
+
+def beam(form="u_epsv", basis="quadratic_spline", cells=(4, 3), **options):
+    grid = grid_of(cells)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=3)
+    material = tawami.linear_elastic(E=3e3, nu=0.4999)
+    return tawami.Scene(grid, body, material, form=form, basis=basis, **options)
+
+
+@pytest.mark.parametrize("point", [(-1.0, 1.25), (-1.0, 1.0), (-0.63, 1.87), (1.0, 2.0)])
+@pytest.mark.parametrize("value", [0.0, 3e-3])
+def test_point_constraint_by_elimination_is_that_by_multiplier(basis, point, value):
+    scene = beam(basis=basis)
+    scene.fix("left", "x", 1e-3)
+    scene.hold(point, "y", value)
+    scene.hold((0.3, 0.9), "y", -value)
+    scene.traction("right", (0.5, -1.0))
+    solution = scene.solve()
+
+    # the same with Lagrange multipliers, by scipy
+    n = scene.num_coefficients
+    matrix = scene.tangent(np.zeros(n))
+    held = boundary.held_edge(scene.grid, basis, scene._field.active, "left", 0, 1e-3)
+    rows = [sp.csr_matrix(([1.0], ([0], [k])), shape=(1, n)) for k in held.indices]
+    values = list(held.values)
+    for place, v in ((point, value), ((0.3, 0.9), -value)):
+        p = boundary.held_point(scene.grid, basis, scene._field.active, place, 1, v)
+        rows.append(sp.csr_matrix((p.weights, (np.zeros(len(p.indices)), p.indices)), shape=(1, n)))
+        values.append(v)
+    b = sp.vstack(rows)
+    saddle = sp.bmat([[matrix, b.T], [b, None]], format="csc")
+    right = np.concatenate([scene._external(), values])
+    expected = np.linalg.solve(saddle.toarray(), right)[:n]
+    mine = np.concatenate([solution.u, solution.volumetric])
+    assert np.abs(mine - expected).max() < 1e-9 * np.abs(expected).max()
+    assert solution.displacement(point)[1] == pytest.approx(value, abs=1e-15)
+
+
+def test_profiles_are_projected_in_l2_and_reproduced_where_the_basis_can(basis):
+    scene = beam(basis=basis)
+    linear = boundary.held_edge(
+        scene.grid, basis, scene._field.active, "top", 0, lambda x, y: 2 + 3 * x
+    )
+    width = len(linear.indices)
+    u = np.zeros(scene._field.layout.num_displacement)
+    u[linear.indices] = linear.values
+    for x in np.linspace(-1, 1, 7):
+        location = boundary.locate_point(scene.grid, (x, scene.grid.upper[1]), "test")
+        assert _rust.interpolate(location, basis, 2, u)[0, 0] == pytest.approx(2 + 3 * x, abs=1e-13)
+    # a cubic is not in the space: the error of the projection is orthogonal to it
+    cubic = boundary.held_edge(scene.grid, basis, scene._field.active, "top", 0, lambda x, y: x**3)
+    t, w = np.polynomial.legendre.leggauss(6)
+    total = np.zeros(width)
+    for cell in range(4):
+        s = 0.5 + 0.5 * t
+        functions = values_1d(basis, 4, np.full(6, cell), s).toarray()
+        x = -1 + 0.5 * (cell + s)
+        total += functions.T @ (w * (functions @ cubic.values - x**3))
+    assert np.abs(total).max() < 1e-13
+
+
+FREE = {
+    "translation in x, translation in y, rotation about": [],
+    "translation in y$": [("fix", "left", "x")],
+    "translation in x$": [("fix", "bottom", "y")],
+    r"rotation about \(-1, 1\.25\)": [("hold", (-1, 1.25), "x"), ("hold", (-1, 1.25), "y")],
+    r"rotation about \(-1, 2\)": [("hold", (1, 2), "x"), ("hold", (-1, 0.5), "y")],
+}
+
+
+@pytest.mark.parametrize("motion", FREE)
+def test_free_rigid_motions_are_named(motion):
+    scene = beam()
+    for kind, where, component in FREE[motion]:
+        getattr(scene, kind)(where, component)
+    scene.traction("right", (0.0, -1.0))
+    with pytest.raises(SupportError, match=motion.rstrip("$")) as caught:
+        scene.solve()
+    if motion.endswith("$"):
+        assert "rotation" not in str(caught.value)
+    assert not scene.particles.stress.any()
+
+
+def test_supports_that_contradict_each_other_are_refused():
+    scene = beam()
+    scene.fix("left", "x", 0.0)
+    scene.fix("bottom", "x", 1e-3)
+    scene.fix("bottom", "y")
+    with pytest.raises(SupportError, match="different displacements where they meet"):
+        scene.solve()
+    scene = beam()
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    scene.hold((-1.0, 1.0), "y", 1e-3)
+    with pytest.raises(SupportError, match="other supports already give this point"):
+        scene.solve()
+
+
+def test_the_same_support_twice_is_the_support_once():
+    solutions = []
+    for times in (1, 2):
+        scene = beam()
+        for _ in range(times):
+            scene.fix("left", "x")
+            scene.hold((-1.0, 1.25), "y")
+        scene.traction("right", (0.0, -1.0))
+        solutions.append(scene.solve().u)
+    np.testing.assert_array_equal(*solutions)
+
+
+def test_a_support_that_misses_the_body_is_refused():
+    grid = grid_of()
+    body = tawami.box(grid, grid.origin, (0.0, grid.upper[1]))
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3))
+    scene.fix("right", "x")
+    with pytest.raises(SupportError, match=r"fix\(edge='right'\): no cell"):
+        scene.solve()
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3))
+    scene.hold((0.9, 1.0), "y")
+    with pytest.raises(SupportError, match="lies in a cell without particles"):
+        scene.solve()
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3))
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    scene.traction("right", (0.0, -1.0))
+    with pytest.raises(SupportError, match=r"traction\(edge='right'\): no cell"):
+        scene.solve()
+
+
+def test_loading_in_two_steps_is_loading_in_one():
+    def fixed():
+        scene = beam()
+        scene.fix("left", "x", 1e-3)
+        scene.fix("left", "y")
+        return scene
+
+    at_once = fixed()
+    at_once.traction("right", (2.0, -1.0))
+    once = at_once.solve()
+    stepwise = fixed()
+    stepwise.traction("right", (1.5, 0.0))
+    stepwise.solve()
+    stepwise.traction("right", (0.5, -1.0))
+    twice = stepwise.solve()
+    np.testing.assert_allclose(twice.u, once.u, rtol=0, atol=1e-9 * np.abs(once.u).max())
+    scale = np.abs(at_once.particles.stress).max()
+    np.testing.assert_allclose(
+        stepwise.particles.stress, at_once.particles.stress, rtol=0, atol=1e-9 * scale
+    )
+    # nothing left to do: no iteration, no change
+    before = np.array(stepwise.particles.stress)
+    assert stepwise.solve().iterations == 0
+    np.testing.assert_allclose(stepwise.particles.stress, before, rtol=0, atol=1e-12 * scale)
+
+
+@pytest.mark.parametrize("basis", ["bilinear", "biquadratic"])
+def test_cells_without_particles_do_not_change_the_answer(basis):
+    """Lagrange functions on the cells of the body are the same however far the grid goes on (open
+    splines are not: they are clamped at the end of the grid).
+    """
+
+    def solve(extra):
+        grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(8 + extra, 4 + extra))
+        body = tawami.box(grid, (0, 0), (2, 1), per_axis=3)
+        material = tawami.linear_elastic(E=3e3, nu=0.4999)
+        scene = tawami.Scene(grid, body, material, basis=basis)
+        scene.fix("left", "x")
+        scene.fix("bottom", "y", lambda x, y: 1e-3 * x**2)
+        return scene.solve()
+
+    tight, loose = solve(0), solve(5)
+    assert loose.unknowns == tight.unknowns
+    stresses = [np.array(s.scene.particles.stress) for s in (tight, loose)]
+    assert np.abs(stresses[1] - stresses[0]).max() < 1e-9 * np.abs(stresses[0]).max()
+
+
+@given(a=st.floats(-1, 1), b=st.floats(0.5, 2.0))
+def test_hold_anywhere_holds_there(a, b):
+    scene = beam()
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    if a > -0.99:
+        scene.hold((a, b), "y", 1e-3)
+        assert scene.solve().displacement((a, b))[1] == pytest.approx(1e-3, abs=1e-14)
+
+
+def test_reduction_selects_active_unsupported_coefficients_once():
+    scene = beam()
+    layout = scene._field.layout
+    held = [boundary.held_edge(scene.grid, scene.basis, scene._field.active, "left", k, 0.0)
+            for k in range(2)]  # fmt: skip
+    reduction = Reduction(layout, held, [])
+    assert reduction.size == layout.size - 2 * (3 + 2)
+    assert (reduction.selection.sum(axis=0) == 1).all()
