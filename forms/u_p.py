@@ -8,7 +8,7 @@ parameters = {"alpha": {"default": 0.1, "minimum": 0.0}}
 
 
 def residual(u, p, w, q, sigma, K, mu, t, h, sum_p, ds, alpha):
-    """sigma = s + p I;  R_q(q) = sum_p V_p { q (div u - p/K) - alpha h^2/mu grad q . grad p }."""
+    """sigma + p I, p the increment; sigma old mean and new s;  R_q(q) = sum_p V_p { q (div u - p/K) - alpha h^2/mu grad q . grad p }."""
     R_u = sum_p(sigma, grad(w)) + sum_p(p * div(w)) - dot(t, w) * ds
     R_q = sum_p(q * div(u)) - sum_p(1 / K, q * p)
     return R_u + R_q - sum_p(1 / mu, alpha * h**2 * dot(grad(q), grad(p)))

@@ -61,7 +61,7 @@ impl Grid {
     }
 
     /// Cell and position in it along one axis; `None` outside. A particle on an inner edge belongs
-    /// to the cell on its positive side.
+    /// to the cell on its positive side (but see `leave_border_cells`).
     fn locate_1d(&self, axis: usize, x: f64) -> Option<(usize, f64)> {
         let n = self.cells[axis];
         let s = (x - self.origin[axis]) / self.h;
@@ -113,7 +113,29 @@ impl Grid {
                 y1: end(1),
             });
         }
+        for axis in 0..2 {
+            self.leave_border_cells(axis, &mut cell, &mut xi);
+        }
         Ok(Location::new(*self, cell, xi))
+    }
+}
+
+impl Grid {
+    /// Where all particles of a cell lie on its lower border, move them to the cell below: a body
+    /// that ends on a line of the grid takes no part in the cells beyond it, whose functions would
+    /// vanish, with their gradients, at every particle.
+    fn leave_border_cells(&self, axis: usize, cell: &mut [u32], xi: &mut [[f64; 2]]) {
+        let stride = if axis == 0 { 1 } else { self.cells[0] as u32 };
+        let mut inside = vec![false; self.num_cells()];
+        for (&c, t) in cell.iter().zip(xi.iter()) {
+            inside[c as usize] |= t[axis] > BORDER;
+        }
+        for (c, t) in cell.iter_mut().zip(xi) {
+            if !inside[*c as usize] && self.cell_ij(*c as usize)[axis] > 0 {
+                *c -= stride;
+                t[axis] = 1.0;
+            }
+        }
     }
 }
 

@@ -50,6 +50,13 @@ fn view<'py, T: Element, D: Dimension, O: PyClass>(
     unsafe { PyArray::borrow_from_array(array(&object), owner.clone().into_any()) }
 }
 
+/// The same array, not writeable from Python: the cells of the particles and their laws' constants
+/// are known from these values.
+fn read_only<T, D>(array: Bound<'_, PyArray<T, D>>) -> PyResult<Bound<'_, PyArray<T, D>>> {
+    array.call_method("setflags", (false,), None)?;
+    Ok(array)
+}
+
 #[pyclass(name = "Grid", frozen)]
 struct PyGrid(Grid);
 
@@ -135,8 +142,8 @@ impl PyParticles {
     }
 
     #[getter]
-    fn x<'py>(slf: &Bound<'py, Self>) -> Bound<'py, PyArray2<f64>> {
-        view(|p: &Self| &p.0.x, slf)
+    fn x<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        read_only(view(|p: &Self| &p.0.x, slf))
     }
 
     #[getter]
@@ -145,8 +152,8 @@ impl PyParticles {
     }
 
     #[getter]
-    fn material<'py>(slf: &Bound<'py, Self>) -> Bound<'py, PyArray1<u32>> {
-        view(|p: &Self| &p.0.material, slf)
+    fn material<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<u32>>> {
+        read_only(view(|p: &Self| &p.0.material, slf))
     }
 
     #[getter]

@@ -38,9 +38,7 @@ def greville(basis: str, n: int) -> np.ndarray:
     return np.linspace(0, n, n + 1 if basis == "bilinear" else 2 * n + 1)
 
 
-def linear_field(
-    grid: tawami.Grid, basis: str, a: np.ndarray, gradient: np.ndarray
-) -> np.ndarray:
+def linear_field(grid: tawami.Grid, basis: str, a: np.ndarray, gradient: np.ndarray) -> np.ndarray:
     """Displacement coefficients of u = a + gradient (x - origin)."""
     x, y = (grid.h * greville(basis, n) for n in grid.cells)
     points = np.stack([np.tile(x, len(y)), np.repeat(y, len(x))], axis=1)

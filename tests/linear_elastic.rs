@@ -77,6 +77,8 @@ fn parameters_out_of_range_are_named() {
     assert_eq!(name(LinearElastic::from_e_nu(1.0, f64::NAN)), "nu");
     assert_eq!(name(LinearElastic::from_e_nu(0.0, 0.3)), "E");
     assert_eq!(name(LinearElastic::from_e_nu(f64::INFINITY, 0.3)), "E");
+    assert_eq!(name(LinearElastic::from_e_nu(5e-324, 0.3)), "E");
+    assert_eq!(name(LinearElastic::from_e_one_minus_2nu(1e308, 1e-12)), "E");
     assert_eq!(name(LinearElastic::from_k_mu(-1.0, 1.0)), "K");
     assert_eq!(name(LinearElastic::from_k_mu(1.0, 0.0)), "mu");
     assert_eq!(name(LinearElastic::from_e_one_minus_2nu(1.0, -1e-9)), "one_minus_2nu");

@@ -40,9 +40,21 @@ proptest! {
 #[test]
 fn edges_belong_to_the_upper_cell_and_the_border_to_the_grid() {
     let grid = Grid::new([0.0, 0.0], 0.1, [3, 1]).unwrap();
-    let location = grid.locate(&[0.1, 0.0, 0.30000000000000004, 0.1, -1e-12, 0.05]).unwrap();
-    assert_eq!(location.cell, [1, 2, 0]);
+    let x = [0.1, 0.0, 0.30000000000000004, 0.1, -1e-12, 0.05, 0.15, 0.05];
+    let location = grid.locate(&x).unwrap();
+    assert_eq!(location.cell, [1, 2, 0, 1]);
     assert_eq!(location.xi[1], [1.0, 1.0]);
+}
+
+#[test]
+fn a_body_that_ends_on_a_line_takes_no_part_in_the_cells_beyond() {
+    let grid = Grid::new([0.0, 0.0], 1.0, [4, 4]).unwrap();
+    let line = [0.0, 0.5, 1.0, 1.5, 2.0];
+    let x: Vec<f64> = line.iter().flat_map(|&y| line.iter().flat_map(move |&x| [x, y])).collect();
+    let location = grid.locate(&x).unwrap();
+    assert_eq!(location.active, [0, 1, 4, 5]);
+    assert_eq!(location.xi[24], [1.0, 1.0]);
+    assert_eq!(location.cell[24], 5);
 }
 
 #[test]

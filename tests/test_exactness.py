@@ -37,16 +37,24 @@ def functions_1d(basis: str, n: int, s: float, cell: int) -> np.ndarray:
     return out
 
 
+def cells_of(s: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Cell of each particle: the upper one at an edge, but not if only its border holds any."""
+    cell = np.minimum(np.floor(s + 1e-12), cells - 1)
+    for axis in range(2):
+        for c in np.unique(cell, axis=0):
+            mine = (cell == c).all(axis=1)
+            if c[axis] > 0 and (s[mine, axis] - c[axis] < 1e-9).all():
+                cell[mine, axis] -= 1
+    return cell
+
+
 class Sum:
     """The bilinear form of elasticity, particle by particle."""
 
     def __init__(self, scene: tawami.Scene, options: dict[str, object]) -> None:
         self.scene, self.options = scene, options
         grid, self.h = scene.grid, scene.grid.h
-        self.cells = [
-            np.minimum(np.floor((x - grid.origin) / grid.h + 1e-12), np.array(grid.cells) - 1)
-            for x in scene.particles.x
-        ]
+        self.cells = cells_of((scene.particles.x - grid.origin) / grid.h, np.array(grid.cells))
 
     def at(self, basis: str, s: np.ndarray, cell: np.ndarray) -> list[list[np.ndarray]]:
         """Table [dx][dy] of the derivatives (per metre) of all products, x fastest."""
@@ -54,8 +62,7 @@ class Sum:
             functions_1d(basis, self.scene.grid.cells[a], s[a], int(cell[a])) for a in range(2)
         )
         return [
-            [np.outer(fy[b], fx[a]).ravel() / self.h ** (a + b) for b in range(3)]
-            for a in range(3)
+            [np.outer(fy[b], fx[a]).ravel() / self.h ** (a + b) for b in range(3)] for a in range(3)
         ]
 
     def matrix(self) -> np.ndarray:
@@ -84,7 +91,9 @@ class Sum:
             div_centre[0::2], div_centre[1::2] = centre[1][0], centre[0][1]
             deviatoric = mu * (DEV @ strain).T @ ISOTROPIC @ (DEV @ strain)
             if total is None:
-                total = np.zeros((size_u + size_v,) * 2 if form in ("u_epsv", "u_p") else (size_u,) * 2)
+                total = np.zeros(
+                    (size_u + size_v,) * 2 if form in ("u_epsv", "u_p") else (size_u,) * 2
+                )
             volume = particles.volume[p]
             uu = deviatoric.copy()
             if form == "u":
@@ -111,9 +120,7 @@ class Sum:
                 div_s[0, 1::2] = n[1][1] - 2 / 3 * n[1][1]
                 div_s[1, 1::2] = 2 * n[0][2] + n[2][0] - 2 / 3 * n[0][2]
                 div_s[1, 0::2] = n[1][1] - 2 / 3 * n[1][1]
-                total[size_u:, :size_u] -= (
-                    volume * bulk * alpha * self.h**2 * gradient.T @ div_s
-                )
+                total[size_u:, :size_u] -= volume * bulk * alpha * self.h**2 * gradient.T @ div_s
         if self.options.get("stabilisation") == "projection":
             points, weights = np.polynomial.legendre.leggauss(3)
             for cell, (volume, ratio) in mean_ratio.items():
@@ -123,7 +130,9 @@ class Sum:
                         s = np.array(cell) + 0.5 + 0.5 * np.array([a, b])
                         part = self.at("bilinear", s, np.array(cell))[0][0] - middle
                         area = wa * wb / 4 * self.h**2
-                        total[size_u:, size_u:] -= alpha * ratio / volume * area * np.outer(part, part)
+                        total[size_u:, size_u:] -= (
+                            alpha * ratio / volume * area * np.outer(part, part)
+                        )
         return total
 
 
@@ -163,5 +172,7 @@ def test_any_cloud_of_particles(data):
     numbers = data.draw(st.lists(st.integers(0, 1), min_size=len(x), max_size=len(x)))
     volumes = np.linspace(0.01, 0.2, len(x))
     body = tawami.Body(x, volumes)
-    scene = tawami.Scene(grid, body, laws, material_of=numbers, basis=basis, form="u_epsv", alpha=0.3)
+    scene = tawami.Scene(
+        grid, body, laws, material_of=numbers, basis=basis, form="u_epsv", alpha=0.3
+    )
     compare(scene, {"form": "u_epsv", "alpha": 0.3})

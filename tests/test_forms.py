@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 import textwrap
 
 import numpy as np
 import pytest
-from conftest import FORMS
+from conftest import FORMS, grid_of
 from ufl import div, dot, grad, inner, sym
 
 import tawami
-from tawami.formulation import Form, ParticleScalar, shipped
+from tawami.formulation import Form, InexactSumWarning, ParticleScalar, shipped
 
 # A form in a driver script: this module is one. It is the shipped u_epsv, written differently.
 fields = {"v": ("displacement", "w"), "theta": ("volumetric_strain", "r")}
@@ -71,7 +72,8 @@ def test_a_form_nonlinear_in_the_fields_has_the_right_tangent(random_scene):
         )
 
     form = Form({"u": ("displacement", "w")}, "displacement", cubic)
-    scene = random_scene(form=form)
+    with pytest.warns(InexactSumWarning, match=r"degree \d .* up to 4"):
+        scene = random_scene(form=form)
     random = np.random.default_rng(3)
     c, d = random.standard_normal((2, scene.num_coefficients))
     step = 1e-5
@@ -80,9 +82,33 @@ def test_a_form_nonlinear_in_the_fields_has_the_right_tangent(random_scene):
     assert np.abs(difference - predicted).max() < 1e-8 * np.abs(predicted).max()
 
 
+def test_terms_under_two_rules_are_those_of_each_rule(random_scene):
+    """FFCx would mix up the values of a field that one kernel evaluates under two rules."""
+
+    def term(u, w, K, cell_mean):
+        return cell_mean(K) * div(u) ** 2 * dot(u, w)
+
+    def both(u, w, K, cell_mean, dx, dx_c):
+        return term(u, w, K, cell_mean) * dx + term(u, w, K, cell_mean) * dx_c
+
+    def full(u, w, K, cell_mean, dx):
+        return term(u, w, K, cell_mean) * dx
+
+    def centre(u, w, K, cell_mean, dx_c):
+        return term(u, w, K, cell_mean) * dx_c
+
+    scenes = [random_scene(form=form_of(function)) for function in (both, full, centre)]
+    c = np.random.default_rng(0).standard_normal(scenes[0].num_coefficients)
+    residuals = [scene.residual(c) for scene in scenes]
+    scale = np.abs(residuals[1]).max()
+    np.testing.assert_allclose(residuals[0], residuals[1] + residuals[2], atol=1e-13 * scale)
+    tangents = [scene.tangent(c) for scene in scenes]
+    difference = abs(tangents[0] - tangents[1] - tangents[2]).max()
+    assert difference < 1e-13 * abs(tangents[0]).max()
+
+
 def test_newton_converges_quadratically_on_a_nonlinear_form():
     """Stiffening spring on div u: the iterations are more than one and the last ones square."""
-    from conftest import grid_of
 
     def stiff(u, w, sigma, mu, sum_p, t, ds):
         return sum_p(sigma, grad(w)) + sum_p(3e3 * mu, div(u) ** 3 * div(w)) - dot(t, w) * ds
@@ -91,7 +117,8 @@ def test_newton_converges_quadratically_on_a_nonlinear_form():
     grid = grid_of()
     body = tawami.box(grid, grid.origin, grid.upper, per_axis=3)
     material = tawami.linear_elastic(E=1e3, nu=0.2)
-    scene = tawami.Scene(grid, body, material, form=form, tolerance=1e-12)
+    with pytest.warns(InexactSumWarning):
+        scene = tawami.Scene(grid, body, material, form=form, tolerance=1e-12)
     scene.fix("left", "x")
     scene.fix("left", "y")
     scene.traction("right", (120.0, 20.0))
@@ -114,6 +141,11 @@ WRONG = [
     (lambda: Form.load("nowhere.py"), "'nowhere.py' does not exist"),
     (lambda: Form.load(textwrap), "'textwrap' declares no 'fields', 'kinematics', 'residual'"),
     (lambda: form_of(None, {"u": ("velocity", "w")}), "kind 'velocity': expected one of"),
+    (lambda: form_of(None, {"u": "displacement"}), r"expected \(kind, test function\)"),
+    (lambda: form_of(None, parameters={"a": {}}), "parameter 'a' has no \"default\""),
+    (lambda: form_of(None, parameters={"h": {"default": 1}}), "'h' stands for two things"),
+    (lambda: form_of(None, {"u": ("displacement", "K")}), "'K' stands for two things"),
+    (lambda: Form.load(3), "form = 3: expected the name of a shipped form"),
     (lambda: form_of(None, kinematics="large"), "kinematics = 'large': expected one of"),
     (lambda: form_of(None, kinematics="mixed"), "'mixed' needs fields of the kinds"),
     (lambda: form_of(None, BOTH), "'displacement' needs fields of the kinds 'displacement'"),
@@ -126,6 +158,7 @@ def test_wrong_declarations(make, message):
         make()
 
 
+@pytest.mark.filterwarnings("ignore::tawami.formulation.InexactSumWarning")
 @pytest.mark.parametrize(
     ("function", "message"),
     [
@@ -133,21 +166,67 @@ def test_wrong_declarations(make, message):
         (lambda w, sigma: 3.0, "residual returned float: expected a UFL form"),
         (lambda u, sum_p, K: sum_p(K, div(u)), "test function 'w' of field 'u' does not appear"),
         (lambda u, w, sum_p, K: sum_p(K, div(u)), "test function 'w' of field 'u' does not appear"),
-        (lambda w, sum_p, sigma: sum_p(sigma, w), r"shape \(2, 2\) and an expression of shape \(2,\)"),
+        (
+            lambda w, sum_p, sigma: sum_p(sigma, w),
+            r"shape \(2, 2\) and an expression of shape \(2,\)",
+        ),
         (lambda w, sum_p: sum_p(1, 2, 3), "not 3 arguments"),
         (lambda w, sum_p: sum_p(w, div(w)), "takes a particle quantity"),
+        (lambda w, sum_p, t, ds: sum_p(div(w)) - dot(t, t) * w[0] * ds, "linear in the traction t"),
+        (lambda w, sum_p, t, dx: sum_p(div(w)) - dot(t, w) * dx, "t belongs into terms with ds"),
+        (lambda w, sum_p, ds: sum_p(div(w)) - w[1] * ds, "linear in the traction t"),
+        (lambda w, sum_p, dx: sum_p(div(w)) + w[1] * dx(1), r"as dx\(1\): expected dx"),
         (lambda w, sum_c, sigma_m: sum_c(sigma_m, div(w)), "needs kinematics 'cell'"),
         (lambda w, sum_p, sigma: sum_p(sigma * 2, grad(w)), "its residual raised"),
-        (lambda w, sum_p, K: sum_p(K * div(w), div(w)), "a particle constant combines with numbers"),
-        (lambda w, cell_mean, sigma, dx: cell_mean(sigma) * div(w) * dx, "cell_mean takes constants"),
+        (
+            lambda w, sum_p, K: sum_p(K * div(w), div(w)),
+            "a particle constant combines with numbers",
+        ),
+        (
+            lambda w, cell_mean, sigma, dx: cell_mean(sigma) * div(w) * dx,
+            "cell_mean takes constants",
+        ),
         (lambda u, w, sum_p: sum_p(div(w) ** 2 * div(u)), "linear in one test function"),
-        (lambda u, w, sigma, sum_p, ds: sum_p(sigma, grad(w)) + dot(u, w) * ds, "the unknown fields in"),
+        (
+            lambda u, w, sigma, sum_p, ds: sum_p(sigma, grad(w)) + dot(u, w) * ds,
+            "in nothing else",
+        ),
         (lambda t, w, ds: dot(t, w) * ds, "expected integrals over particles or cells"),
     ],
 )
 def test_wrong_residuals(random_scene, function, message):
     with pytest.raises(tawami.FormError, match=message):
         random_scene(form=form_of(function))
+
+
+def test_b_bar_takes_the_deviator_at_particles_and_the_mean_at_centres_only(random_scene):
+    for function, message in [
+        (lambda w, sigma, sum_p: sum_p(sigma, grad(w)), r"sum_p\(sigma"),
+        (lambda w, s, sum_c: sum_c(s, grad(w)), r"sum_c\(s,"),
+    ]:
+        with pytest.raises(tawami.FormError, match=message + r".* 'cell': expected sum_p\(s"):
+            random_scene(form=form_of(function, kinematics="cell"))
+
+
+def test_a_module_that_is_edited_and_reloaded_is_another_form(random_scene, tmp_path, monkeypatch):
+    path = tmp_path / "edited_form.py"
+    text = """
+from ufl import grad
+fields = {"u": ("displacement", "w")}
+kinematics = "displacement"
+def residual(w, sigma, sum_p):
+    return FACTOR * sum_p(sigma, grad(w))
+"""
+    monkeypatch.syspath_prepend(tmp_path)
+    path.write_text(text.replace("FACTOR", "1"))
+    module = importlib.import_module("edited_form")
+    c = np.ones(random_scene(form=module).num_coefficients)
+    c[::5] = 0
+    once = random_scene(form=module).residual(c)
+    path.write_text(text.replace("FACTOR", "20"))
+    importlib.invalidate_caches()
+    twenty = random_scene(form=importlib.reload(module)).residual(c)
+    np.testing.assert_allclose(twenty, 20 * once, atol=1e-12 * np.abs(twenty).max())
 
 
 def test_a_forgotten_test_function_of_the_second_field(random_scene):

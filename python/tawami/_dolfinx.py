@@ -219,10 +219,6 @@ class Rectangle:
         """Reference positions (dolfinx axes) as positions in the cell along x and y."""
         return points[:, ::-1] if self.swapped else points
 
-    def space(self, element: Any) -> Space:
-        """The function space of an element."""
-        return Space(self, element)
-
     def facet_of_edge(self, edge: str) -> int:
         """Local number of a cell's facet on its 'left', 'right', 'bottom' or 'top' side."""
         # reference facets: axis 1 = 0, axis 0 = 0, axis 0 = 1, axis 1 = 1

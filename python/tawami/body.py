@@ -11,6 +11,7 @@ import numpy.typing as npt
 from tawami import _rust
 from tawami.errors import InputError
 from tawami.grid import Grid
+from tawami.inputs import point, whole_number
 
 Array = npt.NDArray[np.float64]
 
@@ -51,8 +52,8 @@ def box(
     Raises:
         InputError: Sides off the lines of the grid or outside the grid, or no particle.
     """
-    if per_axis < 1:
-        raise InputError(f"per_axis = {per_axis}: expected at least 1 particle per cell and axis")
+    per_axis = whole_number("per_axis", per_axis, low=1)
+    lower, upper = point("lower", lower), point("upper", upper)
     if gauss:
         points, weights = _rust.gauss(per_axis)
     else:

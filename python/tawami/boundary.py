@@ -8,8 +8,10 @@ from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+import scipy.sparse as sp
+from scipy.sparse.linalg import spsolve
 
-from tawami import _rust
+from tawami import _rust, inputs
 from tawami.basis import Basis, values_1d
 from tawami.errors import InputError, SupportError
 from tawami.grid import Edge, Grid
@@ -63,9 +65,12 @@ def evaluate(profile: Profile, x: Array, y: Array, what: str) -> Array:
             f"{what}: expected a number or a function f(x, y) on arrays of shape {x.shape}, got "
             f"{profile!r}, which gave {error!r}"
         ) from error
-    if not np.isfinite(values).all():
-        bad = np.flatnonzero(~np.isfinite(values))[0]
-        raise InputError(f"{what}: {values[bad]} at ({x[bad]}, {y[bad]}): expected a finite number")
+    bad = np.flatnonzero(~np.isfinite(values))
+    if len(bad):
+        first = bad[0]
+        raise InputError(
+            f"{what}: {values[first]} at ({x[first]:g}, {y[first]:g}): expected a finite number"
+        )
     return values
 
 
@@ -109,9 +114,9 @@ def held_edge(
     prescribed = evaluate(value, x, y, f"fix(edge='{edge}')")
     values = values_1d(basis, n, cell, t)
     used = np.unique(values.indices)
-    values = values[:, used].toarray()
-    weighted = values * np.tile(weights, len(touched))[:, None]
-    coefficients = np.linalg.solve(weighted.T @ values, weighted.T @ prescribed)
+    values = values[:, used]
+    weighted = sp.diags(np.tile(weights, len(touched))) @ values
+    coefficients = spsolve((weighted.T @ values).tocsc(), weighted.T @ prescribed)
     width = _rust.basis_len(basis, grid.cells[0])
     across = 0 if end == 0 else _rust.basis_len(basis, grid.cells[axis]) - 1
     function = across + width * used if axis == 0 else used + width * across
@@ -138,12 +143,15 @@ def held_point(
     # On an edge between cells the point belongs to any of those it touches.
     a, b = location.xi[0]
     near = [(i + di, j + dj) for di in _touching(a) for dj in _touching(b)]
-    inside = [(k, m) for k, m in near if 0 <= k < grid.cells[0] and 0 <= m < grid.cells[1]]
-    if not any(active[m, k] for k, m in inside):
+    nx, ny = grid.cells
+    filled = [(k, m) for k, m in near if 0 <= k < nx and 0 <= m < ny and active[m, k]]
+    if not filled:
         raise SupportError(
             f"{where}: the point lies in a cell without particles; move it into the body"
         )
-    wx, wy = values_1d(basis, grid.cells[0], i, a), values_1d(basis, grid.cells[1], j, b)
+    k, m = filled[0]
+    wx = values_1d(basis, nx, k, np.clip(a + i - k, 0, 1))
+    wy = values_1d(basis, ny, m, np.clip(b + j - m, 0, 1))
     width = _rust.basis_len(basis, grid.cells[0])
     functions = (wx.indices[None, :] + width * wy.indices[:, None]).ravel().astype(np.int64)
     return PointHeld(2 * functions + component, np.outer(wy.data, wx.data).ravel(), value, where)
@@ -159,12 +167,11 @@ def locate_point(grid: Grid, point: Sequence[float], what: str) -> _rust.Locatio
     Raises:
         InputError: The point is outside the grid, or not two finite numbers.
     """
-    x = np.asarray(point, dtype=float)
-    if x.shape != (2,):
-        raise InputError(f"{what}: expected a point (x, y)")
     try:
-        return grid.rust.locate(x[None, :])
-    except InputError:
+        return grid.rust.locate(np.array([inputs.point(what, point)]))
+    except InputError as error:
+        if "outside" not in str(error):
+            raise
         raise InputError(
             f"{what}: expected a point within the grid, [{grid.origin[0]:g}, {grid.upper[0]:g}] x "
             f"[{grid.origin[1]:g}, {grid.upper[1]:g}]"

@@ -12,6 +12,9 @@ from petsc4py import PETSc
 
 from tawami import _dolfinx
 
+#: What this process has loaded (Linux).
+MAPS = Path("/proc/self/maps")
+
 
 def blas() -> tuple[str, bool]:
     """The BLAS library that PETSc's solvers use, and whether it is the slow reference one.
@@ -19,7 +22,7 @@ def blas() -> tuple[str, bool]:
     The loaded libraries are read from the process itself (Linux); 'unknown' elsewhere.
     """
     try:
-        maps = Path("/proc/self/maps").read_text().splitlines()
+        maps = MAPS.read_text().splitlines()
     except OSError:
         return "unknown", False
     loaded = {Path(line.split()[-1]) for line in maps if ".so" in line}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
+import weakref
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +23,16 @@ from tawami.reduction import Layout, Reduction
 from tawami.stopwatch import Stopwatch
 
 Array = npt.NDArray[np.float64]
+
+
+class _Matrices(dict[str, Any]):
+    """PETSc matrices by name; petsc4py frees them late or never, so we do."""
+
+    def free(self, *names: str) -> None:
+        """Free those of these names that are there; all of them if none is named."""
+        for name in names or list(self):
+            if name in self:
+                self.pop(name).destroy()
 
 
 class Field:
@@ -71,8 +82,9 @@ class Field:
             for rank, integrals in ((1, compiled.residual), (2, compiled.tangent))
             for integral in integrals
         }
-        self._matrix: Any = None
-        self._reduced: Any = None
+        self._reduction: Reduction | None = None
+        self._petsc = _Matrices()
+        weakref.finalize(self, self._petsc.free)
 
     def _point_indices(self, rule: Rule) -> list[tuple[int, int]]:
         """Indices along x and y, in the Gauss rule, of each point of dolfinx' rule."""
@@ -94,7 +106,8 @@ class Field:
         for slot in integral.slots:
             if slot.source == "fields":
                 packed[:, offset : offset + slot.width] = nodal[self._space.dofs[self._cells]]
-            elif slot.source != "traction":
+            else:
+                assert slot.source != "traction"  # refused in integrals over cells
                 rule, mean = slot.source, slot.source == "mean"
                 points = [(0, 0)] if mean else self._points[rule]
                 _rust.densities(
@@ -132,23 +145,18 @@ class Field:
 
         Args:
             edge: Name of the edge; only its cells with particles are loaded.
-            values: Traction [Pa] at the nodes of :meth:`edge_nodes`, cells x 9 x 2.
+            values: Traction [Pa] at the nodes of :meth:`edge_nodes`, cells x 3 x 2.
         """
         integral = self.compiled.traction
         assert integral is not None
         cells, local = self._edge_cells(edge), self.grid.rectangle.facet_of_edge(edge)
         order = self.grid.rectangle.facet_order(cells, local)
-        packed = np.zeros((len(cells), integral.width))
-        offset = 0
-        for slot in integral.slots:
-            assert slot.source == "traction"
-            packed[:, offset : offset + slot.width] = values.reshape(len(cells), 18)[order]
-            offset += slot.width
-        form = self._space.form(
-            integral.kernel, 1, self.grid.rectangle.entities(cells[order], local)
-        )
+        packed = np.zeros((len(cells), 9, 2))
+        packed[:, self._nodes_on(edge)] = values[order]
+        entities = self.grid.rectangle.entities(cells[order], local)
+        form = self._space.form(integral.kernel, 1, entities)
         vector = np.zeros(self._space.size)
-        self._add_vector(vector, form, integral, packed)
+        self._add_vector(vector, form, integral, packed.reshape(len(cells), 18))
         return -np.asarray(self.layout.extraction.T @ vector)
 
     def _edge_cells(self, edge: Edge) -> npt.NDArray[np.int32]:
@@ -159,22 +167,31 @@ class Field:
         ]
         return cells
 
+    def _nodes_on(self, edge: Edge) -> npt.NDArray[np.bool_]:
+        """Which of the nine biquadratic nodes of a cell lie on its side towards an edge."""
+        axis, end = self.grid.edge(edge)
+        nodes = self.grid.rectangle.to_grid_axes(_dolfinx.reference_nodes(2))
+        return np.isclose(nodes[:, axis], 1.0 if end else 0.0)
+
     def edge_nodes(self, edge: Edge) -> Array:
-        """Positions [m] of the biquadratic nodes of the loaded cells, cells x 9 x 2."""
+        """Positions [m] of the biquadratic nodes of an edge, cells with particles x 3 x 2."""
         nodes = self.grid.rectangle.to_grid_axes(_dolfinx.reference_nodes(2))
         ij = self.grid.rectangle.ij[self._edge_cells(edge)]
-        return np.asarray(self.grid.origin + self.grid.h * (ij[:, None, :] + nodes))
+        positions = ij[:, None, :] + nodes[self._nodes_on(edge)]
+        return np.asarray(self.grid.origin + self.grid.h * positions)
 
     def tangent(self, coefficients: Array, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
         """P^T K P as a PETSc matrix; it is overwritten by the next call."""
         matrix = self._assemble_tangent(coefficients, data)
         with self.stopwatch("reduction"):
-            if self._reduced is None or self._reduced[0] is not reduction:
+            if self._reduction is not reduction:
+                self._petsc.free("P", "reduced")
+                self._reduction = reduction
                 p = _petsc(self.layout.extraction @ reduction.selection, self.grid.comm)
-                self._reduced = (reduction, p, matrix.ptap(p))
+                self._petsc["P"], self._petsc["reduced"] = p, matrix.ptap(p)
             else:
-                matrix.ptap(self._reduced[1], result=self._reduced[2])
-        return self._reduced[2]
+                matrix.ptap(self._petsc["P"], result=self._petsc["reduced"])
+        return self._petsc["reduced"]
 
     def unreduced_tangent(self, coefficients: Array, data: Mapping[Rule, Array]) -> sp.csr_matrix:
         """E^T K E, the tangent of :meth:`residual`."""
@@ -186,18 +203,19 @@ class Field:
     def _assemble_tangent(self, coefficients: Array, data: Mapping[Rule, Array]) -> Any:
         """K on the degrees of freedom of the mesh."""
         with self.stopwatch("tangent"):
-            if self._matrix is None:
-                self._matrix = self._space.create_matrix(self._cells)
-            self._matrix.zeroEntries()
+            if "full" not in self._petsc:
+                self._petsc["full"] = self._space.create_matrix(self._cells)
+            matrix = self._petsc["full"]
+            matrix.zeroEntries()
         nodal = self.layout.extraction @ coefficients
         for integral in self.compiled.tangent:
             with self.stopwatch("pack"):
                 packed = self._pack(integral, nodal, data)
             with self.stopwatch("tangent"):
                 form, constants = self._forms[id(integral)], self._constants(integral)
-                _dolfinx.add_matrix(self._matrix, form, integral.kernel, constants, packed)
-        self._matrix.assemble()
-        return self._matrix
+                _dolfinx.add_matrix(matrix, form, integral.kernel, constants, packed)
+        matrix.assemble()
+        return matrix
 
 
 def _petsc(matrix: sp.spmatrix, comm: Any) -> Any:

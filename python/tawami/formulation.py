@@ -7,7 +7,8 @@ A form declares `fields`, `kinematics`, optionally `parameters` and `options`, a
 the fields, the tests     u, w, eps_v, q, ... as declared in `fields`
 sigma, s, sigma_m         in-plane stress, its (three-dimensional) deviator, mean stress: of the law
 K, mu                     bulk and shear modulus of the particle; `K**2 / mu`, `1 / K` work
-sum_p(D, f), sum_p(f)     sum over particles of V_p D_p : f(x_p), and of V_p f(x_p)
+sum_p(D, f), sum_p(f)     sum over particles of V_p D_p : f(x_p), and of V_p f(x_p); exact for f up
+                          to degree 4 along x and along y (a warning tells of more)
 sum_c(D, f), sum_c(f)     the same with f taken at the centre of the particle's cell
 cell_mean(D)              volume-weighted mean over the particles of each cell
 dx, dx_c, ds              area of the cells with particles (full rule, one point); loaded edges
@@ -27,6 +28,7 @@ import functools
 import importlib.util
 import inspect
 import math
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -56,6 +58,14 @@ KINEMATICS: Mapping[str, tuple[str, ...]] = {
 _PLACEHOLDERS = 1000
 #: Components of the quantities that the material law gives.
 LAW = {"sigma": 3, "s": 3, "sigma_m": 1}
+#: Degree along x and y that the densities of `sum_p` integrate exactly.
+EXACT_DEGREE = 4
+#: Names that every form has.
+RESERVED = frozenset((*LAW, "K", "mu", "t", "h", "dx", "dx_c", "ds", "sum_p", "sum_c", "cell_mean"))
+
+
+class InexactSumWarning(UserWarning):
+    """A `sum_p` of an expression of too high a degree to be the sum over the particles."""
 
 
 OPERATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
@@ -175,6 +185,17 @@ class Form:
     name: str = "of the driver script"
 
     def __post_init__(self) -> None:
+        for name, declared in self.fields.items():
+            if isinstance(declared, str) or len(declared) != 2:
+                self._fail(f"field '{name}' is {declared!r}: expected (kind, test function)")
+        for name, limits in self.parameters.items():
+            if "default" not in limits:
+                self._fail(f"parameter '{name}' has no \"default\"")
+        names = [*self.fields, *(test for _, test in self.fields.values())]
+        names += [*self.parameters, *self.options, *RESERVED]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            self._fail(f"{_list(twice)} stands for two things: expected another name for one")
         kinds = [kind for kind, _ in self.fields.values()]
         for name, (kind, _) in self.fields.items():
             if kind not in KINDS:
@@ -201,7 +222,12 @@ class Form:
         if isinstance(source, Form):
             return source
         if isinstance(source, ModuleType):
-            return _from_module(source)
+            return _from_module(source, getattr(source, "residual", None))
+        if not isinstance(source, str | Path):
+            raise FormError(
+                f"form = {source!r}: expected the name of a shipped form, the path of a .py file, a "
+                "module or a Form"
+            )
         path = Path(source)
         if path.suffix != ".py":
             path = Path(__file__).parent / "forms" / f"{source}.py"
@@ -265,11 +291,12 @@ def _from_file(path: Path, _modified: int) -> Form:
         specification.loader.exec_module(module)
     except Exception as error:
         raise FormError(f"form file '{path.name}' cannot be read: {error!r}") from error
-    return _from_module(module, f"'{path.stem}'")
+    return _from_module(module, getattr(module, "residual", None), f"'{path.stem}'")
 
 
 @functools.cache
-def _from_module(module: ModuleType, name: str | None = None) -> Form:
+def _from_module(module: ModuleType, _residual: Any, name: str | None = None) -> Form:
+    """The form of a module; another one once the module is reloaded with another residual."""
     missing = [n for n in ("fields", "kinematics", "residual") if not hasattr(module, n)]
     name = name or f"'{module.__name__}'"
     if missing:
@@ -427,15 +454,10 @@ class _Symbols:
             )
         quantity = self._quantity(arguments[0], caller) if len(arguments) == 2 else ONE
         expression = ufl.as_ufl(arguments[-1])
-        if (
-            rule == "centre"
-            and isinstance(quantity, LawQuantity)
-            and self.form.kinematics != "cell"
-        ):
-            raise FormError(
-                f"form {self.form.name}: sum_c({quantity.name}, ...) needs kinematics 'cell': "
-                "elsewhere the stress depends on the strain at the particle"
-            )
+        if isinstance(quantity, LawQuantity):
+            self._check_place(rule, quantity)
+        if rule == "particle":
+            self._check_degree(expression)
         c = self.density(Density(rule, quantity))
         weight = ufl.as_matrix([[c[0], c[2]], [c[2], c[1]]]) if len(c) == 3 else c[0]
         if weight.ufl_shape != expression.ufl_shape:
@@ -444,6 +466,36 @@ class _Symbols:
                 f"expression of shape {expression.ufl_shape}: expected the same shape"
             )
         return ufl.inner(weight, expression) * self.measures[rule]
+
+    def _check_place(self, rule: Rule, quantity: LawQuantity) -> None:
+        """In B-bar the deviator depends on the strain at the particle and the mean stress on that
+        at the centre: only there are their tangents known.
+        """
+        cell, centre = self.form.kinematics == "cell", rule == "centre"
+        if not cell and centre:
+            raise FormError(
+                f"form {self.form.name}: sum_c({quantity.name}, ...) needs kinematics 'cell': "
+                "elsewhere the stress depends on the strain at the particle"
+            )
+        if cell and quantity.name != ("sigma_m" if centre else "s"):
+            raise FormError(
+                f"form {self.form.name}: {'sum_c' if centre else 'sum_p'}({quantity.name}, ...) with "
+                "kinematics 'cell': expected sum_p(s, ...) and sum_c(sigma_m, ...) only"
+            )
+
+    def _check_degree(self, expression: Any) -> None:
+        # UFL's estimate for squares is a multiple of the degree along one axis; 1 for u_x would be 2.
+        unit = ufl.algorithms.estimate_total_polynomial_degree(self.traction[0]) / 2
+        expanded = ufl.algorithms.apply_algebra_lowering.apply_algebra_lowering(expression)
+        degree = ufl.algorithms.estimate_total_polynomial_degree(expanded) / unit
+        if degree > EXACT_DEGREE:
+            warnings.warn(
+                f"form {self.form.name}: sum_p of an expression of degree {degree:g} (products count "
+                f"together) is not exactly the sum over the particles, which it is up to "
+                f"{EXACT_DEGREE}; what is nonlinear in the fields belongs into the material law",
+                InexactSumWarning,
+                stacklevel=2,
+            )
 
     def _cell_mean(self, quantity: Any) -> Any:
         quantity = self._quantity(quantity, "cell_mean")
@@ -466,7 +518,7 @@ class _Symbols:
             )
         try:
             return form.residual(**{name: names[name] for name in wanted})
-        except FormError:
+        except (FormError, Warning):
             raise
         except Exception as error:
             raise FormError(f"form {form.name}: its residual raised {error!r}") from error
@@ -529,6 +581,18 @@ def _of_type(form: Any, kind: str) -> Any | None:
     return ufl.Form(integrals) if integrals else None
 
 
+def _is_linear_in(form: Any, coefficient: Any) -> bool:
+    """Whether a form names this coefficient and no other, once in every term."""
+    if set(form.coefficients()) != {coefficient}:
+        return False
+    zero = ufl.zero(coefficient.ufl_shape)
+    expand = ufl.algorithms.expand_derivatives
+    at_zero = expand(ufl.replace(form, {coefficient: zero}))
+    direction = ufl.Coefficient(coefficient.ufl_function_space(), count=_PLACEHOLDERS - 2)
+    slope = expand(ufl.derivative(form, coefficient, direction))
+    return at_zero.empty() and coefficient not in slope.coefficients()
+
+
 def _by_rule(form: Any) -> list[Any]:
     """One form per quadrature rule. FFCx 0.5 puts several rules into one kernel, but a field that is
     evaluated under the rule with one point is then taken from there under the other rule as well,
@@ -544,10 +608,16 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
     symbols = _Symbols(form, options)
     residual = symbols.residual()
     cells, edges = _of_type(residual, "cell"), _of_type(residual, "exterior_facet")
-    if edges is not None and symbols.increments in edges.coefficients():
+    for part in residual.integrals():
+        if part.subdomain_id() != "everywhere":
+            raise FormError(
+                f"form {form.name}: a measure with a number, as dx({part.subdomain_id()}): expected dx, "
+                "dx_c and ds as they are; where the body is follows from the particles"
+            )
+    if edges is not None and not _is_linear_in(edges, symbols.traction):
         raise FormError(
-            f"form {form.name}: the unknown fields in a term with ds: expected edge terms of the "
-            "traction t and the test functions only"
+            f"form {form.name}: expected edge terms linear in the traction t and in nothing else but "
+            "the test functions, as - dot(t, w) * ds; give other loads through scene.traction(...)"
         )
     if cells is None or len(residual.integrals()) > len(cells.integrals()) + (
         len(edges.integrals()) if edges is not None else 0
@@ -555,6 +625,8 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
         raise FormError(
             f"form {form.name}: expected integrals over particles or cells, and over edges (ds) only"
         )
+    if symbols.traction in cells.coefficients():
+        raise FormError(f"form {form.name}: the traction t belongs into terms with ds, not with dx")
     tangent = symbols.tangent(cells)
     densities: dict[Rule, dict[Density, int]] = {"particle": {}, "centre": {}, "mean": {}}
     width = dict.fromkeys(densities, 0)

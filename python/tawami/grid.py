@@ -8,8 +8,11 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from mpi4py import MPI
+
 from tawami import _dolfinx, _rust
 from tawami.errors import InputError
+from tawami.inputs import number, pair, point, whole_number
 
 Array = npt.NDArray[np.float64]
 Edge = Literal["left", "right", "bottom", "top"]
@@ -32,15 +35,19 @@ class Grid:
     def __init__(
         self, comm: Any, *, origin: Sequence[float], h: float, cells: Sequence[int]
     ) -> None:
+        if not isinstance(comm, MPI.Comm):
+            raise InputError(
+                f"comm = {comm!r}: expected a communicator, as mpi4py's MPI.COMM_WORLD"
+            )
         if comm.size > 1:
             raise InputError(
                 f"the communicator has {comm.size} ranks: tawami runs on one rank for now. Start it "
                 "without mpirun, or give every rank a grid on MPI.COMM_SELF"
             )
         self.comm = comm
-        self.origin = (float(origin[0]), float(origin[1]))
-        self.h = float(h)
-        self.cells = (int(cells[0]), int(cells[1]))
+        self.origin = point("origin", origin)
+        self.h = number("h", h)
+        self.cells = _cells(cells)
         self.rust = _rust.Grid(self.origin, self.h, self.cells)
         self._rectangle: _dolfinx.Rectangle | None = None
         self._spaces: dict[int, _dolfinx.Space] = {}
@@ -61,7 +68,7 @@ class Grid:
     def space(self, num_fields: int, element: Any) -> _dolfinx.Space:
         """The function space of displacement and `num_fields - 1` bilinear fields."""
         if num_fields not in self._spaces:
-            self._spaces[num_fields] = self.rectangle.space(element)
+            self._spaces[num_fields] = _dolfinx.Space(self.rectangle, element)
         return self._spaces[num_fields]
 
     def edge(self, name: Edge) -> tuple[int, int]:
@@ -77,3 +84,8 @@ class Grid:
     def axis_positions(self, axis: int, cell: Any, t: Any) -> Array:
         """Coordinates [m] along an axis of positions `t` (0 to 1) in cells."""
         return np.asarray(self.origin[axis] + self.h * (np.asarray(cell) + np.asarray(t)))
+
+
+def _cells(cells: Sequence[int]) -> tuple[int, int]:
+    nx, ny = pair("cells", cells, "whole numbers")
+    return whole_number("cells[0]", nx, low=1), whole_number("cells[1]", ny, low=1)

@@ -1,8 +1,8 @@
 """The scaled linear system of one Newton iteration, solved by MUMPS.
 
-LDL^T where the tangent is symmetric, LU otherwise. One solve with a fixed random right-hand side
-follows each factorisation: the growth of its solution estimates the condition number from below and,
-for a singular system, its large entries say where (formulation.md, section 3).
+LDL^T where the tangent is symmetric, LU otherwise. Two steps of inverse iteration from a fixed random
+vector follow each factorisation: their growth estimates the condition number from below, and the
+large entries of the vector they end with say where a singular system is weak.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from tawami.stopwatch import Stopwatch
 Array = npt.NDArray[np.float64]
 
 #: A scaled system beyond this condition number has no digit left to trust.
-SINGULAR = 1e13
+SINGULAR = 1e14
 
 
 class LinearSystem:
@@ -60,11 +60,11 @@ class LinearSystem:
         self._ksp = PETSc.KSP().create(matrix.comm)
         self._ksp.setOperators(matrix)
         self._ksp.setType("preonly")
-        preconditioner = self._ksp.getPC()
-        preconditioner.setType("cholesky" if self.symmetric else "lu")
-        preconditioner.setFactorSolverType("mumps")
-        preconditioner.setFactorSetUpSolverType()
-        self._factor = preconditioner.getFactorMatrix()
+        self._pc = self._ksp.getPC()
+        self._pc.setType("cholesky" if self.symmetric else "lu")
+        self._pc.setFactorSolverType("mumps")
+        self._pc.setFactorSetUpSolverType()
+        self._factor = self._pc.getFactorMatrix()
         self._factor.setMumpsIcntl(7, 0)  # AMD: the cheapest first factorisation
         self._factor.setMumpsIcntl(14, 50)  # room for delayed pivots
         self._ksp.setUp()
@@ -78,15 +78,29 @@ class LinearSystem:
         self._failed = code < 0
 
     def _estimate(self, matrix: Any, probe: Array) -> None:
-        if self._failed:
+        failed = self._failed
+        if failed:
             matrix.shift(1e-12)
+            self._free(self._factor, self._pc, self._ksp)
             self._factorise(matrix)
-            self.condition = np.inf
         weak = self._apply(probe)
-        if not self._failed:
-            norm = matrix.norm(PETSc.NormType.FROBENIUS) / np.sqrt(len(probe))
-            self.condition = float(norm * np.linalg.norm(weak) / np.linalg.norm(probe))
+        weak = self._apply(weak / np.linalg.norm(weak))
+        # rms of the row norms, which the scaling makes alike
+        norm = matrix.norm(PETSc.NormType.FROBENIUS) / np.sqrt(len(probe))
+        self.condition = np.inf if failed else float(norm * np.linalg.norm(weak))
         self.suspects = np.argsort(-np.abs(weak))
+
+    def __enter__(self) -> LinearSystem:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._free(self._factor, self._pc, self._ksp, self._left, self._right)
+
+    @staticmethod
+    def _free(*objects: Any) -> None:
+        """petsc4py frees late or never, and each of its handles keeps the object: free them all."""
+        for item in objects:
+            item.destroy()
 
     def _apply(self, right: Array) -> Array:
         self._right.setArray(right)
@@ -108,7 +122,8 @@ def _is_symmetric(matrix: Any, probe: Array) -> bool:
     x, y = matrix.createVecs()
     x.setArray(probe)
     matrix.mult(x, y)
-    forward = np.array(y.array)
+    forward = y.array.copy()
     matrix.multTranspose(x, y)
     change = np.linalg.norm(forward - y.array)
+    x.destroy(), y.destroy()
     return bool(change <= 1e-12 * np.linalg.norm(forward))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from numbers import Real
+
 from tawami import _rust
 from tawami.errors import InputError
 
@@ -29,18 +32,22 @@ def linear_elastic(
         InputError: A parameter out of its range, or another combination.
     """
     given = {"E": E, "nu": nu, "K": K, "mu": mu, "one_minus_2nu": one_minus_2nu}
-    names = {name for name, value in given.items() if value is not None}
+    values = {name: value for name, value in given.items() if value is not None}
+    makers: dict[tuple[str, ...], Callable[[float, float], _rust.Material]] = {
+        ("E", "nu"): _rust.Material.linear_elastic_e_nu,
+        ("K", "mu"): _rust.Material.linear_elastic_k_mu,
+        ("E", "one_minus_2nu"): _rust.Material.linear_elastic_e_one_minus_2nu,
+    }
+    if tuple(values) not in makers:
+        raise InputError(
+            f"linear_elastic got {', '.join(values) or 'nothing'}: expected (E, nu), (K, mu) or "
+            "(E, one_minus_2nu)"
+        )
+    for name, value in values.items():
+        if not isinstance(value, Real):
+            raise InputError(f"linear_elastic: {name} = {value!r}: expected a number")
+    first, second = (float(value) for value in values.values())
     try:
-        match E, nu, K, mu, one_minus_2nu:
-            case float() | int(), float() | int(), None, None, None:
-                return _rust.Material.linear_elastic_e_nu(E, nu)
-            case None, None, float() | int(), float() | int(), None:
-                return _rust.Material.linear_elastic_k_mu(K, mu)
-            case float() | int(), None, None, None, float() | int():
-                return _rust.Material.linear_elastic_e_one_minus_2nu(E, one_minus_2nu)
+        return makers[tuple(values)](first, second)
     except InputError as error:
         raise InputError(f"linear_elastic: {error}") from None
-    raise InputError(
-        f"linear_elastic got {', '.join(sorted(names)) or 'nothing'}: expected the numbers (E, nu), "
-        "(K, mu) or (E, one_minus_2nu)"
-    )

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami import _rust
-from tawami.errors import ConvergenceError, SingularError
+from tawami.errors import ConvergenceError, InputError, SingularError
 from tawami.field import Field
 from tawami.formulation import CompiledForm, Density, LawQuantity, ParticleScalar, Rule
 from tawami.linear import LinearSystem
@@ -98,7 +98,18 @@ class Newton:
         if isinstance(density.quantity, LawQuantity):
             self._requests[rule].append((density.quantity.name, density.part, column))
         elif isinstance(density.quantity, ParticleScalar):
-            self.data[rule][:, column] = density.quantity.evaluate(self.constants)
+            with np.errstate(all="ignore"):
+                values = density.quantity.evaluate(self.constants)
+            self.data[rule][:, column] = values
+            bad = np.flatnonzero(~np.isfinite(self.data[rule][:, column]))
+            if len(bad):
+                p = bad[0]
+                raise InputError(
+                    f"form {self.compiled.form.name}: '{density.quantity.text}' is not finite at "
+                    f"particle {p}, where K = {self.constants['K'][p]:g} and mu = "
+                    f"{self.constants['mu'][p]:g} Pa; with nu = 0.5 (K infinite) use form 'u_p', or "
+                    "nu < 0.5"
+                )
 
     def internal(self, coefficients: Array) -> Array:
         """Internal forces and volume residual on all coefficients, at given increments."""
@@ -115,8 +126,11 @@ class Newton:
         n = self.field.layout.num_displacement
         free = reduction.selection.T @ (internal - external)
         of_u = reduction.unknowns < n
-        scale = max(float(np.linalg.norm(f[:n])) for f in (internal, external)) or 1.0
-        momentum = float(np.linalg.norm(free[of_u])) / scale
+        scale = max(float(np.linalg.norm(f[:n])) for f in (internal, external))
+        # Forces of a body that only moves rigidly are round-off: it is in equilibrium.
+        modulus = np.minimum(self.constants["K"], 1e4 * self.constants["mu"]).max()
+        round_off = 1e-14 * modulus * np.abs(coefficients[:n]).max() * np.sqrt(n)
+        momentum = float(np.linalg.norm(free[of_u])) / scale if scale > round_off else 0.0
         if self.kind is None:
             return momentum, None
         weight, volume = self._volume_scale(coefficients)
@@ -139,7 +153,9 @@ class Newton:
         """
         layout = self.field.layout
         of_u = reduction.unknowns < layout.num_displacement
-        diagonal = matrix.getDiagonal().array
+        vector = matrix.getDiagonal()
+        diagonal = vector.array.copy()
+        vector.destroy()
         scale = np.ones(reduction.size)
         # A zero diagonal (a function that no particle strains) is left for the solver to report.
         positive = of_u & (diagonal > 0)
@@ -176,21 +192,23 @@ class Newton:
             coefficients = reduction.selection @ unknowns + reduction.offset
             internal = self.internal(coefficients)
             history.append(self._measures(internal, external, coefficients, reduction))
-            worst = max(m for m in history[-1] if m is not None)
-            if worst < self.tolerance:
+            measures = [m for m in history[-1] if m is not None]
+            if not np.isfinite(measures).all():
+                self._fail(history, "an infinite or undefined number came up")
+            if max(measures) < self.tolerance:
                 return Converged(coefficients, history, condition, symmetric)
-            if not np.isfinite(worst) or len(history) > self.max_iterations:
-                self._fail(history)
+            if len(history) > self.max_iterations:
+                self._fail(history, "Take a smaller load, or check material and supports")
             matrix = self.field.tangent(coefficients, self.data, reduction)
             scale = self._scale(matrix, reduction)
-            system = LinearSystem(matrix, scale, self.stopwatch)
-            condition, symmetric = system.condition, system.symmetric
-            if system.singular:
-                self._report_singular(system, reduction)
-            right = reduction.selection.T @ (external - internal)
-            unknowns += system.solve(right)
+            with LinearSystem(matrix, scale, self.stopwatch) as system:
+                condition, symmetric = system.condition, system.symmetric
+                if system.singular:
+                    self._report_singular(system, reduction)
+                right = reduction.selection.T @ (external - internal)
+                unknowns += system.solve(right)
 
-    def _fail(self, history: History) -> None:
+    def _fail(self, history: History, advice: str) -> None:
         rows = "; ".join(
             f"{k}: {u:.2e}" + ("" if q is None else f", {q:.2e}")
             for k, (u, q) in enumerate(history)
@@ -198,24 +216,35 @@ class Newton:
         raise ConvergenceError(
             f"Newton did not converge in {len(history) - 1} iterations to {self.tolerance:g}; "
             f"measures of momentum and volume by iteration: {rows}. Nothing was changed in the "
-            "particles. Take a smaller load, or check material and supports",
+            f"particles. {advice}",
             history,
         )
 
     def _report_singular(self, system: LinearSystem, reduction: Reduction) -> None:
         layout, grid = self.field.layout, self.field.grid
-        cells = []
-        for unknown in system.suspects[:200]:
-            coefficient = reduction.unknowns[unknown]
-            cell = layout.cell_of(coefficient)
-            if cell not in cells:
-                cells.append(cell)
         counts = np.bincount(self.location.cell, minlength=grid.cells[0] * grid.cells[1])
-        named = ", ".join(f"({i}, {j}) with {counts[i + grid.cells[0] * j]}" for i, j in cells[:4])
+        weakest: list[str] = []
+        for unknown in system.suspects[:20]:
+            cells = layout.cells_of(reduction.unknowns[unknown])
+            number = counts[cells @ [1, grid.cells[0]]]
+            i, j = cells[number.argmin()]
+            text = f"({i}, {j}) with {number.min()} particles"
+            if text not in weakest:
+                weakest.append(text)
+        stiff = float((self.constants["K"] / self.constants["mu"]).max())
+        if stiff > 1e9 and self.compiled.form.kinematics in ("displacement", "cell"):
+            advice = (
+                f"K/mu is {stiff:.1e}: without a field for the volume no digit is left at that; use "
+                "form 'u_epsv' or 'u_p'"
+            )
+        else:
+            advice = (
+                "the particles do not stiffen every function of the grid. Use more particles per "
+                "cell, the basis 'quadratic_spline', or alpha > 0"
+            )
+        size = "infinite" if np.isinf(system.condition) else f"{system.condition:.1e} at least"
         raise SingularError(
-            "the tangent is singular (condition number of the scaled matrix above "
-            f"{system.condition:.1e} by one solve with a random right-hand side): the particles "
-            f"do not stiffen every function of the grid. Weakest at the cells (i, j): {named} "
-            f"particles. The displacement basis is '{layout.basis}': use more particles per cell, "
-            "the basis 'quadratic_spline', alpha > 0, or supports for every separate part"
+            f"the tangent is singular (condition number of the scaled matrix: {size}; by inverse "
+            f"iteration with the factorisation). The displacement basis is '{layout.basis}'; weakest "
+            f"at the cells (i, j): {', '.join(weakest[:4])}. Likely cause: {advice}"
         )

@@ -69,13 +69,13 @@ def write_particles(path: str | Path, solution: Solution) -> None:
     particles = solution.scene.particles
     n = len(particles)
     data: dict[str, Array] = {
-        "displacement [m]": _with_z(particles.displacement),
-        "stress xx yy zz xy [Pa]": np.array(particles.stress),
+        "displacement [m]": _with_z(solution.displacement_of_particles),
+        "stress xx yy zz xy [Pa]": solution.stress,
         "mean stress [Pa]": solution.mean_stress,
         "volume [m2 per m]": np.array(particles.volume),
     }
-    if particles.eps_v is not None:
-        data["eps_v [-]"] = np.array(particles.eps_v)
+    if solution.eps_v is not None:
+        data["eps_v [-]"] = solution.eps_v
     mesh = meshio.Mesh(_with_z(particles.x), [("vertex", np.arange(n)[:, None])], point_data=data)
     _write(path, mesh)
 

@@ -12,9 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
+import scipy.sparse.csgraph
 
 from tawami import _dolfinx, _rust
-from tawami.basis import Basis, extraction, greville_1d
+from tawami.basis import Basis, extraction, greville_1d, values_1d
 from tawami.boundary import Held, PointHeld
 from tawami.errors import SupportError
 from tawami.grid import Grid
@@ -38,18 +39,27 @@ class Layout:
         size: Number of coefficients.
         extraction: E, degrees of freedom of the mesh x coefficients.
         active: Whether each coefficient belongs to a function with a particle in its support.
+        num_parts: Number of parts of the body that share no displacement function.
+        part: Part that each displacement coefficient belongs to, -1 for inactive ones.
     """
 
     def __init__(self, grid: Grid, basis: Basis, space: _dolfinx.Space, active: Mask) -> None:
         self.grid, self.basis = grid, basis
         num_bilinear_dofs = space.dofs.shape[1] - 18
         blocks = [_place(grid, space, np.arange(18).reshape(9, 2), basis, degree=2)]
-        masks = [np.repeat(_active_functions(basis, grid.cells, active), 2)]
+        functions = _functions_of_cells(basis, grid.cells, active)
+        count = blocks[0].shape[1] // 2
+        masks = [np.repeat(_mask(functions, count), 2)]
+        self.num_parts, self.part = _parts(functions, count)
+        self._cells = np.argwhere(active)[:, ::-1]
+        self._functions = [functions]
         if num_bilinear_dofs:
             blocks.append(
                 _place(grid, space, 18 + np.arange(4).reshape(4, 1), "bilinear", degree=1)
             )
-            masks.append(_active_functions("bilinear", grid.cells, active))
+            functions = _functions_of_cells("bilinear", grid.cells, active)
+            masks.append(_mask(functions, blocks[1].shape[1]))
+            self._functions.append(functions)
         self.extraction = sp.hstack(blocks, format="csr")
         self.num_displacement = blocks[0].shape[1]
         self.size = self.extraction.shape[1]
@@ -60,19 +70,17 @@ class Layout:
         n = self.num_displacement
         return coefficients[:n], coefficients[n:] if n < self.size else None
 
-    def cell_of(self, coefficient: int) -> tuple[int, int]:
-        """The cell (i, j) in the middle of the support of a coefficient's function."""
+    def cells_of(self, coefficient: int) -> Indices:
+        """The cells (i, j) with particles in the support of a coefficient's function."""
         displacement = coefficient < self.num_displacement
-        basis: Basis = self.basis if displacement else "bilinear"
         function = coefficient // 2 if displacement else coefficient - self.num_displacement
-        nx, ny = self.grid.cells
-        row, column = divmod(function, _rust.basis_len(basis, nx))
-        i = min(int(greville_1d(basis, nx)[column]), nx - 1)
-        return i, min(int(greville_1d(basis, ny)[row]), ny - 1)
+        functions = self._functions[0 if displacement else 1]
+        cells: Indices = self._cells[(functions == function).any(axis=1)]
+        return cells
 
-    def rigid_modes(self) -> tuple[Array, Array, float]:
+    def rigid_modes(self, part: Mask) -> tuple[Array, Array, float]:
         """Coefficients of the translations in x and y and of the rotation (coefficients x 3), the
-        centre [m] and the length [m] of the rotation, which is scaled to order 1.
+        centre [m] of a part of the body and the length [m] that scales the rotation to order 1.
         """
         grid = self.grid
         x, y = (
@@ -80,9 +88,9 @@ class Layout:
             for axis in range(2)
         )
         points = np.stack([np.tile(x, len(y)), np.repeat(y, len(x))], axis=1)
-        held = points[self.active[: self.num_displacement : 2]]
-        centre = held.mean(axis=0)
-        length = float(np.ptp(held, axis=0).max())
+        mine = points[part[::2]]
+        centre = mine.mean(axis=0)
+        length = float(np.ptp(mine, axis=0).max())
         modes = np.zeros((self.num_displacement, 3))
         modes[0::2, 0] = modes[1::2, 1] = 1.0
         modes[0::2, 2] = -(points[:, 1] - centre[1]) / length
@@ -116,15 +124,35 @@ def _place(
     return sp.csr_matrix((np.repeat(scalar.data, components), (rows, columns)), shape=shape)
 
 
-def _active_functions(basis: Basis, cells: tuple[int, int], active: Mask) -> Mask:
-    width = 2 if basis == "bilinear" else 3
-    step = 2 if basis == "biquadratic" else 1
-    mask = np.zeros([_rust.basis_len(basis, n) for n in reversed(cells)], dtype=bool)
+def _functions_of_cells(basis: Basis, cells: tuple[int, int], active: Mask) -> Indices:
+    """Functions that do not vanish in each active cell, active cells x functions."""
     j, i = np.nonzero(active)
-    for b in range(width):
-        for a in range(width):
-            mask[step * j + b, step * i + a] = True
-    return mask.ravel()
+    fx, fy = (
+        values_1d(basis, n, cell, np.full(len(cell), 0.4)).indices.reshape(len(cell), -1)
+        for n, cell in zip(cells, (i, j), strict=True)
+    )
+    width = _rust.basis_len(basis, cells[0])
+    functions: Indices = fx[:, None, :] + width * fy[:, :, None].astype(np.int64)
+    return functions.reshape(len(i), -1)
+
+
+def _parts(functions: Indices, count: int) -> tuple[int, Indices]:
+    """Parts of the body that share no displacement function: their number, and the part of each
+    displacement coefficient (-1 for inactive ones).
+    """
+    cell = np.repeat(np.arange(len(functions)), functions.shape[1])
+    shape = (len(functions), count)
+    incidence = sp.csr_matrix((np.ones(functions.size), (cell, functions.ravel())), shape=shape)
+    number, of_cell = sp.csgraph.connected_components(incidence @ incidence.T, directed=False)
+    part = np.full(count, -1)
+    part[functions] = of_cell[:, None]
+    return int(number), np.repeat(part, 2)
+
+
+def _mask(functions: Indices, count: int) -> Mask:
+    mask = np.zeros(count, dtype=bool)
+    mask[functions] = True
+    return mask
 
 
 class Reduction:
@@ -132,27 +160,34 @@ class Reduction:
 
     Args:
         layout: The coefficients.
-        held: Prescribed coefficients.
-        points: Multi-point constraints.
+        held: Coefficients with their prescribed values.
+        points: Multi-point constraints with their prescribed values.
+        start: Coefficients that are there already; values are prescribed for the sum of these and
+            the increments, unknowns are increments.
 
     Attributes:
         size: Number of unknowns.
         unknowns: Coefficient that each unknown is.
         selection: S, coefficients x unknowns.
-        offset: Coefficients at zero unknowns.
+        offset: Increments of the coefficients at zero unknowns.
 
     Raises:
         SupportError: Supports that contradict each other, or that leave a rigid motion free.
     """
 
-    def __init__(self, layout: Layout, held: Sequence[Held], points: Sequence[PointHeld]) -> None:
+    def __init__(
+        self, layout: Layout, held: Sequence[Held], points: Sequence[PointHeld], start: Array
+    ) -> None:
         self.layout = layout
-        self.offset = np.zeros(layout.size)
+        total = np.zeros(layout.size)
         fixed = np.zeros(layout.size, dtype=bool)
+        sizes = [float(np.abs(support.values).max(initial=0.0)) for support in held]
+        sizes += [abs(point.value) for point in points]
+        tolerance = 1e-9 * max(sizes, default=0.0)  # where supports meet: round-off
         for support in held:
-            self._hold(support, fixed)
+            _hold(support, fixed, total, tolerance)
         _check_rigid_motions(layout, fixed, points)
-        dependent, involved, weights, values = _eliminate(points, fixed, self.offset)
+        dependent, involved, weights, values = _eliminate(points, fixed, total, start, tolerance)
         free = layout.active & ~fixed
         free[dependent] = False
         self.unknowns = np.flatnonzero(free)
@@ -165,27 +200,30 @@ class Reduction:
         columns = np.concatenate([np.arange(self.size), number[involved[column]]])
         shape = (layout.size, self.size)
         self.selection = sp.csr_matrix((entries, (rows, columns)), shape=shape)
+        self.offset = np.where(fixed, total - start, 0.0)
         self.offset[dependent] = values
 
-    def _hold(self, support: Held, fixed: Mask) -> None:
-        twice = fixed[support.indices]
-        change = np.abs(self.offset[support.indices] - support.values)[twice]
-        if change.size and change.max() > 1e-9 * np.abs(support.values).max(initial=1e-300):
-            raise SupportError(
-                "two supports prescribe different displacements where they meet (an end of an "
-                "edge?): expected supports that agree there"
-            )
-        self.offset[support.indices] = support.values
-        fixed[support.indices] = True
+
+def _hold(support: Held, fixed: Mask, total: Array, tolerance: float) -> None:
+    twice = fixed[support.indices]
+    change = np.abs(total[support.indices] - support.values)[twice].max(initial=0.0)
+    if change > tolerance:
+        raise SupportError(
+            f"two supports prescribe displacements that differ by {change:.3g} m where they meet (an "
+            "end of an edge?): expected supports that agree there. Profiles are projected in L2, "
+            "which may miss their values at an end by the error of the projection"
+        )
+    total[support.indices] = support.values
+    fixed[support.indices] = True
 
 
 def _eliminate(
-    points: Sequence[PointHeld], fixed: Mask, offset: Array
+    points: Sequence[PointHeld], fixed: Mask, total: Array, start: Array, tolerance: float
 ) -> tuple[Indices, Indices, Array, Array]:
     """Solve the multi-point constraints for one coefficient each (the one with the largest weight).
 
     Returns:
-        The dependent coefficients, the others involved, and A, b with
+        The dependent coefficients, the others involved, and A, b with the increments
         `c[dependent] = b - A c[others]`.
     """
     all_indices = [point.indices for point in points]
@@ -196,15 +234,16 @@ def _eliminate(
     for k, point in enumerate(points):
         loose = ~fixed[point.indices]
         a[k, np.searchsorted(involved, point.indices[loose])] = point.weights[loose]
-        b[k] = point.value - point.weights[~loose] @ offset[point.indices[~loose]]
+        known = np.where(loose, start[point.indices], total[point.indices])
+        b[k] = point.value - point.weights @ known
     pivots: dict[int, int] = {}
     for k, point in enumerate(points):
         pivot = int(np.argmax(np.abs(a[k]))) if len(involved) else -1
         if pivot < 0 or abs(a[k, pivot]) < 1e-10:
-            if abs(b[k]) > 1e-9 * max(abs(point.value), 1e-300):
+            if abs(b[k]) > tolerance:
                 raise SupportError(
-                    f"{point.where}: other supports already give this point another displacement; "
-                    "expected supports that agree, or one of them only"
+                    f"{point.where}: other supports already give this point a displacement that "
+                    f"differs by {abs(b[k]):.3g} m; expected supports that agree, or one of them"
                 )
             continue
         b[k] /= a[k, pivot]
@@ -219,16 +258,25 @@ def _eliminate(
 
 
 def _check_rigid_motions(layout: Layout, fixed: Mask, points: Sequence[PointHeld]) -> None:
-    """Name the rigid motions that no support prevents."""
-    modes, centre, length = layout.rigid_modes()
-    held = modes[fixed[: layout.num_displacement]]
-    rows = [point.weights @ modes[point.indices] for point in points]
-    matrix = np.vstack([held.T @ held, *rows, np.zeros((3, 3))])
-    _, singular, vectors = np.linalg.svd(matrix)
-    free = vectors[singular < 1e-10 * max(singular[0], 1e-300)]
-    if len(free):
+    """Name the rigid motions of each separate part of the body that no support prevents."""
+    for number in range(layout.num_parts):
+        mine = layout.part == number
+        modes, centre, length = layout.rigid_modes(mine)
+        held = modes[mine & fixed[: layout.num_displacement]]
+        rows = [p.weights @ modes[p.indices] for p in points if mine[p.indices].any()]
+        matrix = np.vstack([held.T @ held, *rows, np.zeros((3, 3))])
+        _, singular, vectors = np.linalg.svd(matrix)
+        free = vectors[singular < 1e-10 * max(singular[0], 1e-300)]
+        if not len(free):
+            continue
+        what = "the body"
+        if layout.num_parts > 1:
+            what = (
+                f"the part of the body around ({centre[0]:.3g}, {centre[1]:.3g}), which shares no "
+                f"function with the others ({layout.num_parts} parts),"
+            )
         raise SupportError(
-            f"the supports leave the body free to move: {', '.join(_names(free, centre, length))}. "
+            f"the supports leave {what} free to move: {', '.join(_names(free, centre, length))}. "
             "A static scene needs supports that prevent it: add scene.fix(...) or scene.hold(...)"
         )
 

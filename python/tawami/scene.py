@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from tawami import _rust, boundary
+from tawami import _rust, boundary, inputs
 from tawami.basis import BASES, Basis
 from tawami.body import Body
 from tawami.boundary import Component, Profile
@@ -42,9 +42,10 @@ class Scene:
         parameters: What the form names: alpha, stabilisation, ...
 
     Attributes:
-        particles: The particles; their arrays are views of the storage, not copies: `x` [m],
-            `volume` [m2], `stress` [Pa] (xx, yy, zz, xy; tension positive), `displacement` [m], and
-            `eps_v` with forms that have that field (None otherwise).
+        particles: The particles; their arrays are views of the storage, not copies: `x` [m] and
+            `material`, which cannot be written, `volume` [m2], `stress` [Pa] (xx, yy, zz, xy;
+            tension positive), `displacement` [m], and `eps_v` with forms that have that field (None
+            otherwise).
 
     Raises:
         InputError: Particles outside the grid, a body without particles, NaN, an incompressible
@@ -67,16 +68,27 @@ class Scene:
     ) -> None:
         if basis not in BASES:
             raise InputError(f"basis '{basis}': expected one of {', '.join(map(repr, BASES))}")
-        if not 0 < tolerance < 1:
-            raise InputError(f"tolerance = {tolerance}: expected a number between 0 and 1")
+        if not isinstance(grid, Grid) or not isinstance(body, Body):
+            raise InputError(
+                f"Scene({type(grid).__name__}, {type(body).__name__}, ...): expected a tawami.Grid and "
+                "a tawami.Body"
+            )
+        tolerance = inputs.number("tolerance", tolerance, low=1e-14, high=0.1)
+        max_iterations = inputs.whole_number("max_iterations", max_iterations, low=1)
         self.grid, self.basis = grid, basis
         self.form = Form.load(form)
         values, options = self.form.settings(parameters)
-        materials = list(material) if isinstance(material, Sequence) else [material]
-        x = _array(body.x, "x", 2)
-        numbers = np.zeros(len(x)) if material_of is None else np.asarray(material_of)
-        volume = _array(body.volume, "volume", 1)
-        self.particles = _rust.Particles(x, volume, numbers.astype(np.uint32))
+        many = isinstance(material, Sequence)
+        materials: list[_rust.Material] = list(material) if many else [material]  # type: ignore[list-item, arg-type]
+        if not materials or not all(isinstance(m, _rust.Material) for m in materials):
+            raise InputError(
+                f"material = {material!r}: expected a material as linear_elastic(...) makes it, or a "
+                "list of them"
+            )
+        x, volume = inputs.array("x", body.x, 2), inputs.array("volume", body.volume, 1)
+        numbers = np.zeros(len(x)) if material_of is None else material_of
+        numbers = inputs.numbering("material_of", numbers, len(x))
+        self.particles = _rust.Particles(x, volume, numbers)
         self.particles.check_materials(materials, self.form.kinematics)
         self._location = grid.rust.locate(self.particles.x)
         self._compiled = compile_form(grid.comm, self.form, options)
@@ -129,8 +141,10 @@ class Scene:
         Raises:
             InputError: A point outside the grid, or an unknown component.
         """
-        boundary.locate_point(self.grid, point, f"hold(point={tuple(point)})")
-        self._points.append((point, boundary.component_index(component), float(value)))
+        what = f"hold(point={point})"
+        boundary.locate_point(self.grid, point, what)
+        held = inputs.number(f"{what}: value", value)
+        self._points.append((point, boundary.component_index(component), held))
 
     def traction(self, edge: Edge, value: tuple[Profile, Profile]) -> None:
         """Load an edge of the grid where the body touches it.
@@ -144,15 +158,17 @@ class Scene:
             InputError: An unknown edge, or a form without a term `dot(t, w) * ds`.
         """
         self.grid.edge(edge)
+        what = f"traction(edge='{edge}')"
         if self._compiled.traction is None:
             raise InputError(
-                f"traction(edge='{edge}'): form {self.form.name} has no edge term; add "
+                f"{what}: form {self.form.name} has no edge term; add "
                 "- dot(t, w) * ds to its residual"
             )
-        self._tractions.append((edge, value[0], value[1]))
+        components = inputs.pair(what, value, "components (t_x, t_y)")
+        self._tractions.append((edge, *components))
 
     def _reduction(self) -> Reduction:
-        field, total = self._field, self._total
+        field = self._field
         held = [
             boundary.held_edge(self.grid, self.basis, field.active, edge, component, value)
             for edge, component, value in self._edges
@@ -161,15 +177,7 @@ class Scene:
             boundary.held_point(self.grid, self.basis, field.active, point, component, value)
             for point, component, value in self._points
         ]
-        # Supports are given from the start; the unknowns are increments.
-        held = [boundary.Held(h.indices, h.values - total[h.indices]) for h in held]
-        points = [
-            boundary.PointHeld(
-                p.indices, p.weights, p.value - float(p.weights @ total[p.indices]), p.where
-            )
-            for p in points
-        ]
-        return Reduction(field.layout, held, points)
+        return Reduction(field.layout, held, points, self._total)
 
     def _external(self) -> Array:
         force = np.zeros(self._field.layout.size)
@@ -183,7 +191,7 @@ class Scene:
             x, y = nodes[..., 0].ravel(), nodes[..., 1].ravel()
             what = f"traction(edge='{edge}')"
             values = [boundary.evaluate(c, x, y, what) for c in components]
-            force += self._field.traction(edge, np.stack(values, axis=-1))
+            force += self._field.traction(edge, np.stack(values, axis=-1).reshape(nodes.shape))
         return force
 
     def split(self, coefficients: Array) -> tuple[Array, Array | None]:
@@ -214,7 +222,8 @@ class Scene:
     @property
     def num_coefficients(self) -> int:
         """Number of coefficients of all fields, supports and empty cells included."""
-        return self._field.layout.size
+        size: int = self._field.layout.size
+        return size
 
     def solve(self) -> Solution:
         """Find equilibrium under the present supports and loads, and store it in the particles.
@@ -247,6 +256,9 @@ class Solution:
         unknowns: Number of reduced unknowns.
         iterations: Newton iterations of the last step.
         history: (momentum, volume) measures of every residual of the last step.
+        stress: Stress of the particles [Pa] (xx, yy, zz, xy), as it was when this was solved.
+        displacement_of_particles: Their displacement [m] since the start.
+        eps_v: Their volumetric strain; None with forms that do not have it.
         condition: Lower estimate of the condition number of the scaled tangent.
         symmetric: Whether the tangent was symmetric.
     """
@@ -257,6 +269,10 @@ class Solution:
         self.unknowns, self.iterations = unknowns, step.iterations
         self.history: History = step.history
         self.condition, self.symmetric = step.condition, step.symmetric
+        particles = scene.particles
+        self.stress = particles.stress.copy()
+        self.displacement_of_particles = particles.displacement.copy()
+        self.eps_v = None if particles.eps_v is None else particles.eps_v.copy()
 
     def displacement(self, point: Sequence[float]) -> Array:
         """Displacement (u_x, u_y) [m] of the grid at a point.
@@ -271,14 +287,4 @@ class Solution:
     @property
     def mean_stress(self) -> Array:
         """Mean stress [Pa] at the particles, (xx + yy + zz)/3, tension positive."""
-        return np.asarray(self.scene.particles.stress[:, :3].mean(axis=1))
-
-
-def _array(values: npt.ArrayLike, name: str, dimensions: int) -> Array:
-    try:
-        array = np.ascontiguousarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name}: expected an array of numbers: {error}") from None
-    if array.ndim != dimensions:
-        raise InputError(f"{name} has shape {array.shape}: expected {dimensions} dimensions")
-    return array
+        return np.asarray(self.stress[:, :3].mean(axis=1))

@@ -48,8 +48,17 @@ impl LinearElastic {
                 expected: "0 <= 1 - 2 nu < 3 (that is -1 < nu <= 0.5)",
             });
         }
-        // mu = E / (2 (1 + nu)), K = E / (3 (1 - 2 nu)); infinite at nu = 0.5
-        Ok(Self { mu: e / (3.0 - one_minus_2nu), bulk: e / (3.0 * one_minus_2nu) })
+        let one_minus_2nu = one_minus_2nu.abs(); // a negative zero would make K negative
+                                                 // mu = E / (2 (1 + nu)), K = E / (3 (1 - 2 nu)); infinite at nu = 0.5
+        let (mu, bulk) = (e / (3.0 - one_minus_2nu), e / (3.0 * one_minus_2nu));
+        if !mu.is_normal() || (one_minus_2nu > 0.0 && !bulk.is_normal()) {
+            return Err(Error::Parameter {
+                name: "E",
+                value: e,
+                expected: "a modulus whose mu and K are neither 0 nor infinite in floating point",
+            });
+        }
+        Ok(Self { mu, bulk })
     }
 
     /// From bulk and shear modulus [Pa].

@@ -1,0 +1,113 @@
+"""What surrounds a run: missing packages, ranks, BLAS, the wheel."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+import pytest
+from conftest import FORMS
+
+from tawami import environment
+from tawami.formulation import shipped
+
+ROOT = Path(__file__).parent.parent
+
+
+def python(
+    code: str, *, executable: str = sys.executable, **options
+) -> subprocess.CompletedProcess:
+    command = [executable, "-c", code]
+    return subprocess.run(
+        command, capture_output=True, text=True, check=False, timeout=300, **options
+    )
+
+
+def test_a_missing_dolfinx_says_how_to_install_it():
+    run = python("import sys; sys.modules['dolfinx'] = None; import tawami")
+    assert run.returncode == 1
+    last = run.stderr.strip().splitlines()[-1]
+    assert last.startswith("tawami.errors.MissingDependencyError: tawami needs dolfinx")
+    assert "apt install python3-dolfinx-real" in last
+
+
+def test_the_header_names_versions_and_blas():
+    header = environment.header()
+    for word in ("tawami", "dolfinx", "PETSc", "NumPy", "BLAS", "OMP_NUM_THREADS"):
+        assert word in header
+
+
+def test_the_reference_blas_is_warned_of(monkeypatch, tmp_path):
+    maps = tmp_path / "maps"
+    library = tmp_path / "blas" / "libblas.so.3"
+    library.parent.mkdir()
+    library.touch()
+    maps.write_text(f"7f00-7f01 r-xp 0 08:01 1 {library}\n")
+    monkeypatch.setattr(environment, "MAPS", maps)
+    assert environment.blas() == (f"reference BLAS ({library})", True)
+    assert "apt install libopenblas0-serial" in environment.header()
+    library.unlink()
+    fast = tmp_path / "openblas-serial" / "libblas.so.3"
+    fast.parent.mkdir()
+    fast.touch()
+    library.symlink_to(fast)
+    assert environment.blas() == ("openblas-serial", False)
+    assert "Warning" not in environment.header()
+
+
+@pytest.mark.mpi
+def test_more_than_one_rank_is_refused_with_a_sentence():
+    code = """
+import sys
+from mpi4py import MPI
+import tawami
+try:
+    tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=1.0, cells=(2, 2))
+except tawami.InputError as error:
+    print(error, flush=True)
+tawami.Grid(MPI.COMM_SELF, origin=(0, 0), h=1.0, cells=(2, 2))
+"""
+    command = ["mpirun", "--oversubscribe", "-n", "2", sys.executable, "-c", code]
+    # this process is an MPI process itself: the ranks must not take its variables for theirs
+    clean = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))}
+    clean |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    run = subprocess.run(
+        command, capture_output=True, text=True, check=False, timeout=120, env=clean
+    )
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.count("the communicator has 2 ranks: tawami runs on one rank for now") == 2
+
+
+def test_every_form_runs_from_an_installed_wheel(tmp_path):
+    """Built, installed in an empty environment, imported from there, and run."""
+    build = [sys.executable, "-m", "maturin", "build", "--release", "--locked", "--quiet"]
+    subprocess.run([*build, "--out", tmp_path], cwd=ROOT, check=True, capture_output=True)
+    (wheel,) = tmp_path.glob("tawami-*.whl")
+    home = tmp_path / "empty"
+    venv.create(home, system_site_packages=True, with_pip=True)
+    executable = str(home / "bin" / "python")
+    install = [executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", str(wheel)]
+    subprocess.run(install, check=True, capture_output=True)
+    code = f"""
+import logging; logging.disable(logging.INFO)
+from mpi4py import MPI
+import tawami
+assert "empty" in tawami.__file__, tawami.__file__
+for options in {list(FORMS.values())!r}:
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.5, cells=(4, 2))
+    body = tawami.box(grid, (0, 0), (2, 1))
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1e3, nu=0.4999), **options)
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    scene.traction("right", (0.0, -1.0))
+    print(options["form"], scene.solve().displacement((2, 0.5))[1] < 0)
+"""
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+    run = python(code, executable=executable, cwd=tmp_path, env=environment)
+    assert run.returncode == 0, run.stderr
+    lines = run.stdout.split("\n")[:-1]
+    assert {line.split()[0] for line in lines} == set(shipped())
+    assert all(line.endswith("True") for line in lines)
