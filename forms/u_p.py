@@ -1,4 +1,8 @@
-"""Mixed u-p form: Commend, Truty and Zimmermann 2004. Takes nu = 0.5 exactly (1/K = 0)."""
+"""Mixed u-p form: Commend, Truty and Zimmermann 2004. Takes nu = 0.5 exactly (1/K = 0).
+
+p is the increment of the pressure-like mean stress; sigma is the law's stress without it, that is
+the new deviator and the old mean stress.
+"""
 
 from ufl import div, dot, grad
 
@@ -8,7 +12,9 @@ parameters = {"alpha": {"default": 0.1, "minimum": 0.0}}
 
 
 def residual(u, p, w, q, sigma, K, mu, t, h, sum_p, ds, alpha):
-    """sigma + p I, p the increment; sigma old mean and new s;  R_q(q) = sum_p V_p { q (div u - p/K) - alpha h^2/mu grad q . grad p }."""
+    """R_u = sum_p V_p (sigma_p + p I) : grad w - int t . w ds
+    R_q = sum_p V_p { q (div u - p/K) - alpha h^2/mu grad q . grad p }.
+    """
     R_u = sum_p(sigma, grad(w)) + sum_p(p * div(w)) - dot(t, w) * ds
     R_q = sum_p(q * div(u)) - sum_p(1 / K, q * p)
     return R_u + R_q - sum_p(1 / mu, alpha * h**2 * dot(grad(q), grad(p)))

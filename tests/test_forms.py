@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 import textwrap
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -126,7 +127,7 @@ def test_newton_converges_quadratically_on_a_nonlinear_form():
     measures = [m for m, _ in solution.history]
     assert 3 < solution.iterations < 12
     assert measures[-1] < 1e-12
-    quadratic = [b for a, b in zip(measures, measures[1:], strict=False) if a < 1e-2 and b > 1e-11]
+    quadratic = [b for a, b in pairwise(measures) if a < 1e-2 and b > 1e-11]
     assert quadratic
     assert measures[-2] < 1e-5
 

@@ -12,7 +12,7 @@ import pytest
 
 import tawami
 from cases.cantilever import __main__ as study
-from cases.cantilever import mpm
+from cases.cantilever import bench, mpm
 from cases.cantilever.beam import COLUMNS, SUPPORTS
 from tawami.output import result_folder, whole_file, write_grid, write_particles
 
@@ -133,3 +133,11 @@ def test_wrong_cells_of_the_study(cells, capsys):
     with pytest.raises(SystemExit):
         study.main(["--cells", cells])
     assert "expected even numbers such as 2,4,8" in capsys.readouterr().err
+
+
+def test_the_benchmark_prints_its_ratios(capsys):
+    """Small, and without a look at the times themselves."""
+    bench.main(["--cells", "8"])
+    printed = capsys.readouterr().out
+    for words in ("factorisation: ", "particle stages: ", "per particle", "of them empty:", "BLAS"):
+        assert words in printed

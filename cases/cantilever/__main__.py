@@ -14,11 +14,9 @@ from pathlib import Path
 from time import perf_counter
 
 import matplotlib
-import tawami
-from tawami.environment import header
-from tawami.output import result_folder, whole_file, write_grid, write_particles
 from tqdm import tqdm
 
+import tawami
 from cases.cantilever import figures, mpm
 from cases.cantilever.beam import (
     COLUMNS,
@@ -30,6 +28,8 @@ from cases.cantilever.beam import (
     table,
 )  # fmt: skip
 from cases.cantilever.study import CELLS, runs
+from tawami.environment import header
+from tawami.output import result_folder, whole_file, write_grid, write_particles
 
 FIELDS = {
     "displacement only": ("u", None),

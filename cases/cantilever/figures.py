@@ -8,11 +8,10 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
-import tawami
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
-from tawami.output import whole_file
 
+import tawami
 from cases.cantilever.beam import (
     SUPPORTS,
     V_CLAMPED,
@@ -23,6 +22,7 @@ from cases.cantilever.beam import (
     mean_stress,
     point_support_growth,
 )  # fmt: skip
+from tawami.output import whole_file
 
 Values = npt.NDArray[np.float64]
 #: Largest mean stress of the closed form [Pa]: the range of the colours.

@@ -8,9 +8,9 @@ from __future__ import annotations
 from time import perf_counter
 
 import numpy as np
-import tawami
 from mpi4py import MPI
 
+import tawami
 from cases.cantilever.beam import (
     NU,
     D,

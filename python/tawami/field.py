@@ -6,9 +6,9 @@ reference: plain dolfinx assembly over the active cells, then P^T r and P^T K P 
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Mapping
 from typing import Any
-import weakref
 
 import numpy as np
 import numpy.typing as npt

@@ -7,7 +7,6 @@ from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
-
 from mpi4py import MPI
 
 from tawami import _dolfinx, _rust

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
-import scipy.sparse.csgraph
+from scipy.sparse.csgraph import connected_components
 
 from tawami import _dolfinx, _rust
 from tawami.basis import Basis, extraction, greville_1d, values_1d
@@ -143,7 +143,7 @@ def _parts(functions: Indices, count: int) -> tuple[int, Indices]:
     cell = np.repeat(np.arange(len(functions)), functions.shape[1])
     shape = (len(functions), count)
     incidence = sp.csr_matrix((np.ones(functions.size), (cell, functions.ravel())), shape=shape)
-    number, of_cell = sp.csgraph.connected_components(incidence @ incidence.T, directed=False)
+    number, of_cell = connected_components(incidence @ incidence.T, directed=False)
     part = np.full(count, -1)
     part[functions] = of_cell[:, None]
     return int(number), np.repeat(part, 2)
