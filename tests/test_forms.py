@@ -13,7 +13,9 @@ from conftest import FORMS, grid_of
 from ufl import div, dot, grad, inner, sym
 
 import tawami
-from tawami.formulation import Form, InexactSumWarning, ParticleScalar, shipped
+from tawami.density import ParticleScalar
+from tawami.formulation import Form, shipped
+from tawami.symbols import InexactSumWarning
 
 # A form in a driver script: this module is one. It is the shipped u_epsv, written differently.
 fields = {"v": ("displacement", "w"), "theta": ("volumetric_strain", "r")}
@@ -159,7 +161,7 @@ def test_wrong_declarations(make, message):
         make()
 
 
-@pytest.mark.filterwarnings("ignore::tawami.formulation.InexactSumWarning")
+@pytest.mark.filterwarnings("ignore::tawami.symbols.InexactSumWarning")
 @pytest.mark.parametrize(
     ("function", "message"),
     [

@@ -17,7 +17,8 @@ from petsc4py import PETSc
 
 from tawami import _dolfinx, _rust
 from tawami.basis import Basis
-from tawami.formulation import DEGREE, CompiledForm, Integral, Rule
+from tawami.compilation import CompiledForm, Integral
+from tawami.density import DEGREE, Rule
 from tawami.grid import Edge, Grid
 from tawami.reduction import Layout, Reduction
 from tawami.stopwatch import Stopwatch

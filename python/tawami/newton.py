@@ -15,9 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami import _rust
+from tawami.compilation import CompiledForm
+from tawami.density import Density, LawQuantity, ParticleScalar, Rule
 from tawami.errors import ConvergenceError, InputError, SingularError
 from tawami.field import Field
-from tawami.formulation import CompiledForm, Density, LawQuantity, ParticleScalar, Rule
 from tawami.linear import LinearSystem
 from tawami.reduction import Reduction
 from tawami.stopwatch import Stopwatch

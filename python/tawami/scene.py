@@ -15,9 +15,10 @@ from tawami import _rust, boundary, inputs
 from tawami.basis import BASES, Basis
 from tawami.body import Body
 from tawami.boundary import Component, Profile
+from tawami.compilation import compile_form
 from tawami.errors import InputError, SupportError
 from tawami.field import Field
-from tawami.formulation import Form, compile_form
+from tawami.formulation import Form
 from tawami.grid import Edge, Grid
 from tawami.newton import Converged, History, Newton
 from tawami.reduction import Reduction

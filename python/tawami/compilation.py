@@ -1,0 +1,197 @@
+"""From a form to compiled kernels: its residual in UFL, the derived tangent, the FFCx kernels.
+
+The tangent is `derivative(R, fields)` plus, for each quantity of the material law, the residual with
+that quantity exchanged for its own consistent tangent (formulation.md, section 2). Forms are written
+and compiled without a mesh, once per process and on disk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import ufl
+
+from tawami import _dolfinx
+from tawami.density import (
+    DEGREE,
+    Density,
+    Rule,
+)
+from tawami.errors import FormError
+from tawami.formulation import Form
+from tawami.symbols import PLACEHOLDERS, Symbols
+
+
+@dataclass(frozen=True)
+class Slot:
+    """One coefficient of a kernel, in packed order.
+
+    Attributes:
+        source: 'fields' (the increments), 'traction', or the rule of particle densities.
+        width: Entries per cell.
+        columns: Columns of the rule's particle data (densities only).
+    """
+
+    source: Literal["fields", "traction"] | Rule
+    width: int
+    columns: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Integral:
+    """A compiled integral and what it reads."""
+
+    kernel: _dolfinx.Kernel
+    slots: tuple[Slot, ...]
+    constants: tuple[str, ...]
+
+    @property
+    def width(self) -> int:
+        """Entries per cell of the packed coefficients."""
+        return sum(slot.width for slot in self.slots)
+
+
+@dataclass(frozen=True)
+class CompiledForm:
+    """A form ready to be attached to a grid.
+
+    Attributes:
+        form: What it was compiled from.
+        element: Element of all fields on the mesh: biquadratic displacement, bilinear others.
+        residual: Its integrals over cells, one per quadrature rule.
+        traction: Its integral over loaded edges, if it has one.
+        tangent: Derivative of `residual`, one per quadrature rule.
+        densities: Particle data per rule: each density with its first column.
+    """
+
+    form: Form
+    element: Any
+    residual: tuple[Integral, ...]
+    traction: Integral | None
+    tangent: tuple[Integral, ...]
+    densities: Mapping[Rule, Mapping[Density, int]]
+
+    def columns(self, rule: Rule) -> int:
+        """Number of columns of the particle data of a rule."""
+        return sum(density.size for density in self.densities[rule])
+
+
+def _of_type(form: Any, kind: str) -> Any | None:
+    integrals = form.integrals_by_type(kind)
+    return ufl.Form(integrals) if integrals else None
+
+
+def _is_linear_in(form: Any, coefficient: Any) -> bool:
+    """Whether a form names this coefficient and no other, once in every term."""
+    if set(form.coefficients()) != {coefficient}:
+        return False
+    zero = ufl.zero(coefficient.ufl_shape)
+    expand = ufl.algorithms.expand_derivatives
+    at_zero = expand(ufl.replace(form, {coefficient: zero}))
+    direction = ufl.Coefficient(coefficient.ufl_function_space(), count=PLACEHOLDERS - 2)
+    slope = expand(ufl.derivative(form, coefficient, direction))
+    return at_zero.empty() and coefficient not in slope.coefficients()
+
+
+def _by_rule(form: Any) -> list[Any]:
+    """One form per quadrature rule. FFCx 0.5 puts several rules into one kernel, but a field that is
+    evaluated under the rule with one point is then taken from there under the other rule as well,
+    and UFL 2022 takes two integrals of one integrand under two rules for one.
+    """
+    rules: dict[int, list[Any]] = {}
+    for integral in form.integrals():
+        rules.setdefault(integral.metadata()["quadrature_degree"], []).append(integral)
+    return [ufl.Form(rules[degree]) for degree in sorted(rules, reverse=True)]
+
+
+def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
+    symbols = Symbols(form, options)
+    residual = symbols.residual()
+    cells, edges = _of_type(residual, "cell"), _of_type(residual, "exterior_facet")
+    for part in residual.integrals():
+        if part.subdomain_id() != "everywhere":
+            raise FormError(
+                f"form {form.name}: a measure with a number, as dx({part.subdomain_id()}): expected dx, "
+                "dx_c and ds as they are; where the body is follows from the particles"
+            )
+    if edges is not None and not _is_linear_in(edges, symbols.traction):
+        raise FormError(
+            f"form {form.name}: expected edge terms linear in the traction t and in nothing else but "
+            "the test functions, as - dot(t, w) * ds; give other loads through scene.traction(...)"
+        )
+    if cells is None or len(residual.integrals()) > len(cells.integrals()) + (
+        len(edges.integrals()) if edges is not None else 0
+    ):
+        raise FormError(
+            f"form {form.name}: expected integrals over particles or cells, and over edges (ds) only"
+        )
+    if symbols.traction in cells.coefficients():
+        raise FormError(f"form {form.name}: the traction t belongs into terms with ds, not with dx")
+    tangent = symbols.tangent(cells)
+    densities: dict[Rule, dict[Density, int]] = {"particle": {}, "centre": {}, "mean": {}}
+    width = dict.fromkeys(densities, 0)
+    for density in symbols.placeholders:
+        densities[density.rule][density] = width[density.rule]
+        width[density.rule] += density.size
+
+    def integral(ufl_form: Any, *, facets: bool = False) -> Integral:
+        used = set(ufl_form.coefficients())
+        kinds = {symbols.increments: Slot("fields", 18 + 4 * (len(form.fields) - 1)),
+                 symbols.traction: Slot("traction", 18)}  # fmt: skip
+        exchange = {}
+        for rule in densities:
+            mine = {d: s for d, s in symbols.placeholders.items() if d.rule == rule and s in used}
+            size = sum(density.size for density in mine)
+            if size == 0:
+                continue
+            together = ufl.Coefficient(symbols.space(rule, size), count=2 + len(kinds))
+            columns: list[int] = []
+            for density, symbol in mine.items():
+                first, start = len(columns), densities[rule][density]
+                exchange[symbol] = ufl.as_vector([together[first + k] for k in range(density.size)])
+                columns += range(start, start + density.size)
+            points = len(_dolfinx.reference_points(DEGREE[rule])) if rule != "mean" else 1
+            kinds[together] = Slot(rule, points * size, tuple(columns))
+        ufl_form = ufl.replace(ufl_form, exchange)
+        try:
+            kernel = _dolfinx.compile_kernel(comm, ufl_form, facets=facets)
+        except Exception as error:
+            raise FormError(
+                f"form {form.name}: UFL or FFCx refused it: {error}. Each term must be linear in one "
+                "test function"
+            ) from error
+        order = ufl_form.coefficients()
+        slots = tuple(kinds[order[i]] for i in kernel.coefficients)
+        names = {constant: name for name, constant in symbols.constants.items()}
+        return Integral(kernel, slots, tuple(names[c] for c in ufl_form.constants()))
+
+    return CompiledForm(
+        form=form,
+        element=symbols.element,
+        residual=tuple(integral(part) for part in _by_rule(cells)),
+        traction=integral(edges, facets=True) if edges is not None else None,
+        tangent=tuple(integral(part) for part in _by_rule(tangent)),
+        densities=densities,
+    )
+
+
+_compiled: dict[tuple[Form, tuple[tuple[str, str], ...]], CompiledForm] = {}
+
+
+def compile_form(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
+    """Compile a form with its options; the result is kept for the process and on disk.
+
+    Args:
+        comm: Communicator; a collective call.
+        form: The form.
+        options: One value for each of the form's options.
+
+    Raises:
+        FormError: An unknown name, a forgotten test function, or what UFL and FFCx refuse.
+    """
+    key = (form, tuple(sorted(options.items())))
+    if key not in _compiled:
+        _compiled[key] = _compile(comm, form, options)
+    return _compiled[key]

@@ -1,0 +1,241 @@
+"""Everything that a residual may name, as UFL on a mesh that is not there yet."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import warnings
+from collections.abc import Mapping
+from typing import Any
+
+import ufl
+
+from tawami import _dolfinx
+from tawami.density import (
+    DEGREE,
+    LAW,
+    MU,
+    ONE,
+    Density,
+    K,
+    LawQuantity,
+    ParticleScalar,
+    Quantity,
+    Rule,
+)
+from tawami.errors import FormError
+from tawami.formulation import Form, listed
+
+#: FFCx 0.5 writes C that does not compile when a coefficient's number has two digits, so those that
+#: reach it are numbered from 0 and those that only stand in while a form is written from here.
+PLACEHOLDERS = 1000
+#: Degree along x and y that the densities of `sum_p` integrate exactly.
+EXACT_DEGREE = 4
+
+
+class InexactSumWarning(UserWarning):
+    """A `sum_p` of an expression of too high a degree to be the sum over the particles."""
+
+
+class Symbols:
+    """Everything a residual may name, on a mesh that is not there yet."""
+
+    def __init__(self, form: Form, options: Mapping[str, str]) -> None:
+        self.form = form
+        domain = _dolfinx.domain()
+        elements = [_dolfinx.lagrange(2, 2)] + [_dolfinx.lagrange(1)] * (len(form.fields) - 1)
+        self.element = elements[0] if len(elements) == 1 else _dolfinx.mixed(elements)
+        space = ufl.FunctionSpace(domain, self.element)
+        self.domain = domain
+        self.increments = ufl.Coefficient(space, count=0)
+        self.trial = ufl.TrialFunction(space)
+        test = ufl.TestFunction(space)
+        self.fields = self._split(self.increments)
+        self.trials = self._split(self.trial)
+        tests = self._split(test)
+        self.tests = {form.fields[name][1]: tests[name] for name in form.fields}
+        self.traction = ufl.Coefficient(ufl.FunctionSpace(domain, _dolfinx.lagrange(2, 2)), count=1)
+        self.constants = {
+            name: ufl.Constant(domain, count=k) for k, name in enumerate(("h", *form.parameters))
+        }
+        self.measures = {
+            rule: ufl.dx(domain=domain, metadata={"quadrature_degree": degree})
+            for rule, degree in DEGREE.items()
+        }
+        self.placeholders: dict[Density, Any] = {}
+        self.names = {
+            **self.fields,
+            **self.tests,
+            **self.constants,
+            **{name: LawQuantity(name) for name in LAW},
+            **options,
+            "K": K,
+            "mu": MU,
+            "t": self.traction,
+            "dx": self.measures["particle"],
+            "dx_c": self.measures["centre"],
+            "ds": ufl.ds(domain=domain, metadata={"quadrature_degree": 4}),
+            "sum_p": functools.partial(self._sum, "particle"),
+            "sum_c": functools.partial(self._sum, "centre"),
+            "cell_mean": self._cell_mean,
+        }
+
+    def _split(self, function: Any) -> dict[str, Any]:
+        names = list(self.form.fields)
+        parts = [function] if len(names) == 1 else ufl.split(function)
+        return dict(zip(names, parts, strict=True))
+
+    def space(self, rule: Rule, size: int) -> Any:
+        element = (
+            _dolfinx.per_cell(size) if rule == "mean" else _dolfinx.at_points(DEGREE[rule], size)
+        )
+        return ufl.FunctionSpace(self.domain, element)
+
+    def density(self, density: Density) -> Any:
+        """The coefficient that stands for a density while the form is being written."""
+        if density not in self.placeholders:
+            count = PLACEHOLDERS + len(self.placeholders)
+            self.placeholders[density] = ufl.Coefficient(
+                self.space(density.rule, density.size), count=count
+            )
+        return self.placeholders[density]
+
+    def _quantity(self, quantity: Any, caller: str) -> Quantity:
+        if isinstance(quantity, (int, float)):
+            return ONE * quantity
+        if not isinstance(quantity, (ParticleScalar, LawQuantity)):
+            raise FormError(
+                f"form {self.form.name}: {caller} takes a particle quantity (sigma, s, sigma_m, K, "
+                f"mu, or arithmetic of K and mu) first, not {quantity}"
+            )
+        return quantity
+
+    def _sum(self, rule: Rule, *arguments: Any) -> Any:
+        caller = {"particle": "sum_p", "centre": "sum_c"}[rule]
+        if len(arguments) not in (1, 2):
+            raise FormError(
+                f"form {self.form.name}: {caller} takes (quantity, expression) or (expression), "
+                f"not {len(arguments)} arguments"
+            )
+        quantity = self._quantity(arguments[0], caller) if len(arguments) == 2 else ONE
+        expression = ufl.as_ufl(arguments[-1])
+        if isinstance(quantity, LawQuantity):
+            self._check_place(rule, quantity)
+        if rule == "particle":
+            self._check_degree(expression)
+        c = self.density(Density(rule, quantity))
+        weight = ufl.as_matrix([[c[0], c[2]], [c[2], c[1]]]) if len(c) == 3 else c[0]
+        if weight.ufl_shape != expression.ufl_shape:
+            raise FormError(
+                f"form {self.form.name}: {caller} got a quantity of shape {weight.ufl_shape} and an "
+                f"expression of shape {expression.ufl_shape}: expected the same shape"
+            )
+        return ufl.inner(weight, expression) * self.measures[rule]
+
+    def _check_place(self, rule: Rule, quantity: LawQuantity) -> None:
+        """In B-bar the deviator depends on the strain at the particle and the mean stress on that
+        at the centre: only there are their tangents known.
+        """
+        cell, centre = self.form.kinematics == "cell", rule == "centre"
+        if not cell and centre:
+            raise FormError(
+                f"form {self.form.name}: sum_c({quantity.name}, ...) needs kinematics 'cell': "
+                "elsewhere the stress depends on the strain at the particle"
+            )
+        if cell and quantity.name != ("sigma_m" if centre else "s"):
+            raise FormError(
+                f"form {self.form.name}: {'sum_c' if centre else 'sum_p'}({quantity.name}, ...) with "
+                "kinematics 'cell': expected sum_p(s, ...) and sum_c(sigma_m, ...) only"
+            )
+
+    def _check_degree(self, expression: Any) -> None:
+        # UFL's estimate for squares is a multiple of the degree along one axis; 1 for u_x would be 2.
+        unit = ufl.algorithms.estimate_total_polynomial_degree(self.traction[0]) / 2
+        expanded = ufl.algorithms.apply_algebra_lowering.apply_algebra_lowering(expression)
+        degree = ufl.algorithms.estimate_total_polynomial_degree(expanded) / unit
+        if degree > EXACT_DEGREE:
+            warnings.warn(
+                f"form {self.form.name}: sum_p of an expression of degree {degree:g} (products count "
+                f"together) is not exactly the sum over the particles, which it is up to "
+                f"{EXACT_DEGREE}; what is nonlinear in the fields belongs into the material law",
+                InexactSumWarning,
+                stacklevel=2,
+            )
+
+    def _cell_mean(self, quantity: Any) -> Any:
+        quantity = self._quantity(quantity, "cell_mean")
+        if isinstance(quantity, LawQuantity):
+            raise FormError(
+                f"form {self.form.name}: cell_mean takes constants (K, mu), not '{quantity.name}'"
+            )
+        return self.density(Density("mean", quantity))[0]
+
+    def call(self, **other: Any) -> Any:
+        """The residual as the form file states it, with some names standing for something else."""
+        form = self.form
+        names = {**self.names, **other}
+        wanted = inspect.signature(form.residual).parameters
+        unknown = [name for name in wanted if name not in names]
+        if unknown:
+            raise FormError(
+                f"form {form.name}: residual asks for {listed(unknown)}, which is neither a field nor "
+                f"anything else it can have: expected names among {listed(sorted(names))}"
+            )
+        try:
+            return form.residual(**{name: names[name] for name in wanted})
+        except (FormError, Warning):
+            raise
+        except Exception as error:
+            raise FormError(f"form {form.name}: its residual raised {error!r}") from error
+
+    def residual(self) -> Any:
+        """The residual, checked to be a UFL form that uses every test function."""
+        residual = self.call()
+        if not isinstance(residual, ufl.Form):
+            raise FormError(
+                f"form {self.form.name}: residual returned {type(residual).__name__}: expected a UFL "
+                "form (sums of sum_p(...) and of expressions * dx or * ds)"
+            )
+        for unknown, (_, test) in self.form.fields.items():
+            components = 2 if self.fields[unknown].ufl_shape else 1
+            space = ufl.FunctionSpace(self.domain, _dolfinx.lagrange(1, components))
+            stranger = ufl.Coefficient(space, count=PLACEHOLDERS - 1)
+            named = test in inspect.signature(self.form.residual).parameters
+            if not named or residual.equals(self.call(**{test: stranger})):
+                raise FormError(
+                    f"form {self.form.name}: the test function '{test}' of field '{unknown}' does not "
+                    "appear in its residual: every field needs its equation"
+                )
+        return residual
+
+    def _direction(self, density: Density) -> Any:
+        """Change of a law quantity with the fields: C : strain(du) + c d_eps_v."""
+        assert isinstance(density.quantity, LawQuantity)
+        kinematics, n = self.form.kinematics, LAW[density.quantity.name]
+        du, *volumetric = self.trials.values()
+        change = [ufl.as_ufl(0.0)] * n
+        if density.rule == "particle":
+            e = ufl.sym(ufl.grad(du))
+            strain = (e[0, 0], e[1, 1], 2 * e[0, 1])
+            c = self.density(Density(density.rule, density.quantity, "strain"))
+            change = [sum(c[3 * i + j] * strain[j] for j in range(3)) for i in range(n)]
+        volume = None
+        if kinematics == "mixed":
+            volume = volumetric[0]
+        elif kinematics == "cell" and density.rule == "centre":
+            volume = ufl.div(du)
+        if volume is not None:
+            c = self.density(Density(density.rule, density.quantity, "volume"))
+            change = [change[i] + c[i] * volume for i in range(n)]
+        return ufl.as_vector(change)
+
+    def tangent(self, residual: Any) -> Any:
+        """Derivative with respect to the fields, the law's part by its consistent tangent."""
+        tangent = ufl.algorithms.expand_derivatives(
+            ufl.derivative(residual, self.increments, self.trial)
+        )
+        for density, symbol in list(self.placeholders.items()):
+            if isinstance(density.quantity, LawQuantity) and density.part == "value":
+                # Linear in each density: what is bilinear after the exchange is its share.
+                tangent += ufl.lhs(ufl.replace(residual, {symbol: self._direction(density)}))
+        return tangent
