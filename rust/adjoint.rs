@@ -7,7 +7,7 @@
 //! ```
 //!
 //! on the tensor Gauss points, `sum_q w_q |J| D_q f(xi_q) = sum_p V_p D_p f(xi_p)` holds to round-off
-//! for every f in Q_k, k + 1 points per axis (formulation.md, section 2).
+//! for every f in Q_k, k + 1 points per axis (README, The method).
 
 use ndarray::{ArrayView2, ArrayViewMut2};
 use rayon::prelude::*;

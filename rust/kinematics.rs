@@ -7,7 +7,7 @@
 //! | `cell`         | dev(sym grad u)           | div u at the cell's centre |
 //! | `deviatoric`   | dev(sym grad u)           | 0 (the form carries p)     |
 //!
-//! (formulation.md, section 1.) Deviator and volume stay apart all the way to the stress: summed
+//! Deviator and volume stay apart all the way to the stress: summed
 //! into one tensor, the round-off of the deviator would reach the mean stress multiplied by K.
 
 use std::str::FromStr;

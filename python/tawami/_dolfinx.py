@@ -1,6 +1,6 @@
 """The only importer of dolfinx and basix: versions 0.5.2, 0.9 and 0.11 end here.
 
-Contract 3 of the design: forms are compiled once, without a mesh, and then attached to a list of
+Contract 3 of CONTRIBUTING.md: forms are compiled once, without a mesh, and then attached to a list of
 cells (or of facets) with coefficient arrays packed by hand, so that a change of the active cells
 costs no compilation.
 """

@@ -1,8 +1,8 @@
 """From a form to compiled kernels: its residual in UFL, the derived tangent, the FFCx kernels.
 
 The tangent is `derivative(R, fields)` plus, for each quantity of the material law, the residual with
-that quantity exchanged for its own consistent tangent (formulation.md, section 2). Forms are written
-and compiled without a mesh, once per process and on disk.
+that quantity exchanged for its own consistent tangent. Forms are written and compiled without a mesh,
+once per process and on disk.
 """
 
 from __future__ import annotations

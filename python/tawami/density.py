@@ -1,7 +1,7 @@
 """Particle data that a form may name, and the densities it enters the field problem with.
 
 On the points of a fixed rule, particle data D become the volume-weighted densities of
-formulation.md, section 2: `D_q = (sum_p V_p D_p l_q(x_p)) / (w_q |J|)` (`rust/adjoint.rs`).
+README, The method: `D_q = (sum_p V_p D_p l_q(x_p)) / (w_q |J|)` (`rust/adjoint.rs`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The seam between particles and field problem (contract 3 of the design).
+"""The seam between particles and field problem (contract 3 of CONTRIBUTING.md).
 
 (form, particle densities on active cells, reduction P) -> reduced residual and tangent. This is the
 reference: plain dolfinx assembly over the active cells, then P^T r and P^T K P by PETSc.

@@ -17,8 +17,8 @@ parameters, options       alpha, ...: as declared
 ========================= ========================================================================
 
 Particle data enter as volume-weighted densities on the points of a fixed rule; there is exactly one
-in each `sum_p`, which makes the integral equal to the sum over the particles (formulation.md,
-section 2). The tangent is derived (`tawami.compilation`).
+in each `sum_p`, which makes the integral equal to the sum over the particles (README,
+The method). The tangent is derived (`tawami.compilation`).
 """
 
 from __future__ import annotations

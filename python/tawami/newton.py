@@ -1,4 +1,4 @@
-"""Newton's method for one step, stopped by the two measures of formulation.md, section 1.
+"""Newton's method for one step, stopped by two measures (README, The method).
 
 momentum   |R_u| / max(|f_int|, |f_ext|), norms over all displacement coefficients
 volume     |R_q| / |sum_p V_p W_p q (max(|div u|, |eps_v|) + p_ref/K_p + floor)|, W = K for a field
@@ -150,7 +150,7 @@ class Newton:
 
     def _scale(self, matrix: Any, reduction: Reduction) -> Array:
         """Factors of the unknowns: displacement by 1/sqrt(diagonal); eps_v and p are solved as
-        p/mu, over the square root of mu times the volume of their function (formulation.md, 3).
+        p/mu, over the square root of mu times the volume of their function (README, The method).
         """
         layout = self.field.layout
         of_u = reduction.unknowns < layout.num_displacement

@@ -86,6 +86,7 @@ class Symbols:
         return dict(zip(names, parts, strict=True))
 
     def space(self, rule: Rule, size: int) -> Any:
+        """Space of vectors of a size at the points of a rule."""
         element = (
             _dolfinx.per_cell(size) if rule == "mean" else _dolfinx.at_points(DEGREE[rule], size)
         )
