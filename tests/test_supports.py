@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from conftest import grid_of
+from conftest import greville, grid_of
 from hypothesis import given
 from hypothesis import strategies as st
 from mpi4py import MPI
@@ -206,6 +206,39 @@ def test_a_solution_keeps_its_values_when_the_scene_goes_on():
     second = scene.solve()
     np.testing.assert_array_equal(first.mean_stress, before)
     np.testing.assert_allclose(second.mean_stress, 2 * before, atol=1e-9 * np.abs(before).max())
+
+
+@pytest.mark.parametrize("edge", ["left", "right", "bottom", "top"])
+def test_a_traction_adds_up_to_its_integral(edge, basis):
+    """A parabola along part of each edge: force and moment of all functions together."""
+    grid = grid_of((6, 5))
+    lower = (grid.origin[0], 1.0) if edge != "bottom" else grid.origin
+    upper = (grid.upper[0] if edge == "right" else 1.5, 2.5 if edge != "top" else grid.upper[1])
+    body = tawami.box(grid, lower, upper, per_axis=3)
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3), form="u", basis=basis)
+    scene.traction(edge, (lambda x, y: 1 + x * y + x**2 + y**2, lambda x, y: -2 * x + y))
+    force = scene._external().reshape(-1, 2)
+    along = 1 if edge in ("left", "right") else 0
+    t, w = np.polynomial.legendre.leggauss(4)
+    half = (upper[along] - lower[along]) / 2
+    s = lower[along] + half * (1 + t)
+    fixed = np.full(4, {"left": lower[0], "right": upper[0]}.get(edge, 0.0)
+                    if along == 1 else {"bottom": lower[1], "top": upper[1]}[edge])  # fmt: skip
+    x, y = (fixed, s) if along == 1 else (s, fixed)
+    expected = [half * w @ (1 + x * y + x**2 + y**2), half * w @ (-2 * x + y)]
+    np.testing.assert_allclose(force.sum(axis=0), expected, rtol=1e-12, atol=1e-14)
+    points = [grid.origin[a] + grid.h * greville(basis, grid.cells[a]) for a in range(2)]
+    lever = (
+        np.tile(points[0], len(points[1])) if along == 0 else np.repeat(points[1], len(points[0]))
+    )
+    moment = half * w @ ((1 + x * y + x**2 + y**2) * s)
+    assert lever @ force[:, 0] == pytest.approx(moment, rel=1e-12)
+
+
+def test_coefficients_of_another_length_are_refused():
+    scene = beam()
+    with pytest.raises(tawami.InputError, match="coefficients has 3 entries: expected 80"):
+        scene.residual(np.zeros(3))
 
 
 def test_many_solves_do_not_keep_their_factorisations():

@@ -212,13 +212,22 @@ class Scene:
             coefficients: Increments of all fields: displacement (two per function, x fastest),
                 then the bilinear field, as `split` takes them apart.
         """
-        return self._newton.internal(np.asarray(coefficients, dtype=float))
+        return self._newton.internal(self._coefficients(coefficients))
 
     def tangent(self, coefficients: Array) -> sp.csr_matrix:
         """Derivative of :meth:`residual` as the form's tangent gives it, before supports."""
-        coefficients = np.asarray(coefficients, dtype=float)
+        coefficients = self._coefficients(coefficients)
         self._newton.internal(coefficients)
         return self._field.unreduced_tangent(coefficients, self._newton.data)
+
+    def _coefficients(self, values: Array) -> Array:
+        coefficients = inputs.array("coefficients", values, 1)
+        if len(coefficients) != self.num_coefficients:
+            raise InputError(
+                f"coefficients has {len(coefficients)} entries: expected {self.num_coefficients}, the "
+                "num_coefficients of this scene"
+            )
+        return coefficients
 
     @property
     def num_coefficients(self) -> int:
