@@ -34,6 +34,28 @@ def test_a_missing_dolfinx_says_how_to_install_it():
     assert "apt install python3-dolfinx-real" in last
 
 
+def test_a_missing_compiler_says_how_to_install_it(tmp_path):
+    code = """
+import logging, os; logging.disable(logging.INFO)
+from cases.cantilever import mpm
+os.environ["CC"] = "no-such-compiler"
+mpm.build("u", "paper", 2)
+"""
+    clean = os.environ | {"XDG_CACHE_HOME": str(tmp_path), "CC": "no-such-compiler"}
+    run = python(code, cwd=ROOT, env=clean)
+    last = run.stderr.strip().splitlines()[-1]
+    assert last.startswith("tawami.errors.MissingDependencyError: form 'u': the C compiler failed")
+    assert "apt install g++ python3-dev" in last
+
+
+def test_a_closed_pipe_is_no_page_about_a_crash():
+    code = "from cases.cantilever import mpm; import sys; [print('x' * 200) for _ in range(9999)]"
+    command = f"'{sys.executable}' -c \"{code}\" | head -n 1"
+    run = subprocess.run(command, shell=True, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert "PETSC" not in run.stderr
+    assert "MPI_ABORT" not in run.stderr
+
+
 def test_the_header_names_versions_and_blas():
     header = environment.header()
     for word in ("tawami", "dolfinx", "PETSc", "NumPy", "BLAS", "OMP_NUM_THREADS"):

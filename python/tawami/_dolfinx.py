@@ -7,10 +7,12 @@ costs no compilation.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import logging
 import platform
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,6 +23,13 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami.errors import MissingDependencyError
+
+if "petsc4py.PETSc" not in sys.modules and "petsc4py" not in sys.modules:
+    # PETSc would answer a closed pipe (| head) with a page about a crash and abort MPI
+    with contextlib.suppress(ImportError):
+        import petsc4py
+
+        petsc4py.init(["tawami", "-no_signal_handler"])
 
 try:
     import basix

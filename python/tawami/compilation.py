@@ -7,7 +7,8 @@ once per process and on disk.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -19,7 +20,7 @@ from tawami.density import (
     Density,
     Rule,
 )
-from tawami.errors import FormError
+from tawami.errors import FormError, MissingDependencyError
 from tawami.formulation import Form
 from tawami.symbols import PLACEHOLDERS, Symbols
 
@@ -78,6 +79,23 @@ class CompiledForm:
         return sum(density.size for density in self.densities[rule])
 
 
+@contextmanager
+def _refusals(form: Form) -> Iterator[None]:
+    """What UFL, FFCx and the C compiler refuse, as a sentence."""
+    try:
+        yield
+    except Exception as error:
+        if type(error).__name__ in ("VerificationError", "CompileError"):
+            raise MissingDependencyError(
+                f"form {form.name}: the C compiler failed on the code of FFCx: {error}. It needs gcc "
+                "and Python's headers; on Debian: apt install g++ python3-dev"
+            ) from error
+        advice = ""
+        if type(error).__name__ == "ArityMismatch":
+            advice = ". Each term must be linear in one test function"
+        raise FormError(f"form {form.name}: UFL or FFCx refused it: {error}{advice}") from error
+
+
 def _of_type(form: Any, kind: str) -> Any | None:
     integrals = form.integrals_by_type(kind)
     return ufl.Form(integrals) if integrals else None
@@ -129,7 +147,8 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
         )
     if symbols.traction in cells.coefficients():
         raise FormError(f"form {form.name}: the traction t belongs into terms with ds, not with dx")
-    tangent = symbols.tangent(cells)
+    with _refusals(form):
+        tangent = symbols.tangent(cells)
     densities: dict[Rule, dict[Density, int]] = {"particle": {}, "centre": {}, "mean": {}}
     width = dict.fromkeys(densities, 0)
     for density in symbols.placeholders:
@@ -155,13 +174,8 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
             points = len(_dolfinx.reference_points(DEGREE[rule])) if rule != "mean" else 1
             kinds[together] = Slot(rule, points * size, tuple(columns))
         ufl_form = ufl.replace(ufl_form, exchange)
-        try:
+        with _refusals(form):
             kernel = _dolfinx.compile_kernel(comm, ufl_form, facets=facets)
-        except Exception as error:
-            raise FormError(
-                f"form {form.name}: UFL or FFCx refused it: {error}. Each term must be linear in one "
-                "test function"
-            ) from error
         order = ufl_form.coefficients()
         slots = tuple(kinds[order[i]] for i in kernel.coefficients)
         names = {constant: name for name, constant in symbols.constants.items()}
