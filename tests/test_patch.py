@@ -178,4 +178,6 @@ def test_results_do_not_depend_on_units_or_place(name):
 
     reference = solve(1.0, 1.0, 0.0)
     for arguments in ((1e3, 1e-6, 0.0), (1e-6, 1.0, 0.0), (1.0, 1e6, 1e3)):
-        assert solve(*arguments) == pytest.approx(reference, rel=1e-9)
+        # without a field for the volume the condition number is that of K/mu
+        accuracy = 1e-8 if options["form"] in ("u", "u_bbar") else 1e-9
+        assert solve(*arguments) == pytest.approx(reference, rel=accuracy)

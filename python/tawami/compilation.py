@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import ufl
+from ufl.algorithms.check_arities import ArityMismatch
 
 from tawami import _dolfinx
 from tawami.density import (
@@ -84,14 +85,14 @@ def _refusals(form: Form) -> Iterator[None]:
     """What UFL, FFCx and the C compiler refuse, as a sentence."""
     try:
         yield
-    except Exception as error:
+    except (Exception, ArityMismatch) as error:  # the second is no Exception in newer UFL
         if type(error).__name__ in ("VerificationError", "CompileError"):
             raise MissingDependencyError(
                 f"form {form.name}: the C compiler failed on the code of FFCx: {error}. It needs gcc "
                 "and Python's headers; on Debian: apt install g++ python3-dev"
             ) from error
         advice = ""
-        if type(error).__name__ == "ArityMismatch":
+        if isinstance(error, ArityMismatch):
             advice = ". Each term must be linear in one test function"
         raise FormError(f"form {form.name}: UFL or FFCx refused it: {error}{advice}") from error
 
