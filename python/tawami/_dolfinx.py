@@ -136,6 +136,11 @@ def _table(connectivity: Any, rows: int) -> Integers:
     return np.asarray(array, dtype=np.int32).reshape(rows, -1)
 
 
+def _vertices(geometry: Any) -> Any:
+    """Vertices of each cell."""
+    return geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
+
+
 # -- kernels -----------------------------------------------------------------
 
 
@@ -215,7 +220,7 @@ class Rectangle:
         self.cpp = self.mesh._mesh if OLD else self.mesh._cpp_object
         x = np.asarray(self.mesh.geometry.x)[:, :2]
         # the vertices of each cell in reference order (0, 0), (1, 0), (0, 1), (1, 1): axis 0 first
-        vertices = x[_table(self.mesh.geometry.dofmap, cells[0] * cells[1])]
+        vertices = x[_table(_vertices(self.mesh.geometry), cells[0] * cells[1])]
         axis0 = (vertices[:, 1] - vertices[:, 0]) / h
         self.swapped = bool(abs(axis0[0, 1]) > 0.5)
         expected = np.array([0.0, 1.0]) if self.swapped else np.array([1.0, 0.0])
