@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import ufl
-from ufl.algorithms.check_arities import ArityMismatch
+from ufl.algorithms.check_arities import ArityMismatch, check_form_arity
 
 from tawami import _dolfinx
 from tawami.density import (
@@ -176,6 +176,8 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
             kinds[together] = Slot(rule, points * size, tuple(columns))
         ufl_form = ufl.replace(ufl_form, exchange)
         with _refusals(form):
+            # FFCx checks this too, but in newer versions it then leaves its cache locked
+            check_form_arity(ufl.algorithms.expand_derivatives(ufl_form), ufl_form.arguments())
             kernel = _dolfinx.compile_kernel(comm, ufl_form, facets=facets)
         order = ufl_form.coefficients()
         slots = tuple(kinds[order[i]] for i in kernel.coefficients)
