@@ -16,85 +16,101 @@ use crate::basis::Basis;
 use crate::grid::Location;
 use crate::quadrature::Rule;
 
-/// Where densities go in the rows of a packed coefficient array: one row per active cell, entry
-/// `offset + q * columns.len() + k` for point q and column k.
+/// Particle data on the points of a rule: what of it, and at which points.
 #[derive(Debug, Clone)]
-pub struct Packing<'a> {
-    /// Row r belongs to the active cell `location.active[rows[r]]`.
-    pub rows: &'a [u32],
+pub struct Densities<'a> {
+    /// One-dimensional rule of the points.
+    pub rule: &'a Rule,
     /// `points[q]` gives the indices along x and y of quadrature point q.
     pub points: &'a [[usize; 2]],
     /// Column of the particle data for each of the k densities.
     pub columns: &'a [usize],
-    /// First entry of a row that is written.
-    pub offset: usize,
 }
 
-/// Write the densities of the particle data `data` (particles x columns) into `out` (one row per
-/// active cell). Entries outside the packing are left alone.
-///
-/// # Panics
-/// If a row index, a column or the packing reaches outside its array; callers check at the border.
-pub fn densities(
-    location: &Location,
-    volume: &[f64],
-    data: ArrayView2<f64>,
-    rule: &Rule,
-    packing: &Packing,
-    mut out: ArrayViewMut2<f64>,
-) {
-    let n = rule.points.len();
-    let nc = packing.columns.len();
-    let area = location.grid.h * location.grid.h;
-    let scale: Vec<f64> = packing
-        .points
-        .iter()
-        .map(|&[a, b]| 1.0 / (rule.weights[a] * rule.weights[b] * area))
-        .collect();
-    let used = packing.offset..packing.offset + packing.points.len() * nc;
-    out.outer_iter_mut().into_par_iter().zip(packing.rows).for_each(|(mut row, &a)| {
-        let row = &mut row.as_slice_mut().expect("rows are contiguous")[used.clone()];
-        row.fill(0.0);
-        let (mut lx, mut ly) = (vec![0.0; n], vec![0.0; n]);
-        let mut values = vec![0.0; nc];
-        for &p in location.particles_of(a as usize) {
+impl Densities<'_> {
+    /// Number of entries in one cell: `q * columns.len() + k` for point q and column k.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.points.len() * self.columns.len()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Densities of the particle data `data` (particles x columns) in the a-th active cell.
+    ///
+    /// # Panics
+    /// If a column or point reaches outside its array; callers check at the border.
+    pub fn of_cell(
+        &self,
+        location: &Location,
+        a: usize,
+        volume: &[f64],
+        data: ArrayView2<f64>,
+        out: &mut [f64],
+    ) {
+        let area = location.grid.h * location.grid.h;
+        let (mut lx, mut ly) = ([0.0; MAX_POINTS], [0.0; MAX_POINTS]);
+        let n = self.rule.points.len();
+        out.fill(0.0);
+        for &p in location.particles_of(a) {
             let p = p as usize;
-            rule.lagrange(location.xi[p][0], &mut lx);
-            rule.lagrange(location.xi[p][1], &mut ly);
-            for (v, &c) in values.iter_mut().zip(packing.columns) {
-                *v = volume[p] * data[[p, c]];
-            }
-            for ((point, &[a, b]), &s) in row.chunks_exact_mut(nc).zip(packing.points).zip(&scale) {
-                let l = lx[a] * ly[b] * s;
-                for (d, v) in point.iter_mut().zip(&values) {
-                    *d += l * v;
+            self.rule.lagrange(location.xi[p][0], &mut lx[..n]);
+            self.rule.lagrange(location.xi[p][1], &mut ly[..n]);
+            let row = data.row(p);
+            for (point, &[i, j]) in out.chunks_exact_mut(self.columns.len()).zip(self.points) {
+                let weight = self.rule.weights[i] * self.rule.weights[j] * area;
+                let l = volume[p] * lx[i] * ly[j] / weight;
+                for (d, &c) in point.iter_mut().zip(self.columns) {
+                    *d += l * row[c];
                 }
             }
         }
-    });
+    }
 }
 
-/// Volume-weighted mean over the particles of each active cell, into the same packing (one value
-/// per cell and column).
+/// Largest number of points per axis of a rule.
+pub const MAX_POINTS: usize = 8;
+
+/// Volume-weighted mean over the particles of the a-th active cell, one value per column.
 ///
 /// # Panics
-/// As [`densities`].
-pub fn cell_means(
+/// As [`Densities::of_cell`].
+pub fn cell_mean(
     location: &Location,
+    a: usize,
     volume: &[f64],
     data: ArrayView2<f64>,
-    packing: &Packing,
-    mut out: ArrayViewMut2<f64>,
+    columns: &[usize],
+    out: &mut [f64],
 ) {
-    for (mut row, &a) in out.outer_iter_mut().zip(packing.rows) {
-        let particles = location.particles_of(a as usize);
-        let total: f64 = particles.iter().map(|&p| volume[p as usize]).sum();
-        for (k, &c) in packing.columns.iter().enumerate() {
-            let sum: f64 =
-                particles.iter().map(|&p| volume[p as usize] * data[[p as usize, c]]).sum();
-            row[packing.offset + k] = sum / total;
-        }
+    let particles = location.particles_of(a);
+    let total: f64 = particles.iter().map(|&p| volume[p as usize]).sum();
+    for (mean, &c) in out.iter_mut().zip(columns) {
+        let weighted = particles.iter().map(|&p| volume[p as usize] * data[[p as usize, c]]);
+        *mean = weighted.sum::<f64>() / total;
     }
+}
+
+/// Fill entries `offset..` of the rows of a packed coefficient array, `length` in each; row r belongs
+/// to the active cell `location.active[rows[r]]`, and `fill` writes it.
+///
+/// # Panics
+/// If the rows are shorter than `offset + length`, or not contiguous.
+pub fn pack(
+    rows: &[u32],
+    offset: usize,
+    length: usize,
+    mut out: ArrayViewMut2<f64>,
+    fill: impl Fn(usize, &mut [f64]) + Sync,
+) {
+    out.outer_iter_mut().into_par_iter().zip(rows).for_each(|(mut row, &a)| {
+        let row = row.as_slice_mut().expect("rows are contiguous");
+        fill(a as usize, &mut row[offset..offset + length]);
+    });
 }
 
 /// Sums `sum_p V_p D_p N_i(x_p)` over the functions of a basis: functions x columns, the function

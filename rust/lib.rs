@@ -18,6 +18,7 @@
 )]
 
 pub mod adjoint;
+pub mod assembly;
 pub mod basis;
 pub mod constitutive;
 pub mod error;

@@ -2,7 +2,7 @@
 
 use ndarray::{Array2, ArrayView2};
 use proptest::prelude::*;
-use tawami::adjoint::{cell_means, densities, nodal_sums, Packing};
+use tawami::adjoint::{cell_mean, nodal_sums, pack, Densities};
 use tawami::basis::Basis;
 use tawami::grid::Grid;
 use tawami::quadrature::Rule;
@@ -48,10 +48,12 @@ proptest! {
         let location = grid.locate(&x).unwrap();
         let rule = Rule::gauss(n);
         let (rows, points) = packing_of(location.active.len(), n);
-        let packing = Packing { rows: &rows, points: &points, columns: &[0, 1], offset: 3 };
+        let densities = Densities { rule: &rule, points: &points, columns: &[0, 1] };
         let mut out = Array2::from_elem((rows.len(), 3 + 2 * n * n), f64::NAN);
         out.column_mut(0).fill(7.0);
-        densities(&location, &volume, data.view(), &rule, &packing, out.view_mut());
+        pack(&rows, 3, densities.len(), out.view_mut(), |a, row| {
+            densities.of_cell(&location, a, &volume, data.view(), row);
+        });
 
         for (row, a) in out.outer_iter().zip(0..) {
             for k in 0..2 {
@@ -94,9 +96,10 @@ fn the_mean_of_a_cell_is_weighted_by_volume() {
     let grid = Grid::new([0.0, 0.0], 1.0, [2, 1]).unwrap();
     let location = grid.locate(&[0.2, 0.5, 0.9, 0.5, 1.5, 0.5]).unwrap();
     let data = ndarray::arr2(&[[1.0], [4.0], [9.0]]);
-    let packing = Packing { rows: &[1, 0], points: &[[0, 0]], columns: &[0], offset: 0 };
     let mut out = Array2::zeros((2, 1));
-    cell_means(&location, &[2.0, 1.0, 5.0], data.view(), &packing, out.view_mut());
+    pack(&[1, 0], 0, 1, out.view_mut(), |a, row| {
+        cell_mean(&location, a, &[2.0, 1.0, 5.0], data.view(), &[0], row);
+    });
     assert_eq!(out, ndarray::arr2(&[[9.0], [2.0]]));
 }
 

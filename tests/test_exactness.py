@@ -143,8 +143,9 @@ def compare(scene: tawami.Scene, options: dict[str, object]) -> None:
     assert np.abs(mine - reference).max() < 1e-12 * np.abs(reference).max()
 
 
-def test_random_particles_of_two_materials(random_scene, form, basis):
-    compare(random_scene(basis=basis, **form), form)
+@pytest.mark.parametrize("assembly", ["reference", "fast"])
+def test_random_particles_of_two_materials(random_scene, form, basis, assembly):
+    compare(random_scene(basis=basis, assembly=assembly, **form), form)
 
 
 @pytest.mark.parametrize("name", FORMS)
@@ -172,7 +173,8 @@ def test_any_cloud_of_particles(data):
     numbers = data.draw(st.lists(st.integers(0, 1), min_size=len(x), max_size=len(x)))
     volumes = np.linspace(0.01, 0.2, len(x))
     body = tawami.Body(x, volumes)
-    scene = tawami.Scene(
-        grid, body, laws, material_of=numbers, basis=basis, form="u_epsv", alpha=0.3
-    )
-    compare(scene, {"form": "u_epsv", "alpha": 0.3})
+    for assembly in ("reference", "fast"):
+        scene = tawami.Scene(
+            grid, body, laws, material_of=numbers, basis=basis, alpha=0.3, assembly=assembly
+        )
+        compare(scene, {"form": "u_epsv", "alpha": 0.3})

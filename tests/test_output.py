@@ -139,5 +139,6 @@ def test_the_benchmark_prints_its_ratios(capsys):
     """Small, and without a look at the times themselves."""
     bench.main(["--cells", "8"])
     printed = capsys.readouterr().out
-    for words in ("factorisation: ", "particle stages: ", "per particle", "of them empty:", "BLAS"):
+    words_of_each = ("factorisation: ", "particle stages: ", "per particle", "reference over fast")
+    for words in (*words_of_each, "of them empty:", "BLAS"):
         assert words in printed

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 __all__ = [
+    "Assembler",
     "Grid",
     "InputError",
     "Location",
@@ -80,6 +81,36 @@ class Material:
     def bulk_modulus(self) -> float: ...
     @property
     def shear_modulus(self) -> float: ...
+
+_Source = tuple[_Floats, Sequence[tuple[int, int]], Sequence[int]]
+_Kernel = tuple[int, Sequence[_Source | None], Sequence[float]]
+_Starts = npt.NDArray[np.int32]
+_Selection = tuple[_Starts, _Starts, _Floats, npt.NDArray[np.int64]]
+
+@final
+class Assembler:
+    def __new__(
+        cls,
+        location: Location,
+        basis: str,
+        nodes: Sequence[Sequence[int]],
+        vertices: Sequence[Sequence[int]],
+        bilinear: bool,
+    ) -> Assembler: ...
+    def vector(
+        self, kernels: Sequence[_Kernel], volume: _Floats, coefficients: _Floats
+    ) -> _Floats: ...
+    def pattern(self, selection: _Selection) -> tuple[_Starts, _Starts]: ...
+    def matrix(
+        self,
+        kernels: Sequence[_Kernel],
+        volume: _Floats,
+        coefficients: _Floats,
+        selection: _Selection,
+        start: _Starts,
+        columns: _Starts,
+        values: _Floats,
+    ) -> None: ...
 
 @final
 class Stage:

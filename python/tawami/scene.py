@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,7 @@ from tawami.body import Body
 from tawami.boundary import Component, Profile
 from tawami.compilation import compile_form
 from tawami.errors import InputError, SupportError
+from tawami.fast_field import FastField
 from tawami.field import Field
 from tawami.formulation import Form
 from tawami.grid import Edge, Grid
@@ -25,6 +26,7 @@ from tawami.reduction import Reduction
 from tawami.stopwatch import Stopwatch
 
 Array = npt.NDArray[np.float64]
+FIELDS: dict[str, type[Field]] = {"fast": FastField, "reference": Field}
 
 
 class Scene:
@@ -40,6 +42,8 @@ class Scene:
         basis: Basis of the displacement: 'quadratic_spline', 'bilinear' or 'biquadratic'.
         tolerance: Newton stops when both measures of `tawami.newton` are below it.
         max_iterations: Newton iterations before the step is given up.
+        assembly: 'fast', kernels called from Rust, or 'reference', dolfinx and P^T K P: the same
+            numbers to round-off.
         parameters: What the form names: alpha, stabilisation, ...
 
     Attributes:
@@ -65,10 +69,13 @@ class Scene:
         basis: Basis = "quadratic_spline",
         tolerance: float = 1e-6,
         max_iterations: int = 20,
+        assembly: Literal["fast", "reference"] = "fast",
         **parameters: Any,
     ) -> None:
         if basis not in BASES:
             raise InputError(f"basis '{basis}': expected one of {', '.join(map(repr, BASES))}")
+        if assembly not in FIELDS:
+            raise InputError(f"assembly = {assembly!r}: expected 'fast' or 'reference'")
         if not isinstance(grid, Grid) or not isinstance(body, Body):
             raise InputError(
                 f"Scene({type(grid).__name__}, {type(body).__name__}, ...): expected a tawami.Grid and "
@@ -100,7 +107,7 @@ class Scene:
         self._constants = {"K": of_particle[:, 0], "mu": of_particle[:, 1]}
         self.stopwatch = Stopwatch()
         with self.stopwatch("set-up"):
-            self._field = Field(
+            self._field = FIELDS[assembly](
                 grid, self._compiled, basis, self._location, self.particles.volume, values,
                 self.stopwatch,
             )  # fmt: skip

@@ -1,0 +1,116 @@
+"""The field side without a matrix of the mesh: kernels called from Rust, into the reduced matrix.
+
+It does what `Field` does, from the same compiled form (`rust/assembly.rs`): gather, FFCx kernel and
+extraction cell by cell on all threads, scatter into known slots of P^T K P. Edge terms stay with
+`Field`. Both give the same numbers to round-off (`tests/test_fast_field.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+from petsc4py import PETSc
+
+from tawami import _dolfinx, _rust
+from tawami.basis import Basis
+from tawami.compilation import CompiledForm, Integral
+from tawami.density import Rule
+from tawami.field import Field
+from tawami.grid import Grid
+from tawami.reduction import Reduction
+from tawami.stopwatch import Stopwatch
+
+Array = npt.NDArray[np.float64]
+
+
+class FastField(Field):
+    """A compiled form on the active cells of a grid; arguments as those of `Field`."""
+
+    def __init__(
+        self,
+        grid: Grid,
+        compiled: CompiledForm,
+        basis: Basis,
+        location: _rust.Location,
+        volume: Array,
+        parameters: Mapping[str, float],
+        stopwatch: Stopwatch,
+    ) -> None:
+        super().__init__(grid, compiled, basis, location, volume, parameters, stopwatch)
+        to_grid = grid.rectangle.to_grid_axes
+        nodes, vertices = (
+            np.rint(degree * to_grid(_dolfinx.reference_nodes(degree))).astype(int).tolist()
+            for degree in (2, 1)
+        )
+        bilinear = len(compiled.form.fields) > 1
+        self._assembler = _rust.Assembler(location, basis, nodes, vertices, bilinear)
+        self._pattern: tuple[Any, ...] = ()
+
+    def _kernels(self, integrals: Sequence[Integral], data: Mapping[Rule, Array]) -> list[Any]:
+        """Address, coefficients and constants of each kernel, as `_rust.Assembler` takes them."""
+        kernels = []
+        for integral in integrals:
+            slots: list[Any] = []
+            for slot in integral.slots:
+                if slot.source == "fields":
+                    slots.append(None)
+                else:
+                    assert slot.source != "traction"  # refused in integrals over cells
+                    points = [] if slot.source == "mean" else self._points[slot.source]
+                    slots.append((data[slot.source], points, list(slot.columns)))
+            constants = self._constants(integral).tolist()
+            kernels.append((integral.kernel.address, slots, constants))
+        return kernels
+
+    def residual(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
+        """Internal forces and volume residual on all coefficients, before supports."""
+        with self.stopwatch("residual"):
+            kernels = self._kernels(self.compiled.residual, data)
+            return self._assembler.vector(kernels, self._volume, coefficients)
+
+    def tangent(self, coefficients: Array, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
+        """P^T K P as a PETSc matrix; it is overwritten by the next call."""
+        with self.stopwatch("pattern"):
+            if self._reduction is not reduction:
+                self._new_pattern(reduction)
+        selection, start, columns, values = self._pattern
+        with self.stopwatch("tangent"):
+            kernels = self._kernels(self.compiled.tangent, data)
+            self._assembler.matrix(
+                kernels, self._volume, coefficients, selection, start, columns, values
+            )
+            matrix = self._petsc["reduced"]
+            matrix.assemble()
+        return matrix
+
+    def unreduced_tangent(self, coefficients: Array, data: Mapping[Rule, Array]) -> sp.csr_matrix:
+        """E^T K E, the tangent of :meth:`residual`."""
+        n = self.layout.size
+        every = np.arange(n + 1)
+        selection = (every.astype(np.int32), every[:n].astype(np.int32), np.ones(n), every[:n])
+        start, columns = self._assembler.pattern(selection)
+        values = np.zeros(len(columns))
+        kernels = self._kernels(self.compiled.tangent, data)
+        self._assembler.matrix(
+            kernels, self._volume, coefficients, selection, start, columns, values
+        )
+        return sp.csr_matrix((values, columns, start), shape=(n, n))
+
+    def _new_pattern(self, reduction: Reduction) -> None:
+        self._petsc.free("reduced")
+        s = reduction.selection
+        selection = (
+            s.indptr.astype(np.int32), s.indices.astype(np.int32), s.data, reduction.unknowns
+        )  # fmt: skip
+        start, columns = self._assembler.pattern(selection)
+        values = np.zeros(len(columns))
+        self._pattern, self._reduction = (selection, start, columns, values), reduction
+        size, csr = (reduction.size, reduction.size), (start, columns, values)
+        comm = self.grid.comm
+        # the matrix uses the arrays themselves: what Rust writes is what PETSc sees
+        assert np.dtype(PETSc.IntType) == np.int32
+        self._petsc["reduced"] = PETSc.Mat().createAIJWithArrays(size, csr, comm=comm)

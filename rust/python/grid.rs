@@ -1,0 +1,130 @@
+//! The grid, where points are in it, and its bases.
+
+use std::sync::Arc;
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+
+use super::require;
+use crate::basis::Basis;
+use crate::error::Error;
+use crate::grid::{Grid, Location};
+use crate::interpolation::Field;
+use crate::quadrature::Rule;
+
+#[pyclass(name = "Grid", frozen)]
+pub(super) struct PyGrid(pub(super) Grid);
+
+#[pymethods]
+impl PyGrid {
+    #[new]
+    fn new(origin: [f64; 2], h: f64, cells: [usize; 2]) -> PyResult<Self> {
+        Ok(Self(Grid::new(origin, h, cells)?))
+    }
+
+    fn locate(&self, x: PyReadonlyArray2<f64>) -> PyResult<PyLocation> {
+        let x = x.as_array().as_standard_layout().into_owned();
+        if x.ncols() != 2 {
+            let expected = "(points, 2)".to_owned();
+            return Err(Error::Shape { name: "x", got: x.shape().to_vec(), expected }.into());
+        }
+        let flat = x.as_slice().unwrap_or_default();
+        Ok(PyLocation(Arc::new(self.0.locate(flat)?)))
+    }
+}
+
+#[pyclass(name = "Location", frozen)]
+pub(super) struct PyLocation(pub(super) Arc<Location>);
+
+#[pymethods]
+impl PyLocation {
+    #[getter]
+    fn active<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
+        self.0.active.to_pyarray(py)
+    }
+
+    #[getter]
+    fn cell<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
+        self.0.cell.to_pyarray(py)
+    }
+
+    #[getter]
+    fn xi<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.0.xi.as_flattened().to_pyarray(py).reshape([self.0.len(), 2])
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.len()
+    }
+}
+
+pub(super) fn field<'a, const C: usize>(
+    grid: Grid,
+    basis: Basis,
+    coefficients: &'a PyReadonlyArray1<f64>,
+) -> PyResult<Field<'a, C>> {
+    let coefficients = coefficients.as_slice()?;
+    let expected = C * basis.len(grid.cells[0]) * basis.len(grid.cells[1]);
+    require(coefficients.len() == expected, "wrong number of grid coefficients")?;
+    Ok(Field { grid, basis, coefficients })
+}
+
+/// Values of a grid field at points: points x components.
+#[pyfunction]
+pub(super) fn interpolate<'py>(
+    py: Python<'py>,
+    location: &PyLocation,
+    basis: &str,
+    components: usize,
+    coefficients: PyReadonlyArray1<f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (basis, grid) = (basis.parse()?, location.0.grid);
+    let values = match components {
+        1 => field::<1>(grid, basis, &coefficients)?.at_particles(&location.0).into_flattened(),
+        2 => field::<2>(grid, basis, &coefficients)?.at_particles(&location.0).into_flattened(),
+        _ => return Err(PyRuntimeError::new_err("internal: fields have 1 or 2 components")),
+    };
+    values.to_pyarray(py).reshape([location.0.len(), components])
+}
+
+/// Functions of a basis on a row of `n` cells at positions `t` of `cell`: index of the first one
+/// and the values of up to three.
+#[pyfunction]
+#[allow(clippy::type_complexity)]
+pub(super) fn basis_1d<'py>(
+    py: Python<'py>,
+    basis: &str,
+    n: usize,
+    cell: PyReadonlyArray1<i64>,
+    t: PyReadonlyArray1<f64>,
+) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<f64>>)> {
+    let basis: Basis = basis.parse()?;
+    let (cell, t) = (cell.as_array(), t.as_array());
+    require(cell.len() == t.len(), "cells and positions differ in number")?;
+    require(cell.iter().all(|&c| c >= 0 && (c as usize) < n), "cell outside the row")?;
+    let mut first = Vec::with_capacity(t.len());
+    let mut values = Vec::with_capacity(3 * t.len());
+    for (&c, &s) in cell.iter().zip(&t) {
+        let local = basis.at(n, c as usize, s);
+        first.push(local.first as i64);
+        values.extend(local.value);
+    }
+    Ok((first.to_pyarray(py), values.to_pyarray(py).reshape([t.len(), 3])?))
+}
+
+/// Number of functions of a basis on a row of `n` cells.
+#[pyfunction]
+pub(super) fn basis_len(basis: &str, n: usize) -> PyResult<usize> {
+    Ok(basis.parse::<Basis>()?.len(n))
+}
+
+/// Points on [0, 1] and weights of the Gauss-Legendre rule.
+#[pyfunction]
+pub(super) fn gauss(
+    py: Python<'_>,
+    n: usize,
+) -> (Bound<'_, PyArray1<f64>>, Bound<'_, PyArray1<f64>>) {
+    let rule = Rule::gauss(n);
+    (rule.points.to_pyarray(py), rule.weights.to_pyarray(py))
+}

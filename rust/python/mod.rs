@@ -1,0 +1,49 @@
+//! Python bindings: they convert and check shapes at the border, and nothing else.
+
+mod adjoint;
+mod assembly;
+mod grid;
+mod particles;
+mod stage;
+
+use pyo3::create_exception;
+use pyo3::exceptions::{PyException, PyRuntimeError};
+use pyo3::prelude::*;
+
+use crate::error::Error;
+
+create_exception!(tawami, TawamiError, PyException, "Base of every error that tawami raises.");
+create_exception!(tawami, InputError, TawamiError, "An input is wrong; the message says which.");
+
+impl From<Error> for PyErr {
+    fn from(error: Error) -> Self {
+        InputError::new_err(error.to_string())
+    }
+}
+
+/// A mistake of the Python package, not of the user: the arrays it passes do not fit together.
+fn require(condition: bool, what: &str) -> PyResult<()> {
+    if condition {
+        return Ok(());
+    }
+    Err(PyRuntimeError::new_err(format!("internal: {what} (please report this)")))
+}
+
+#[pymodule]
+fn _rust(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add("TawamiError", m.py().get_type::<TawamiError>())?;
+    m.add("InputError", m.py().get_type::<InputError>())?;
+    m.add_class::<grid::PyGrid>()?;
+    m.add_class::<grid::PyLocation>()?;
+    m.add_class::<particles::PyParticles>()?;
+    m.add_class::<particles::PyMaterial>()?;
+    m.add_class::<assembly::PyAssembler>()?;
+    m.add_class::<stage::PyStage>()?;
+    m.add_function(wrap_pyfunction!(grid::interpolate, m)?)?;
+    m.add_function(wrap_pyfunction!(grid::basis_1d, m)?)?;
+    m.add_function(wrap_pyfunction!(grid::basis_len, m)?)?;
+    m.add_function(wrap_pyfunction!(grid::gauss, m)?)?;
+    m.add_function(wrap_pyfunction!(adjoint::densities, m)?)?;
+    m.add_function(wrap_pyfunction!(adjoint::nodal_sums, m)?)?;
+    Ok(())
+}

@@ -1,0 +1,136 @@
+//! Particles, as views of their storage, and material laws.
+
+use std::sync::Arc;
+
+use ndarray::Dimension;
+use numpy::{Element, PyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::PyClass;
+
+use crate::constitutive;
+use crate::material::{LinearElastic, Material};
+use crate::particles::Particles;
+
+/// NumPy view of an array inside a Python object: no copy; the object stays alive with the view.
+fn view<'py, T: Element, D: Dimension, O: PyClass>(
+    array: impl Fn(&O) -> &ndarray::Array<T, D>,
+    owner: &Bound<'py, O>,
+) -> Bound<'py, PyArray<T, D>> {
+    let object = owner.borrow();
+    // SAFETY: the arrays of a `PyParticles` are never reallocated, and the view keeps the object.
+    unsafe { PyArray::borrow_from_array(array(&object), owner.clone().into_any()) }
+}
+
+/// The same array, not writeable from Python: the cells of the particles and their laws' constants
+/// are known from these values.
+fn read_only<T, D>(array: Bound<'_, PyArray<T, D>>) -> PyResult<Bound<'_, PyArray<T, D>>> {
+    array.call_method("setflags", (false,), None)?;
+    Ok(array)
+}
+
+#[pyclass(name = "Particles")]
+pub(super) struct PyParticles(pub(super) Particles);
+
+#[pymethods]
+impl PyParticles {
+    #[new]
+    fn new(
+        x: PyReadonlyArray2<f64>,
+        volume: PyReadonlyArray1<f64>,
+        material: PyReadonlyArray1<u32>,
+    ) -> PyResult<Self> {
+        let x = x.as_array().as_standard_layout().into_owned();
+        let (volume, material) = (volume.as_array().to_owned(), material.as_array().to_owned());
+        Ok(Self(Particles::new(x, volume, material)?))
+    }
+
+    fn check(&self) -> PyResult<()> {
+        Ok(self.0.check()?)
+    }
+
+    fn check_materials(&self, materials: Vec<PyRef<PyMaterial>>, kinematics: &str) -> PyResult<()> {
+        let laws = laws(&materials);
+        Ok(constitutive::check_materials(&self.0, &laws, kinematics.parse()?)?)
+    }
+
+    fn add_eps_v(&mut self) {
+        self.0.add_eps_v();
+    }
+
+    #[getter]
+    fn bytes_per_particle(&self) -> usize {
+        self.0.bytes_per_particle()
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.len()
+    }
+
+    #[getter]
+    fn x<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        read_only(view(|p: &Self| &p.0.x, slf))
+    }
+
+    #[getter]
+    fn volume<'py>(slf: &Bound<'py, Self>) -> Bound<'py, PyArray1<f64>> {
+        view(|p: &Self| &p.0.volume, slf)
+    }
+
+    #[getter]
+    fn material<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<u32>>> {
+        read_only(view(|p: &Self| &p.0.material, slf))
+    }
+
+    #[getter]
+    fn stress<'py>(slf: &Bound<'py, Self>) -> Bound<'py, PyArray2<f64>> {
+        view(|p: &Self| &p.0.stress, slf)
+    }
+
+    #[getter]
+    fn displacement<'py>(slf: &Bound<'py, Self>) -> Bound<'py, PyArray2<f64>> {
+        view(|p: &Self| &p.0.displacement, slf)
+    }
+
+    #[getter]
+    fn eps_v<'py>(slf: &Bound<'py, Self>) -> Option<Bound<'py, PyArray1<f64>>> {
+        let object = slf.borrow();
+        let array = object.0.eps_v.as_ref()?;
+        // SAFETY: as in `view`.
+        Some(unsafe { PyArray::borrow_from_array(array, slf.clone().into_any()) })
+    }
+}
+
+#[pyclass(name = "Material", frozen)]
+pub(super) struct PyMaterial(pub(super) Arc<dyn Material>);
+
+#[pymethods]
+impl PyMaterial {
+    #[staticmethod]
+    fn linear_elastic_e_nu(e: f64, nu: f64) -> PyResult<Self> {
+        Ok(Self(Arc::new(LinearElastic::from_e_nu(e, nu)?)))
+    }
+
+    #[staticmethod]
+    fn linear_elastic_e_one_minus_2nu(e: f64, one_minus_2nu: f64) -> PyResult<Self> {
+        Ok(Self(Arc::new(LinearElastic::from_e_one_minus_2nu(e, one_minus_2nu)?)))
+    }
+
+    #[staticmethod]
+    fn linear_elastic_k_mu(k: f64, mu: f64) -> PyResult<Self> {
+        Ok(Self(Arc::new(LinearElastic::from_k_mu(k, mu)?)))
+    }
+
+    #[getter]
+    fn bulk_modulus(&self) -> f64 {
+        self.0.bulk_modulus()
+    }
+
+    #[getter]
+    fn shear_modulus(&self) -> f64 {
+        self.0.shear_modulus()
+    }
+}
+
+pub(super) fn laws(materials: &[PyRef<PyMaterial>]) -> Vec<Arc<dyn Material>> {
+    materials.iter().map(|m| Arc::clone(&m.0)).collect()
+}

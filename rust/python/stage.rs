@@ -1,0 +1,137 @@
+//! The particle stage of a Newton iteration.
+
+use std::sync::Arc;
+
+use numpy::{PyArray2, PyReadonlyArray1, PyReadwriteArray2, ToPyArray};
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+
+use super::grid::{field, PyLocation};
+use super::particles::{laws, PyMaterial, PyParticles};
+use super::require;
+use crate::basis::Basis;
+use crate::constitutive::{Operator, Part, Request, Stage};
+use crate::grid::Location;
+use crate::kinematics::{Increments, Kinematics};
+use crate::material::Material;
+
+/// The particle side of one scene: its particles in their cells, with their laws.
+#[pyclass(name = "Stage")]
+pub(super) struct PyStage {
+    particles: Py<PyParticles>,
+    location: Arc<Location>,
+    materials: Vec<Arc<dyn Material>>,
+    kinematics: Kinematics,
+    basis: Basis,
+}
+
+impl PyStage {
+    fn with<R>(
+        &self,
+        u: &PyReadonlyArray1<f64>,
+        volumetric: Option<&PyReadonlyArray1<f64>>,
+        run: impl FnOnce(&Stage) -> R,
+    ) -> PyResult<R> {
+        let grid = self.location.grid;
+        let increments = Increments {
+            u: field(grid, self.basis, u)?,
+            volumetric: volumetric.map(|v| field(grid, Basis::Bilinear, v)).transpose()?,
+        };
+        Ok(run(&Stage {
+            location: &self.location,
+            materials: &self.materials,
+            kinematics: self.kinematics,
+            increments,
+        }))
+    }
+}
+
+#[pymethods]
+impl PyStage {
+    #[new]
+    fn new(
+        py: Python,
+        particles: Py<PyParticles>,
+        location: &PyLocation,
+        materials: Vec<PyRef<PyMaterial>>,
+        kinematics: &str,
+        basis: &str,
+    ) -> PyResult<Self> {
+        require(particles.borrow(py).0.len() == location.0.len(), "location of other particles")?;
+        Ok(Self {
+            particles,
+            location: Arc::clone(&location.0),
+            materials: laws(&materials),
+            kinematics: kinematics.parse()?,
+            basis: basis.parse()?,
+        })
+    }
+
+    /// Write the requested quantities of the law into `data` (particles x columns).
+    #[pyo3(signature = (u, volumetric, requests, data))]
+    fn evaluate(
+        &self,
+        py: Python,
+        u: PyReadonlyArray1<f64>,
+        volumetric: Option<PyReadonlyArray1<f64>>,
+        requests: Vec<(String, String, usize)>,
+        mut data: PyReadwriteArray2<f64>,
+    ) -> PyResult<()> {
+        let particles = self.particles.borrow(py);
+        let data = data.as_array_mut();
+        require(data.is_standard_layout() && data.nrows() == particles.0.len(), "particle data")?;
+        let requests: Vec<Request> = requests.iter().map(request).collect::<PyResult<_>>()?;
+        let fits = |r: &Request| {
+            let per_component = if r.part == Part::Strain { 3 } else { 1 };
+            r.column + r.operator.components() * per_component <= data.ncols()
+        };
+        require(requests.iter().all(fits), "a request reaches outside the particle data")?;
+        Ok(self.with(&u, volumetric.as_ref(), |s| s.evaluate(&particles.0, &requests, data))??)
+    }
+
+    /// Accept the increments: stress, displacement and eps_v of the particles.
+    #[pyo3(signature = (u, volumetric))]
+    fn commit(
+        &self,
+        py: Python,
+        u: PyReadonlyArray1<f64>,
+        volumetric: Option<PyReadonlyArray1<f64>>,
+    ) -> PyResult<()> {
+        let mut particles = self.particles.borrow_mut(py);
+        self.with(&u, volumetric.as_ref(), |s| s.commit(&mut particles.0))
+    }
+
+    /// div u and the bilinear field (0 if there is none) at the particles: n x 2.
+    #[pyo3(signature = (u, volumetric))]
+    fn volume_strains<'py>(
+        &self,
+        py: Python<'py>,
+        u: PyReadonlyArray1<f64>,
+        volumetric: Option<PyReadonlyArray1<f64>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let location = &self.location;
+        let strains = self.with(&u, volumetric.as_ref(), |s| {
+            ndarray::Array2::from_shape_fn((location.len(), 2), |(p, k)| match k {
+                0 => s.increments.div_u(location, p),
+                _ => s.increments.volumetric_at(location, p),
+            })
+        })?;
+        Ok(strains.to_pyarray(py))
+    }
+}
+
+pub(super) fn request((operator, part, column): &(String, String, usize)) -> PyResult<Request> {
+    let operator = match operator.as_str() {
+        "sigma" => Operator::Sigma,
+        "s" => Operator::Deviator,
+        "sigma_m" => Operator::Mean,
+        other => return Err(PyRuntimeError::new_err(format!("internal: operator '{other}'"))),
+    };
+    let part = match part.as_str() {
+        "value" => Part::Value,
+        "strain" => Part::Strain,
+        "volume" => Part::Volume,
+        other => return Err(PyRuntimeError::new_err(format!("internal: part '{other}'"))),
+    };
+    Ok(Request { operator, part, column: *column })
+}

@@ -1,0 +1,157 @@
+"""The fast path gives what plain dolfinx assembly with P^T K P gives, to round-off and to the bit
+whatever the number of threads.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from contextlib import nullcontext
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import BASES, FORMS, grid_of
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.sparse import csr_matrix
+
+import tawami
+from tawami.formulation import Form
+from tawami.symbols import InexactSumWarning
+
+SUPPORTS = {
+    "edges": lambda s: (s.fix("left", "x"), s.fix("left", "y", lambda x, y: 1e-3 * y)),
+    "points": lambda s: (
+        s.hold((-1, 0.7), "x"),
+        s.hold((-0.9, 1.9), "x"),
+        s.hold((0.3, 1.1), "y", 1),
+    ),
+    "both": lambda s: (s.fix("bottom", "y"), s.hold((-0.51, 1.2), "x"), s.hold((-0.5, 1.3), "y")),
+}
+
+
+def both(make):
+    """The same scene on both paths."""
+    return [make(assembly=path) for path in ("fast", "reference")]
+
+
+def close(a, b):
+    assert np.abs(a - b).max() < 1e-12 * max(np.abs(b).max(), 1e-300)
+
+
+def reduced(scene, c):
+    """P^T K P as the field side gives it to the solver, at increments c."""
+    reduction = scene._reduction()
+    scene._newton.internal(c)
+    start, columns, values = scene._field.tangent(c, scene._newton.data, reduction).getValuesCSR()
+    return csr_matrix((values, columns, start), shape=(reduction.size,) * 2).toarray()
+
+
+@pytest.mark.parametrize("support", SUPPORTS)
+def test_residual_and_reduced_tangent(random_scene, form, basis, support):
+    scenes = both(lambda **path: random_scene(basis=basis, count=150, **form, **path))
+    for scene in scenes:
+        SUPPORTS[support](scene)
+    c = np.random.default_rng(0).standard_normal(scenes[0].num_coefficients)
+    close(*[scene.residual(c) for scene in scenes])
+    close(*[reduced(scene, c) for scene in scenes])
+    close(*[scene.tangent(c).toarray() for scene in scenes])
+
+
+def test_a_form_nonlinear_in_the_fields(random_scene):
+    """Fields as coefficients of the tangent, two rules, cell means, a constant of the form."""
+    from ufl import div, dot, grad
+
+    def residual(u, w, s, sigma_m, K, cell_mean, sum_p, sum_c, dx, dx_c, beta):
+        extra = beta * cell_mean(K) * div(u) ** 2 * dot(u, w)
+        return sum_p(s, grad(w)) + sum_c(sigma_m, div(w)) + extra * dx + 2 * extra * dx_c
+
+    form = Form(
+        {"u": ("displacement", "w")}, "cell", residual, parameters={"beta": {"default": 0.7}}
+    )
+    scenes = both(lambda **path: random_scene(form=form, **path))
+    for scene in scenes:
+        SUPPORTS["both"](scene)
+    c = np.random.default_rng(1).standard_normal(scenes[0].num_coefficients)
+    close(*[scene.residual(c) for scene in scenes])
+    close(*[reduced(scene, c) for scene in scenes])
+
+
+@settings(max_examples=20, deadline=None)
+@given(data=st.data())
+def test_any_cloud_of_particles(data):
+    cells = (data.draw(st.integers(1, 7)), data.draw(st.integers(1, 7)))
+    coordinate = st.one_of(st.floats(0, 1), st.sampled_from([0.0, 0.25, 0.5, 1.0]))
+    points = data.draw(st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=20))
+    options = FORMS[data.draw(st.sampled_from(sorted(FORMS)))]
+    basis = data.draw(st.sampled_from(BASES))
+    grid = grid_of(cells)
+    body = tawami.Body(grid.origin + grid.h * np.array(cells) * points, np.full(len(points), 0.1))
+    material = tawami.linear_elastic(E=2.0, nu=0.3)
+    scenes = both(lambda **p: tawami.Scene(grid, body, material, basis=basis, **options, **p))
+    c = np.random.default_rng(0).standard_normal(scenes[0].num_coefficients)
+    close(*[scene.residual(c) for scene in scenes])
+    close(*[scene.tangent(c).toarray() for scene in scenes])
+
+
+@pytest.mark.parametrize("support", ["paper", "exact", "clamped"])
+def test_the_beam(support):
+    from cases.cantilever import mpm
+
+    rows = [mpm.solve("u_epsv", support, 8, 0.1, assembly=p)[0] for p in ("fast", "reference")]
+    assert rows[0].deflection_m == pytest.approx(rows[1].deflection_m, rel=1e-12)
+    assert rows[0].unknowns == rows[1].unknowns
+
+
+def test_newton_reuses_the_pattern(random_scene):
+    """Several iterations on one pattern: each tangent is that of the reference."""
+    from ufl import div, dot, grad
+
+    def stiff(u, w, sigma, mu, sum_p, t, ds):
+        return sum_p(sigma, grad(w)) + sum_p(3e3 * mu, div(u) ** 3 * div(w)) - dot(t, w) * ds
+
+    form = Form({"u": ("displacement", "w")}, "displacement", stiff)
+    solutions = []
+    for path in ("fast", "reference"):
+        grid = grid_of()
+        body = tawami.box(grid, grid.origin, grid.upper, per_axis=3)
+        material = tawami.linear_elastic(E=1e3, nu=0.2)
+        warning = pytest.warns(InexactSumWarning) if path == "fast" else nullcontext()
+        with warning:  # when it is compiled, the first time
+            scene = tawami.Scene(grid, body, material, form=form, tolerance=1e-12, assembly=path)
+        scene.fix("left", "x")
+        scene.fix("left", "y")
+        scene.traction("right", (120.0, 20.0))
+        solutions.append(scene.solve())
+    assert solutions[0].iterations == solutions[1].iterations > 3
+    close(solutions[0].u, solutions[1].u)
+
+
+def test_the_same_bits_whatever_the_number_of_threads():
+    code = """
+import logging; logging.disable(logging.INFO)
+import hashlib, numpy as np
+from cases.cantilever import mpm
+scene = mpm.build("u_epsv", "paper", 16)
+c = np.random.default_rng(0).standard_normal(scene.num_coefficients)
+matrix = scene.tangent(c)
+print(hashlib.sha256(scene.residual(c).tobytes() + matrix.data.tobytes()).hexdigest())
+"""
+    outputs = set()
+    for threads in ("1", "2", "7", "2"):
+        environment = os.environ | {"RAYON_NUM_THREADS": threads}
+        run = subprocess.run(
+            [sys.executable, "-c", code], env=environment, cwd=Path(__file__).parent.parent,
+            capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        outputs.add(run.stdout)
+    assert len(outputs) == 1
+
+
+def test_an_unknown_path_is_refused(random_scene):
+    with pytest.raises(
+        tawami.InputError, match="assembly = 'quick': expected 'fast' or 'reference'"
+    ):
+        random_scene(assembly="quick")
