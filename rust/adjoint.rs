@@ -9,7 +9,7 @@
 //! on the tensor Gauss points, `sum_q w_q |J| D_q f(xi_q) = sum_p V_p D_p f(xi_p)` holds to round-off
 //! for every f in Q_k, k + 1 points per axis (README, The method).
 
-use ndarray::{ArrayView2, ArrayViewMut2};
+use ndarray::ArrayView2;
 use rayon::prelude::*;
 
 use crate::basis::Basis;
@@ -95,20 +95,19 @@ pub fn cell_mean(
     }
 }
 
-/// Fill entries `offset..` of the rows of a packed coefficient array, `length` in each; row r belongs
-/// to the active cell `location.active[rows[r]]`, and `fill` writes it.
+/// Fill entries `offset..offset + length` of the rows of a packed coefficient array, `width` entries
+/// each; row r belongs to the active cell `location.active[rows[r]]`, and `fill` writes it.
 ///
 /// # Panics
-/// If the rows are shorter than `offset + length`, or not contiguous.
+/// If the rows are shorter than `offset + length`; callers check at the border.
 pub fn pack(
     rows: &[u32],
-    offset: usize,
-    length: usize,
-    mut out: ArrayViewMut2<f64>,
+    (offset, length): (usize, usize),
+    width: usize,
+    packed: &mut [f64],
     fill: impl Fn(usize, &mut [f64]) + Sync,
 ) {
-    out.outer_iter_mut().into_par_iter().zip(rows).for_each(|(mut row, &a)| {
-        let row = row.as_slice_mut().expect("rows are contiguous");
+    packed.par_chunks_exact_mut(width).zip(rows).for_each(|(row, &a)| {
         fill(a as usize, &mut row[offset..offset + length]);
     });
 }

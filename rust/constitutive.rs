@@ -3,7 +3,6 @@
 
 use std::sync::Arc;
 
-use ndarray::ArrayViewMut2;
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
@@ -131,7 +130,7 @@ impl Stage<'_> {
         (strain, stress, moduli)
     }
 
-    /// Write what is requested into the particle data (particles x columns).
+    /// Write what is requested into the particle data (particles x `columns`, at least one).
     ///
     /// # Errors
     /// [`Error::CoupledLaw`] where B-bar meets a law it has no tangent for.
@@ -142,14 +141,14 @@ impl Stage<'_> {
         &self,
         particles: &Particles,
         requests: &[Request],
-        mut data: ArrayViewMut2<f64>,
+        columns: usize,
+        data: &mut [f64],
     ) -> Result<()> {
-        data.outer_iter_mut().into_par_iter().enumerate().try_for_each(|(p, mut row)| {
+        data.par_chunks_exact_mut(columns).enumerate().try_for_each(|(p, row)| {
             let (_, stress, moduli) = self.respond(particles, p);
             if self.kinematics == Kinematics::Cell && couples(&moduli) {
                 return Err(Error::CoupledLaw { index: p });
             }
-            let row = row.as_slice_mut().expect("rows are contiguous");
             for request in requests {
                 write(request, self.kinematics, &stress, &moduli, row);
             }

@@ -51,7 +51,8 @@ proptest! {
         let densities = Densities { rule: &rule, points: &points, columns: &[0, 1] };
         let mut out = Array2::from_elem((rows.len(), 3 + 2 * n * n), f64::NAN);
         out.column_mut(0).fill(7.0);
-        pack(&rows, 3, densities.len(), out.view_mut(), |a, row| {
+        let width = out.ncols();
+        pack(&rows, (3, densities.len()), width, out.as_slice_mut().unwrap(), |a, row| {
             densities.of_cell(&location, a, &volume, data.view(), row);
         });
 
@@ -97,7 +98,7 @@ fn the_mean_of_a_cell_is_weighted_by_volume() {
     let location = grid.locate(&[0.2, 0.5, 0.9, 0.5, 1.5, 0.5]).unwrap();
     let data = ndarray::arr2(&[[1.0], [4.0], [9.0]]);
     let mut out = Array2::zeros((2, 1));
-    pack(&[1, 0], 0, 1, out.view_mut(), |a, row| {
+    pack(&[1, 0], (0, 1), 1, out.as_slice_mut().unwrap(), |a, row| {
         cell_mean(&location, a, &[2.0, 1.0, 5.0], data.view(), &[0], row);
     });
     assert_eq!(out, ndarray::arr2(&[[9.0], [2.0]]));

@@ -96,7 +96,7 @@ fn one_particle(kinematics: Kinematics, p: f64) -> Particles {
     };
     let mut data = Array2::zeros((1, 3));
     let request = Request { operator: Operator::Sigma, part: Part::Value, column: 0 };
-    stage.evaluate(&particles, &[request], data.view_mut()).unwrap();
+    stage.evaluate(&particles, &[request], 3, data.as_slice_mut().unwrap()).unwrap();
     stage.commit(&mut particles);
     if kinematics != Kinematics::Deviatoric {
         for (k, i) in [(0, 0), (1, 1), (2, 3)] {

@@ -26,24 +26,25 @@ pub(super) fn densities(
 ) -> PyResult<()> {
     let location = &location.0;
     let (volume, data, rows) = (volume.as_slice()?, data.as_array(), rows.as_slice()?);
-    let out = out.as_array_mut();
+    let (height, width) = (out.as_array().nrows(), out.as_array().ncols());
+    let out = out.as_slice_mut()?;
     require(data.nrows() == location.len() && volume.len() == location.len(), "particle data")?;
-    require(out.is_standard_layout() && out.nrows() == rows.len(), "packed array")?;
+    require(height == rows.len(), "packed array of other cells")?;
     require(rows.iter().all(|&r| (r as usize) < location.active.len()), "row of no active cell")?;
     require(columns.iter().all(|&c| c < data.ncols()) && !columns.is_empty(), "columns")?;
-    require(offset + points.len() * columns.len() <= out.ncols(), "packed array too narrow")?;
+    require(offset + points.len() * columns.len() <= width, "packed array too narrow")?;
     let per_axis = (points.len() as f64).sqrt().round() as usize;
     let tensor = per_axis * per_axis == points.len();
     require(tensor && points.iter().flatten().all(|&i| i < per_axis), "not a tensor rule")?;
     require(per_axis <= adjoint::MAX_POINTS, "too many points")?;
     if mean {
-        adjoint::pack(rows, offset, columns.len(), out, |a, row| {
+        adjoint::pack(rows, (offset, columns.len()), width, out, |a, row| {
             adjoint::cell_mean(location, a, volume, data, &columns, row);
         });
     } else {
         let rule = Rule::gauss(per_axis);
         let densities = Densities { rule: &rule, points: &points, columns: &columns };
-        adjoint::pack(rows, offset, densities.len(), out, |a, row| {
+        adjoint::pack(rows, (offset, densities.len()), width, out, |a, row| {
             densities.of_cell(location, a, volume, data, row);
         });
     }

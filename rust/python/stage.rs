@@ -78,15 +78,20 @@ impl PyStage {
         mut data: PyReadwriteArray2<f64>,
     ) -> PyResult<()> {
         let particles = self.particles.borrow(py);
-        let data = data.as_array_mut();
-        require(data.is_standard_layout() && data.nrows() == particles.0.len(), "particle data")?;
+        let (rows, columns) = (data.as_array().nrows(), data.as_array().ncols());
+        let data = data.as_slice_mut()?;
+        require(rows == particles.0.len(), "data of other particles")?;
         let requests: Vec<Request> = requests.iter().map(request).collect::<PyResult<_>>()?;
         let fits = |r: &Request| {
             let per_component = if r.part == Part::Strain { 3 } else { 1 };
-            r.column + r.operator.components() * per_component <= data.ncols()
+            r.column + r.operator.components() * per_component <= columns
         };
         require(requests.iter().all(fits), "a request reaches outside the particle data")?;
-        Ok(self.with(&u, volumetric.as_ref(), |s| s.evaluate(&particles.0, &requests, data))??)
+        if requests.is_empty() {
+            return Ok(());
+        }
+        let run = |s: &Stage| s.evaluate(&particles.0, &requests, columns, data);
+        Ok(self.with(&u, volumetric.as_ref(), run)??)
     }
 
     /// Accept the increments: stress, displacement and eps_v of the particles.
