@@ -10,7 +10,7 @@ use crate::grid::Location;
 use crate::kinematics::{Increments, Kinematics};
 use crate::material::{Material, Moduli, Strain, Stress};
 use crate::particles::Particles;
-use crate::tensor::{deviator, mean, Sym, COMPONENTS, IN_PLANE, UNIT};
+use crate::tensor::{Sym, COMPONENTS, IN_PLANE, UNIT};
 
 /// A quantity of the law that a form may name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -102,8 +102,18 @@ fn write(request: &Request, kinematics: Kinematics, stress: &Stress, c: &Moduli,
 /// Whether mean stress and deviator depend on each other beyond round-off.
 fn couples(c: &Moduli) -> bool {
     let cross = c.dev_vol.iter().chain(&c.mean_dev).fold(0.0_f64, |a, b| a.max(b.abs()));
-    let own = c.dev_dev.iter().flatten().fold(0.0_f64, |a, b| a.max(b.abs()));
+    let own = c.dev_dev.iter().flatten().fold(c.mean_vol.abs(), |a, b| a.max(b.abs()));
     cross > 1e-12 * own
+}
+
+/// Where stress and tangent come from.
+#[derive(Clone, Copy)]
+pub enum Response<'a> {
+    /// The laws; `particles.material` counts them from 0.
+    Laws(&'a [Arc<dyn Material>]),
+    /// Computed outside for the strains of [`Stage::strain`]: stress (4 numbers per particle) and
+    /// tangent d stress / d strain (16, strain fastest), in the order of [`crate::tensor`].
+    Given(&'a [f64], &'a [f64]),
 }
 
 /// What the particle stage works on.
@@ -111,8 +121,8 @@ fn couples(c: &Moduli) -> bool {
 pub struct Stage<'a> {
     /// Where the particles are.
     pub location: &'a Location,
-    /// The laws; `particles.material` counts them from 0.
-    pub materials: &'a [Arc<dyn Material>],
+    /// The laws, or what was computed in their place.
+    pub response: Response<'a>,
     /// How the strain follows from the increments.
     pub kinematics: Kinematics,
     /// The increments of the current Newton iterate.
@@ -123,11 +133,26 @@ impl Stage<'_> {
     /// Strain, stress and tangent of particle `p`.
     fn respond(&self, particles: &Particles, p: usize) -> (Strain, Stress, Moduli) {
         let strain = self.increments.strain(self.kinematics, self.location, p);
-        let old: Sym = std::array::from_fn(|i| particles.stress[[p, i]]);
-        let old = Stress { deviator: deviator(&old), mean: mean(&old) };
-        let law = &self.materials[particles.material[p] as usize];
-        let (stress, moduli) = law.respond(&strain, &old);
+        let (stress, moduli) = match self.response {
+            Response::Laws(laws) => {
+                let old: Sym = std::array::from_fn(|i| particles.stress[[p, i]]);
+                laws[particles.material[p] as usize].respond(&strain, &Stress::from(&old))
+            }
+            Response::Given(stress, tangent) => {
+                let stress: Sym = std::array::from_fn(|i| stress[COMPONENTS * p + i]);
+                let at = COMPONENTS * COMPONENTS * p;
+                let row = |i: usize| std::array::from_fn(|j| tangent[at + COMPONENTS * i + j]);
+                (Stress::from(&stress), Moduli::from(&std::array::from_fn(row)))
+            }
+        };
         (strain, stress, moduli)
+    }
+
+    /// Strain increment of particle `p` as one tensor.
+    #[must_use]
+    pub fn strain(&self, p: usize) -> Sym {
+        let strain = self.increments.strain(self.kinematics, self.location, p);
+        std::array::from_fn(|i| strain.deviator[i] + strain.volume / 3.0 * UNIT[i])
     }
 
     /// Write what is requested into the particle data (particles x `columns`, at least one).

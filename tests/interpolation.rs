@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ndarray::{Array1, Array2};
 use proptest::prelude::*;
 use tawami::basis::Basis;
-use tawami::constitutive::{check_materials, Operator, Part, Request, Stage};
+use tawami::constitutive::{check_materials, Operator, Part, Request, Response, Stage};
 use tawami::error::Error;
 use tawami::grid::Grid;
 use tawami::interpolation::Field;
@@ -87,7 +87,7 @@ fn one_particle(kinematics: Kinematics, p: f64) -> Particles {
     let location = grid.locate(particles.x.as_slice().unwrap()).unwrap();
     let stage = Stage {
         location: &location,
-        materials: &materials,
+        response: Response::Laws(&materials),
         kinematics,
         increments: Increments {
             u: Field { grid, basis, coefficients: &u },

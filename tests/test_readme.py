@@ -36,3 +36,11 @@ def test_the_form_is_the_shipped_one(tmp_path):
     shipped, _ = mpm.solve("u_epsv", "exact", 4, 0.1)
     assert np.isclose(mine.deflection_m, shipped.deflection_m, rtol=1e-12)
     assert isinstance(Form.load(path), tawami.Form)
+
+
+def test_the_law_in_numpy_is_linear_elasticity():
+    names: dict[str, object] = {}
+    exec(next(block for block in BLOCKS if "NumpyLaw" in block), names)
+    rust = tawami.linear_elastic(K=names["K"], mu=names["mu"])
+    u = [mpm.build("u_epsv", "clamped", 4, material=m).solve().u for m in (names["my_law"], rust)]
+    assert np.allclose(u[0], u[1], rtol=0, atol=1e-9 * np.abs(u[1]).max())

@@ -30,7 +30,7 @@ def build(
     support: str,
     n: int,
     *,
-    material: tawami.Material | None = None,
+    material: tawami.Material | tawami.NumpyLaw | None = None,
     per_axis: int = 2,
     gauss: bool = False,
     **parameters: object,

@@ -15,6 +15,7 @@ from tawami.errors import (
 from tawami.formulation import Form
 from tawami.grid import Grid
 from tawami.materials import linear_elastic
+from tawami.numpy_law import NumpyLaw
 from tawami.scene import Scene, Solution
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "InputError",
     "Material",
     "MissingDependencyError",
+    "NumpyLaw",
     "OutputError",
     "Scene",
     "SingularError",

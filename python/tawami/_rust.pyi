@@ -128,8 +128,15 @@ class Stage:
         volumetric: _Floats | None,
         requests: Sequence[tuple[str, str, int]],
         data: _Floats,
+        given: tuple[_Floats, _Floats] | None = None,
     ) -> None: ...
-    def commit(self, u: _Floats, volumetric: _Floats | None) -> None: ...
+    def commit(
+        self,
+        u: _Floats,
+        volumetric: _Floats | None,
+        given: tuple[_Floats, _Floats] | None = None,
+    ) -> None: ...
+    def strains(self, u: _Floats, volumetric: _Floats | None) -> _Floats: ...
     def volume_strains(self, u: _Floats, volumetric: _Floats | None) -> _Floats: ...
 
 def interpolate(

@@ -20,6 +20,7 @@ from tawami.density import Density, LawQuantity, ParticleScalar, Rule
 from tawami.errors import ConvergenceError, InputError, SingularError
 from tawami.field import Field
 from tawami.linear import LinearSystem
+from tawami.numpy_law import NumpyStage
 from tawami.reduction import Reduction
 from tawami.stopwatch import Stopwatch
 
@@ -71,7 +72,7 @@ class Newton:
         self,
         field: Field,
         compiled: CompiledForm,
-        stage: _rust.Stage,
+        stage: _rust.Stage | NumpyStage,
         particles: _rust.Particles,
         location: _rust.Location,
         constants: Mapping[str, Array],

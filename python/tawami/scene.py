@@ -22,6 +22,7 @@ from tawami.field import Field
 from tawami.formulation import Form
 from tawami.grid import Edge, Grid
 from tawami.newton import Converged, History, Newton
+from tawami.numpy_law import NumpyLaw, NumpyStage
 from tawami.reduction import Reduction
 from tawami.stopwatch import Stopwatch
 
@@ -35,7 +36,7 @@ class Scene:
     Args:
         grid: The background grid.
         body: Positions and volumes of the particles, as `box(...)` or `Body(x, volume)`.
-        material: The material law, or several.
+        material: The material law, or several; or one `NumpyLaw` for all particles.
         material_of: Number of the law of each particle; the first for all by default.
         form: Weak form: the name of a shipped one ('u_epsv', 'u_p', 'u_bbar', 'u'), the path of a
             file, a module, or a `Form`.
@@ -62,7 +63,7 @@ class Scene:
         self,
         grid: Grid,
         body: Body,
-        material: _rust.Material | Sequence[_rust.Material],
+        material: _rust.Material | Sequence[_rust.Material] | NumpyLaw,
         *,
         material_of: npt.ArrayLike | None = None,
         form: str | Path | ModuleType | Form = "u_epsv",
@@ -86,12 +87,15 @@ class Scene:
         self.grid, self.basis = grid, basis
         self.form = Form.load(form)
         values, options = self.form.settings(parameters)
+        law = material if isinstance(material, NumpyLaw) else None
+        if isinstance(material, NumpyLaw):
+            material = material.elastic()
         many = isinstance(material, Sequence)
         materials: list[_rust.Material] = list(material) if many else [material]  # type: ignore[list-item, arg-type]
         if not materials or not all(isinstance(m, _rust.Material) for m in materials):
             raise InputError(
-                f"material = {material!r}: expected a material as linear_elastic(...) makes it, or a "
-                "list of them"
+                f"material = {material!r}: expected a material as linear_elastic(...) makes it, a "
+                "list of these, or a NumpyLaw"
             )
         x, volume = inputs.array("x", body.x, 2), inputs.array("volume", body.volume, 1)
         numbers = np.zeros(len(x)) if material_of is None else material_of
@@ -111,9 +115,8 @@ class Scene:
                 grid, self._compiled, basis, self._location, self.particles.volume, values,
                 self.stopwatch,
             )  # fmt: skip
-        self._stage = _rust.Stage(
-            self.particles, self._location, materials, self.form.kinematics, basis
-        )
+        stage = _rust.Stage(self.particles, self._location, materials, self.form.kinematics, basis)
+        self._stage = NumpyStage(stage, self.particles, law) if law is not None else stage
         self._newton = Newton(
             self._field, self._compiled, self._stage, self.particles, self._location,
             self._constants, self.stopwatch, tolerance=tolerance, max_iterations=max_iterations,

@@ -7,7 +7,7 @@ mod linear_elastic;
 
 pub use linear_elastic::LinearElastic;
 
-use crate::tensor::{Sym, Tangent};
+use crate::tensor::{deviator, mean, Sym, Tangent, COMPONENTS};
 
 /// A strain increment in its two parts; order and signs as in [`crate::tensor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +38,29 @@ pub struct Moduli {
     pub mean_dev: Sym,
     /// d sigma_m / d volume.
     pub mean_vol: f64,
+}
+
+impl From<&Sym> for Stress {
+    fn from(stress: &Sym) -> Self {
+        Self { deviator: deviator(stress), mean: mean(stress) }
+    }
+}
+
+impl From<&Tangent> for Moduli {
+    /// The parts of a tangent d stress / d strain: `s = dev(C e)`, `sigma_m = mean(C e)`, with
+    /// `e = deviator + volume/3 I`; what acts on deviators is itself deviatoric.
+    fn from(c: &Tangent) -> Self {
+        let column = |j: usize| std::array::from_fn(|i| c[i][j]);
+        let columns: Tangent = std::array::from_fn(column);
+        let of_unit: Sym = std::array::from_fn(|i| mean(&c[i]));
+        let dev: [Sym; COMPONENTS] = columns.each_ref().map(deviator);
+        Self {
+            dev_dev: std::array::from_fn(|i| deviator(&std::array::from_fn(|j| dev[j][i]))),
+            dev_vol: deviator(&of_unit),
+            mean_dev: deviator(&columns.each_ref().map(mean)),
+            mean_vol: mean(&of_unit),
+        }
+    }
 }
 
 /// A material law.

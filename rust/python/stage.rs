@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray2, PyReadonlyArray1, PyReadwriteArray2, ToPyArray};
+use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray2, ToPyArray};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
@@ -10,10 +10,11 @@ use super::grid::{field, PyLocation};
 use super::particles::{laws, PyMaterial, PyParticles};
 use super::require;
 use crate::basis::Basis;
-use crate::constitutive::{Operator, Part, Request, Stage};
+use crate::constitutive::{Operator, Part, Request, Response, Stage};
 use crate::grid::Location;
 use crate::kinematics::{Increments, Kinematics};
 use crate::material::Material;
+use crate::tensor::{Sym, COMPONENTS};
 
 /// The particle side of one scene: its particles in their cells, with their laws.
 #[pyclass(name = "Stage")]
@@ -25,21 +26,36 @@ pub(super) struct PyStage {
     basis: Basis,
 }
 
+/// Stress and tangent that were computed in Python, flat.
+type Given<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>);
+
 impl PyStage {
     fn with<R>(
         &self,
         u: &PyReadonlyArray1<f64>,
         volumetric: Option<&PyReadonlyArray1<f64>>,
+        given: Option<&Given>,
         run: impl FnOnce(&Stage) -> R,
     ) -> PyResult<R> {
         let grid = self.location.grid;
+        let response = match given {
+            None => Response::Laws(&self.materials),
+            Some((stress, tangent)) => {
+                let (stress, tangent) = (stress.as_slice()?, tangent.as_slice()?);
+                let n = self.location.len();
+                let fits =
+                    stress.len() == COMPONENTS * n && tangent.len() == COMPONENTS * COMPONENTS * n;
+                require(fits, "stress and tangent of other particles")?;
+                Response::Given(stress, tangent)
+            }
+        };
         let increments = Increments {
             u: field(grid, self.basis, u)?,
             volumetric: volumetric.map(|v| field(grid, Basis::Bilinear, v)).transpose()?,
         };
         Ok(run(&Stage {
             location: &self.location,
-            materials: &self.materials,
+            response,
             kinematics: self.kinematics,
             increments,
         }))
@@ -68,7 +84,7 @@ impl PyStage {
     }
 
     /// Write the requested quantities of the law into `data` (particles x columns).
-    #[pyo3(signature = (u, volumetric, requests, data))]
+    #[pyo3(signature = (u, volumetric, requests, data, given=None))]
     fn evaluate(
         &self,
         py: Python,
@@ -76,6 +92,7 @@ impl PyStage {
         volumetric: Option<PyReadonlyArray1<f64>>,
         requests: Vec<(String, String, usize)>,
         mut data: PyReadwriteArray2<f64>,
+        given: Option<Given>,
     ) -> PyResult<()> {
         let particles = self.particles.borrow(py);
         let (rows, columns) = (data.as_array().nrows(), data.as_array().ncols());
@@ -91,19 +108,34 @@ impl PyStage {
             return Ok(());
         }
         let run = |s: &Stage| s.evaluate(&particles.0, &requests, columns, data);
-        Ok(self.with(&u, volumetric.as_ref(), run)??)
+        Ok(self.with(&u, volumetric.as_ref(), given.as_ref(), run)??)
     }
 
     /// Accept the increments: stress, displacement and eps_v of the particles.
-    #[pyo3(signature = (u, volumetric))]
+    #[pyo3(signature = (u, volumetric, given=None))]
     fn commit(
         &self,
         py: Python,
         u: PyReadonlyArray1<f64>,
         volumetric: Option<PyReadonlyArray1<f64>>,
+        given: Option<Given>,
     ) -> PyResult<()> {
         let mut particles = self.particles.borrow_mut(py);
-        self.with(&u, volumetric.as_ref(), |s| s.commit(&mut particles.0))
+        self.with(&u, volumetric.as_ref(), given.as_ref(), |s| s.commit(&mut particles.0))
+    }
+
+    /// Strain increments at the particles (xx, yy, zz, gamma_xy): n x 4.
+    #[pyo3(signature = (u, volumetric))]
+    fn strains<'py>(
+        &self,
+        py: Python<'py>,
+        u: PyReadonlyArray1<f64>,
+        volumetric: Option<PyReadonlyArray1<f64>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let strains: Vec<Sym> = self.with(&u, volumetric.as_ref(), None, |s| {
+            (0..self.location.len()).map(|p| s.strain(p)).collect()
+        })?;
+        strains.as_flattened().to_pyarray(py).reshape([self.location.len(), COMPONENTS])
     }
 
     /// div u and the bilinear field (0 if there is none) at the particles: n x 2.
@@ -115,7 +147,7 @@ impl PyStage {
         volumetric: Option<PyReadonlyArray1<f64>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let location = &self.location;
-        let strains = self.with(&u, volumetric.as_ref(), |s| {
+        let strains = self.with(&u, volumetric.as_ref(), None, |s| {
             ndarray::Array2::from_shape_fn((location.len(), 2), |(p, k)| match k {
                 0 => s.increments.div_u(location, p),
                 _ => s.increments.volumetric_at(location, p),

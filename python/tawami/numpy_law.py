@@ -1,0 +1,99 @@
+"""A material law written in NumPy: to try one out before it is written in Rust."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami import _rust
+from tawami.errors import InputError
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class NumpyLaw:
+    """A law for all particles of a scene at once.
+
+    Components are those of the stress of the particles: xx, yy, zz, xy, tension positive; a strain
+    holds gamma_xy = 2 eps_xy, so that tangent[:, i, j] = d stress_i / d strain_j.
+
+    Args:
+        respond: From strain increment (n x 4) and old stress (n x 4) [Pa] to new stress (n x 4) [Pa]
+            and consistent tangent (n x 4 x 4) [Pa]. Must not change what it is given.
+        K: Bulk modulus [Pa] that forms and scaling name; finite.
+        mu: Shear modulus [Pa] that forms and scaling name.
+
+    Raises:
+        InputError: K or mu is not a positive, finite number.
+    """
+
+    respond: Callable[[Array, Array], tuple[npt.ArrayLike, npt.ArrayLike]]
+    K: float
+    mu: float
+
+    def __post_init__(self) -> None:
+        self.elastic()
+
+    def elastic(self) -> _rust.Material:
+        """The elastic law of K and mu, which stands for this one where only these matter."""
+        try:
+            return _rust.Material.linear_elastic_k_mu(self.K, self.mu)
+        except (InputError, TypeError) as error:
+            raise InputError(f"NumpyLaw: {error}") from None
+
+
+class NumpyStage:
+    """`_rust.Stage` with the law in NumPy: same calls, same results.
+
+    Args:
+        stage: The particle side of the scene.
+        particles: Its particles, which hold the old stress.
+        law: The law.
+    """
+
+    def __init__(self, stage: _rust.Stage, particles: _rust.Particles, law: NumpyLaw) -> None:
+        self._stage, self._particles, self._law = stage, particles, law
+        self.volume_strains = stage.volume_strains
+
+    def _given(self, u: Array, volumetric: Array | None) -> tuple[Array, Array]:
+        strain = self._stage.strains(u, volumetric)
+        n = len(strain)
+        result = self._law.respond(strain, self._particles.stress.copy())
+        if not isinstance(result, tuple) or len(result) != 2:
+            raise InputError("NumpyLaw: respond returned no pair: expected (stress, tangent)")
+        arrays = []
+        for name, values, shape in (
+            ("stress", result[0], (n, 4)),
+            ("tangent", result[1], (n, 4, 4)),
+        ):
+            array = np.ascontiguousarray(values, dtype=np.float64)
+            if array.shape != shape:
+                raise InputError(
+                    f"NumpyLaw: respond returned a {name} of shape {array.shape}: expected {shape}"
+                )
+            bad = np.flatnonzero(~np.isfinite(array.reshape(n, -1)).all(axis=1))
+            if len(bad):
+                raise InputError(
+                    f"NumpyLaw: respond returned a {name} that is not finite at {len(bad)} "
+                    f"particles, the first is {bad[0]}, with the strain increment {strain[bad[0]]}"
+                )
+            arrays.append(array.ravel())
+        return arrays[0], arrays[1]
+
+    def evaluate(
+        self,
+        u: Array,
+        volumetric: Array | None,
+        requests: Sequence[tuple[str, str, int]],
+        data: Array,
+    ) -> None:
+        """As `_rust.Stage.evaluate`."""
+        self._stage.evaluate(u, volumetric, requests, data, self._given(u, volumetric))
+
+    def commit(self, u: Array, volumetric: Array | None) -> None:
+        """As `_rust.Stage.commit`."""
+        self._stage.commit(u, volumetric, self._given(u, volumetric))
