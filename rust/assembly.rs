@@ -18,7 +18,9 @@ use crate::basis::Basis;
 use crate::grid::Location;
 
 /// Signature of an FFCx kernel: element tensor, coefficients, constants, coordinates of the vertices
-/// (3 each), local facet, permutations, user data (the last from FFCx 0.10 on, ignored before).
+/// (3 each), local facet, permutations, user data. FFCx has the last from 0.10 on; a function without
+/// it leaves it unread under the calling conventions of Linux on x86-64 and AArch64 (caller cleans
+/// up), which are those that Debian's dolfinx is built for.
 pub type TabulateTensor = unsafe extern "C" fn(
     *mut f64,
     *const f64,
@@ -41,6 +43,17 @@ pub enum Slot<'a> {
     Densities(Densities<'a>, ArrayView2<'a, f64>),
     /// Means over the particles of the cell.
     Means(&'a [usize], ArrayView2<'a, f64>),
+}
+
+impl Slot<'_> {
+    /// Number of packed coefficients.
+    pub fn len(&self, cells: &Cells) -> usize {
+        match self {
+            Slot::Fields => cells.dofs(),
+            Slot::Densities(densities, _) => densities.len(),
+            Slot::Means(columns, _) => columns.len(),
+        }
+    }
 }
 
 /// A kernel with what it reads.
@@ -124,14 +137,13 @@ impl Cells {
         local
     }
 
-    /// Vertices of a cell in the kernels' order, three coordinates each.
-    fn vertices_of(&self, location: &Location, a: usize) -> [f64; 12] {
-        let grid = &location.grid;
-        let ij = grid.cell_ij(location.active[a] as usize);
+    /// Vertices of a cell in the kernels' order, three coordinates each, from the cell's own corner:
+    /// no form names the position, and far from the origin the cell's size would be rounded.
+    fn vertices_of_cell(&self, h: f64) -> [f64; 12] {
         let mut x = [0.0; 12];
         for (k, position) in self.vertices.iter().enumerate() {
             for axis in 0..2 {
-                x[3 * k + axis] = grid.origin[axis] + grid.h * (ij[axis] + position[axis]) as f64;
+                x[3 * k + axis] = h * position[axis] as f64;
             }
         }
         x
@@ -174,7 +186,10 @@ impl Local {
 }
 
 /// Sum of the kernels' results on the a-th active cell, into `element`.
-fn tabulate(
+///
+/// # Safety
+/// As [`vector`] and [`matrix`]; `element` is as long as the kernels write.
+unsafe fn tabulate(
     cells: &Cells,
     kernels: &[Kernel],
     location: &Location,
@@ -184,29 +199,23 @@ fn tabulate(
     element: &mut [f64],
 ) {
     element.fill(0.0);
-    let x = cells.vertices_of(location, a);
+    let x = cells.vertices_of_cell(location.grid.h);
     for kernel in kernels {
         packed.clear();
         for slot in &kernel.slots {
             let start = packed.len();
+            packed.resize(start + slot.len(cells), 0.0);
+            let out = &mut packed[start..];
             match slot {
-                Slot::Fields => {
-                    packed.resize(start + cells.dofs(), 0.0);
-                    local.nodal(coefficients, &mut packed[start..]);
-                }
+                Slot::Fields => local.nodal(coefficients, out),
                 Slot::Densities(densities, data) => {
-                    packed.resize(start + densities.len(), 0.0);
-                    densities.of_cell(location, a, volume, *data, &mut packed[start..]);
+                    densities.of_cell(location, a, volume, *data, out);
                 }
-                Slot::Means(columns, data) => {
-                    packed.resize(start + columns.len(), 0.0);
-                    cell_mean(location, a, volume, *data, columns, &mut packed[start..]);
-                }
+                Slot::Means(columns, data) => cell_mean(location, a, volume, *data, columns, out),
             }
         }
-        // SAFETY: the function is one that FFCx made of a form with these slots and constants: it
-        // reads their number of entries and writes `dofs` or `dofs x dofs` to `element`, which is
-        // as long; for integrals over cells facet, permutations and user data are not read.
+        // SAFETY: the caller vouches for the kernel and the length of `element`; for integrals over
+        // cells, facet, permutations and user data are not read.
         unsafe {
             (kernel.tabulate)(
                 element.as_mut_ptr(),
@@ -253,17 +262,20 @@ impl Shared {
     }
 
     /// # Safety
-    /// No other thread may touch this index at the same time.
+    /// The index is inside the slice, and no other thread touches it at the same time.
     unsafe fn add(self, index: usize, value: f64) {
-        assert!(index < self.len, "index outside the shared slice");
+        debug_assert!(index < self.len, "index outside the shared slice");
         // SAFETY: inside the slice, and the caller is alone with this index.
         unsafe { *self.start.add(index) += value };
     }
 }
 
 /// The form's vector on all coefficients: `E^T r`.
-#[must_use]
-pub fn vector(
+///
+/// # Safety
+/// Each kernel is an FFCx kernel of rank 1 of these cells, loaded, that reads as many coefficients as
+/// its slots have and as many constants as it has; `coefficients` are those of all fields.
+pub unsafe fn vector(
     cells: &Cells,
     kernels: &[Kernel],
     location: &Location,
@@ -280,10 +292,11 @@ pub fn vector(
                 let local = cells.local(location, a);
                 let at = (a, &local, coefficients);
                 let element = &mut element[..cells.dofs()];
-                tabulate(cells, kernels, location, volume, at, &mut packed, element);
+                // SAFETY: the caller's; kernels of rank 1 write `dofs` numbers.
+                unsafe { tabulate(cells, kernels, location, volume, at, &mut packed, element) };
                 local.transposed(element, 1, &mut reduced);
                 for (&c, &value) in local.coefficients.iter().zip(&reduced) {
-                    // SAFETY: rows of one colour share no coefficient.
+                    // SAFETY: a local coefficient is one of all; rows of one colour share none.
                     unsafe { shared.add(c, value) };
                 }
             }
@@ -327,18 +340,30 @@ impl<'a> Selection<'a> {
     }
 }
 
-/// Pattern of the reduced matrix: compressed rows with ascending columns.
+/// Pattern of the reduced matrix.
+#[derive(Debug, Clone)]
+pub struct Pattern {
+    /// Start of each row in `columns`; one more than rows.
+    pub start: Vec<i32>,
+    /// Columns of the rows, ascending.
+    pub columns: Vec<i32>,
+    /// Active cells whose unknowns reach beyond their own functions (point constraints), ascending.
+    pub reaching: Vec<u32>,
+}
+
+/// Pattern of the reduced matrix; `None` if it has more entries than its indices can count.
 #[must_use]
-pub fn pattern(cells: &Cells, location: &Location, selection: &Selection) -> (Vec<i32>, Vec<i32>) {
-    let unknowns: Vec<Vec<u32>> = (0..location.active.len())
+pub fn pattern(cells: &Cells, location: &Location, selection: &Selection) -> Option<Pattern> {
+    let (unknowns, own): (Vec<Vec<u32>>, Vec<bool>) = (0..location.active.len())
         .into_par_iter()
         .map(|a| {
-            let (entries, _) = selection.of_cell(&cells.local(location, a));
+            let (entries, own) = selection.of_cell(&cells.local(location, a));
             let mut mine: Vec<u32> = entries.into_iter().map(|e| e.0).collect();
             mine.dedup();
-            mine
+            (mine, own)
         })
-        .collect();
+        .unzip();
+    let reaching = (0..).zip(&own).filter(|(_, own)| !**own).map(|(a, _)| a).collect();
     let mut first = vec![0usize; selection.unknowns.len() + 1];
     for &u in unknowns.iter().flatten() {
         first[u as usize + 1] += 1;
@@ -366,64 +391,76 @@ pub fn pattern(cells: &Cells, location: &Location, selection: &Selection) -> (Ve
         })
         .collect();
     let mut start = Vec::with_capacity(selection.unknowns.len() + 1);
+    let mut end = 0;
     start.push(0);
     for row in &rows {
-        start.push(start[start.len() - 1] + row.len() as i32);
+        end += row.len();
+        start.push(i32::try_from(end).ok()?);
     }
-    (start, rows.concat())
+    Some(Pattern { start, columns: rows.concat(), reaching })
 }
 
-/// The reduced matrix in its pattern: `P^T K P`.
+/// The reduced matrix in its pattern: `P^T K P`. False if the pattern is not that of these cells and
+/// this selection; `values` are then of no use.
 ///
-/// # Panics
-/// If the pattern is not that of these cells and this selection.
+/// # Safety
+/// As [`vector`], with kernels of rank 2; `values` is as long as the columns of the pattern, whose
+/// rows are disjoint (`start` ascends).
 #[allow(clippy::too_many_arguments)]
-pub fn matrix(
+pub unsafe fn matrix(
     cells: &Cells,
     kernels: &[Kernel],
     location: &Location,
     volume: &[f64],
     coefficients: &[f64],
     selection: &Selection,
-    (start, columns): (&[i32], &[i32]),
+    pattern: &Pattern,
     values: &mut [f64],
-) {
+) -> bool {
     values.fill(0.0);
     let shared = Shared::new(values);
-    let one = |a: usize, parallel: bool, packed: &mut Vec<f64>, work: &mut Work| {
+    let add = |a: usize, reaching: bool, packed: &mut Vec<f64>, work: &mut Work| {
         let local = cells.local(location, a);
         let (entries, own) = selection.of_cell(&local);
-        if own != parallel {
-            return;
+        if own == reaching {
+            return true;
         }
         let (n, m) = (cells.dofs(), local.coefficients.len());
         let element = &mut work.element[..n * n];
-        tabulate(cells, kernels, location, volume, (a, &local, coefficients), packed, element);
+        let at = (a, &local, coefficients);
+        // SAFETY: the caller's; kernels of rank 2 write `dofs x dofs` numbers.
+        unsafe { tabulate(cells, kernels, location, volume, at, packed, element) };
         // T^T A, then (T^T (T^T A)^T)^T = T^T A T
         local.transposed(element, n, &mut work.half);
         transpose(&work.half[..m * n], n, &mut work.turned);
         local.transposed(&work.turned[..n * m], m, &mut work.reduced);
         for &(r, k, wr) in &entries {
-            let (from, to) = (start[r as usize] as usize, start[r as usize + 1] as usize);
-            let row = &columns[from..to];
+            let row = pattern.start[r as usize] as usize..pattern.start[r as usize + 1] as usize;
+            let columns = &pattern.columns[row.clone()];
             let mut slot = 0;
             for &(c, l, wc) in &entries {
-                slot += row[slot..].iter().take_while(|&&x| x < c as i32).count();
-                assert!(row.get(slot) == Some(&(c as i32)), "not the pattern of this matrix");
-                // SAFETY: rows of one colour share no unknown; cells whose unknowns reach further
-                // are not in parallel.
-                unsafe { shared.add(from + slot, wr * wc * work.reduced[l * m + k]) };
+                slot += columns[slot..].iter().take_while(|&&x| x < c as i32).count();
+                if columns.get(slot) != Some(&(c as i32)) {
+                    return false;
+                }
+                // SAFETY: inside the row. In parallel, rows of the grid of one colour share no
+                // unknown; the cells whose unknowns reach further come one after the other.
+                unsafe { shared.add(row.start + slot, wr * wc * work.reduced[l * m + k]) };
             }
         }
+        true
     };
     for rows in colours(location) {
-        rows.into_par_iter().for_each(|row| {
+        let fits = rows.into_par_iter().all(|mut row| {
             let (mut packed, mut work) = (Vec::new(), Work::new());
-            row.for_each(|a| one(a, true, &mut packed, &mut work));
+            row.all(|a| add(a, false, &mut packed, &mut work))
         });
+        if !fits {
+            return false;
+        }
     }
     let (mut packed, mut work) = (Vec::new(), Work::new());
-    (0..location.active.len()).for_each(|a| one(a, false, &mut packed, &mut work));
+    pattern.reaching.iter().all(|&a| add(a as usize, true, &mut packed, &mut work))
 }
 
 /// `a` is rows x columns; `out` becomes its transpose.

@@ -18,7 +18,8 @@
 )]
 
 pub mod adjoint;
-pub mod assembly;
+#[cfg(feature = "python")]
+mod assembly;
 pub mod basis;
 pub mod constitutive;
 pub mod error;

@@ -15,9 +15,10 @@ import pytest
 from conftest import BASES, FORMS, grid_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, identity
 
 import tawami
+from tawami.fast_field import _selection
 from tawami.formulation import Form
 from tawami.symbols import InexactSumWarning
 
@@ -130,14 +131,26 @@ def test_newton_reuses_the_pattern(random_scene):
 
 
 def test_the_same_bits_whatever_the_number_of_threads():
+    """Residual, tangent, and a reduced tangent in which many points are held, in every row."""
     code = """
-import logging; logging.disable(logging.INFO)
-import hashlib, numpy as np
-from cases.cantilever import mpm
-scene = mpm.build("u_epsv", "paper", 16)
-c = np.random.default_rng(0).standard_normal(scene.num_coefficients)
-matrix = scene.tangent(c)
-print(hashlib.sha256(scene.residual(c).tobytes() + matrix.data.tobytes()).hexdigest())
+import hashlib, logging; logging.disable(logging.INFO)
+import numpy as np
+import tawami
+from mpi4py import MPI
+total = hashlib.sha256()
+for basis in ("quadratic_spline", "bilinear", "biquadratic"):
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.1, cells=(12, 40))
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=3)
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.49), basis=basis)
+    for row in range(40):
+        scene.hold((0.13 + 0.02 * (row % 5), 0.1 * row + 0.04), "x")
+        scene.hold((0.71, 0.1 * row + 0.06), "y")
+    c = np.random.default_rng(0).standard_normal(scene.num_coefficients)
+    total.update(scene.residual(c).tobytes() + scene.tangent(c).data.tobytes())
+    field, reduction = scene._field, scene._reduction()
+    for _ in range(3):
+        total.update(field.tangent(c, scene._newton.data, reduction).getValuesCSR()[2].tobytes())
+print(total.hexdigest())
 """
     outputs = set()
     for threads in ("1", "2", "7", "2"):
@@ -148,6 +161,67 @@ print(hashlib.sha256(scene.residual(c).tobytes() + matrix.data.tobytes()).hexdig
         )  # fmt: skip
         outputs.add(run.stdout)
     assert len(outputs) == 1
+
+
+def test_one_field_with_several_reductions_in_turn(random_scene):
+    """Another pattern, the first again, and values that the solver scaled in between."""
+    scenes = both(lambda **path: random_scene(count=150, **path))
+    c = np.random.default_rng(0).standard_normal(scenes[0].num_coefficients)
+    for scene in scenes:
+        scene.fix("left", "x")
+        scene.hold((-0.9, 1.9), "y")
+    close(*[reduced(scene, c) for scene in scenes])
+    reductions = [scene._reduction() for scene in scenes]
+    for scene in scenes:
+        scene.hold((0.4, 1.3), "y")
+    close(*[reduced(scene, c) for scene in scenes])
+    values = []
+    for scene, reduction in zip(scenes, reductions, strict=True):
+        matrix = scene._field.tangent(c, scene._newton.data, reduction)
+        vector = matrix.createVecLeft()
+        vector.set(3.0)
+        matrix.diagonalScale(vector, vector)
+        again = scene._field.tangent(c, scene._newton.data, reduction)
+        values.append(again.getValuesCSR()[2].sum())
+    assert values[0] == pytest.approx(values[1], rel=1e-9)
+
+
+def test_solving_again_with_other_supports():
+    def run(path):
+        grid = grid_of()
+        body = tawami.box(grid, grid.origin, grid.upper)
+        material = tawami.linear_elastic(E=1e3, nu=0.4999)
+        scene = tawami.Scene(grid, body, material, assembly=path)
+        scene.fix("left", "x")
+        scene.hold((-1.0, 1.25), "y")
+        scene.traction("right", (1.0, -2.0))
+        scene.solve()
+        scene.hold((1.0, 1.25), "y", -1e-3)
+        return scene.solve()
+
+    fast, reference = run("fast"), run("reference")
+    assert np.abs(fast.u - reference.u).max() < 1e-10 * np.abs(reference.u).max()
+
+
+def test_arrays_that_do_not_fit_are_refused_and_never_panic(random_scene):
+    scene = random_scene(form="u")
+    field, c = scene._field, np.zeros(scene.num_coefficients)
+    scene.residual(c)
+    kernels = field._kernels(field.compiled.tangent, scene._newton.data)
+    volume = scene.particles.volume
+    with pytest.raises(RuntimeError, match="a kernel of another rank"):
+        field._assembler.vector(kernels, volume, c)
+    address, rank, width, slots, constants = kernels[0]
+    wrong = [(address, rank, width + 1, slots, constants)]
+    pattern = field._assembler.pattern(
+        _selection(identity(len(c), format="csr"), np.arange(len(c)))
+    )
+    with pytest.raises(RuntimeError, match="a kernel of other coefficients"):
+        field._assembler.matrix(wrong, volume, c, pattern, np.zeros(len(pattern.columns)))
+    with pytest.raises(RuntimeError, match="another pattern"):
+        field._assembler.matrix(kernels, volume, c, pattern, np.zeros(3))
+    with pytest.raises(RuntimeError, match="not a selection of these coefficients"):
+        field._assembler.pattern(_selection(identity(3, format="csr"), np.arange(3)))
 
 
 def test_an_unknown_path_is_refused(random_scene):

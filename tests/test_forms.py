@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from conftest import FORMS, grid_of
-from ufl import div, dot, grad, inner, sym
+from ufl import SpatialCoordinate, div, dot, grad, inner, sym
 
 import tawami
 from tawami.density import ParticleScalar
@@ -177,6 +177,10 @@ def test_wrong_declarations(make, message):
         (lambda w, sum_p: sum_p(w, div(w)), "takes a particle quantity"),
         (lambda w, sum_p, t, ds: sum_p(div(w)) - dot(t, t) * w[0] * ds, "linear in the traction t"),
         (lambda w, sum_p, t, dx: sum_p(div(w)) - dot(t, w) * dx, "t belongs into terms with ds"),
+        (
+            lambda w, sum_p, dx: sum_p(SpatialCoordinate(dx.ufl_domain())[0] * w[0]),
+            "the position x",
+        ),
         (lambda w, sum_p, ds: sum_p(div(w)) - w[1] * ds, "linear in the traction t"),
         (lambda w, sum_p, dx: sum_p(div(w)) + w[1] * dx(1), r"as dx\(1\): expected dx"),
         (lambda w, sum_c, sigma_m: sum_c(sigma_m, div(w)), "needs kinematics 'cell'"),

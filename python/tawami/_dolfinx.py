@@ -50,6 +50,12 @@ if np.dtype(PETSc.ScalarType) != np.float64:
         "On Debian: apt install python3-dolfinx-real python3-petsc4py-real, and unset PETSC_DIR"
     )
 
+if np.dtype(PETSc.IntType) != np.int32:
+    raise MissingDependencyError(
+        f"tawami needs PETSc with 32-bit indices, but its are {np.dtype(PETSc.IntType)}. On Debian: "
+        "apt install python3-dolfinx-real python3-petsc4py-real, and unset PETSC_DIR"
+    )
+
 version: str = dolfinx.__version__
 #: Before basix.ufl (dolfinx 0.5) the elements were UFL's own.
 OLD = not hasattr(dolfinx.fem, "functionspace")

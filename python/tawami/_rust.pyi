@@ -13,6 +13,7 @@ __all__ = [
     "Location",
     "Material",
     "Particles",
+    "Pattern",
     "Stage",
     "TawamiError",
     "basis_1d",
@@ -83,7 +84,7 @@ class Material:
     def shear_modulus(self) -> float: ...
 
 _Source = tuple[_Floats, Sequence[tuple[int, int]], Sequence[int]]
-_Kernel = tuple[int, Sequence[_Source | None], Sequence[float]]
+_Kernel = tuple[int, int, int, Sequence[_Source | None], Sequence[float]]
 _Starts = npt.NDArray[np.int32]
 _Selection = tuple[_Starts, _Starts, _Floats, npt.NDArray[np.int64]]
 
@@ -100,17 +101,22 @@ class Assembler:
     def vector(
         self, kernels: Sequence[_Kernel], volume: _Floats, coefficients: _Floats
     ) -> _Floats: ...
-    def pattern(self, selection: _Selection) -> tuple[_Starts, _Starts]: ...
+    def pattern(self, selection: _Selection) -> Pattern: ...
     def matrix(
         self,
         kernels: Sequence[_Kernel],
         volume: _Floats,
         coefficients: _Floats,
-        selection: _Selection,
-        start: _Starts,
-        columns: _Starts,
+        pattern: Pattern,
         values: _Floats,
     ) -> None: ...
+
+@final
+class Pattern:
+    @property
+    def start(self) -> _Starts: ...
+    @property
+    def columns(self) -> _Starts: ...
 
 @final
 class Stage:

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import ufl
+from ufl import SpatialCoordinate
+from ufl.algorithms.analysis import has_type
 from ufl.algorithms.check_arities import ArityMismatch, check_form_arity
 
 from tawami import _dolfinx
@@ -43,8 +45,9 @@ class Slot:
 
 @dataclass(frozen=True)
 class Integral:
-    """A compiled integral and what it reads."""
+    """A compiled integral and what it reads; `rank` is 1 for vectors and 2 for matrices."""
 
+    rank: int
     kernel: _dolfinx.Kernel
     slots: tuple[Slot, ...]
     constants: tuple[str, ...]
@@ -135,6 +138,11 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
                 f"form {form.name}: a measure with a number, as dx({part.subdomain_id()}): expected dx, "
                 "dx_c and ds as they are; where the body is follows from the particles"
             )
+    if any(has_type(part.integrand(), SpatialCoordinate) for part in residual.integrals()):
+        raise FormError(
+            f"form {form.name}: the position x in a term: expected position-dependent data at the "
+            "particles (material, volume) or in scene.traction(...)"
+        )
     if edges is not None and not _is_linear_in(edges, symbols.traction):
         raise FormError(
             f"form {form.name}: expected edge terms linear in the traction t and in nothing else but "
@@ -182,7 +190,8 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
         order = ufl_form.coefficients()
         slots = tuple(kinds[order[i]] for i in kernel.coefficients)
         names = {constant: name for name, constant in symbols.constants.items()}
-        return Integral(kernel, slots, tuple(names[c] for c in ufl_form.constants()))
+        constants = tuple(names[c] for c in ufl_form.constants())
+        return Integral(len(ufl_form.arguments()), kernel, slots, constants)
 
     return CompiledForm(
         form=form,

@@ -48,10 +48,10 @@ class FastField(Field):
         )
         bilinear = len(compiled.form.fields) > 1
         self._assembler = _rust.Assembler(location, basis, nodes, vertices, bilinear)
-        self._pattern: tuple[Any, ...] = ()
+        self._pattern: tuple[_rust.Pattern, Array]
 
     def _kernels(self, integrals: Sequence[Integral], data: Mapping[Rule, Array]) -> list[Any]:
-        """Address, coefficients and constants of each kernel, as `_rust.Assembler` takes them."""
+        """Address, rank, width, coefficients and constants of each kernel, as Rust takes them."""
         kernels = []
         for integral in integrals:
             slots: list[Any] = []
@@ -63,7 +63,9 @@ class FastField(Field):
                     points = [] if slot.source == "mean" else self._points[slot.source]
                     slots.append((data[slot.source], points, list(slot.columns)))
             constants = self._constants(integral).tolist()
-            kernels.append((integral.kernel.address, slots, constants))
+            kernels.append(
+                (integral.kernel.address, integral.rank, integral.width, slots, constants)
+            )
         return kernels
 
     def residual(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
@@ -77,40 +79,42 @@ class FastField(Field):
         with self.stopwatch("pattern"):
             if self._reduction is not reduction:
                 self._new_pattern(reduction)
-        selection, start, columns, values = self._pattern
         with self.stopwatch("tangent"):
-            kernels = self._kernels(self.compiled.tangent, data)
-            self._assembler.matrix(
-                kernels, self._volume, coefficients, selection, start, columns, values
-            )
+            self._fill(coefficients, data, *self._pattern)
             matrix = self._petsc["reduced"]
             matrix.assemble()
         return matrix
 
+    def _fill(
+        self,
+        coefficients: Array,
+        data: Mapping[Rule, Array],
+        pattern: _rust.Pattern,
+        values: Array,
+    ) -> None:
+        kernels = self._kernels(self.compiled.tangent, data)
+        self._assembler.matrix(kernels, self._volume, coefficients, pattern, values)
+
     def unreduced_tangent(self, coefficients: Array, data: Mapping[Rule, Array]) -> sp.csr_matrix:
         """E^T K E, the tangent of :meth:`residual`."""
         n = self.layout.size
-        every = np.arange(n + 1)
-        selection = (every.astype(np.int32), every[:n].astype(np.int32), np.ones(n), every[:n])
-        start, columns = self._assembler.pattern(selection)
-        values = np.zeros(len(columns))
-        kernels = self._kernels(self.compiled.tangent, data)
-        self._assembler.matrix(
-            kernels, self._volume, coefficients, selection, start, columns, values
-        )
-        return sp.csr_matrix((values, columns, start), shape=(n, n))
+        pattern = self._assembler.pattern(_selection(sp.identity(n, format="csr"), np.arange(n)))
+        values = np.zeros(len(pattern.columns))
+        self._fill(coefficients, data, pattern, values)
+        return sp.csr_matrix((values, pattern.columns, pattern.start), shape=(n, n))
 
     def _new_pattern(self, reduction: Reduction) -> None:
         self._petsc.free("reduced")
-        s = reduction.selection
-        selection = (
-            s.indptr.astype(np.int32), s.indices.astype(np.int32), s.data, reduction.unknowns
-        )  # fmt: skip
-        start, columns = self._assembler.pattern(selection)
-        values = np.zeros(len(columns))
-        self._pattern, self._reduction = (selection, start, columns, values), reduction
-        size, csr = (reduction.size, reduction.size), (start, columns, values)
-        comm = self.grid.comm
+        self._reduction = None
+        pattern = self._assembler.pattern(_selection(reduction.selection, reduction.unknowns))
+        values = np.zeros(len(pattern.columns))
+        size, csr = (reduction.size, reduction.size), (pattern.start, pattern.columns, values)
         # the matrix uses the arrays themselves: what Rust writes is what PETSc sees
-        assert np.dtype(PETSc.IntType) == np.int32
-        self._petsc["reduced"] = PETSc.Mat().createAIJWithArrays(size, csr, comm=comm)
+        matrix = PETSc.Mat().createAIJWithArrays(size, csr, comm=self.grid.comm)
+        self._petsc["reduced"] = matrix
+        self._pattern, self._reduction = (pattern, values), reduction
+
+
+def _selection(s: sp.csr_matrix, unknowns: npt.NDArray[np.int64]) -> tuple[Any, ...]:
+    """S as `_rust.Assembler` takes it."""
+    return s.indptr.astype(np.int32), s.indices.astype(np.int32), s.data, unknowns

@@ -6,6 +6,7 @@ reference: plain dolfinx assembly over the active cells, then P^T r and P^T K P 
 
 from __future__ import annotations
 
+import functools
 import weakref
 from collections.abc import Mapping
 from typing import Any
@@ -77,15 +78,19 @@ class Field:
         self.layout = Layout(grid, basis, self._space, self.active)
         self._points = {rule: self._point_indices(rule) for rule in DEGREE}
         self._packed: dict[int, Array] = {}
-        entities = rectangle.entities(self._cells, None)
-        self._forms = {
-            id(integral): self._space.form(integral.kernel, rank, entities)
-            for rank, integrals in ((1, compiled.residual), (2, compiled.tangent))
-            for integral in integrals
-        }
         self._reduction: Reduction | None = None
         self._petsc = _Matrices()
         weakref.finalize(self, self._petsc.free)
+
+    @functools.cached_property
+    def _forms(self) -> dict[int, Any]:
+        """The integrals over cells, attached to those with particles."""
+        entities = self.grid.rectangle.entities(self._cells, None)
+        return {
+            id(integral): self._space.form(integral.kernel, rank, entities)
+            for rank, integrals in ((1, self.compiled.residual), (2, self.compiled.tangent))
+            for integral in integrals
+        }
 
     def _point_indices(self, rule: Rule) -> list[tuple[int, int]]:
         """Indices along x and y, in the Gauss rule, of each point of dolfinx' rule."""

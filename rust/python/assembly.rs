@@ -6,18 +6,18 @@ use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1, ToP
 use pyo3::prelude::*;
 
 use super::grid::PyLocation;
-use super::require;
+use super::{require, InputError};
 use crate::adjoint::{Densities, MAX_POINTS};
-use crate::assembly::{self, Cells, Kernel, Selection, Slot, TabulateTensor};
+use crate::assembly::{self, Cells, Kernel, Pattern, Selection, Slot, TabulateTensor};
 use crate::grid::Location;
 use crate::quadrature::Rule;
 
 /// Particle data of one rule, and at which points: indices along x and y, or none for cell means.
 type Source<'py> = (PyReadonlyArray2<'py, f64>, Vec<[usize; 2]>, Vec<usize>);
 
-/// Address of an FFCx kernel, its coefficients in packed order (none stands for the fields), and its
-/// constants.
-type KernelOf<'py> = (usize, Vec<Option<Source<'py>>>, Vec<f64>);
+/// Address of an FFCx kernel, its rank, the number of its packed coefficients, these in packed order
+/// (none stands for the fields), and its constants.
+type KernelOf<'py> = (usize, usize, usize, Vec<Option<Source<'py>>>, Vec<f64>);
 
 /// Element kernels over the cells with particles; see `assembly.rs`.
 #[pyclass(name = "Assembler", frozen)]
@@ -28,7 +28,7 @@ pub(super) struct PyAssembler {
 }
 
 impl PyAssembler {
-    fn kernels<'a>(&'a self, kernels: &'a [KernelOf]) -> PyResult<Vec<Kernel<'a>>> {
+    fn kernels<'a>(&'a self, rank: usize, kernels: &'a [KernelOf]) -> PyResult<Vec<Kernel<'a>>> {
         let slot = |source: &'a Option<Source>| -> PyResult<Slot<'a>> {
             let Some((data, points, columns)) = source else { return Ok(Slot::Fields) };
             let data = data.as_array();
@@ -44,13 +44,16 @@ impl PyAssembler {
         };
         kernels
             .iter()
-            .map(|(address, slots, constants)| {
-                require(*address != 0, "kernel without an address")?;
-                // SAFETY: the address is that of an FFCx kernel, which Python keeps loaded.
+            .map(|(address, its_rank, width, slots, constants)| {
+                require(*address != 0 && *its_rank == rank, "a kernel of another rank")?;
+                // SAFETY: the address is that of an FFCx kernel, which `compilation.Integral` keeps
+                // loaded; rank and number of coefficients are checked against what it says of it.
                 let tabulate = unsafe {
                     std::mem::transmute::<*const (), TabulateTensor>(*address as *const ())
                 };
-                let slots = slots.iter().map(slot).collect::<PyResult<_>>()?;
+                let slots = slots.iter().map(slot).collect::<PyResult<Vec<_>>>()?;
+                let packed: usize = slots.iter().map(|slot| slot.len(&self.cells)).sum();
+                require(packed == *width, "a kernel of other coefficients")?;
                 Ok(Kernel { tabulate, slots, constants: constants.clone() })
             })
             .collect()
@@ -61,28 +64,6 @@ impl PyAssembler {
         let expected = self.cells.coefficients(self.location.grid.cells);
         require(coefficients.len() == expected, "wrong number of grid coefficients")?;
         Ok(coefficients)
-    }
-
-    fn selection<'a>(
-        &self,
-        (start, unknown, weight, unknowns): &'a SelectionOf,
-    ) -> PyResult<Selection<'a>> {
-        let (start, unknown) = (start.as_slice()?, unknown.as_slice()?);
-        let selection = Selection {
-            start,
-            unknown,
-            weight: weight.as_slice()?,
-            unknowns: unknowns.as_slice()?,
-        };
-        let rows = self.cells.coefficients(self.location.grid.cells);
-        let inside = |&u: &i32| u >= 0 && (u as usize) < selection.unknowns.len();
-        let fits = start.len() == rows + 1
-            && start.windows(2).all(|w| 0 <= w[0] && w[0] <= w[1])
-            && start[rows] as usize == unknown.len()
-            && unknown.len() == selection.weight.len()
-            && unknown.iter().all(inside);
-        require(fits, "not a selection of these coefficients")?;
-        Ok(selection)
     }
 }
 
@@ -121,58 +102,108 @@ impl PyAssembler {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let volume = volume.as_slice()?;
         require(volume.len() == self.location.len(), "volumes of other particles")?;
-        let kernels = self.kernels(&kernels)?;
+        let kernels = self.kernels(1, &kernels)?;
         let coefficients = self.coefficients(&coefficients)?;
-        let sums = assembly::vector(&self.cells, &kernels, &self.location, volume, coefficients);
+        // SAFETY: kernels as in `kernels`, of rank 1; the coefficients' number was checked.
+        let sums = unsafe {
+            assembly::vector(&self.cells, &kernels, &self.location, volume, coefficients)
+        };
         Ok(sums.to_pyarray(py))
     }
 
-    /// Compressed rows of the reduced matrix: starts and columns.
-    #[allow(clippy::type_complexity)]
-    fn pattern<'py>(
-        &self,
-        py: Python<'py>,
-        selection: SelectionOf,
-    ) -> PyResult<(Bound<'py, PyArray1<i32>>, Bound<'py, PyArray1<i32>>)> {
-        let selection = self.selection(&selection)?;
-        let (start, columns) = assembly::pattern(&self.cells, &self.location, &selection);
-        Ok((start.to_pyarray(py), columns.to_pyarray(py)))
+    /// Pattern of the reduced matrix for a selection.
+    fn pattern(&self, selection: SelectionOf) -> PyResult<PyPattern> {
+        let (start, unknown, weight, unknowns) = &selection;
+        let (start, unknown) = (start.as_slice()?.to_vec(), unknown.as_slice()?.to_vec());
+        let (weight, unknowns) = (weight.as_slice()?.to_vec(), unknowns.as_slice()?.to_vec());
+        let rows = self.cells.coefficients(self.location.grid.cells);
+        let fits = start.len() == rows + 1
+            && start.windows(2).all(|w| 0 <= w[0] && w[0] <= w[1])
+            && start[rows] as usize == unknown.len()
+            && unknown.len() == weight.len()
+            && unknown.iter().all(|&u| u >= 0 && (u as usize) < unknowns.len());
+        require(fits, "not a selection of these coefficients")?;
+        let selection = OwnedSelection { start, unknown, weight, unknowns };
+        let Some(pattern) = assembly::pattern(&self.cells, &self.location, &selection.view())
+        else {
+            return Err(InputError::new_err(
+                "the reduced matrix has more than 2147483647 entries: expected a coarser grid",
+            ));
+        };
+        Ok(PyPattern { location: Arc::clone(&self.location), selection, pattern })
     }
 
     /// Fill the values of the reduced matrix in its pattern.
-    #[allow(clippy::too_many_arguments)]
     fn matrix(
         &self,
         kernels: Vec<KernelOf>,
         volume: PyReadonlyArray1<f64>,
         coefficients: PyReadonlyArray1<f64>,
-        selection: SelectionOf,
-        start: PyReadonlyArray1<i32>,
-        columns: PyReadonlyArray1<i32>,
+        pattern: &PyPattern,
         mut values: PyReadwriteArray1<f64>,
     ) -> PyResult<()> {
-        let volume = volume.as_slice()?;
+        let (volume, values) = (volume.as_slice()?, values.as_slice_mut()?);
         require(volume.len() == self.location.len(), "volumes of other particles")?;
-        let (start, columns, values) =
-            (start.as_slice()?, columns.as_slice()?, values.as_slice_mut()?);
-        let selection = self.selection(&selection)?;
-        let fits = start.len() == selection.unknowns.len() + 1
-            && start.windows(2).all(|w| 0 <= w[0] && w[0] <= w[1])
-            && start[start.len() - 1] as usize == columns.len()
-            && columns.len() == values.len();
-        require(fits, "not the pattern of this selection")?;
-        let kernels = self.kernels(&kernels)?;
+        let mine = Arc::ptr_eq(&pattern.location, &self.location);
+        require(mine && values.len() == pattern.pattern.columns.len(), "another pattern")?;
+        let kernels = self.kernels(2, &kernels)?;
         let coefficients = self.coefficients(&coefficients)?;
-        assembly::matrix(
-            &self.cells,
-            &kernels,
-            &self.location,
-            volume,
-            coefficients,
-            &selection,
-            (start, columns),
-            values,
-        );
-        Ok(())
+        // SAFETY: kernels as in `kernels`, of rank 2; the pattern is one that `assembly::pattern`
+        // made of this location, and the lengths were checked.
+        let fits = unsafe {
+            assembly::matrix(
+                &self.cells,
+                &kernels,
+                &self.location,
+                volume,
+                coefficients,
+                &pattern.selection.view(),
+                &pattern.pattern,
+                values,
+            )
+        };
+        require(fits, "not the pattern of this matrix")
+    }
+}
+
+/// S, kept with the pattern that was made of it.
+struct OwnedSelection {
+    start: Vec<i32>,
+    unknown: Vec<i32>,
+    weight: Vec<f64>,
+    unknowns: Vec<i64>,
+}
+
+impl OwnedSelection {
+    fn view(&self) -> Selection<'_> {
+        Selection {
+            start: &self.start,
+            unknown: &self.unknown,
+            weight: &self.weight,
+            unknowns: &self.unknowns,
+        }
+    }
+}
+
+/// Compressed rows of the reduced matrix of one selection.
+#[pyclass(name = "Pattern", frozen)]
+pub(super) struct PyPattern {
+    location: Arc<Location>,
+    selection: OwnedSelection,
+    pattern: Pattern,
+}
+
+#[pymethods]
+impl PyPattern {
+    /// Start of each row; one more than rows.
+    #[getter]
+    fn start<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i32>> {
+        self.pattern.start.to_pyarray(py)
+    }
+
+    /// Columns of the rows, ascending.
+    #[getter]
+    fn columns<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i32>> {
+        self.pattern.columns.to_pyarray(py)
     }
 }

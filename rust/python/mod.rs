@@ -38,6 +38,7 @@ fn _rust(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<particles::PyParticles>()?;
     m.add_class::<particles::PyMaterial>()?;
     m.add_class::<assembly::PyAssembler>()?;
+    m.add_class::<assembly::PyPattern>()?;
     m.add_class::<stage::PyStage>()?;
     m.add_function(wrap_pyfunction!(grid::interpolate, m)?)?;
     m.add_function(wrap_pyfunction!(grid::basis_1d, m)?)?;
