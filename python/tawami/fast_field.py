@@ -1,12 +1,13 @@
 """The field side without a matrix of the mesh: kernels called from Rust, into the reduced matrix.
 
-It does what `Field` does, from the same compiled form (`rust/assembly.rs`): gather, FFCx kernel and
+It does what `Field` does, from the same compiled form (`rust/assembly`): gather, FFCx kernel and
 extraction cell by cell on all threads, scatter into known slots of P^T K P. Edge terms stay with
 `Field`. Both give the same numbers to round-off (`tests/test_fast_field.py`).
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -16,39 +17,28 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 from tawami import _dolfinx, _rust
-from tawami.basis import Basis
-from tawami.compilation import CompiledForm, Integral
+from tawami.compilation import Integral
 from tawami.density import Rule
 from tawami.field import Field
-from tawami.grid import Grid
 from tawami.reduction import Reduction
-from tawami.stopwatch import Stopwatch
 
 Array = npt.NDArray[np.float64]
 
 
 class FastField(Field):
-    """A compiled form on the active cells of a grid; arguments as those of `Field`."""
+    """A compiled form on the active cells of a grid; made as `Field` is."""
 
-    def __init__(
-        self,
-        grid: Grid,
-        compiled: CompiledForm,
-        basis: Basis,
-        location: _rust.Location,
-        volume: Array,
-        parameters: Mapping[str, float],
-        stopwatch: Stopwatch,
-    ) -> None:
-        super().__init__(grid, compiled, basis, location, volume, parameters, stopwatch)
-        to_grid = grid.rectangle.to_grid_axes
+    _pattern: tuple[_rust.Pattern, Array]
+
+    @functools.cached_property
+    def _assembler(self) -> _rust.Assembler:
+        to_grid = self.grid.rectangle.to_grid_axes
         nodes, vertices = (
             np.rint(degree * to_grid(_dolfinx.reference_nodes(degree))).astype(int).tolist()
             for degree in (2, 1)
         )
-        bilinear = len(compiled.form.fields) > 1
-        self._assembler = _rust.Assembler(location, basis, nodes, vertices, bilinear)
-        self._pattern: tuple[_rust.Pattern, Array]
+        bilinear = len(self.compiled.form.fields) > 1
+        return _rust.Assembler(self._location, self.layout.basis, nodes, vertices, bilinear)
 
     def _kernels(self, integrals: Sequence[Integral], data: Mapping[Rule, Array]) -> list[Any]:
         """Address, rank, width, coefficients and constants of each kernel, as Rust takes them."""

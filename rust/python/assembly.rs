@@ -19,7 +19,7 @@ type Source<'py> = (PyReadonlyArray2<'py, f64>, Vec<[usize; 2]>, Vec<usize>);
 /// (none stands for the fields), and its constants.
 type KernelOf<'py> = (usize, usize, usize, Vec<Option<Source<'py>>>, Vec<f64>);
 
-/// Element kernels over the cells with particles; see `assembly.rs`.
+/// Element kernels over the cells with particles; see `rust/assembly`.
 #[pyclass(name = "Assembler", frozen)]
 pub(super) struct PyAssembler {
     location: Arc<Location>,
