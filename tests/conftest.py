@@ -8,11 +8,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import settings
 from mpi4py import MPI
 
 import tawami
 
 logging.disable(logging.INFO)  # the compilation of forms is talkative
+# the first example of a test may compile a form
+settings.register_profile("tawami", deadline=None)
+settings.load_profile("tawami")
 
 FORMS: dict[str, dict[str, Any]] = {
     "u": {"form": "u"},

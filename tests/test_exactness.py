@@ -160,7 +160,7 @@ def test_particles_on_edges_and_corners_of_cells(random_scene, name):
     compare(random_scene(x=x, **FORMS[name]), FORMS[name])
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(data=st.data())
 def test_any_cloud_of_particles(data):
     cells = (data.draw(st.integers(1, 4)), data.draw(st.integers(1, 3)))

@@ -80,7 +80,7 @@ def test_a_form_nonlinear_in_the_fields(random_scene):
     close(*[reduced(scene, c) for scene in scenes])
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(data=st.data())
 def test_any_cloud_of_particles(data):
     cells = (data.draw(st.integers(1, 7)), data.draw(st.integers(1, 7)))
