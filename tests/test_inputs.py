@@ -327,5 +327,5 @@ def test_internal_shapes_are_checked_at_the_border_and_never_panic():
     with pytest.raises(RuntimeError, match="row of no active cell"):
         _rust.densities(
             scene._location, scene.particles.volume, data, [(0, 0)],
-            np.array([999], dtype=np.uint32), [0], 0, False, np.zeros((1, 1)),
+            np.array([999], dtype=np.uint32), [0], 0, np.zeros((1, 1)),
         )  # fmt: skip

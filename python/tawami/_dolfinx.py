@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from tawami.errors import MissingDependencyError
 
-if "petsc4py.PETSc" not in sys.modules and "petsc4py" not in sys.modules:
+if "petsc4py" not in sys.modules:
     # PETSc would answer a closed pipe (| head) with a page about a crash and abort MPI
     with contextlib.suppress(ImportError):
         import petsc4py
@@ -57,6 +57,8 @@ if np.dtype(PETSc.IntType) != np.int32:
     )
 
 version: str = dolfinx.__version__
+#: Degrees of freedom of a cell: of the biquadratic displacement (9 nodes), of a bilinear field.
+DISPLACEMENT_DOFS, BILINEAR_DOFS = 18, 4
 #: Before basix.ufl (dolfinx 0.5) the elements were UFL's own.
 OLD = not hasattr(dolfinx.fem, "functionspace")
 CELL = "quadrilateral"
@@ -292,12 +294,10 @@ class Space:
 
     def form(self, kernel: Kernel, rank: int, entities: Any) -> Any:
         """A form of the given rank with one kernel over the given entities."""
-        kind = _integral.exterior_facet if kernel.facets else _integral.cell
+        kind, spaces = _key(kernel), [self._space._cpp_object] * rank
         if OLD:
-            spaces = [self._space._cpp_object] * rank
             old = {kind: ([(0, kernel.address)], entities)}
             return cpp.fem.Form_float64(spaces, old, [], [], False, self.rectangle.cpp)
-        spaces = [self._space._cpp_object] * rank
         none = np.empty(0, dtype=np.int8)
         integrals = {kind: [(0, kernel.address, entities, none)]}
         maps: Any = {} if version.startswith("0.9") else []

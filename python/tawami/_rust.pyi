@@ -161,7 +161,6 @@ def densities(
     rows: _Numbers,
     columns: Sequence[int],
     offset: int,
-    mean: bool,
     out: _Floats,
 ) -> None: ...
 def nodal_sums(location: Location, volume: _Floats, data: _Floats, basis: str) -> _Floats: ...

@@ -167,11 +167,10 @@ def locate_point(grid: Grid, point: Sequence[float], what: str) -> _rust.Locatio
     Raises:
         InputError: The point is outside the grid, or not two finite numbers.
     """
+    x = np.array([inputs.point(what, point)])
     try:
-        return grid.rust.locate(np.array([inputs.point(what, point)]))
-    except InputError as error:
-        if "outside" not in str(error):
-            raise
+        return grid.rust.locate(x)
+    except InputError:
         raise InputError(
             f"{what}: expected a point within the grid, [{grid.origin[0]:g}, {grid.upper[0]:g}] x "
             f"[{grid.origin[1]:g}, {grid.upper[1]:g}]"

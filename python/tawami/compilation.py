@@ -18,11 +18,7 @@ from ufl.algorithms.analysis import has_type
 from ufl.algorithms.check_arities import ArityMismatch, check_form_arity
 
 from tawami import _dolfinx
-from tawami.density import (
-    DEGREE,
-    Density,
-    Rule,
-)
+from tawami.density import DEGREE, Density, Rule
 from tawami.errors import FormError, MissingDependencyError
 from tawami.formulation import Form
 from tawami.symbols import PLACEHOLDERS, Symbols
@@ -166,8 +162,11 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
 
     def integral(ufl_form: Any, *, facets: bool = False) -> Integral:
         used = set(ufl_form.coefficients())
-        kinds = {symbols.increments: Slot("fields", 18 + 4 * (len(form.fields) - 1)),
-                 symbols.traction: Slot("traction", 18)}  # fmt: skip
+        displacement, bilinear = _dolfinx.DISPLACEMENT_DOFS, _dolfinx.BILINEAR_DOFS
+        kinds = {
+            symbols.increments: Slot("fields", displacement + bilinear * (len(form.fields) - 1)),
+            symbols.traction: Slot("traction", displacement),
+        }
         exchange = {}
         for rule in densities:
             mine = {d: s for d, s in symbols.placeholders.items() if d.rule == rule and s in used}

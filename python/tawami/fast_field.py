@@ -50,8 +50,8 @@ class FastField(Field):
                     slots.append(None)
                 else:
                     assert slot.source != "traction"  # refused in integrals over cells
-                    points = [] if slot.source == "mean" else self._points[slot.source]
-                    slots.append((data[slot.source], points, list(slot.columns)))
+                    points, columns = self._points[slot.source], list(slot.columns)
+                    slots.append((data[slot.source], points, columns))
             constants = self._constants(integral).tolist()
             kernels.append(
                 (integral.kernel.address, integral.rank, integral.width, slots, constants)

@@ -76,7 +76,10 @@ class Field:
         self.active = np.zeros(grid.cells[::-1], dtype=bool)
         self.active.ravel()[location.active] = True
         self.layout = Layout(grid, basis, self._space, self.active)
-        self._points = {rule: self._point_indices(rule) for rule in DEGREE}
+        #: Indices of the points of each rule; none for means over cells.
+        self._points: dict[Rule, list[tuple[int, int]]] = {"mean": []}
+        for rule in DEGREE:
+            self._points[rule] = self._point_indices(rule)
         self._packed: dict[int, Array] = {}
         self._reduction: Reduction | None = None
         self._petsc = _Matrices()
@@ -114,11 +117,10 @@ class Field:
                 packed[:, offset : offset + slot.width] = nodal[self._space.dofs[self._cells]]
             else:
                 assert slot.source != "traction"  # refused in integrals over cells
-                rule, mean = slot.source, slot.source == "mean"
-                points = [(0, 0)] if mean else self._points[rule]
+                rule = slot.source
                 _rust.densities(
-                    self._location, self._volume, data[rule], points, self._rows,
-                    list(slot.columns), offset, mean, packed,
+                    self._location, self._volume, data[rule], self._points[rule],
+                    self._rows, list(slot.columns), offset, packed,
                 )  # fmt: skip
             offset += slot.width
         return packed
@@ -162,7 +164,9 @@ class Field:
         entities = self.grid.rectangle.entities(cells[order], local)
         form = self._space.form(integral.kernel, 1, entities)
         vector = np.zeros(self._space.size)
-        self._add_vector(vector, form, integral, packed.reshape(len(cells), 18))
+        self._add_vector(
+            vector, form, integral, packed.reshape(len(cells), _dolfinx.DISPLACEMENT_DOFS)
+        )
         return -np.asarray(self.layout.extraction.T @ vector)
 
     def _edge_cells(self, edge: Edge) -> npt.NDArray[np.int32]:

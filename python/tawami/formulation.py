@@ -34,6 +34,7 @@ from typing import Any
 
 from tawami.density import LAW
 from tawami.errors import FormError, InputError
+from tawami.inputs import number
 
 KINDS = ("displacement", "volumetric_strain", "pressure")
 KINEMATICS: Mapping[str, tuple[str, ...]] = {
@@ -139,7 +140,9 @@ class Form:
         options = {name: choices[0] for name, choices in self.options.items()}
         for name, value in given.items():
             if name in parameters:
-                parameters[name] = self._number(name, value)
+                limits = self.parameters[name]
+                low, high = limits.get("minimum", -math.inf), limits.get("maximum", math.inf)
+                parameters[name] = number(name, value, low=low, high=high)
             elif name in options:
                 if value not in self.options[name]:
                     raise InputError(
@@ -151,17 +154,6 @@ class Form:
                 has = f"it has {listed(known)}" if known else "it has none"
                 raise InputError(f"form {self.name} has no parameter '{name}': {has}")
         return parameters, options
-
-    def _number(self, name: str, value: Any) -> float:
-        limits = self.parameters[name]
-        low, high = limits.get("minimum", -math.inf), limits.get("maximum", math.inf)
-        try:
-            number = float(value)
-        except (TypeError, ValueError):
-            raise InputError(f"{name} = {value!r}: expected a number") from None
-        if not (math.isfinite(number) and low <= number <= high):
-            raise InputError(f"{name} = {value!r}: expected a finite number from {low} to {high}")
-        return number
 
 
 def shipped() -> list[str]:

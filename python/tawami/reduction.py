@@ -45,18 +45,17 @@ class Layout:
 
     def __init__(self, grid: Grid, basis: Basis, space: _dolfinx.Space, active: Mask) -> None:
         self.grid, self.basis = grid, basis
-        num_bilinear_dofs = space.dofs.shape[1] - 18
-        blocks = [_place(grid, space, np.arange(18).reshape(9, 2), basis, degree=2)]
+        of_u, of_bilinear = _dolfinx.DISPLACEMENT_DOFS, _dolfinx.BILINEAR_DOFS
+        blocks = [_place(grid, space, np.arange(of_u).reshape(-1, 2), basis, degree=2)]
         functions = _functions_of_cells(basis, grid.cells, active)
         count = blocks[0].shape[1] // 2
         masks = [np.repeat(_mask(functions, count), 2)]
         self.num_parts, self.part = _parts(functions, count)
         self._cells = np.argwhere(active)[:, ::-1]
         self._functions = [functions]
-        if num_bilinear_dofs:
-            blocks.append(
-                _place(grid, space, 18 + np.arange(4).reshape(4, 1), "bilinear", degree=1)
-            )
+        if space.dofs.shape[1] > of_u:
+            local = of_u + np.arange(of_bilinear)[:, None]
+            blocks.append(_place(grid, space, local, "bilinear", degree=1))
             functions = _functions_of_cells("bilinear", grid.cells, active)
             masks.append(_mask(functions, blocks[1].shape[1]))
             self._functions.append(functions)

@@ -87,9 +87,9 @@ class Scene:
         self.grid, self.basis = grid, basis
         self.form = Form.load(form)
         values, options = self.form.settings(parameters)
-        law = material if isinstance(material, NumpyLaw) else None
+        law = None
         if isinstance(material, NumpyLaw):
-            material = material.elastic()
+            law, material = material, material.elastic()
         many = isinstance(material, Sequence)
         materials: list[_rust.Material] = list(material) if many else [material]  # type: ignore[list-item, arg-type]
         if not materials or not all(isinstance(m, _rust.Material) for m in materials):

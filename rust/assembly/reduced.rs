@@ -7,20 +7,20 @@ use super::{colours, Shared};
 use crate::grid::Location;
 
 /// S as compressed rows: the unknowns behind each coefficient and their weights.
-#[derive(Debug, Clone, Copy)]
-pub struct Selection<'a> {
+#[derive(Debug, Clone)]
+pub struct Selection {
     /// Start of each coefficient's entries; one more than coefficients.
-    pub start: &'a [i32],
+    pub start: Vec<i32>,
     /// Unknown of each entry.
-    pub unknown: &'a [i32],
+    pub unknown: Vec<i32>,
     /// Weight of each entry.
-    pub weight: &'a [f64],
+    pub weight: Vec<f64>,
     /// Coefficient that each unknown is.
-    pub unknowns: &'a [i64],
+    pub unknowns: Vec<i64>,
 }
 
-impl<'a> Selection<'a> {
-    fn of(&self, coefficient: usize) -> impl Iterator<Item = (u32, f64)> + use<'a> {
+impl Selection {
+    fn of(&self, coefficient: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
         let range = self.start[coefficient] as usize..self.start[coefficient + 1] as usize;
         let (unknown, weight) = (&self.unknown[range.clone()], &self.weight[range]);
         unknown.iter().zip(weight).map(|(&u, &w)| (u as u32, w))

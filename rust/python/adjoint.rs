@@ -1,16 +1,34 @@
 //! Particle data as densities of packed arrays, and sums over functions.
 
+use ndarray::ArrayView2;
 use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray2, ToPyArray};
 use pyo3::prelude::*;
 
 use super::grid::PyLocation;
 use super::require;
 use crate::adjoint::{self, Densities};
+use crate::grid::Location;
 use crate::quadrature::Rule;
 
+/// Points per axis of the tensor rule that `points` are of, 0 where there are none (means over cells),
+/// once `data` is known to be of these particles and to have the columns.
+pub(super) fn points_per_axis(
+    location: &Location,
+    data: &ArrayView2<f64>,
+    points: &[[usize; 2]],
+    columns: &[usize],
+) -> PyResult<usize> {
+    require(data.nrows() == location.len(), "data of other particles")?;
+    require(columns.iter().all(|&c| c < data.ncols()) && !columns.is_empty(), "columns")?;
+    let n = (points.len() as f64).sqrt().round() as usize;
+    let tensor = n * n == points.len() && points.iter().flatten().all(|&i| i < n);
+    require(tensor && n <= adjoint::MAX_POINTS, "not a tensor rule")?;
+    Ok(n)
+}
+
 /// Densities of particle data in the rows of a packed coefficient array; see `adjoint.rs`.
-/// `points` holds the indices along x and y of each quadrature point; `mean` asks for the mean
-/// over the particles of a cell instead.
+/// `points` holds the indices along x and y of each quadrature point; none asks for the mean over
+/// the particles of a cell instead.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn densities(
@@ -21,30 +39,26 @@ pub(super) fn densities(
     rows: PyReadonlyArray1<u32>,
     columns: Vec<usize>,
     offset: usize,
-    mean: bool,
     mut out: PyReadwriteArray2<f64>,
 ) -> PyResult<()> {
     let location = &location.0;
     let (volume, data, rows) = (volume.as_slice()?, data.as_array(), rows.as_slice()?);
     let (height, width) = (out.as_array().nrows(), out.as_array().ncols());
     let out = out.as_slice_mut()?;
-    require(data.nrows() == location.len() && volume.len() == location.len(), "particle data")?;
+    let per_axis = points_per_axis(location, &data, &points, &columns)?;
+    require(volume.len() == location.len(), "volumes of other particles")?;
     require(height == rows.len(), "packed array of other cells")?;
     require(rows.iter().all(|&r| (r as usize) < location.active.len()), "row of no active cell")?;
-    require(columns.iter().all(|&c| c < data.ncols()) && !columns.is_empty(), "columns")?;
-    require(offset + points.len() * columns.len() <= width, "packed array too narrow")?;
-    let per_axis = (points.len() as f64).sqrt().round() as usize;
-    let tensor = per_axis * per_axis == points.len();
-    require(tensor && points.iter().flatten().all(|&i| i < per_axis), "not a tensor rule")?;
-    require(per_axis <= adjoint::MAX_POINTS, "too many points")?;
-    if mean {
-        adjoint::pack(rows, (offset, columns.len()), width, out, |a, row| {
+    let length = points.len().max(1) * columns.len();
+    require(offset + length <= width, "packed array too narrow")?;
+    if per_axis == 0 {
+        adjoint::pack(rows, (offset, length), width, out, |a, row| {
             adjoint::cell_mean(location, a, volume, data, &columns, row);
         });
     } else {
         let rule = Rule::gauss(per_axis);
         let densities = Densities { rule: &rule, points: &points, columns: &columns };
-        adjoint::pack(rows, (offset, densities.len()), width, out, |a, row| {
+        adjoint::pack(rows, (offset, length), width, out, |a, row| {
             densities.of_cell(location, a, volume, data, row);
         });
     }

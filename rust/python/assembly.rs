@@ -5,6 +5,7 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1, ToPyArray};
 use pyo3::prelude::*;
 
+use super::adjoint::points_per_axis;
 use super::grid::PyLocation;
 use super::{require, InputError};
 use crate::adjoint::{Densities, MAX_POINTS};
@@ -32,15 +33,10 @@ impl PyAssembler {
         let slot = |source: &'a Option<Source>| -> PyResult<Slot<'a>> {
             let Some((data, points, columns)) = source else { return Ok(Slot::Fields) };
             let data = data.as_array();
-            require(data.nrows() == self.location.len(), "particle data of other particles")?;
-            require(columns.iter().all(|&c| c < data.ncols()) && !columns.is_empty(), "columns")?;
-            if points.is_empty() {
-                return Ok(Slot::Means(columns, data));
-            }
-            let n = (points.len() as f64).sqrt().round() as usize;
-            require((1..self.rules.len()).contains(&n) && n * n == points.len(), "not a rule")?;
-            require(points.iter().flatten().all(|&i| i < n), "not a tensor rule")?;
-            Ok(Slot::Densities(Densities { rule: &self.rules[n], points, columns }, data))
+            Ok(match points_per_axis(&self.location, &data, points, columns)? {
+                0 => Slot::Means(columns, data),
+                n => Slot::Densities(Densities { rule: &self.rules[n], points, columns }, data),
+            })
         };
         kernels
             .iter()
@@ -123,9 +119,8 @@ impl PyAssembler {
             && unknown.len() == weight.len()
             && unknown.iter().all(|&u| u >= 0 && (u as usize) < unknowns.len());
         require(fits, "not a selection of these coefficients")?;
-        let selection = OwnedSelection { start, unknown, weight, unknowns };
-        let Some(pattern) = assembly::pattern(&self.cells, &self.location, &selection.view())
-        else {
+        let selection = Selection { start, unknown, weight, unknowns };
+        let Some(pattern) = assembly::pattern(&self.cells, &self.location, &selection) else {
             return Err(InputError::new_err(
                 "the reduced matrix has more than 2147483647 entries: expected a coarser grid",
             ));
@@ -157,7 +152,7 @@ impl PyAssembler {
                 &self.location,
                 volume,
                 coefficients,
-                &pattern.selection.view(),
+                &pattern.selection,
                 &pattern.pattern,
                 values,
             )
@@ -166,30 +161,11 @@ impl PyAssembler {
     }
 }
 
-/// S, kept with the pattern that was made of it.
-struct OwnedSelection {
-    start: Vec<i32>,
-    unknown: Vec<i32>,
-    weight: Vec<f64>,
-    unknowns: Vec<i64>,
-}
-
-impl OwnedSelection {
-    fn view(&self) -> Selection<'_> {
-        Selection {
-            start: &self.start,
-            unknown: &self.unknown,
-            weight: &self.weight,
-            unknowns: &self.unknowns,
-        }
-    }
-}
-
 /// Compressed rows of the reduced matrix of one selection.
 #[pyclass(name = "Pattern", frozen)]
 pub(super) struct PyPattern {
     location: Arc<Location>,
-    selection: OwnedSelection,
+    selection: Selection,
     pattern: Pattern,
 }
 
