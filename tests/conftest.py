@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import settings
+from hypothesis import strategies as st
 from mpi4py import MPI
 
 import tawami
@@ -33,6 +34,16 @@ BASES = ("quadratic_spline", "bilinear", "biquadratic")
 def grid_of(cells: tuple[int, int] = (4, 3), h: float = 0.5) -> tawami.Grid:
     """A grid away from the origin."""
     return tawami.Grid(MPI.COMM_WORLD, origin=(-1.0, 0.5), h=h, cells=cells)
+
+
+@st.composite
+def clouds(draw: st.DrawFn, cells: tuple[int, int], most: int) -> tuple[tawami.Grid, np.ndarray]:
+    """A grid of at most so many cells, and up to `most` points on it: anywhere, on edges, on corners."""
+    size = tuple(draw(st.integers(1, n)) for n in cells)
+    coordinate = st.one_of(st.floats(0, 1), st.sampled_from([0.0, 0.25, 0.5, 1.0]))
+    points = draw(st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=most))
+    grid = grid_of(size)
+    return grid, grid.origin + grid.h * np.array(size) * np.array(points)
 
 
 def greville(basis: str, n: int) -> np.ndarray:

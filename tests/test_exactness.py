@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import BASES, FORMS, grid_of
+from conftest import BASES, FORMS, clouds
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
@@ -163,12 +163,8 @@ def test_particles_on_edges_and_corners_of_cells(random_scene, name):
 @settings(max_examples=15)
 @given(data=st.data())
 def test_any_cloud_of_particles(data):
-    cells = (data.draw(st.integers(1, 4)), data.draw(st.integers(1, 3)))
-    coordinate = st.one_of(st.floats(0, 1), st.sampled_from([0.0, 0.25, 0.5, 1.0]))
-    points = data.draw(st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=12))
+    grid, x = data.draw(clouds(cells=(4, 3), most=12))
     basis = data.draw(st.sampled_from(BASES))
-    grid = grid_of(cells)
-    x = grid.origin + grid.h * np.array(cells) * np.array(points)
     laws = [tawami.linear_elastic(E=2.0, nu=0.3), tawami.linear_elastic(E=7.0, nu=0.49)]
     numbers = data.draw(st.lists(st.integers(0, 1), min_size=len(x), max_size=len(x)))
     volumes = np.linspace(0.01, 0.2, len(x))

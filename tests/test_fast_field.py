@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import BASES, FORMS, grid_of
+from conftest import BASES, FORMS, clouds, grid_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import csr_matrix, identity
@@ -83,13 +83,10 @@ def test_a_form_nonlinear_in_the_fields(random_scene):
 @settings(max_examples=20)
 @given(data=st.data())
 def test_any_cloud_of_particles(data):
-    cells = (data.draw(st.integers(1, 7)), data.draw(st.integers(1, 7)))
-    coordinate = st.one_of(st.floats(0, 1), st.sampled_from([0.0, 0.25, 0.5, 1.0]))
-    points = data.draw(st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=20))
+    grid, x = data.draw(clouds(cells=(7, 7), most=20))
     options = FORMS[data.draw(st.sampled_from(sorted(FORMS)))]
     basis = data.draw(st.sampled_from(BASES))
-    grid = grid_of(cells)
-    body = tawami.Body(grid.origin + grid.h * np.array(cells) * points, np.full(len(points), 0.1))
+    body = tawami.Body(x, np.full(len(x), 0.1))
     material = tawami.linear_elastic(E=2.0, nu=0.3)
     scenes = both(lambda **p: tawami.Scene(grid, body, material, basis=basis, **options, **p))
     c = np.random.default_rng(0).standard_normal(scenes[0].num_coefficients)
