@@ -130,6 +130,6 @@ for options in {list(FORMS.values())!r}:
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
     run = python(code, executable=executable, cwd=tmp_path, env=environment)
     assert run.returncode == 0, run.stderr
-    lines = run.stdout.split("\n")[:-1]
+    lines = run.stdout.splitlines()[-len(FORMS) :]  # MPI may have had its say before
     assert {line.split()[0] for line in lines} == set(shipped())
     assert all(line.endswith("True") for line in lines)

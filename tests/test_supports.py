@@ -254,7 +254,7 @@ for k in range(40):
 print(peak() - before)
 """
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert float(run.stdout) < 60
+    assert float(run.stdout.splitlines()[-1]) < 60  # MPI may have had its say before
 
 
 def test_the_same_support_twice_is_the_support_once():
