@@ -93,6 +93,11 @@ $(STAMPS)/lint: $(STAMPS)/python
 	$(PIP) 'ruff>=0.6' 'mypy>=1.10'
 	@mkdir -p $(STAMPS) && touch $@
 
-$(STAMPS)/wheel: $(STAMPS)/python Cargo.toml Cargo.lock $(shell find rust -name '*.rs')
-	VIRTUAL_ENV=$(CURDIR)/.venv PIP_CONSTRAINT=$(CURDIR)/.venv/constraints.txt .venv/bin/maturin develop --release --locked --quiet >/dev/null
+# Built for the processor it runs on, and again where that is another one.
+PROCESSOR := $(STAMPS)/processor-$(shell grep -m 1 -i flags /proc/cpuinfo 2>/dev/null | cksum | cut -d' ' -f1)
+$(PROCESSOR): $(STAMPS)/rust
+	@touch $@
+
+$(STAMPS)/wheel: $(STAMPS)/python $(PROCESSOR) Cargo.toml Cargo.lock $(shell find rust -name '*.rs')
+	RUSTFLAGS="-C target-cpu=native" VIRTUAL_ENV=$(CURDIR)/.venv PIP_CONSTRAINT=$(CURDIR)/.venv/constraints.txt .venv/bin/maturin develop --release --locked --quiet >/dev/null
 	@touch $@

@@ -55,17 +55,22 @@ impl Densities<'_> {
         let area = location.grid.h * location.grid.h;
         let (mut lx, mut ly) = ([0.0; MAX_POINTS], [0.0; MAX_POINTS]);
         let n = self.rule.points.len();
+        let mut weighted = vec![0.0; self.columns.len()];
         out.fill(0.0);
         for &p in location.particles_of(a) {
             let p = p as usize;
-            self.rule.lagrange(location.xi[p][0], &mut lx[..n]);
-            self.rule.lagrange(location.xi[p][1], &mut ly[..n]);
-            let row = data.row(p);
-            for (point, &[i, j]) in out.chunks_exact_mut(self.columns.len()).zip(self.points) {
-                let weight = self.rule.weights[i] * self.rule.weights[j] * area;
-                let l = volume[p] * lx[i] * ly[j] / weight;
-                for (d, &c) in point.iter_mut().zip(self.columns) {
-                    *d += l * row[c];
+            for (t, l) in location.xi[p].iter().zip([&mut lx, &mut ly]) {
+                self.rule.lagrange(*t, &mut l[..n]);
+                l.iter_mut().zip(&self.rule.weights).for_each(|(l, w)| *l /= w);
+            }
+            let (row, v) = (data.row(p), volume[p] / area);
+            for (d, &c) in weighted.iter_mut().zip(self.columns) {
+                *d = v * row[c];
+            }
+            for (point, &[i, j]) in out.chunks_exact_mut(weighted.len()).zip(self.points) {
+                let l = lx[i] * ly[j];
+                for (o, d) in point.iter_mut().zip(&weighted) {
+                    *o += l * d;
                 }
             }
         }
@@ -113,7 +118,8 @@ pub fn pack(
 }
 
 /// Sums `sum_p V_p D_p N_i(x_p)` over the functions of a basis: functions x columns, the function
-/// along x fastest. The order of summation is that of the particles, so results repeat.
+/// along x fastest. Rows of cells are summed apart and then added in their order, so results repeat
+/// whatever the number of threads.
 #[must_use]
 pub fn nodal_sums(
     location: &Location,
@@ -122,18 +128,36 @@ pub fn nodal_sums(
     basis: Basis,
 ) -> ndarray::Array2<f64> {
     let [nx, ny] = location.grid.cells;
-    let width = basis.len(nx);
-    let mut sums = ndarray::Array2::zeros((width * basis.len(ny), data.ncols()));
-    for (p, (&cell, xi)) in location.cell.iter().zip(&location.xi).enumerate() {
-        let [i, j] = location.grid.cell_ij(cell as usize);
-        let (bx, by) = (basis.at(nx, i, xi[0]), basis.at(ny, j, xi[1]));
-        for b in 0..basis.per_cell() {
-            for a in 0..basis.per_cell() {
-                let weight = volume[p] * bx.value[a] * by.value[b];
-                let mut row = sums.row_mut(bx.first + a + (by.first + b) * width);
-                row.scaled_add(weight, &data.row(p));
+    let (width, columns) = (basis.len(nx), data.ncols());
+    let of_row = |cells: &[usize]| {
+        let mut sums = vec![0.0; basis.per_cell() * width * columns];
+        for &p in cells.iter().flat_map(|&a| location.particles_of(a)) {
+            let p = p as usize;
+            let [i, j] = location.grid.cell_ij(location.cell[p] as usize);
+            let [x, y] = location.xi[p];
+            let (bx, by) = (basis.at(nx, i, x), basis.at(ny, j, y));
+            for b in 0..basis.per_cell() {
+                for a in 0..basis.per_cell() {
+                    let weight = volume[p] * bx.value[a] * by.value[b];
+                    let slot = columns * (bx.first + a + b * width);
+                    for (s, d) in sums[slot..slot + columns].iter_mut().zip(data.row(p)) {
+                        *s += weight * d;
+                    }
+                }
             }
         }
+        sums
+    };
+    let all: Vec<usize> = (0..location.active.len()).collect();
+    let row_of = |a: usize| location.grid.cell_ij(location.active[a] as usize)[1];
+    let rows: Vec<&[usize]> = all.chunk_by(|&a, &b| row_of(a) == row_of(b)).collect();
+    let of_rows: Vec<Vec<f64>> = rows.par_iter().map(|cells| of_row(cells)).collect();
+    let mut sums = vec![0.0; width * basis.len(ny) * columns];
+    for (cells, part) in rows.iter().zip(&of_rows) {
+        let first = basis.first(row_of(cells[0])) * width * columns;
+        for (s, d) in sums[first..].iter_mut().zip(part) {
+            *s += d;
+        }
     }
-    sums
+    ndarray::Array2::from_shape_fn((width * basis.len(ny), columns), |(i, k)| sums[i * columns + k])
 }

@@ -56,6 +56,26 @@ impl Basis {
         }
     }
 
+    /// First and last cell of the support of a function on `n` cells.
+    #[must_use]
+    pub fn support(self, n: usize, function: usize) -> [usize; 2] {
+        match self {
+            Self::QuadraticSpline => [function.saturating_sub(2), function.min(n - 1)],
+            Self::Bilinear => [function.saturating_sub(1), function.min(n - 1)],
+            Self::Biquadratic => {
+                let first =
+                    if function % 2 == 0 { (function / 2).saturating_sub(1) } else { function / 2 };
+                [first, (function / 2).min(n - 1)]
+            }
+        }
+    }
+
+    /// First and last function that do not vanish on all of a run of cells.
+    #[must_use]
+    pub fn on(self, [first, last]: [usize; 2]) -> [usize; 2] {
+        [self.first(first), self.first(last) + self.per_cell() - 1]
+    }
+
     /// The functions at position `t` (0 to 1) of `cell` among `n` cells.
     ///
     /// Quadratic splines: the first function of a cell is `l (1-t)^2`, the last `r t^2`, and they

@@ -172,7 +172,7 @@ impl Stage<'_> {
         data.par_chunks_exact_mut(columns).enumerate().try_for_each(|(p, row)| {
             let (_, stress, moduli) = self.respond(particles, p);
             if self.kinematics == Kinematics::Cell && couples(&moduli) {
-                return Err(Error::CoupledLaw { index: p });
+                return Err(Error::CoupledLaw { index: particles.number[p] as usize });
             }
             for request in requests {
                 write(request, self.kinematics, &stress, &moduli, row);
@@ -183,20 +183,23 @@ impl Stage<'_> {
 
     /// Accept the increments: stress, displacement and (where stored) eps_v of the particles.
     pub fn commit(&self, particles: &mut Particles) {
-        for p in 0..particles.len() {
-            let (strain, stress, _) = self.respond(particles, p);
-            let mut sigma_m = stress.mean;
+        let of = |p: usize| {
+            let (strain, mut stress, _) = self.respond(particles, p);
             if self.kinematics == Kinematics::Deviatoric {
-                sigma_m += self.increments.volumetric_at(self.location, p);
-            }
-            for (i, unit) in UNIT.iter().enumerate() {
-                particles.stress[[p, i]] = stress.deviator[i] + sigma_m * unit;
+                stress.mean += self.increments.volumetric_at(self.location, p);
             }
             let u = self.increments.u.value(self.location.cell[p] as usize, self.location.xi[p]);
+            (stress, u, strain.volume)
+        };
+        let new: Vec<_> = (0..particles.len()).into_par_iter().map(of).collect();
+        for (p, (stress, u, volume)) in new.into_iter().enumerate() {
+            for (i, unit) in UNIT.iter().enumerate() {
+                particles.stress[[p, i]] = stress.deviator[i] + stress.mean * unit;
+            }
             particles.displacement[[p, 0]] += u[0];
             particles.displacement[[p, 1]] += u[1];
             if let Some(eps_v) = &mut particles.eps_v {
-                eps_v[p] += strain.volume;
+                eps_v[p] += volume;
             }
         }
     }

@@ -116,6 +116,17 @@ pub enum Error {
     },
 }
 
+impl Error {
+    /// The same with the number that its particle has in the body.
+    #[must_use]
+    pub(crate) fn of_body(mut self, number: &ndarray::Array1<u32>) -> Self {
+        if let Self::NotFinite { index, .. } = &mut self {
+            *index = number[*index] as usize;
+        }
+        self
+    }
+}
+
 /// Result with this crate's [`enum@Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 

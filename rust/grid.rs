@@ -181,6 +181,17 @@ impl Location {
         Self { grid, cell, xi, active, start, order }
     }
 
+    /// Where some of the particles are, in the order given.
+    ///
+    /// # Panics
+    /// If there is no such particle; callers check at the border.
+    #[must_use]
+    pub fn select(&self, particles: &[u32]) -> Self {
+        let of = |&p: &u32| (self.cell[p as usize], self.xi[p as usize]);
+        let (cell, xi) = particles.iter().map(of).unzip();
+        Self::new(self.grid, cell, xi)
+    }
+
     /// Particles of the a-th active cell.
     #[must_use]
     pub fn particles_of(&self, a: usize) -> &[u32] {
@@ -193,7 +204,7 @@ impl Location {
         self.cell.len()
     }
 
-    /// Whether there are no particles (never true for a `Location` made by [`Grid::locate`]).
+    /// Whether there are no particles (after [`Location::select`] on a rank without any).
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.cell.is_empty()

@@ -17,6 +17,7 @@
     clippy::needless_pass_by_value
 )]
 
+pub mod active;
 pub mod adjoint;
 #[cfg(feature = "python")]
 mod assembly;

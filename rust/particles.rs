@@ -1,6 +1,6 @@
 //! Particle storage: structure of arrays, and only the arrays that the scene needs.
 
-use ndarray::{Array1, Array2};
+use ndarray::{Array1, Array2, Axis};
 
 use crate::error::{check_finite, Error, Result};
 use crate::tensor::COMPONENTS;
@@ -14,6 +14,8 @@ pub struct Particles {
     pub volume: Array1<f64>,
     /// Number of the material, n.
     pub material: Array1<u32>,
+    /// Number of the particle in the body, n: what messages call it.
+    pub number: Array1<u32>,
     /// Stress [Pa], n x 4, order of [`crate::tensor`].
     pub stress: Array2<f64>,
     /// Displacement since the start [m], n x 2.
@@ -46,12 +48,32 @@ impl Particles {
             stress: Array2::zeros((n, COMPONENTS)),
             displacement: Array2::zeros((n, 2)),
             eps_v: None,
+            number: (0..n as u32).collect(),
             x,
             volume,
             material,
         };
         particles.check()?;
         Ok(particles)
+    }
+
+    /// Some of the particles, in the order given; there may be none.
+    ///
+    /// # Panics
+    /// If there is no such particle; callers check at the border.
+    #[must_use]
+    pub fn select(&self, particles: &[u32]) -> Self {
+        let rows: Vec<usize> = particles.iter().map(|&p| p as usize).collect();
+        let (all, per_particle) = (Axis(0), |a: &Array1<f64>| a.select(Axis(0), &rows));
+        Self {
+            x: self.x.select(all, &rows),
+            volume: per_particle(&self.volume),
+            material: self.material.select(all, &rows),
+            number: self.number.select(all, &rows),
+            stress: self.stress.select(all, &rows),
+            displacement: self.displacement.select(all, &rows),
+            eps_v: self.eps_v.as_ref().map(per_particle),
+        }
     }
 
     /// Check what a user may have written into the arrays: finite values, positive volumes.
@@ -62,15 +84,18 @@ impl Particles {
         fn flat<D: ndarray::Dimension>(a: &ndarray::Array<f64, D>) -> &[f64] {
             a.as_slice().unwrap_or_default()
         }
-        check_finite("x", flat(&self.x), 2)?;
-        check_finite("volume", flat(&self.volume), 1)?;
-        check_finite("stress", flat(&self.stress), COMPONENTS)?;
-        check_finite("displacement", flat(&self.displacement), 2)?;
+        let finite = |name, values, per_particle| {
+            check_finite(name, values, per_particle).map_err(|e| e.of_body(&self.number))
+        };
+        finite("x", flat(&self.x), 2)?;
+        finite("volume", flat(&self.volume), 1)?;
+        finite("stress", flat(&self.stress), COMPONENTS)?;
+        finite("displacement", flat(&self.displacement), 2)?;
         if let Some(eps_v) = &self.eps_v {
-            check_finite("eps_v", flat(eps_v), 1)?;
+            finite("eps_v", flat(eps_v), 1)?;
         }
         match self.volume.iter().position(|&v| v <= 0.0) {
-            Some(index) => Err(Error::Volume { index, value: self.volume[index] }),
+            Some(p) => Err(Error::Volume { index: self.number[p] as usize, value: self.volume[p] }),
             None => Ok(()),
         }
     }
@@ -81,7 +106,7 @@ impl Particles {
         self.volume.len()
     }
 
-    /// Whether there are no particles (never true after [`Particles::new`]).
+    /// Whether there are no particles (after [`Particles::select`] on a rank without any).
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.volume.is_empty()
@@ -98,6 +123,6 @@ impl Particles {
     #[must_use]
     pub fn bytes_per_particle(&self) -> usize {
         let doubles = 2 + 1 + COMPONENTS + 2 + usize::from(self.eps_v.is_some());
-        8 * doubles + 4
+        8 * doubles + 4 + 4
     }
 }

@@ -81,28 +81,6 @@ def test_the_reference_blas_is_warned_of(monkeypatch, tmp_path):
 
 
 @pytest.mark.mpi
-def test_more_than_one_rank_is_refused_with_a_sentence():
-    code = """
-import sys
-from mpi4py import MPI
-import tawami
-try:
-    tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=1.0, cells=(2, 2))
-except tawami.InputError as error:
-    print(error, flush=True)
-tawami.Grid(MPI.COMM_SELF, origin=(0, 0), h=1.0, cells=(2, 2))
-"""
-    command = ["mpirun", "--oversubscribe", "-n", "2", sys.executable, "-c", code]
-    # this process is an MPI process itself: the ranks must not take its variables for theirs
-    clean = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))}
-    clean |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-    run = subprocess.run(
-        command, capture_output=True, text=True, check=False, timeout=120, env=clean
-    )
-    assert run.returncode == 0, run.stderr
-    assert run.stdout.count("the communicator has 2 ranks: tawami runs on one rank for now") == 2
-
-
 def test_every_form_runs_from_an_installed_wheel(tmp_path):
     """Built, installed in an empty environment, imported from there, and run."""
     build = [sys.executable, "-m", "maturin", "build", "--release", "--locked", "--quiet"]

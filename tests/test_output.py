@@ -135,10 +135,28 @@ def test_wrong_cells_of_the_study(cells, capsys):
     assert "expected even numbers such as 2,4,8" in capsys.readouterr().err
 
 
-def test_the_benchmark_prints_its_ratios(capsys):
+def test_the_benchmark_prints_its_ratios(capsys, tmp_path):
     """Small, and without a look at the times themselves."""
-    bench.main(["--cells", "8"])
+    options = ["--cells", "4,8", "--per-axis", "2", "--threads", "1", "--ranks", "2"]
+    bench.main([*options, "--results", str(tmp_path)])
     printed = capsys.readouterr().out
-    words_of_each = ("factorisation: ", "particle stages: ", "per particle", "reference over fast")
-    for words in (*words_of_each, "of them empty:", "BLAS"):
+    for words in (
+        "all but the factorisation: ", "particle stages: ", "FGMRES iterations [0, ",
+        "us per particle and iteration", "reference over fast", "2 ranks: step ", "growth, ",
+        "another set of active cells", "of them empty:", "BLAS",
+    ):  # fmt: skip
         assert words in printed
+    with (tmp_path / "bench.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["path"], row["ranks"]) for row in rows[:3]] == [
+        ("fast", "1"), ("reference", "1"), ("fast", "2")
+    ]  # fmt: skip
+    deflections = [float(row["deflection_m"]) for row in rows[:3]]
+    assert deflections == pytest.approx([deflections[0]] * 3, rel=1e-10)
+    assert all(float(row["peak_MB"]) > 10 for row in rows)
+
+
+def test_wrong_numbers_for_the_benchmark(capsys):
+    with pytest.raises(SystemExit):
+        bench.main(["--ranks", "two"])
+    assert "expected whole numbers" in capsys.readouterr().err

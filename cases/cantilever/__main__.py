@@ -9,11 +9,12 @@ import argparse
 import csv
 import logging
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
 
 import matplotlib
+from mpi4py import MPI
 from tqdm import tqdm
 
 import tawami
@@ -58,32 +59,37 @@ def main(arguments: Sequence[str] | None = None) -> None:
     folder = result_folder(options.results)
     start = perf_counter()
     work = list(runs(cells))
-    live = sys.stderr.isatty()
+    first = MPI.COMM_WORLD.rank == 0
+    live = first and sys.stderr.isatty()
     rows = [run() for run in tqdm(work, desc="cantilever", unit="run", disable=not live)]
-    write_table(rows, folder / "cantilever.csv")
-    figures.deflection_error(rows, folder / "deflection_error.png")
+    solutions = {}
     for support in ("paper", "exact"):
-        solutions = {
-            title: mpm.solve(method, support, 16, alpha)[1]
-            for title, (method, alpha) in FIELDS.items()
-        }
-        if support == "paper":
-            three = {title: solutions[title] for title in list(FIELDS)[1:]}
-            figures.mean_stress_paper(three, folder / "mean_stress_paper.png")
-        else:
-            figures.mean_stress_exact(solutions, folder / "mean_stress_exact.png")
-        for (method, alpha), solution in zip(FIELDS.values(), solutions.values(), strict=True):
+        for title, (method, alpha) in FIELDS.items():
+            solution = solutions[support, title] = mpm.solve(method, support, 16, alpha)[1]
             name = method if alpha is None else f"{method}_{alpha:g}"
             write_particles(folder / f"particles_{name}_{support}_n16.vtu", solution)
             write_grid(folder / f"grid_{name}_{support}_n16.vtu", solution)
-    text = report(rows)
-    with whole_file(folder / "report.md") as part:
-        part.write_text(text)
+    if first:
+        draw(rows, solutions, folder)
+        write_table(rows, folder / "cantilever.csv")
+        with whole_file(folder / "report.md") as part:
+            part.write_text(report(rows))
     print(table(rows))
     print(paper_support_in_words(rows))
     print(f"\n{len(work)} computations in {perf_counter() - start:.1f} s. Results: {folder}/")
     for name in sorted(path.name for path in folder.iterdir() if not path.name.startswith(".")):
         print(f"  {folder / name}")
+
+
+def draw(
+    rows: Sequence[Row], solutions: Mapping[tuple[str, str], tawami.Solution], folder: Path
+) -> None:
+    """The figures; solutions by support and title."""
+    figures.deflection_error(rows, folder / "deflection_error.png")
+    three = {title: solutions["paper", title] for title in list(FIELDS)[1:]}
+    figures.mean_stress_paper(three, folder / "mean_stress_paper.png")
+    exact = {title: solutions["exact", title] for title in FIELDS}
+    figures.mean_stress_exact(exact, folder / "mean_stress_exact.png")
 
 
 def write_table(rows: Sequence[Row], path: Path) -> None:
@@ -149,7 +155,4 @@ def markdown(rows: Sequence[Row]) -> str:
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except tawami.TawamiError as error:
-        sys.exit(f"cantilever: {error}")
+    tawami.run(main, "cantilever")

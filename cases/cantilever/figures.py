@@ -130,7 +130,7 @@ def mean_stress_exact(solutions: Mapping[str, tawami.Solution], path: Path) -> N
     )
     closed, profile = panels[0]
     for (left, right), (title, solution) in zip(panels[1:], solutions.items(), strict=True):
-        x, y = np.array(solution.scene.particles.x).T
+        x, y = solution.x.T
         exact = mean_stress(x, y)
         difference = solution.mean_stress - exact
         fields = _field(left, solution, solution.mean_stress, ROOT_STRESS)
@@ -168,11 +168,10 @@ def _titled(title: str, values: Values) -> str:
 
 def _field(axes: Axes, solution: tawami.Solution, values: Values, scale: float) -> PolyCollection:
     """Each particle as the square of its volume, coloured from -scale to scale [Pa]."""
-    particles = solution.scene.particles
     corners = 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    side = np.sqrt(particles.volume)[:, None, None]
+    side = np.sqrt(solution.volume)[:, None, None]
     squares = PolyCollection(
-        particles.x[:, None, :] + side * corners, array=values / 1e3, cmap="RdBu_r",
+        solution.x[:, None, :] + side * corners, array=values / 1e3, cmap="RdBu_r",
         edgecolors="face", linewidths=0.1,
     )  # fmt: skip
     squares.set_clim(-scale / 1e3, scale / 1e3)

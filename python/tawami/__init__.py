@@ -16,6 +16,7 @@ from tawami.formulation import Form
 from tawami.grid import Grid
 from tawami.materials import linear_elastic
 from tawami.numpy_law import NumpyLaw
+from tawami.ranks import run
 from tawami.scene import Scene, Solution
 
 __all__ = [
@@ -36,4 +37,5 @@ __all__ = [
     "TawamiError",
     "box",
     "linear_elastic",
+    "run",
 ]

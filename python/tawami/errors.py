@@ -28,6 +28,10 @@ class ConvergenceError(TawamiError):
         super().__init__(message)
         self.history = history
 
+    def __reduce__(self) -> tuple[type, tuple[str, list[tuple[float, float | None]]]]:
+        """Travels between ranks with its history."""
+        return type(self), (str(self), self.history)
+
 
 class OutputError(TawamiError):
     """A result that cannot be written."""

@@ -23,6 +23,7 @@ from tawami.field import Field
 from tawami.reduction import Reduction
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 
 class FastField(Field):
@@ -59,52 +60,71 @@ class FastField(Field):
         return kernels
 
     def residual(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
-        """Internal forces and volume residual on all coefficients, before supports."""
+        """Internal forces and volume residual on all coefficients, before supports, on every rank."""
         with self.stopwatch("residual"):
             kernels = self._kernels(self.compiled.residual, data)
-            return self._assembler.vector(kernels, self._volume, coefficients)
+            return self._sum(self._assembler.vector(kernels, self._volume, coefficients))
 
     def tangent(self, coefficients: Array, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
-        """P^T K P as a PETSc matrix; it is overwritten by the next call."""
+        """P^T K P as a PETSc matrix; it is overwritten by the next call, and stays the same object
+        as long as the unknowns do.
+        """
         with self.stopwatch("pattern"):
-            if self._reduction is not reduction:
+            if not reduction.same_unknowns(self._reduction):
                 self._new_pattern(reduction)
         with self.stopwatch("tangent"):
-            self._fill(coefficients, data, *self._pattern)
-            matrix = self._petsc["reduced"]
-            matrix.assemble()
-        return matrix
-
-    def _fill(
-        self,
-        coefficients: Array,
-        data: Mapping[Rule, Array],
-        pattern: _rust.Pattern,
-        values: Array,
-    ) -> None:
-        kernels = self._kernels(self.compiled.tangent, data)
-        self._assembler.matrix(kernels, self._volume, coefficients, pattern, values)
-
-    def unreduced_tangent(self, coefficients: Array, data: Mapping[Rule, Array]) -> sp.csr_matrix:
-        """E^T K E, the tangent of :meth:`residual`."""
-        n = self.layout.size
-        pattern = self._assembler.pattern(_selection(sp.identity(n, format="csr"), np.arange(n)))
-        values = np.zeros(len(pattern.columns))
-        self._fill(coefficients, data, pattern, values)
-        return sp.csr_matrix((values, pattern.columns, pattern.start), shape=(n, n))
+            kernels = self._kernels(self.compiled.tangent, data)
+            self._assembler.matrix(kernels, self._volume, coefficients, *self._pattern)
+            self._petsc["of cells"].assemble()
+        if self.grid.comm.size == 1:
+            return self._petsc["of cells"]
+        with self.stopwatch("reduction"):
+            unassembled, reduced = self._petsc["unassembled"], self._petsc["reduced"]
+            unassembled.assemble()
+            self._petsc["reduced"] = unassembled.convert("aij", reduced)
+        return self._petsc["reduced"]
 
     def _new_pattern(self, reduction: Reduction) -> None:
-        self._petsc.free("reduced")
+        """Pattern and matrix of what this rank's cells add, in the unknowns that they reach; the sum
+        over the ranks is PETSc's.
+        """
+        self._petsc.free("of cells", "unassembled", "reduced")
         self._reduction = None
-        pattern = self._assembler.pattern(_selection(reduction.selection, reduction.unknowns))
-        values = np.zeros(len(pattern.columns))
-        size, csr = (reduction.size, reduction.size), (pattern.start, pattern.columns, values)
+        selection, used = reduction.selection, np.arange(reduction.size)
+        if self.grid.comm.size > 1:
+            reached = self.layout.reached_by(self._location.active)
+            selection, used = _rows_of(selection, reached)
+        unknowns = reduction.unknowns[used]
+        pattern = self._assembler.pattern(_selection(selection, unknowns))
+        values = np.empty(len(pattern.columns))
+        size, csr = (len(used), len(used)), (pattern.start, pattern.columns, values)
         # the matrix uses the arrays themselves: what Rust writes is what PETSc sees
-        matrix = PETSc.Mat().createAIJWithArrays(size, csr, comm=self.grid.comm)
-        self._petsc["reduced"] = matrix
+        matrix = PETSc.Mat().createAIJWithArrays(size, csr, comm=PETSc.COMM_SELF)
+        self._petsc["of cells"] = matrix
+        if self.grid.comm.size > 1:
+            own = (reduction.own.stop - reduction.own.start, None)
+            numbers = PETSc.LGMap().create(used.astype(PETSc.IntType), comm=self.grid.comm)
+            unassembled = PETSc.Mat().createIS((own, own), numbers, numbers, comm=self.grid.comm)
+            unassembled.setISLocalMat(matrix)
+            numbers.destroy()
+            self._petsc["unassembled"], self._petsc["reduced"] = unassembled, PETSc.Mat()
         self._pattern, self._reduction = (pattern, values), reduction
 
 
 def _selection(s: sp.csr_matrix, unknowns: npt.NDArray[np.int64]) -> tuple[Any, ...]:
     """S as `_rust.Assembler` takes it."""
     return s.indptr.astype(np.int32), s.indices.astype(np.int32), s.data, unknowns
+
+
+def _rows_of(s: sp.csr_matrix, coefficients: Mask) -> tuple[sp.csr_matrix, Any]:
+    """The rows of S of some coefficients, empty for the others, in the unknowns that they name; and
+    these unknowns.
+    """
+    entries = np.repeat(coefficients, np.diff(s.indptr))
+    named = np.zeros(s.shape[1], dtype=bool)
+    named[s.indices[entries]] = True
+    lengths = np.where(coefficients, np.diff(s.indptr), 0)
+    start = np.concatenate([[0], np.cumsum(lengths)])
+    columns = (np.cumsum(named) - 1)[s.indices[entries]]
+    shape = (s.shape[0], int(named.sum()))
+    return sp.csr_matrix((s.data[entries], columns, start), shape=shape), np.flatnonzero(named)

@@ -7,34 +7,23 @@ reference: plain dolfinx assembly over the active cells, then P^T r and P^T K P 
 from __future__ import annotations
 
 import functools
-import weakref
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
-from petsc4py import PETSc
 
-from tawami import _dolfinx, _rust
+from tawami import _dolfinx, _rust, ranks
 from tawami.basis import Basis
 from tawami.compilation import CompiledForm, Integral
 from tawami.density import DEGREE, Rule
 from tawami.grid import Edge, Grid
+from tawami.petsc import Handles, aij, rows_of
 from tawami.reduction import Layout, Reduction
 from tawami.stopwatch import Stopwatch
 
 Array = npt.NDArray[np.float64]
-
-
-class _Matrices(dict[str, Any]):
-    """PETSc matrices by name; petsc4py frees them late or never, so we do."""
-
-    def free(self, *names: str) -> None:
-        """Free those of these names that are there; all of them if none is named."""
-        for name in names or list(self):
-            if name in self:
-                self.pop(name).destroy()
 
 
 class Field:
@@ -44,7 +33,7 @@ class Field:
         grid: The grid.
         compiled: The form.
         basis: Basis of the displacement.
-        location: Where the particles are.
+        location: Where this rank's particles are.
         volume: Their volumes [m2 per metre depth].
         parameters: Numbers that the form names (alpha, ...).
         stopwatch: Where the time of each stage goes.
@@ -69,12 +58,12 @@ class Field:
         rectangle = grid.rectangle
         self._space = grid.space(len(compiled.form.fields), compiled.element)
         index = rectangle.ij[:, 0] + grid.cells[0] * rectangle.ij[:, 1]
-        position = np.searchsorted(location.active, index)
-        position[position == len(location.active)] = 0
-        self._cells = np.flatnonzero(location.active[position] == index).astype(np.int32)
-        self._rows = position[self._cells].astype(np.uint32)
-        self.active = np.zeros(grid.cells[::-1], dtype=bool)
-        self.active.ravel()[location.active] = True
+        active = np.zeros(grid.cells[::-1], dtype=bool)
+        active.ravel()[location.active] = True
+        self._cells = np.flatnonzero(active.ravel()[index]).astype(np.int32)
+        self._rows = np.searchsorted(location.active, index[self._cells]).astype(np.uint32)
+        #: Whether each cell holds particles, on whichever rank, ny x nx.
+        self.active = ranks.any_of(grid.comm, active)
         self.layout = Layout(grid, basis, self._space, self.active)
         #: Indices of the points of each rule; none for means over cells.
         self._points: dict[Rule, list[tuple[int, int]]] = {"mean": []}
@@ -82,8 +71,7 @@ class Field:
             self._points[rule] = self._point_indices(rule)
         self._packed: dict[int, Array] = {}
         self._reduction: Reduction | None = None
-        self._petsc = _Matrices()
-        weakref.finalize(self, self._petsc.free)
+        self._petsc = Handles(self, grid.comm)
 
     @functools.cached_property
     def _forms(self) -> dict[int, Any]:
@@ -129,7 +117,7 @@ class Field:
         return np.array([self._values[name] for name in integral.constants], dtype=float)
 
     def residual(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
-        """Internal forces and volume residual on all coefficients, before supports.
+        """Internal forces and volume residual on all coefficients, before supports, on every rank.
 
         Args:
             coefficients: Increments of all fields.
@@ -142,7 +130,11 @@ class Field:
                 packed = self._pack(integral, nodal, data)
             with self.stopwatch("residual"):
                 self._add_vector(vector, self._forms[id(integral)], integral, packed)
-        return np.asarray(self.layout.extraction.T @ vector)
+        return self._sum(self.layout.extraction.T @ vector)
+
+    def _sum(self, of_cells: Any) -> Array:
+        """What the cells of all ranks give."""
+        return ranks.sum_of(self.grid.comm, np.ascontiguousarray(of_cells))
 
     def _add_vector(self, vector: Array, form: Any, integral: Integral, packed: Array) -> None:
         constants = self._constants(integral)
@@ -167,7 +159,7 @@ class Field:
         self._add_vector(
             vector, form, integral, packed.reshape(len(cells), _dolfinx.DISPLACEMENT_DOFS)
         )
-        return -np.asarray(self.layout.extraction.T @ vector)
+        return -self._sum(self.layout.extraction_on(cells).T @ vector)
 
     def _edge_cells(self, edge: Edge) -> npt.NDArray[np.int32]:
         axis, end = self.grid.edge(edge)
@@ -184,31 +176,39 @@ class Field:
         return np.isclose(nodes[:, axis], 1.0 if end else 0.0)
 
     def edge_nodes(self, edge: Edge) -> Array:
-        """Positions [m] of the biquadratic nodes of an edge, cells with particles x 3 x 2."""
+        """Positions [m] of the biquadratic nodes of an edge: this rank's cells x 3 x 2."""
         nodes = self.grid.rectangle.to_grid_axes(_dolfinx.reference_nodes(2))
         ij = self.grid.rectangle.ij[self._edge_cells(edge)]
         positions = ij[:, None, :] + nodes[self._nodes_on(edge)]
         return np.asarray(self.grid.origin + self.grid.h * positions)
 
     def tangent(self, coefficients: Array, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
-        """P^T K P as a PETSc matrix; it is overwritten by the next call."""
+        """P^T K P as a PETSc matrix; it is overwritten by the next call, and stays the same object
+        as long as the unknowns do.
+        """
         matrix = self._assemble_tangent(coefficients, data)
         with self.stopwatch("reduction"):
-            if self._reduction is not reduction:
+            if not reduction.same_unknowns(self._reduction):
                 self._petsc.free("P", "reduced")
                 self._reduction = reduction
-                p = _petsc(self.layout.extraction @ reduction.selection, self.grid.comm)
+                own = reduction.own.stop - reduction.own.start
+                rows = self.layout.extraction[: self._space.own] @ reduction.selection
+                p = aij(self.grid.comm, rows, own)
                 self._petsc["P"], self._petsc["reduced"] = p, matrix.ptap(p)
             else:
                 matrix.ptap(self._petsc["P"], result=self._petsc["reduced"])
         return self._petsc["reduced"]
 
     def unreduced_tangent(self, coefficients: Array, data: Mapping[Rule, Array]) -> sp.csr_matrix:
-        """E^T K E, the tangent of :meth:`residual`."""
-        rows, columns, values = self._assemble_tangent(coefficients, data).getValuesCSR()
-        shape = (self._space.size, self._space.size)
-        matrix = sp.csr_matrix((values, columns, rows), shape=shape)
-        return sp.csr_matrix(self.layout.extraction.T @ matrix @ self.layout.extraction)
+        """E^T K E, the tangent of :meth:`residual`, whole on every rank."""
+        everything = Reduction.of_all(self.layout)
+        mine = rows_of(self.tangent(coefficients, data, everything)).tocoo()
+        rows, columns, values = (
+            ranks.joined(self.grid.comm, part)
+            for part in (mine.row + everything.own.start, mine.col, mine.data)
+        )
+        unknowns, shape = everything.unknowns, (self.layout.size, self.layout.size)
+        return sp.csr_matrix((values, (unknowns[rows], unknowns[columns])), shape=shape)
 
     def _assemble_tangent(self, coefficients: Array, data: Mapping[Rule, Array]) -> Any:
         """K on the degrees of freedom of the mesh."""
@@ -226,10 +226,3 @@ class Field:
                 _dolfinx.add_matrix(matrix, form, integral.kernel, constants, packed)
         matrix.assemble()
         return matrix
-
-
-def _petsc(matrix: sp.spmatrix, comm: Any) -> Any:
-    rows: sp.csr_matrix = sp.csr_matrix(matrix)
-    rows.sort_indices()
-    csr = (rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), rows.data)
-    return PETSc.Mat().createAIJ(size=rows.shape, csr=csr, comm=comm)

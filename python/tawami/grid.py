@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any, Literal
 
@@ -9,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from tawami import _dolfinx, _rust
+from tawami import _dolfinx, _rust, ranks
 from tawami.errors import InputError
 from tawami.inputs import number, pair, point, whole_number
 
@@ -22,13 +23,13 @@ class Grid:
     """Uniform grid of squares; all scenes on it share its dolfinx mesh.
 
     Args:
-        comm: Communicator, as MPI.COMM_WORLD; one rank for now.
+        comm: Communicator, as MPI.COMM_WORLD; the cells are shared out among its ranks.
         origin: Lower left corner [m].
         h: Side of a cell [m].
         cells: Number of cells in x and y.
 
     Raises:
-        InputError: A parameter out of its range, or a communicator of more than one rank.
+        InputError: A parameter out of its range, or no communicator.
     """
 
     def __init__(
@@ -38,11 +39,7 @@ class Grid:
             raise InputError(
                 f"comm = {comm!r}: expected a communicator, as mpi4py's MPI.COMM_WORLD"
             )
-        if comm.size > 1:
-            raise InputError(
-                f"the communicator has {comm.size} ranks: tawami runs on one rank for now. Start it "
-                "without mpirun, or give every rank a grid on MPI.COMM_SELF"
-            )
+        ranks.watch(comm)
         self.comm = comm
         self.origin = point("origin", origin)
         self.h = number("h", h)
@@ -63,6 +60,14 @@ class Grid:
         if self._rectangle is None:
             self._rectangle = _dolfinx.Rectangle(self.comm, self.origin, self.h, self.cells)
         return self._rectangle
+
+    @functools.cached_property
+    def rank_of_cell(self) -> npt.NDArray[np.int64]:
+        """The rank that each cell, and the particles in it, live on; x fastest."""
+        ij = self.rectangle.ij
+        rank = np.zeros(self.cells[0] * self.cells[1], dtype=np.int64)
+        rank[ij[:, 0] + self.cells[0] * ij[:, 1]] = self.comm.rank
+        return ranks.sum_of(self.comm, rank)
 
     def space(self, num_fields: int, element: Any) -> _dolfinx.Space:
         """The function space of displacement and `num_fields - 1` bilinear fields."""

@@ -1,12 +1,21 @@
-"""The scaled linear system of one Newton iteration, solved by MUMPS.
+"""The scaled linear systems of a step, solved by MUMPS, whose factorisation is kept and reused.
 
-LDL^T where the tangent is symmetric, LU otherwise. Two steps of inverse iteration from a fixed random
-vector follow each factorisation: their growth estimates the condition number from below, and the
-large entries of the vector they end with say where a singular system is weak.
+A tangent is factorised (LDL^T where it is symmetric, LU otherwise) and solved directly; the ones
+that follow are solved by FGMRES with that factorisation as preconditioner, to the tolerance asked
+for. A tangent is factorised again
+
+- if it is another matrix: other unknowns, another pattern;
+- if the last solve took more than `PAYS` iterations: from there a new factorisation is cheaper;
+- if FGMRES does not get there within `LIMIT` iterations.
+
+With the right-hand side, random vectors are solved for at each factorisation: the rms of `||A^-1 p||`
+over vectors p of standard normal numbers estimates the Frobenius norm of A^-1 (Kenney and Laub 1994),
+and the large entries of `A^-1 p` say where a singular system is weak.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,116 +23,172 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from tawami.errors import SingularError
+from tawami.petsc import Handles
 from tawami.stopwatch import Stopwatch
 
 Array = npt.NDArray[np.float64]
 
 #: A scaled system beyond this condition number has no digit left to trust.
 SINGULAR = 1e14
+#: Iterations of FGMRES that are worth less than a factorisation, and the most there may be.
+PAYS, LIMIT = 8, 15
+#: Random vectors; the factors are read once for all right-hand sides, so they cost little.
+PROBES = 3
 
 
-class LinearSystem:
-    """A factorised tangent.
+class LinearSolver:
+    """Solves the tangents of one scene; each rank passes and gets its own rows.
 
     Args:
-        matrix: Reduced tangent; scaled in place.
-        scale: Factor of each unknown: the system solved is `S K S y = S r`, `x = S y`.
+        comm: Communicator.
         stopwatch: Where the time goes.
 
     Attributes:
-        symmetric: Whether the tangent is symmetric (probed by one product with a random vector).
-        condition: Lower estimate of the condition number of the scaled matrix; infinite where the
-            factorisation met a zero pivot.
-        suspects: Unknowns that dominate the weakest direction found, most suspect first.
-
-    Raises:
-        SingularError: The factorisation ran out of memory or failed for another reason than a
-            singular matrix.
+        symmetric: Whether the tangent last factorised is symmetric (probed by one product with a
+            random vector).
+        condition: Estimate of its condition number, scaled; infinite where the factorisation met a
+            zero pivot.
+        weak: This rank's entries of the direction that it is weakest in, so far as known.
+        iterations: FGMRES iterations of the last solve; 0 where the tangent was factorised.
     """
 
-    def __init__(self, matrix: Any, scale: Array, stopwatch: Stopwatch) -> None:
+    def __init__(self, comm: Any, stopwatch: Stopwatch) -> None:
         self._stopwatch = stopwatch
-        self._left, self._right = matrix.createVecs()
-        with stopwatch("scale"):
-            self._scale = scale
-            self._left.setArray(scale)
-            matrix.diagonalScale(self._left, self._left)
-            probe = np.random.default_rng(0).standard_normal(len(scale))
-            self.symmetric = _is_symmetric(matrix, probe)
-        with stopwatch("factorise"):
-            self._factorise(matrix)
-        with stopwatch("solve"):
-            self._estimate(matrix, probe)
+        self._handles = Handles(self, comm)
+        self._matrix: Any = None
+        self._scale = np.empty(0)
+        self.condition, self.symmetric, self.iterations = 1.0, True, 0
+        self.weak = np.empty(0)
 
-    def _factorise(self, matrix: Any) -> None:
-        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)
-        self._ksp = PETSc.KSP().create(matrix.comm)
-        self._ksp.setOperators(matrix)
-        self._ksp.setType("preonly")
-        self._pc = self._ksp.getPC()
-        self._pc.setType("cholesky" if self.symmetric else "lu")
-        self._pc.setFactorSolverType("mumps")
-        self._pc.setFactorSetUpSolverType()
-        self._factor = self._pc.getFactorMatrix()
-        self._factor.setMumpsIcntl(7, 0)  # AMD: the cheapest first factorisation
-        self._factor.setMumpsIcntl(14, 50)  # room for delayed pivots
-        self._ksp.setUp()
-        code = self._factor.getMumpsInfog(1)
-        if code < 0 and code not in (-10, -6):
-            raise SingularError(
-                f"MUMPS could not factorise the tangent (INFOG(1) = {code}, INFOG(2) = "
-                f"{self._factor.getMumpsInfog(2)}): see the MUMPS users' guide; -9 and -13 mean "
-                "that memory is short"
-            )
-        self._failed = code < 0
-
-    def _estimate(self, matrix: Any, probe: Array) -> None:
-        failed = self._failed
-        if failed:
-            matrix.shift(1e-12)
-            self._free(self._factor, self._pc, self._ksp)
-            self._factorise(matrix)
-        weak = self._apply(probe)
-        weak = self._apply(weak / np.linalg.norm(weak))
-        # rms of the row norms, which the scaling makes alike
-        norm = matrix.norm(PETSc.NormType.FROBENIUS) / np.sqrt(len(probe))
-        self.condition = np.inf if failed else float(norm * np.linalg.norm(weak))
-        self.suspects = np.argsort(-np.abs(weak))
-
-    def __enter__(self) -> LinearSystem:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._free(self._factor, self._pc, self._ksp, self._left, self._right)
-
-    @staticmethod
-    def _free(*objects: Any) -> None:
-        """petsc4py frees late or never, and each of its handles keeps the object: free them all."""
-        for item in objects:
-            item.destroy()
-
-    def _apply(self, right: Array) -> Array:
-        self._right.setArray(right)
-        self._ksp.solve(self._right, self._left)
-        return np.array(self._left.array)
+    def forget(self) -> None:
+        """Free the factorisation; the next solve makes a new one."""
+        self._handles.free()
+        self._matrix = None
 
     @property
     def singular(self) -> bool:
-        """Whether the system cannot be solved to any accuracy."""
+        """Whether the tangent last factorised cannot be solved to any accuracy."""
         return not self.condition < SINGULAR
 
-    def solve(self, right: Array) -> Array:
-        """Solution for a right-hand side."""
+    def solve(
+        self, matrix: Any, scale: Callable[[], Array], right: Array, tolerance: float
+    ) -> Array:
+        """Solution of `K x = r`; of `S K S y = S r`, `x = S y`, in fact.
+
+        Args:
+            matrix: Reduced tangent K; scaled in place.
+            scale: Gives the factors S of the unknowns of a tangent that is to be factorised.
+            right: r.
+            tolerance: Of `|S (r - K x)| / |S r|` where the solve is not direct.
+
+        Raises:
+            SingularError: The factorisation ran out of memory or failed for another reason than a
+                singular matrix. Whether it is singular is for the caller to ask.
+        """
+        if self._matrix is matrix and self.iterations <= PAYS:
+            self._multiply(matrix, self._scale)
+            solution = self._iterate(right, tolerance)
+            if solution is not None:
+                return solution
+            self._multiply(matrix, 1 / self._scale)
+        self.forget()
+        self._handles["x"], self._handles["b"] = matrix.createVecs()
+        self._scale = scale()
+        self._multiply(matrix, self._scale)
+        return self._direct(matrix, right)
+
+    def _multiply(self, matrix: Any, factors: Array) -> None:
+        """Rows and columns of a matrix with factors."""
+        with self._stopwatch("scale"):
+            vector = self._handles["x"]
+            vector.setArray(factors)
+            matrix.diagonalScale(vector, vector)
+
+    def _iterate(self, right: Array, tolerance: float) -> Array | None:
+        """By FGMRES with the factorisation that is there; None if it takes too long."""
         with self._stopwatch("solve"):
-            return self._scale * self._apply(self._scale * right)
+            ksp, x, b = (self._handles[name] for name in ("ksp", "x", "b"))
+            ksp.setTolerances(rtol=tolerance, atol=0.0, max_it=LIMIT)
+            b.setArray(self._scale * right)
+            ksp.solve(b, x)
+            self.iterations = ksp.getIterationNumber()
+            if ksp.getConvergedReason() <= 0:
+                return None
+            return np.asarray(self._scale * x.array)
 
+    def _direct(self, matrix: Any, right: Array) -> Array:
+        """By a new factorisation; the condition number and its direction with it."""
+        begin, end = matrix.getOwnershipRange()
+        size = matrix.getSize()[0]
+        probes = np.random.default_rng(0).standard_normal((PROBES, size))[:, begin:end]
+        with self._stopwatch("scale"):
+            self.symmetric = self._is_symmetric(matrix, probes[0])
+        with self._stopwatch("factorise"):
+            failed = not self._factorise(matrix)
+            if failed:
+                matrix.shift(1e-12)
+                self._factorise(matrix)
+        with self._stopwatch("solve"):
+            y, *weak = self._solve_all(np.vstack([self._scale * right, probes]))
+            norms = [self._norm(direction) for direction in weak]
+            self.weak = weak[int(np.argmax(norms))]
+            # rms of the row norms, which the scaling makes alike
+            norm = matrix.norm(PETSc.NormType.FROBENIUS) / np.sqrt(size)
+            estimate = float(norm * np.sqrt(np.mean(np.square(norms))))
+            self.condition = np.inf if failed else estimate
+        self._matrix, self.iterations = matrix, 0
+        return np.asarray(self._scale * y)
 
-def _is_symmetric(matrix: Any, probe: Array) -> bool:
-    x, y = matrix.createVecs()
-    x.setArray(probe)
-    matrix.mult(x, y)
-    forward = y.array.copy()
-    matrix.multTranspose(x, y)
-    change = np.linalg.norm(forward - y.array)
-    x.destroy(), y.destroy()
-    return bool(change <= 1e-12 * np.linalg.norm(forward))
+    def _factorise(self, matrix: Any) -> bool:
+        """False if a pivot was zero."""
+        self._handles.free("factor", "pc", "ksp")
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)
+        ksp = self._handles["ksp"] = PETSc.KSP().create(matrix.comm)
+        ksp.setOperators(matrix)
+        ksp.setType("fgmres")
+        ksp.setGMRESRestart(LIMIT)
+        pc = self._handles["pc"] = ksp.getPC()
+        pc.setType("cholesky" if self.symmetric else "lu")
+        pc.setFactorSolverType("mumps")
+        pc.setFactorSetUpSolverType()
+        factor = self._handles["factor"] = pc.getFactorMatrix()
+        factor.setMumpsIcntl(7, 0)  # AMD: the cheapest first factorisation
+        factor.setMumpsIcntl(14, 50)  # room for delayed pivots
+        ksp.setUp()
+        pc.setReusePreconditioner(True)
+        code = factor.getMumpsInfog(1)
+        if code < 0 and code not in (-10, -6):
+            raise SingularError(
+                f"MUMPS could not factorise the tangent (INFOG(1) = {code}, INFOG(2) = "
+                f"{factor.getMumpsInfog(2)}): see the MUMPS users' guide; -9 and -13 mean "
+                "that memory is short"
+            )
+        return bool(code >= 0)
+
+    def _solve_all(self, right: Array) -> Array:
+        """Solutions for several right-hand sides, each a row."""
+        factor = self._handles["factor"]
+        count, n = right.shape
+        size = ((n, None), (None, count))
+        b = PETSc.Mat().createDense(size, array=right.ravel(), comm=factor.comm)
+        x = b.duplicate()
+        factor.matSolve(b, x)
+        solutions = np.array(x.getDenseArray()).T
+        b.destroy(), x.destroy()
+        return solutions
+
+    def _norm(self, vector: Array) -> float:
+        x = self._handles["x"]
+        x.setArray(vector)
+        return float(x.norm())
+
+    def _is_symmetric(self, matrix: Any, probe: Array) -> bool:
+        x, y = (self._handles[name] for name in ("x", "b"))
+        x.setArray(probe)
+        matrix.mult(x, y)
+        forward = y.copy()
+        matrix.multTranspose(x, y)
+        size = forward.norm()
+        y.axpy(-1.0, forward)
+        forward.destroy()
+        return bool(y.norm() <= 1e-12 * size)

@@ -7,20 +7,23 @@ volume     |R_q| / |sum_p V_p W_p q (max(|div u|, |eps_v|) + p_ref/K_p + floor)|
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from mpi4py import MPI
 
-from tawami import _rust
+from tawami import _rust, ranks
 from tawami.compilation import CompiledForm
 from tawami.density import Density, LawQuantity, ParticleScalar, Rule
 from tawami.errors import ConvergenceError, InputError, SingularError
 from tawami.field import Field
-from tawami.linear import LinearSystem
+from tawami.linear import LinearSolver
 from tawami.numpy_law import NumpyStage
+from tawami.petsc import clean_up
 from tawami.reduction import Reduction
 from tawami.stopwatch import Stopwatch
 
@@ -38,13 +41,15 @@ class Converged:
     Attributes:
         coefficients: Increments of all fields.
         history: (momentum, volume) measures of every residual, the first before any solve.
-        condition: Lower estimate of the condition number of the last scaled tangent; 1 if none
+        krylov: FGMRES iterations of every solve; 0 where the tangent was factorised.
+        condition: Estimate of the condition number of the tangent last factorised, scaled; 1 if none
             was needed.
-        symmetric: Whether the last tangent was symmetric, so that LDL^T served.
+        symmetric: Whether that tangent was symmetric, so that LDL^T served.
     """
 
     coefficients: Array
     history: History
+    krylov: list[int]
     condition: float
     symmetric: bool
 
@@ -61,7 +66,8 @@ class Newton:
         field: The field side.
         compiled: The form.
         stage: The particle side.
-        particles: The particles, with volumes, stresses and constants.
+        particles: This rank's particles, with volumes and stresses.
+        location: Where they are.
         constants: K and mu of each particle [Pa].
         stopwatch: Where the time goes.
         tolerance: Both measures must fall below it.
@@ -91,10 +97,19 @@ class Newton:
         self._requests: dict[Rule, list[tuple[str, str, int]]] = {r: [] for r in self.data}
         for rule, densities in compiled.densities.items():
             for density, column in densities.items():
-                self._place(rule, density, column)
+                with ranks.together(field.grid.comm):
+                    self._place(rule, density, column)
         volumetric = list(compiled.form.fields.values())[1:]
         self.kind = volumetric[0][0] if volumetric else None
         self._p_ref = 0.0
+        self._comm = field.grid.comm
+        self._linear = LinearSolver(self._comm, stopwatch)
+        softer = np.minimum(constants["K"], 1e4 * constants["mu"])
+        #: Largest moduli of the body [Pa].
+        self._stiffest, self._largest_mu = (
+            self._comm.allreduce(float(modulus.max(initial=0.0)), op=MPI.MAX)
+            for modulus in (softer, constants["mu"])
+        )
 
     def _place(self, rule: Rule, density: Density, column: int) -> None:
         if isinstance(density.quantity, LawQuantity):
@@ -108,9 +123,9 @@ class Newton:
                 p = bad[0]
                 raise InputError(
                     f"form {self.compiled.form.name}: '{density.quantity.text}' is not finite at "
-                    f"particle {p}, where K = {self.constants['K'][p]:g} and mu = "
-                    f"{self.constants['mu'][p]:g} Pa; with nu = 0.5 (K infinite) use form 'u_p', or "
-                    "nu < 0.5"
+                    f"particle {self.particles.number[p]}, where K = {self.constants['K'][p]:g} "
+                    f"and mu = {self.constants['mu'][p]:g} Pa; with nu = 0.5 (K infinite) use form "
+                    "'u_p', or nu < 0.5"
                 )
 
     def internal(self, coefficients: Array) -> Array:
@@ -119,7 +134,8 @@ class Newton:
             for rule, requests in self._requests.items():
                 if requests:
                     fields = self.field.layout.split(coefficients)
-                    self.stage.evaluate(*fields, requests, self.data[rule])
+                    with ranks.together(self._comm):
+                        self.stage.evaluate(*fields, requests, self.data[rule])
         return self.field.residual(coefficients, self.data)
 
     def _measures(
@@ -130,15 +146,23 @@ class Newton:
         of_u = reduction.unknowns < n
         scale = max(float(np.linalg.norm(f[:n])) for f in (internal, external))
         # Forces of a body that only moves rigidly are round-off: it is in equilibrium.
-        modulus = np.minimum(self.constants["K"], 1e4 * self.constants["mu"]).max()
-        round_off = 1e-14 * modulus * np.abs(coefficients[:n]).max() * np.sqrt(n)
+        round_off = 1e-14 * self._stiffest * np.abs(coefficients[:n]).max() * np.sqrt(n)
         momentum = float(np.linalg.norm(free[of_u])) / scale if scale > round_off else 0.0
-        if self.kind is None:
-            return momentum, None
-        weight, volume = self._volume_scale(coefficients)
-        column = (weight * volume)[:, None]
-        sums = _rust.nodal_sums(self.location, self.particles.volume, column, "bilinear")
-        return momentum, float(np.linalg.norm(free[~of_u]) / np.linalg.norm(sums))
+        volume = None
+        if self.kind is not None:
+            weight, strains = self._volume_scale(coefficients)
+            sums = self._nodal_sums((weight * strains)[:, None])
+            volume = float(np.linalg.norm(free[~of_u]) / np.linalg.norm(sums))
+        # all ranks take the same way, to the bit
+        measures: tuple[float, float | None] = self._comm.bcast((momentum, volume))
+        return measures
+
+    def _nodal_sums(self, columns: Array) -> Array:
+        """Volume-weighted sums over all particles on the bilinear functions."""
+        volume = self.particles.volume
+        return ranks.sum_of(
+            self._comm, _rust.nodal_sums(self.location, volume, columns, "bilinear")
+        )
 
     def _volume_scale(self, coefficients: Array) -> tuple[Array, Array]:
         """Weight of the volume equation and the strains it is compared with, per particle."""
@@ -150,26 +174,27 @@ class Newton:
         return (np.ones_like(bulk) if pressure else bulk), scale
 
     def _scale(self, matrix: Any, reduction: Reduction) -> Array:
-        """Factors of the unknowns: displacement by 1/sqrt(diagonal); eps_v and p are solved as
-        p/mu, over the square root of mu times the volume of their function (README, The method).
+        """Factors of this rank's unknowns: displacement by 1/sqrt(diagonal); eps_v and p are solved
+        as p/mu, over the square root of mu times the volume of their function (README, The method).
         """
         layout = self.field.layout
-        of_u = reduction.unknowns < layout.num_displacement
+        own = reduction.unknowns[reduction.own]
+        of_u = own < layout.num_displacement
         vector = matrix.getDiagonal()
         diagonal = vector.array.copy()
         vector.destroy()
-        scale = np.ones(reduction.size)
+        scale = np.ones(len(own))
         # A zero diagonal (a function that no particle strains) is left for the solver to report.
         positive = of_u & (diagonal > 0)
         scale[positive] = 1 / np.sqrt(diagonal[positive])
         if self.kind is None:
             return scale
         bulk, mu = self.constants["K"], self.constants["mu"]
-        columns = np.column_stack([np.ones_like(mu), 1 / bulk, 1 / mu])
-        sums = _rust.nodal_sums(self.location, self.particles.volume, columns, "bilinear")
-        sums = sums[reduction.unknowns[~of_u] - layout.num_displacement]
-        volume = np.maximum(sums[:, 0], 1e-14 * self.field.grid.h**2)
-        mu_i = volume / np.maximum(sums[:, 2], 1e-14 * self.field.grid.h**2 / mu.max())
+        sums = self._nodal_sums(np.column_stack([np.ones_like(mu), 1 / bulk, 1 / mu]))
+        sums = sums[own[~of_u] - layout.num_displacement]
+        least = 1e-14 * self.field.grid.h**2
+        volume = np.maximum(sums[:, 0], least)
+        mu_i = volume / np.maximum(sums[:, 2], least / self._largest_mu)
         to_field = mu_i * sums[:, 1] / volume if self.kind == "volumetric_strain" else mu_i
         scale[~of_u] = np.where(to_field > 0, to_field, 1) / np.sqrt(mu_i * volume)
         return scale
@@ -185,30 +210,41 @@ class Newton:
             ConvergenceError: Not below the tolerance within `max_iterations`, or not finite.
             SingularError: The tangent cannot be solved; the message names the cells.
         """
+        clean_up(self._comm)
         mean_stress = self.particles.stress[:, :3].mean(axis=1)
-        self._p_ref = float(np.sqrt(np.mean(mean_stress**2)))
+        squares = ranks.sum_of(self._comm, np.array([np.sum(mean_stress**2), len(mean_stress)]))
+        self._p_ref = float(np.sqrt(squares[0] / squares[1]))
         unknowns = np.zeros(reduction.size)
-        condition, symmetric = 1.0, True
-        history: History = []
+        linear, history = self._linear, History()
+        krylov: list[int] = []
         while True:
             coefficients = reduction.selection @ unknowns + reduction.offset
             internal = self.internal(coefficients)
-            history.append(self._measures(internal, external, coefficients, reduction))
-            measures = [m for m in history[-1] if m is not None]
-            if not np.isfinite(measures).all():
+            with self.stopwatch("measures"):
+                history.append(self._measures(internal, external, coefficients, reduction))
+            if not np.isfinite(_worst(history[-1])):
                 self._fail(history, "an infinite or undefined number came up")
-            if max(measures) < self.tolerance:
-                return Converged(coefficients, history, condition, symmetric)
+            if _worst(history[-1]) < self.tolerance:
+                return Converged(coefficients, history, krylov, linear.condition, linear.symmetric)
             if len(history) > self.max_iterations:
                 self._fail(history, "Take a smaller load, or check material and supports")
             matrix = self.field.tangent(coefficients, self.data, reduction)
-            scale = self._scale(matrix, reduction)
-            with LinearSystem(matrix, scale, self.stopwatch) as system:
-                condition, symmetric = system.condition, system.symmetric
-                if system.singular:
-                    self._report_singular(system, reduction)
-                right = reduction.selection.T @ (external - internal)
-                unknowns += system.solve(right)
+            right = reduction.selection.T @ (external - internal)
+            scale = functools.partial(self._scale, matrix, reduction)
+            change = linear.solve(matrix, scale, right[reduction.own], self._forcing(history))
+            krylov.append(linear.iterations)
+            if linear.singular:
+                self._report_singular(reduction)
+            unknowns += ranks.joined(self._comm, change)
+            self.stopwatch.lap()
+
+    def _forcing(self, history: History) -> float:
+        """How well the next linear system is to be solved: no worse than what Newton can make of it
+        (choice 2 of Eisenstat and Walker 1996), and no better than its own tolerance asks for.
+        """
+        now = _worst(history[-1])
+        rate = now / _worst(history[-2]) if len(history) > 1 else 1.0
+        return float(np.clip(0.1 * rate**2, min(0.1 * self.tolerance / now, 1e-3), 1e-3))
 
     def _fail(self, history: History, advice: str) -> None:
         rows = "; ".join(
@@ -222,18 +258,25 @@ class Newton:
             history,
         )
 
-    def _report_singular(self, system: LinearSystem, reduction: Reduction) -> None:
+    def _report_singular(self, reduction: Reduction) -> None:
         layout, grid = self.field.layout, self.field.grid
+        condition, weak = self._linear.condition, self._linear.weak
+        self._linear.forget()
+        own = np.argsort(-np.abs(weak))[:20]
+        entries = ranks.joined(self._comm, np.abs(weak[own]))
+        unknowns = ranks.joined(self._comm, reduction.own.start + own)
         counts = np.bincount(self.location.cell, minlength=grid.cells[0] * grid.cells[1])
+        counts = ranks.sum_of(self._comm, counts)
         weakest: list[str] = []
-        for unknown in system.suspects[:20]:
+        for unknown in unknowns[np.argsort(-entries, kind="stable")][:20]:
             cells = layout.cells_of(reduction.unknowns[unknown])
             number = counts[cells @ [1, grid.cells[0]]]
             i, j = cells[number.argmin()]
             text = f"({i}, {j}) with {number.min()} particles"
             if text not in weakest:
                 weakest.append(text)
-        stiff = float((self.constants["K"] / self.constants["mu"]).max())
+        ratio = float((self.constants["K"] / self.constants["mu"]).max(initial=0.0))
+        stiff = self._comm.allreduce(ratio, op=MPI.MAX)
         if stiff > 1e9 and self.compiled.form.kinematics in ("displacement", "cell"):
             advice = (
                 f"K/mu is {stiff:.1e}: without a field for the volume no digit is left at that; use "
@@ -244,9 +287,14 @@ class Newton:
                 "the particles do not stiffen every function of the grid. Use more particles per "
                 "cell, the basis 'quadratic_spline', or alpha > 0"
             )
-        size = "infinite" if np.isinf(system.condition) else f"{system.condition:.1e} at least"
+        size = "infinite" if np.isinf(condition) else f"about {condition:.1e}"
         raise SingularError(
-            f"the tangent is singular (condition number of the scaled matrix: {size}; by inverse "
-            f"iteration with the factorisation). The displacement basis is '{layout.basis}'; weakest "
+            f"the tangent is singular (condition number of the scaled matrix: {size}; from its "
+            f"factorisation and random vectors). The displacement basis is '{layout.basis}'; weakest "
             f"at the cells (i, j): {', '.join(weakest[:4])}. Likely cause: {advice}"
         )
+
+
+def _worst(measures: tuple[float, float | None]) -> float:
+    """The larger of the two; not a number if one is not."""
+    return float(np.max([m for m in measures if m is not None]))

@@ -62,6 +62,8 @@ class NumpyStage:
     def _given(self, u: Array, volumetric: Array | None) -> tuple[Array, Array]:
         strain = self._stage.strains(u, volumetric)
         n = len(strain)
+        if n == 0:  # a rank without particles
+            return np.empty(0), np.empty(0)
         result = self._law.respond(strain, self._particles.stress.copy())
         if not isinstance(result, tuple) or len(result) != 2:
             raise InputError("NumpyLaw: respond returned no pair: expected (stress, tangent)")
@@ -79,7 +81,8 @@ class NumpyStage:
             if len(bad):
                 raise InputError(
                     f"NumpyLaw: respond returned a {name} that is not finite at {len(bad)} "
-                    f"particles, the first is {bad[0]}, with the strain increment {strain[bad[0]]}"
+                    f"particles, the first is {self._particles.number[bad[0]]}, with the strain "
+                    f"increment {strain[bad[0]]}"
                 )
             arrays.append(array.ravel())
         return arrays[0], arrays[1]

@@ -6,11 +6,13 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import meshio
 import numpy as np
 import numpy.typing as npt
 
+from tawami import ranks
 from tawami.basis import extraction
 from tawami.errors import OutputError
 from tawami.scene import Solution
@@ -66,18 +68,17 @@ def write_particles(path: str | Path, solution: Solution) -> None:
     Raises:
         OutputError: The file cannot be written.
     """
-    particles = solution.scene.particles
-    n = len(particles)
+    n = len(solution.x)
     data: dict[str, Array] = {
         "displacement [m]": _with_z(solution.displacement_of_particles),
         "stress xx yy zz xy [Pa]": solution.stress,
         "mean stress [Pa]": solution.mean_stress,
-        "volume [m2 per m]": np.array(particles.volume),
+        "volume [m2 per m]": solution.volume,
     }
     if solution.eps_v is not None:
         data["eps_v [-]"] = solution.eps_v
-    mesh = meshio.Mesh(_with_z(particles.x), [("vertex", np.arange(n)[:, None])], point_data=data)
-    _write(path, mesh)
+    mesh = meshio.Mesh(_with_z(solution.x), [("vertex", np.arange(n)[:, None])], point_data=data)
+    _write(path, mesh, solution.scene.grid.comm)
 
 
 def write_grid(path: str | Path, solution: Solution) -> None:
@@ -114,15 +115,17 @@ def write_grid(path: str | Path, solution: Solution) -> None:
         point_data=data,
         cell_data={"particles [-]": [scene.particles_per_cell.astype(float)]},
     )
-    _write(path, mesh)
+    _write(path, mesh, grid.comm)
 
 
 def _with_z(values: npt.ArrayLike) -> Array:
     return np.pad(np.asarray(values, dtype=float), ((0, 0), (0, 1)))
 
 
-def _write(path: str | Path, mesh: meshio.Mesh) -> None:
+def _write(path: str | Path, mesh: meshio.Mesh, comm: Any) -> None:
     if Path(path).suffix != ".vtu":
         raise OutputError(f"'{path}': expected a file name ending in .vtu")
-    with whole_file(path) as part:
-        meshio.write(part, mesh, file_format="vtu")
+    with ranks.together(comm):
+        if comm.rank == 0:
+            with whole_file(path) as part:
+                meshio.write(part, mesh, file_format="vtu")

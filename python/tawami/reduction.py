@@ -7,15 +7,16 @@ S unknowns + offset` are what supports leave free, P = E S.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from tawami import _dolfinx, _rust
-from tawami.basis import Basis, extraction, greville_1d, values_1d
+from tawami.basis import Basis, greville_1d
 from tawami.boundary import Held, PointHeld
 from tawami.errors import SupportError
 from tawami.grid import Grid
@@ -32,37 +33,87 @@ class Layout:
         grid: The grid.
         basis: Basis of the displacement.
         space: Function space on the mesh: biquadratic displacement, then a bilinear field or none.
-        active: Whether each cell holds particles, ny x nx.
+        active: Whether each cell holds particles, on whichever rank, ny x nx.
 
     Attributes:
         num_displacement: Number of displacement coefficients; the bilinear field's follow.
         size: Number of coefficients.
-        extraction: E, degrees of freedom of the mesh x coefficients.
         active: Whether each coefficient belongs to a function with a particle in its support.
+        owner: The rank that keeps each coefficient's row: one with a cell of its support.
         num_parts: Number of parts of the body that share no displacement function.
         part: Part that each displacement coefficient belongs to, -1 for inactive ones.
     """
 
     def __init__(self, grid: Grid, basis: Basis, space: _dolfinx.Space, active: Mask) -> None:
-        self.grid, self.basis = grid, basis
+        self.grid, self.basis, self._space = grid, basis, space
+        self._bilinear = space.dofs.shape[1] > _dolfinx.DISPLACEMENT_DOFS
+        self._of_cells = _rust.Active(grid.rust, np.flatnonzero(active).astype(np.uint32))
+        self.num_parts, part = self._of_cells.parts(basis)
+        self.part = np.repeat(part, 2)
+        self.num_displacement = len(self.part)
+        self.active = self._of_all(self._of_cells.functions)
+        self.owner = self._of_all(lambda b: self._of_cells.spread(b, grid.rank_of_cell))
+        self.size = len(self.active)
+
+    def _of_all(self, of_functions: Callable[[Basis], Any]) -> Any:
+        """Values for all coefficients from those for the functions of each field."""
+        fields = [np.repeat(of_functions(self.basis), 2)]
+        return np.concatenate(fields + [of_functions("bilinear")] * self._bilinear)
+
+    def reached_by(self, cells: npt.NDArray[np.uint32]) -> Mask:
+        """Whether each coefficient belongs to a function with one of these cells in its support."""
+        mask: Mask = self._of_all(_rust.Active(self.grid.rust, cells).functions)
+        return mask
+
+    @functools.cached_property
+    def extraction(self) -> sp.csr_matrix:
+        """E: degrees of freedom that this rank's cells have on the mesh x coefficients."""
+        return self.extraction_on(np.arange(len(self._space.dofs)))
+
+    def extraction_on(self, cells: npt.NDArray[Any]) -> sp.csr_matrix:
+        """The rows of E of the degrees of freedom of some of this rank's dolfinx cells; the others
+        are empty.
+        """
         of_u, of_bilinear = _dolfinx.DISPLACEMENT_DOFS, _dolfinx.BILINEAR_DOFS
-        blocks = [_place(grid, space, np.arange(of_u).reshape(-1, 2), basis, degree=2)]
-        functions = _functions_of_cells(basis, grid.cells, active)
-        count = blocks[0].shape[1] // 2
-        masks = [np.repeat(_mask(functions, count), 2)]
-        self.num_parts, self.part = _parts(functions, count)
-        self._cells = np.argwhere(active)[:, ::-1]
-        self._functions = [functions]
-        if space.dofs.shape[1] > of_u:
-            local = of_u + np.arange(of_bilinear)[:, None]
-            blocks.append(_place(grid, space, local, "bilinear", degree=1))
-            functions = _functions_of_cells("bilinear", grid.cells, active)
-            masks.append(_mask(functions, blocks[1].shape[1]))
-            self._functions.append(functions)
-        self.extraction = sp.hstack(blocks, format="csr")
-        self.num_displacement = blocks[0].shape[1]
-        self.size = self.extraction.shape[1]
-        self.active = np.concatenate(masks)
+        dofs = self._space.dofs[cells]
+        fields: list[tuple[Basis, int, Any]] = [(self.basis, 2, dofs[:, :of_u].reshape(-1, 2))]
+        if self._bilinear:
+            fields.append(("bilinear", 1, dofs[:, of_u : of_u + of_bilinear].reshape(-1, 1)))
+        rows, columns, values, first = [], [], [], 0
+        for basis, degree, of_nodes in fields:
+            functions, weights, count = self._at_nodes(basis, degree, cells)
+            once = np.unique(of_nodes[:, 0], return_index=True)[1]
+            components = np.arange(of_nodes.shape[1])
+            shape = (len(once), functions.shape[1], len(components))
+            columns.append(first + len(components) * functions[once][..., None] + components)
+            rows.append(np.broadcast_to(of_nodes[once][:, None], shape))
+            values.append(np.broadcast_to(weights[once][..., None], shape))
+            first += len(components) * count
+        flat = [
+            np.concatenate([part.ravel() for part in parts]) for parts in (values, rows, columns)
+        ]
+        matrix = sp.csr_matrix((flat[0], (flat[1], flat[2])), shape=(self._space.size, self.size))
+        matrix.eliminate_zeros()
+        return matrix
+
+    def _at_nodes(self, basis: Basis, degree: int, cells: Any) -> tuple[Indices, Array, int]:
+        """Functions at the Lagrange nodes of cells and their values there (nodes x functions, cell
+        by cell), and how many functions the basis has.
+        """
+        grid = self.grid
+        nodes = grid.rectangle.to_grid_axes(_dolfinx.reference_nodes(degree))
+        along = []
+        for axis, n in enumerate(grid.cells):
+            cell = np.repeat(grid.rectangle.ij[cells, axis], len(nodes))
+            first, values = _rust.basis_1d(basis, n, cell, np.tile(nodes[:, axis], len(cells)))
+            along.append((first[:, None] + np.arange(3), values))
+        (fx, vx), (fy, vy) = along
+        width, height = (_rust.basis_len(basis, n) for n in grid.cells)
+        functions = fx[:, None, :] + width * fy[:, :, None]
+        weights = vx[:, None, :] * vy[:, :, None]
+        # a function beyond the last has the value 0 (a bilinear cell has two along each axis)
+        functions = np.where(weights == 0, 0, functions)
+        return functions.reshape(-1, 9), weights.reshape(-1, 9), width * height
 
     def split(self, coefficients: Array) -> tuple[Array, Array | None]:
         """Coefficients of the displacement and of the bilinear field (None if there is none)."""
@@ -73,9 +124,8 @@ class Layout:
         """The cells (i, j) with particles in the support of a coefficient's function."""
         displacement = coefficient < self.num_displacement
         function = coefficient // 2 if displacement else coefficient - self.num_displacement
-        functions = self._functions[0 if displacement else 1]
-        cells: Indices = self._cells[(functions == function).any(axis=1)]
-        return cells
+        basis: Basis = self.basis if displacement else "bilinear"
+        return self._of_cells.support(basis, function)
 
     def rigid_modes(self, part: Mask) -> tuple[Array, Array, float]:
         """Coefficients of the translations in x and y and of the rotation (coefficients x 3), the
@@ -97,63 +147,6 @@ class Layout:
         return modes, centre, length
 
 
-def _place(
-    grid: Grid, space: _dolfinx.Space, local: Indices, basis: Basis, *, degree: int
-) -> sp.csr_matrix:
-    """E of one field, its rows moved to the degrees of freedom of the mesh.
-
-    Args:
-        grid: The grid.
-        space: Space of all fields.
-        local: Position in a cell of the degree of freedom of each node and component.
-        basis: Basis of the field.
-        degree: Degree of its Lagrange nodes on the mesh.
-    """
-    scalar = extraction(basis, grid.cells, degree).tocoo()
-    num_nodes, num_functions = scalar.shape
-    components = local.shape[1]
-    nodes = np.rint(degree * grid.rectangle.to_grid_axes(_dolfinx.reference_nodes(degree)))
-    i, j = (degree * grid.rectangle.ij[:, axis, None] + nodes[:, axis] for axis in range(2))
-    node = (i + (degree * grid.cells[0] + 1) * j).astype(np.int64)
-    dof = np.empty((num_nodes, components), dtype=np.int64)
-    dof[node] = space.dofs[:, local]
-    rows = dof[scalar.row].ravel()
-    columns = (components * scalar.col[:, None].astype(np.int64) + np.arange(components)).ravel()
-    shape = (space.size, components * num_functions)
-    return sp.csr_matrix((np.repeat(scalar.data, components), (rows, columns)), shape=shape)
-
-
-def _functions_of_cells(basis: Basis, cells: tuple[int, int], active: Mask) -> Indices:
-    """Functions that do not vanish in each active cell, active cells x functions."""
-    j, i = np.nonzero(active)
-    fx, fy = (
-        values_1d(basis, n, cell, np.full(len(cell), 0.4)).indices.reshape(len(cell), -1)
-        for n, cell in zip(cells, (i, j), strict=True)
-    )
-    width = _rust.basis_len(basis, cells[0])
-    functions: Indices = fx[:, None, :] + width * fy[:, :, None].astype(np.int64)
-    return functions.reshape(len(i), -1)
-
-
-def _parts(functions: Indices, count: int) -> tuple[int, Indices]:
-    """Parts of the body that share no displacement function: their number, and the part of each
-    displacement coefficient (-1 for inactive ones).
-    """
-    cell = np.repeat(np.arange(len(functions)), functions.shape[1])
-    shape = (len(functions), count)
-    incidence = sp.csr_matrix((np.ones(functions.size), (cell, functions.ravel())), shape=shape)
-    number, of_cell = connected_components(incidence @ incidence.T, directed=False)
-    part = np.full(count, -1)
-    part[functions] = of_cell[:, None]
-    return int(number), np.repeat(part, 2)
-
-
-def _mask(functions: Indices, count: int) -> Mask:
-    mask = np.zeros(count, dtype=bool)
-    mask[functions] = True
-    return mask
-
-
 class Reduction:
     """What the supports leave free.
 
@@ -166,7 +159,8 @@ class Reduction:
 
     Attributes:
         size: Number of unknowns.
-        unknowns: Coefficient that each unknown is.
+        unknowns: Coefficient that each unknown is; those of a rank follow those of the one before.
+        own: The unknowns whose rows this rank keeps.
         selection: S, coefficients x unknowns.
         offset: Increments of the coefficients at zero unknowns.
 
@@ -189,8 +183,7 @@ class Reduction:
         dependent, involved, weights, values = _eliminate(points, fixed, total, start, tolerance)
         free = layout.active & ~fixed
         free[dependent] = False
-        self.unknowns = np.flatnonzero(free)
-        self.size = len(self.unknowns)
+        self._number(free)
         number = np.full(layout.size, -1)
         number[self.unknowns] = np.arange(self.size)
         row, column = np.nonzero(weights)
@@ -201,6 +194,37 @@ class Reduction:
         self.selection = sp.csr_matrix((entries, (rows, columns)), shape=shape)
         self.offset = np.where(fixed, total - start, 0.0)
         self.offset[dependent] = values
+
+    @classmethod
+    def of_all(cls, layout: Layout) -> Reduction:
+        """Every coefficient is an unknown, those of inactive functions too."""
+        reduction = cls.__new__(cls)
+        reduction.layout = layout
+        reduction._number(np.ones(layout.size, dtype=bool))
+        entries = (np.ones(layout.size), (reduction.unknowns, np.arange(layout.size)))
+        reduction.selection = sp.csr_matrix(entries, shape=(layout.size, layout.size))
+        reduction.offset = np.zeros(layout.size)
+        return reduction
+
+    def _number(self, free: Mask) -> None:
+        comm, unknowns = self.layout.grid.comm, np.flatnonzero(free)
+        owner = self.layout.owner[unknowns]
+        self.unknowns = unknowns[np.argsort(owner, kind="stable")]
+        self.size = len(unknowns)
+        ends = np.cumsum(np.bincount(owner, minlength=comm.size))
+        self.own = slice(int(ends[comm.rank - 1]) if comm.rank else 0, int(ends[comm.rank]))
+
+    def same_unknowns(self, other: Reduction | None) -> bool:
+        """Whether another reduction has the same unknowns and S, so that matrices are alike."""
+        if other is None or other.layout is not self.layout or other.size != self.size:
+            return False
+        mine, others = self.selection, other.selection
+        return (
+            np.array_equal(self.unknowns, other.unknowns)
+            and np.array_equal(mine.indptr, others.indptr)
+            and np.array_equal(mine.indices, others.indices)
+            and np.array_equal(mine.data, others.data)
+        )
 
 
 def _hold(support: Held, fixed: Mask, total: Array, tolerance: float) -> None:

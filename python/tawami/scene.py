@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from tawami import _rust, boundary, inputs
+from tawami import _rust, boundary, inputs, ranks
 from tawami.basis import BASES, Basis
 from tawami.body import Body
 from tawami.boundary import Component, Profile
@@ -35,7 +35,8 @@ class Scene:
 
     Args:
         grid: The background grid.
-        body: Positions and volumes of the particles, as `box(...)` or `Body(x, volume)`.
+        body: Positions and volumes of the particles, as `box(...)` or `Body(x, volume)`; the same on
+            every rank.
         material: The material law, or several; or one `NumpyLaw` for all particles.
         material_of: Number of the law of each particle; the first for all by default.
         form: Weak form: the name of a shipped one ('u_epsv', 'u_p', 'u_bbar', 'u'), the path of a
@@ -48,10 +49,12 @@ class Scene:
         parameters: What the form names: alpha, stabilisation, ...
 
     Attributes:
-        particles: The particles; their arrays are views of the storage, not copies: `x` [m] and
-            `material`, which cannot be written, `volume` [m2], `stress` [Pa] (xx, yy, zz, xy;
-            tension positive), `displacement` [m], and `eps_v` with forms that have that field (None
+        particles: The particles on this rank: those in its cells; `number` says which of the body
+            they are. Their arrays are views of the storage, not copies: `x` [m], `material` and
+            `number`, which cannot be written, `volume` [m2], `stress` [Pa] (xx, yy, zz, xy; tension
+            positive), `displacement` [m], and `eps_v` with forms that have that field (None
             otherwise).
+        num_particles: Number of particles of the body, on all ranks.
 
     Raises:
         InputError: Particles outside the grid, a body without particles, NaN, an incompressible
@@ -100,9 +103,9 @@ class Scene:
         x, volume = inputs.array("x", body.x, 2), inputs.array("volume", body.volume, 1)
         numbers = np.zeros(len(x)) if material_of is None else material_of
         numbers = inputs.numbering("material_of", numbers, len(x))
-        self.particles = _rust.Particles(x, volume, numbers)
-        self.particles.check_materials(materials, self.form.kinematics)
-        self._location = grid.rust.locate(self.particles.x)
+        whole = _rust.Particles(x, volume, numbers)
+        whole.check_materials(materials, self.form.kinematics)
+        self._distribute(whole, grid.rust.locate(whole.x))
         self._compiled = compile_form(grid.comm, self.form, options)
         if self.form.kinematics == "mixed":
             self.particles.add_eps_v()
@@ -125,6 +128,15 @@ class Scene:
         self._points: list[tuple[Sequence[float], int, float]] = []
         self._tractions: list[tuple[Edge, Profile, Profile]] = []
         self._total = np.zeros(self._field.layout.size)
+
+    def _distribute(self, body: _rust.Particles, location: _rust.Location) -> None:
+        """Keep the particles in this rank's cells."""
+        self.num_particles = len(body)
+        self.particles, self._location = body, location
+        if self.grid.comm.size > 1:
+            here = self.grid.rank_of_cell[location.cell] == self.grid.comm.rank
+            mine = np.flatnonzero(here).astype(np.uint32)
+            self.particles, self._location = body.select(mine), location.select(mine)
 
     def fix(self, edge: Edge, component: Component, value: Profile = 0.0) -> None:
         """Prescribe a displacement component along an edge of the grid.
@@ -194,14 +206,15 @@ class Scene:
         force = np.zeros(self._field.layout.size)
         for edge, *components in self._tractions:
             nodes = self._field.edge_nodes(edge)
-            if len(nodes) == 0:
+            if self.grid.comm.allreduce(len(nodes)) == 0:
                 raise SupportError(
                     f"traction(edge='{edge}'): no cell along that edge of the grid holds "
                     "particles; let the grid end where the body is loaded"
                 )
             x, y = nodes[..., 0].ravel(), nodes[..., 1].ravel()
             what = f"traction(edge='{edge}')"
-            values = [boundary.evaluate(c, x, y, what) for c in components]
+            with ranks.together(self.grid.comm):
+                values = [boundary.evaluate(c, x, y, what) for c in components]
             force += self._field.traction(edge, np.stack(values, axis=-1).reshape(nodes.shape))
         return force
 
@@ -211,9 +224,10 @@ class Scene:
 
     @property
     def particles_per_cell(self) -> npt.NDArray[np.int64]:
-        """Number of particles in each cell, x fastest."""
+        """Number of particles in each cell, x fastest; a call for all ranks."""
         nx, ny = self.grid.cells
-        return np.bincount(self._location.cell, minlength=nx * ny)
+        counts = np.bincount(self._location.cell, minlength=nx * ny)
+        return ranks.sum_of(self.grid.comm, counts)
 
     def residual(self, coefficients: Array) -> Array:
         """The form's integrals over particles and cells, for every test function, before supports.
@@ -256,18 +270,21 @@ class Scene:
             SingularError: The tangent cannot be solved; the message names the cells.
             InputError: NaN or infinity in an array of the particles.
         """
-        self.particles.check()
+        with ranks.together(self.grid.comm):
+            self.particles.check()
         with self.stopwatch("set-up"):
             reduction = self._reduction()
             external = self._external()
         step = self._newton.solve(reduction, external)
-        self._stage.commit(*self._field.layout.split(step.coefficients))
+        with self.stopwatch("commit"), ranks.together(self.grid.comm):
+            self._stage.commit(*self._field.layout.split(step.coefficients))
         self._total = self._total + step.coefficients
         return Solution(self, step, reduction.size, self._total)
 
 
 class Solution:
-    """Equilibrium of a scene.
+    """Equilibrium of a scene. On several ranks all of it is on every rank, and arrays of particles
+    are in the order of the body.
 
     Attributes:
         scene: What was solved.
@@ -276,11 +293,17 @@ class Solution:
         unknowns: Number of reduced unknowns.
         iterations: Newton iterations of the last step.
         history: (momentum, volume) measures of every residual of the last step.
-        stress: Stress of the particles [Pa] (xx, yy, zz, xy), as it was when this was solved.
+        krylov: FGMRES iterations of every linear solve of the last step; 0 where the tangent was
+            factorised.
+        x: Positions of the particles [m].
+        volume: Their volumes [m2].
+        stress: Their stress [Pa] (xx, yy, zz, xy), as it was when this was solved.
         displacement_of_particles: Their displacement [m] since the start.
         eps_v: Their volumetric strain; None with forms that do not have it.
-        condition: Lower estimate of the condition number of the scaled tangent.
-        symmetric: Whether the tangent was symmetric.
+        condition: Estimate of the condition number of the tangent last factorised, scaled: its
+            Frobenius norm over the square root of its size, times that of its inverse as random
+            vectors show it.
+        symmetric: Whether that tangent was symmetric.
     """
 
     def __init__(self, scene: Scene, step: Converged, unknowns: int, total: Array) -> None:
@@ -288,11 +311,22 @@ class Solution:
         self.u, self.volumetric = scene.split(total)
         self.unknowns, self.iterations = unknowns, step.iterations
         self.history: History = step.history
+        self.krylov = tuple(step.krylov)
         self.condition, self.symmetric = step.condition, step.symmetric
-        particles = scene.particles
-        self.stress = particles.stress.copy()
-        self.displacement_of_particles = particles.displacement.copy()
-        self.eps_v = None if particles.eps_v is None else particles.eps_v.copy()
+        particles, comm = scene.particles, scene.grid.comm
+        number = ranks.joined(comm, particles.number)
+
+        def whole(values: Array) -> Array:
+            if comm.size == 1:
+                return np.array(values)
+            ordered = np.empty((len(number), *values.shape[1:]))
+            ordered[number] = ranks.joined(comm, values)
+            return ordered
+
+        self.x, self.volume = whole(particles.x), whole(particles.volume)
+        self.stress = whole(particles.stress)
+        self.displacement_of_particles = whole(particles.displacement)
+        self.eps_v = None if particles.eps_v is None else whole(particles.eps_v)
 
     def displacement(self, point: Sequence[float]) -> Array:
         """Displacement (u_x, u_y) [m] of the grid at a point.

@@ -164,6 +164,9 @@ impl Local {
             for k in 0..2 {
                 let row = &a[(2 * node + k) * columns..][..columns];
                 for (f, v) in value.iter().take(self.functions).enumerate() {
+                    if *v == 0.0 {
+                        continue;
+                    }
                     let target = &mut out[(2 * f + k) * columns..][..columns];
                     for (t, r) in target.iter_mut().zip(row) {
                         *t += v * r;

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1, ToPyArray};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
 use super::adjoint::points_per_axis;
 use super::grid::PyLocation;
-use super::{require, InputError};
+use super::{require, view, InputError};
 use crate::adjoint::{Densities, MAX_POINTS};
 use crate::assembly::{self, Cells, Kernel, Pattern, Selection, Slot, TabulateTensor};
 use crate::grid::Location;
@@ -109,17 +110,15 @@ impl PyAssembler {
 
     /// Pattern of the reduced matrix for a selection.
     fn pattern(&self, selection: SelectionOf) -> PyResult<PyPattern> {
-        let (start, unknown, weight, unknowns) = &selection;
+        let (start, unknown, weight, coefficient) = &selection;
         let (start, unknown) = (start.as_slice()?.to_vec(), unknown.as_slice()?.to_vec());
-        let (weight, unknowns) = (weight.as_slice()?.to_vec(), unknowns.as_slice()?.to_vec());
-        let rows = self.cells.coefficients(self.location.grid.cells);
-        let fits = start.len() == rows + 1
-            && start.windows(2).all(|w| 0 <= w[0] && w[0] <= w[1])
-            && start[rows] as usize == unknown.len()
-            && unknown.len() == weight.len()
-            && unknown.iter().all(|&u| u >= 0 && (u as usize) < unknowns.len());
-        require(fits, "not a selection of these coefficients")?;
-        let selection = Selection { start, unknown, weight, unknowns };
+        let (weight, coefficient) = (weight.as_slice()?.to_vec(), coefficient.as_slice()?.to_vec());
+        let count = self.cells.coefficients(self.location.grid.cells);
+        let Some(selection) = Selection::new(count, start, unknown, weight, coefficient) else {
+            return Err(PyRuntimeError::new_err(
+                "internal: not a selection of these coefficients (please report this)",
+            ));
+        };
         let Some(pattern) = assembly::pattern(&self.cells, &self.location, &selection) else {
             return Err(InputError::new_err(
                 "the reduced matrix has more than 2147483647 entries: expected a coarser grid",
@@ -173,13 +172,13 @@ pub(super) struct PyPattern {
 impl PyPattern {
     /// Start of each row; one more than rows.
     #[getter]
-    fn start<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i32>> {
-        self.pattern.start.to_pyarray(py)
+    fn start<'py>(slf: &Bound<'py, Self>) -> Bound<'py, PyArray1<i32>> {
+        view(|p: &Self| &p.pattern.start, slf)
     }
 
     /// Columns of the rows, ascending.
     #[getter]
-    fn columns<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i32>> {
-        self.pattern.columns.to_pyarray(py)
+    fn columns<'py>(slf: &Bound<'py, Self>) -> Bound<'py, PyArray1<i32>> {
+        view(|p: &Self| &p.pattern.columns, slf)
     }
 }

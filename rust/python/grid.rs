@@ -7,6 +7,7 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
 use super::require;
+use crate::active::Active;
 use crate::basis::Basis;
 use crate::error::Error;
 use crate::grid::{Grid, Location};
@@ -56,6 +57,76 @@ impl PyLocation {
 
     fn __len__(&self) -> usize {
         self.0.len()
+    }
+
+    /// Where some of the particles are.
+    fn select(&self, particles: PyReadonlyArray1<u32>) -> PyResult<Self> {
+        let particles = particles.as_slice()?;
+        let inside = particles.iter().all(|&p| (p as usize) < self.0.len());
+        require(inside, "a selection of other particles")?;
+        Ok(Self(Arc::new(self.0.select(particles))))
+    }
+}
+
+/// The cells that hold particles and the functions on them; see `active.rs`.
+#[pyclass(name = "Active", frozen)]
+pub(super) struct PyActive(Active, Grid);
+
+impl PyActive {
+    fn functions_of(&self, basis: Basis) -> usize {
+        self.1.cells.map(|n| basis.len(n)).iter().product()
+    }
+}
+
+#[pymethods]
+impl PyActive {
+    #[new]
+    fn new(grid: &PyGrid, cells: PyReadonlyArray1<u32>) -> PyResult<Self> {
+        let cells = cells.as_slice()?;
+        let inside = cells.iter().all(|&c| (c as usize) < grid.0.num_cells());
+        require(inside, "a cell outside the grid")?;
+        Ok(Self(Active::new(grid.0, cells), grid.0))
+    }
+
+    /// Whether each function of a basis has an active cell in its support.
+    fn functions<'py>(&self, py: Python<'py>, basis: &str) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        Ok(self.0.functions(basis.parse()?).to_pyarray(py))
+    }
+
+    /// Number of parts of the body that share no function, and the part of each function.
+    fn parts<'py>(
+        &self,
+        py: Python<'py>,
+        basis: &str,
+    ) -> PyResult<(usize, Bound<'py, PyArray1<i64>>)> {
+        let (number, of_functions) = self.0.parts(basis.parse()?);
+        Ok((number, of_functions.to_pyarray(py)))
+    }
+
+    /// For each function, the value of one of its active cells; 0 if it has none.
+    fn spread<'py>(
+        &self,
+        py: Python<'py>,
+        basis: &str,
+        of_cells: PyReadonlyArray1<i64>,
+    ) -> PyResult<Bound<'py, PyArray1<i64>>> {
+        let of_cells = of_cells.as_slice()?;
+        require(of_cells.len() == self.1.num_cells(), "values of other cells")?;
+        Ok(self.0.spread(basis.parse()?, of_cells, 0).to_pyarray(py))
+    }
+
+    /// The active cells (i, j) in the support of a function: cells x 2.
+    fn support<'py>(
+        &self,
+        py: Python<'py>,
+        basis: &str,
+        function: usize,
+    ) -> PyResult<Bound<'py, PyArray2<i64>>> {
+        let basis: Basis = basis.parse()?;
+        require(function < self.functions_of(basis), "a function of another basis")?;
+        let cells = self.0.support(basis, function);
+        let flat: Vec<i64> = cells.as_flattened().iter().map(|&i| i as i64).collect();
+        flat.to_pyarray(py).reshape([cells.len(), 2])
     }
 }
 

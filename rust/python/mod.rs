@@ -6,9 +6,12 @@ mod grid;
 mod particles;
 mod stage;
 
+use ndarray::Dimension;
+use numpy::{Element, PyArray};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyRuntimeError};
 use pyo3::prelude::*;
+use pyo3::PyClass;
 
 use crate::error::Error;
 
@@ -29,12 +32,24 @@ fn require(condition: bool, what: &str) -> PyResult<()> {
     Err(PyRuntimeError::new_err(format!("internal: {what} (please report this)")))
 }
 
+/// NumPy view of an array inside a Python object: no copy; the object stays alive with the view.
+/// Arrays so seen are never reallocated: those of `PyParticles` and of `PyPattern` keep their length.
+fn view<'py, T: Element, D: Dimension, O: PyClass>(
+    array: impl Fn(&O) -> &ndarray::Array<T, D>,
+    owner: &Bound<'py, O>,
+) -> Bound<'py, PyArray<T, D>> {
+    let object = owner.borrow();
+    // SAFETY: never reallocated, and the view keeps the object.
+    unsafe { PyArray::borrow_from_array(array(&object), owner.clone().into_any()) }
+}
+
 #[pymodule]
 fn _rust(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("TawamiError", m.py().get_type::<TawamiError>())?;
     m.add("InputError", m.py().get_type::<InputError>())?;
     m.add_class::<grid::PyGrid>()?;
     m.add_class::<grid::PyLocation>()?;
+    m.add_class::<grid::PyActive>()?;
     m.add_class::<particles::PyParticles>()?;
     m.add_class::<particles::PyMaterial>()?;
     m.add_class::<assembly::PyAssembler>()?;

@@ -2,24 +2,13 @@
 
 use std::sync::Arc;
 
-use ndarray::Dimension;
-use numpy::{Element, PyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use pyo3::PyClass;
 
+use super::{require, view};
 use crate::constitutive;
 use crate::material::{LinearElastic, Material};
 use crate::particles::Particles;
-
-/// NumPy view of an array inside a Python object: no copy; the object stays alive with the view.
-fn view<'py, T: Element, D: Dimension, O: PyClass>(
-    array: impl Fn(&O) -> &ndarray::Array<T, D>,
-    owner: &Bound<'py, O>,
-) -> Bound<'py, PyArray<T, D>> {
-    let object = owner.borrow();
-    // SAFETY: the arrays of a `PyParticles` are never reallocated, and the view keeps the object.
-    unsafe { PyArray::borrow_from_array(array(&object), owner.clone().into_any()) }
-}
 
 /// The same array, not writeable from Python: the cells of the particles and their laws' constants
 /// are known from these values.
@@ -53,6 +42,14 @@ impl PyParticles {
         Ok(constitutive::check_materials(&self.0, &laws, kinematics.parse()?)?)
     }
 
+    /// Some of the particles.
+    fn select(&self, particles: PyReadonlyArray1<u32>) -> PyResult<Self> {
+        let particles = particles.as_slice()?;
+        let inside = particles.iter().all(|&p| (p as usize) < self.0.len());
+        require(inside, "a selection of other particles")?;
+        Ok(Self(self.0.select(particles)))
+    }
+
     fn add_eps_v(&mut self) {
         self.0.add_eps_v();
     }
@@ -82,6 +79,11 @@ impl PyParticles {
     }
 
     #[getter]
+    fn number<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<u32>>> {
+        read_only(view(|p: &Self| &p.0.number, slf))
+    }
+
+    #[getter]
     fn stress<'py>(slf: &Bound<'py, Self>) -> Bound<'py, PyArray2<f64>> {
         view(|p: &Self| &p.0.stress, slf)
     }
@@ -95,7 +97,7 @@ impl PyParticles {
     fn eps_v<'py>(slf: &Bound<'py, Self>) -> Option<Bound<'py, PyArray1<f64>>> {
         let object = slf.borrow();
         let array = object.0.eps_v.as_ref()?;
-        // SAFETY: as in `view`.
+        // SAFETY: as in `view`; never reallocated.
         Some(unsafe { PyArray::borrow_from_array(array, slf.clone().into_any()) })
     }
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray2, ToPyArray};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use rayon::prelude::*;
 
 use super::grid::{field, PyLocation};
 use super::particles::{laws, PyMaterial, PyParticles};
@@ -133,7 +134,7 @@ impl PyStage {
         volumetric: Option<PyReadonlyArray1<f64>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let strains: Vec<Sym> = self.with(&u, volumetric.as_ref(), None, |s| {
-            (0..self.location.len()).map(|p| s.strain(p)).collect()
+            (0..self.location.len()).into_par_iter().map(|p| s.strain(p)).collect()
         })?;
         strains.as_flattened().to_pyarray(py).reshape([self.location.len(), COMPONENTS])
     }
@@ -147,13 +148,13 @@ impl PyStage {
         volumetric: Option<PyReadonlyArray1<f64>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let location = &self.location;
-        let strains = self.with(&u, volumetric.as_ref(), None, |s| {
-            ndarray::Array2::from_shape_fn((location.len(), 2), |(p, k)| match k {
-                0 => s.increments.div_u(location, p),
-                _ => s.increments.volumetric_at(location, p),
-            })
+        let of = |s: &Stage, p| {
+            [s.increments.div_u(location, p), s.increments.volumetric_at(location, p)]
+        };
+        let strains: Vec<[f64; 2]> = self.with(&u, volumetric.as_ref(), None, |s| {
+            (0..location.len()).into_par_iter().map(|p| of(s, p)).collect()
         })?;
-        Ok(strains.to_pyarray(py))
+        strains.as_flattened().to_pyarray(py).reshape([location.len(), 2])
     }
 }
 
