@@ -120,7 +120,9 @@ def in_its_own_process(setting: Setting) -> dict[str, Any]:
     """Measure a setting: its peak memory is its own."""
     command = [sys.executable, "-m", "cases.cantilever.bench"]
     command += ["--measure", json.dumps(asdict(setting))]
-    command, environment = mpirun(setting.ranks, command)
+    started, environment = mpirun(setting.ranks, command)
+    if setting.ranks > 1:  # one rank alone would be bound to one processor
+        command = started
     environment["RAYON_NUM_THREADS"] = str(setting.threads)
     root = Path(__file__).parent.parent.parent
     run = subprocess.run(command, env=environment, cwd=root, capture_output=True, text=True,
