@@ -169,16 +169,15 @@ impl Stage<'_> {
         columns: usize,
         data: &mut [f64],
     ) -> Result<()> {
-        data.par_chunks_exact_mut(columns).enumerate().try_for_each(|(p, row)| {
+        let of = |(p, row): (usize, &mut [f64])| {
             let (_, stress, moduli) = self.respond(particles, p);
-            if self.kinematics == Kinematics::Cell && couples(&moduli) {
-                return Err(Error::CoupledLaw { index: particles.number[p] as usize });
-            }
             for request in requests {
                 write(request, self.kinematics, &stress, &moduli, row);
             }
-            Ok(())
-        })
+            (self.kinematics == Kinematics::Cell && couples(&moduli)).then_some(p)
+        };
+        let coupled = data.par_chunks_exact_mut(columns).enumerate().filter_map(of).min();
+        coupled.map_or(Ok(()), |p| Err(Error::CoupledLaw { index: particles.number[p] as usize }))
     }
 
     /// Accept the increments: stress, displacement and (where stored) eps_v of the particles.

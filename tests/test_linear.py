@@ -44,7 +44,7 @@ def test_one_factorisation_serves_a_step_and_the_next(assembly, monkeypatch):
     first = scene.solve()
     assert first.iterations > 3
     assert first.krylov[0] == 0
-    assert all(0 < number <= linear.LIMIT for number in first.krylov[1:])
+    assert all(0 < number <= linear.PAYS for number in first.krylov[1:])
     scene.traction("right", (12.0, 2.0))
     second = scene.solve()
     assert 0 not in second.krylov
@@ -53,16 +53,66 @@ def test_one_factorisation_serves_a_step_and_the_next(assembly, monkeypatch):
     every_time = again.solve()
     assert set(every_time.krylov) == {0}
     assert np.abs(first.u - every_time.u).max() < 1e-10 * np.abs(first.u).max()
-    assert max(first.history[-1][:1]) < 1e-11
     assert first.iterations <= every_time.iterations + 1
     again.traction("right", (12.0, 2.0))
     assert np.abs(second.u - again.solve().u).max() < 1e-10 * np.abs(first.u).max()
 
 
-def test_a_tangent_that_changed_too_much_is_factorised_again():
-    solution = beam(hardening(3e4)).solve()
-    assert solution.krylov.count(0) > 1
-    assert max(solution.krylov) <= linear.LIMIT
+def test_a_tangent_that_changed_too_much_is_factorised_again(monkeypatch):
+    slow = beam(hardening(3e4)).solve()
+    late = [k for k, number in enumerate(slow.krylov[:-1]) if number > linear.PAYS]
+    assert late
+    assert all(slow.krylov[k + 1] == 0 for k in late)
+    monkeypatch.setattr(linear, "LIMIT", 1)  # what does not get there in time is factorised at once
+    at_once = beam(hardening(3e4)).solve()
+    assert at_once.krylov.count(0) > slow.krylov.count(0)
+    assert np.abs(at_once.u - slow.u).max() < 1e-9 * np.abs(slow.u).max()
+
+
+@pytest.mark.parametrize("form", ["u", "u_epsv", "u_p"])
+@pytest.mark.parametrize("load", [10.0, 20.0, 40.0])
+def test_a_load_beyond_what_the_stress_can_carry_is_no_equilibrium(form, load):
+    """The deviator is bounded: the iterates run away, and nothing may call that converged."""
+    K, mu = 2.0, 1.0
+    unit = np.array([1.0, 1.0, 1.0, 0.0])
+    weight = np.array([1.0, 1.0, 1.0, 0.5])  # of gamma_xy in e : e
+
+    def respond(strain, stress):
+        volume = strain[:, :3].sum(axis=1)
+        e = strain - volume[:, None] / 3 * unit
+        root = np.sqrt(1 + 1e3 * (weight * e**2).sum(axis=1))[:, None]
+        s = 2 * mu * weight * e / root
+        projector = np.eye(4) - np.outer(unit, unit) / 3
+        slope = (
+            2
+            * mu
+            * (
+                np.diag(weight)[None] / root[..., None]
+                - 1e3 * np.einsum("ni,nj->nij", weight * e, weight * e) / root[..., None] ** 3
+            )
+        )
+        tangent = slope @ projector + K * np.outer(unit, unit)
+        return stress + s + K * volume[:, None] * unit, tangent
+
+    grid = grid_of((8, 4), h=0.25)
+    body = tawami.box(grid, grid.origin, grid.upper)
+    scene = tawami.Scene(grid, body, tawami.NumpyLaw(respond, K=K, mu=mu), form=form)
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    scene.traction("right", (0.0, -load))
+    with pytest.raises((tawami.SingularError, tawami.ConvergenceError)):
+        scene.solve()
+    assert not scene.particles.stress.any()
+
+
+def test_a_tangent_that_is_not_a_number():
+    def residual(u, w, sigma, mu, sum_p, t, ds):
+        root = sum_p(mu, inner((div(u) ** 2) ** 0.5, div(w)))
+        return sum_p(sigma, grad(w)) + root - dot(t, w) * ds
+
+    form = Form({"u": ("displacement", "w")}, "displacement", residual)
+    with pytest.raises(tawami.SingularError, match="the tangent holds NaN or infinity"):
+        beam(form).solve()
 
 
 def test_other_supports_are_other_unknowns_and_factorised():

@@ -105,8 +105,12 @@ def test_an_error_on_all_ranks_is_told_once():
 FAILS_ON_ONE = (
     SCENE
     + """
+class Broken(Exception):
+    "Cannot be pickled."
+    def __init__(self, one, two):
+        super().__init__(f"{one} {two}")
 def respond(strain, stress):
-    if rank == 1: raise ValueError("of the law, on one rank")
+    if rank == 1: raise Broken("of the law,", "on one rank")
     return stress, np.broadcast_to(np.eye(4), (len(strain), 4, 4))
 s = scene(tawami.NumpyLaw(respond, K=1.0, mu=1.0))
 """
@@ -115,7 +119,8 @@ s = scene(tawami.NumpyLaw(respond, K=1.0, mu=1.0))
 
 def test_an_error_of_a_law_on_one_rank():
     the_only_message(
-        start(2, "-c", FAILS_ON_ONE + "s.solve()"), "ValueError: of the law, on one rank"
+        start(2, "-c", FAILS_ON_ONE + "s.solve()"),
+        "\nRuntimeError: Broken: of the law, on one rank",
     )
 
 
@@ -125,14 +130,16 @@ def test_an_error_on_one_rank_can_be_caught_on_all():
         + """
 try:
     s.solve()
-except ValueError as error:
-    assert scene().solve().iterations == 0  # and the ranks go on together
+except RuntimeError as error:
+    good = scene()
+    good.traction("right", (0.0, 1e-3))
+    assert good.solve().iterations == 1  # and the ranks go on together
     tell(f"caught: {error}")
 """
     )
     run = start(2, "-c", code)
     assert run.returncode == 0, run.stderr
-    assert run.stdout.count("caught: of the law, on one rank") == 2
+    assert run.stdout.count("caught: Broken: of the law, on one rank") == 2
 
 
 def test_not_a_number_on_one_rank_is_named_by_its_number_in_the_body():
@@ -192,17 +199,41 @@ tawami.run(main, "driver")
     assert np.ptp(stress) > 0
 
 
+FEW = (
+    SCENE.replace("h=0.25, cells=(8, 4)", "h=1.0, cells=(2, 1)")
+    + """
+s = scene()
+for _ in range(2):
+    s.traction("right", (0.0, lambda x, y: 1e-3 * y / y.max()))  # of all the edge, on every rank
+    solution = s.solve()
+tell(f"{solution.displacement((2, 0))[1]:.12e} {solution.krylov}")
+"""
+)
+
+
 def test_more_ranks_than_cells():
+    alone, four = (start(number, "-c", FEW) for number in (1, 4))
+    assert four.returncode == 0, four.stderr
+    assert four.stdout.splitlines()[-4:] == 4 * alone.stdout.splitlines()[-1:]
+
+
+def test_a_body_that_differs_between_ranks_is_refused():
+    code = SCENE + "body.x[:] = body.x[np.random.default_rng(rank).permutation(128)]\nscene()"
+    the_only_message(start(2, "-c", code), "InputError: the body is not the same on all ranks")
+
+
+def test_an_exit_on_one_rank_ends_all():
     code = (
-        SCENE.replace("h=0.25, cells=(8, 4)", "h=1.0, cells=(2, 1)")
+        SCENE
         + """
-solution = scene().solve()
-tell(f"solved {solution.unknowns}")
+import sys
+def main():
+    if rank == 1: sys.exit("no such file")
+    scene().solve()
+tawami.run(main, "driver")
 """
     )
-    run = start(4, "-c", code)
-    assert run.returncode == 0, run.stderr
-    assert run.stdout.count("solved") == 4
+    the_only_message(start(2, "-c", code), "no such file")
 
 
 def test_the_study_on_two_ranks(tmp_path):

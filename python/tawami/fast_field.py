@@ -102,7 +102,7 @@ class FastField(Field):
         matrix = PETSc.Mat().createAIJWithArrays(size, csr, comm=PETSc.COMM_SELF)
         self._petsc["of cells"] = matrix
         if self.grid.comm.size > 1:
-            own = (reduction.own.stop - reduction.own.start, None)
+            own = (reduction.own.stop - reduction.own.start, reduction.size)
             numbers = PETSc.LGMap().create(used.astype(PETSc.IntType), comm=self.grid.comm)
             unassembled = PETSc.Mat().createIS((own, own), numbers, numbers, comm=self.grid.comm)
             unassembled.setISLocalMat(matrix)

@@ -149,25 +149,25 @@ class Field:
         """
         integral = self.compiled.traction
         assert integral is not None
-        cells, local = self._edge_cells(edge), self.grid.rectangle.facet_of_edge(edge)
-        order = self.grid.rectangle.facet_order(cells, local)
+        ij, local = self.grid.rectangle.ij, self.grid.rectangle.facet_of_edge(edge)
+        axis, end = self.grid.edge(edge)
+        on_edge = ij[self._cells, axis] == (self.grid.cells[axis] - 1 if end else 0)
+        cells = self._cells[on_edge]
+        cells = cells[self.grid.rectangle.facet_order(cells, local)]
         packed = np.zeros((len(cells), 9, 2))
-        packed[:, self._nodes_on(edge)] = values[order]
-        entities = self.grid.rectangle.entities(cells[order], local)
-        form = self._space.form(integral.kernel, 1, entities)
+        place = np.searchsorted(self._along(edge), ij[cells, 1 - axis])
+        packed[:, self._nodes_on(edge)] = values[place]
+        form = self._space.form(integral.kernel, 1, self.grid.rectangle.entities(cells, local))
         vector = np.zeros(self._space.size)
         self._add_vector(
             vector, form, integral, packed.reshape(len(cells), _dolfinx.DISPLACEMENT_DOFS)
         )
         return -self._sum(self.layout.extraction_on(cells).T @ vector)
 
-    def _edge_cells(self, edge: Edge) -> npt.NDArray[np.int32]:
+    def _along(self, edge: Edge) -> npt.NDArray[np.int64]:
+        """Numbers along an edge of its cells with particles, on whichever rank."""
         axis, end = self.grid.edge(edge)
-        last = self.grid.cells[axis] - 1 if end else 0
-        cells: npt.NDArray[np.int32] = self._cells[
-            self.grid.rectangle.ij[self._cells, axis] == last
-        ]
-        return cells
+        return np.flatnonzero(np.take(self.active, end, axis=1 - axis))
 
     def _nodes_on(self, edge: Edge) -> npt.NDArray[np.bool_]:
         """Which of the nine biquadratic nodes of a cell lie on its side towards an edge."""
@@ -176,9 +176,14 @@ class Field:
         return np.isclose(nodes[:, axis], 1.0 if end else 0.0)
 
     def edge_nodes(self, edge: Edge) -> Array:
-        """Positions [m] of the biquadratic nodes of an edge: this rank's cells x 3 x 2."""
+        """Positions [m] of the biquadratic nodes of an edge: cells with particles x 3 x 2, the same on
+        every rank.
+        """
+        axis, end = self.grid.edge(edge)
+        along = self._along(edge)
+        ij = np.full((len(along), 2), self.grid.cells[axis] - 1 if end else 0)
+        ij[:, 1 - axis] = along
         nodes = self.grid.rectangle.to_grid_axes(_dolfinx.reference_nodes(2))
-        ij = self.grid.rectangle.ij[self._edge_cells(edge)]
         positions = ij[:, None, :] + nodes[self._nodes_on(edge)]
         return np.asarray(self.grid.origin + self.grid.h * positions)
 

@@ -10,7 +10,8 @@ for. A tangent is factorised again
 
 With the right-hand side, random vectors are solved for at each factorisation: the rms of `||A^-1 p||`
 over vectors p of standard normal numbers estimates the Frobenius norm of A^-1 (Kenney and Laub 1994),
-and the large entries of `A^-1 p` say where a singular system is weak.
+and the large entries of `A^-1 p` say where a singular system is weak. Whether a tangent is singular is
+judged where it is factorised.
 """
 
 from __future__ import annotations
@@ -124,17 +125,25 @@ class LinearSolver:
         with self._stopwatch("scale"):
             self.symmetric = self._is_symmetric(matrix, probes[0])
         with self._stopwatch("factorise"):
+            norm = matrix.norm(PETSc.NormType.FROBENIUS)
+            if not np.isfinite(norm):
+                raise SingularError(
+                    "the tangent holds NaN or infinity where the residual does not: a derivative that "
+                    "does not exist at this point, such as that of sqrt or abs at zero?"
+                )
             failed = not self._factorise(matrix)
             if failed:
                 matrix.shift(1e-12)
-                self._factorise(matrix)
+                if not self._factorise(matrix):
+                    raise SingularError(
+                        "the tangent is singular, and so is its neighbour (shift 1e-12)"
+                    )
         with self._stopwatch("solve"):
             y, *weak = self._solve_all(np.vstack([self._scale * right, probes]))
             norms = [self._norm(direction) for direction in weak]
             self.weak = weak[int(np.argmax(norms))]
             # rms of the row norms, which the scaling makes alike
-            norm = matrix.norm(PETSc.NormType.FROBENIUS) / np.sqrt(size)
-            estimate = float(norm * np.sqrt(np.mean(np.square(norms))))
+            estimate = float(norm / np.sqrt(size) * np.sqrt(np.mean(np.square(norms))))
             self.condition = np.inf if failed else estimate
         self._matrix, self.iterations = matrix, 0
         return np.asarray(self._scale * y)
@@ -169,7 +178,7 @@ class LinearSolver:
         """Solutions for several right-hand sides, each a row."""
         factor = self._handles["factor"]
         count, n = right.shape
-        size = ((n, None), (None, count))
+        size = ((n, PETSc.DETERMINE), (PETSc.DECIDE, count))
         b = PETSc.Mat().createDense(size, array=right.ravel(), comm=factor.comm)
         x = b.duplicate()
         factor.matSolve(b, x)

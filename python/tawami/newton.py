@@ -145,8 +145,9 @@ class Newton:
         free = reduction.selection.T @ (internal - external)
         of_u = reduction.unknowns < n
         scale = max(float(np.linalg.norm(f[:n])) for f in (internal, external))
-        # Forces of a body that only moves rigidly are round-off: it is in equilibrium.
-        round_off = 1e-14 * self._stiffest * np.abs(coefficients[:n]).max() * np.sqrt(n)
+        # Forces of a body that supports move rigidly are round-off: it is in equilibrium.
+        moved = np.abs(reduction.offset[:n]).max()
+        round_off = 1e-14 * self._stiffest * moved * np.sqrt(n)
         momentum = float(np.linalg.norm(free[of_u])) / scale if scale > round_off else 0.0
         volume = None
         if self.kind is not None:

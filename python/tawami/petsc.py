@@ -49,7 +49,7 @@ _staying: list[Any] = []
 
 def stay(comm: Any) -> None:
     """Keep PETSc's copy of a communicator; a call for all ranks."""
-    _staying.append(PETSc.Vec().createMPI((1, None), comm=comm))
+    _staying.append(PETSc.Vec().createMPI((1, PETSc.DETERMINE), comm=comm))
 
 
 def clean_up(comm: Any) -> None:
@@ -69,7 +69,7 @@ def aij(comm: Any, rows: sp.spmatrix, own_columns: int) -> Any:
     csr: sp.csr_matrix = sp.csr_matrix(rows)
     csr.sort_indices()
     arrays = (csr.indptr.astype(PETSc.IntType), csr.indices.astype(PETSc.IntType), csr.data)
-    size = ((csr.shape[0], None), (own_columns, None))
+    size = ((csr.shape[0], PETSc.DETERMINE), (own_columns, PETSc.DETERMINE))
     return PETSc.Mat().createAIJ(size=size, csr=arrays, comm=comm)
 
 

@@ -72,8 +72,9 @@ def together(comm: Any) -> Iterator[None]:
     first = comm.allreduce(comm.size if error is None else comm.rank, op=MPI.MIN)
     if first == comm.size:
         return
+    # what travels is raised on the first too: a driver catches the same type everywhere
     told = comm.bcast(_portable(error) if comm.rank == first else None, root=first)
-    raise told if error is None or comm.rank != first else error
+    raise told from (error if comm.rank == first else None)
 
 
 def _portable(error: Exception | None) -> Exception:
@@ -90,13 +91,19 @@ def watch(comm: Any) -> None:
     if comm.size == 1 or sys.excepthook is _end_all:
         return
     sys.excepthook = _end_all
-    neighbours = comm.Split_type(MPI.COMM_TYPE_SHARED)
-    available = len(os.sched_getaffinity(0)) // neighbours.size
-    neighbours.Free()
-    os.environ.setdefault("RAYON_NUM_THREADS", str(max(available, 1)))
+    os.environ.setdefault("RAYON_NUM_THREADS", str(_processors(comm)))
     # at the end PETSc cleans up where something was dropped, and waits for ranks where nothing was
     stay(comm)
     atexit.register(clean_up, comm)
+
+
+def _processors(comm: Any) -> int:
+    """Processors of this rank, those that it shares with others of its machine in part."""
+    machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    all_of_them = machine.allgather(os.sched_getaffinity(0))
+    machine.Free()
+    sharing = [sum(cpu in other for other in all_of_them) for cpu in os.sched_getaffinity(0)]
+    return max(1, int(sum(1 / count for count in sharing) + 1e-9))
 
 
 def _end_all(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
@@ -146,3 +153,7 @@ def run(main: Callable[[], None], name: str) -> None:
         if comm.size == 1:
             sys.exit(f"{name}: {error}")
         _abort(f"{name}: {error}\n")
+    except SystemExit as end:  # sys.exit on one rank: the others would wait for it
+        if comm.size == 1 or end.code in (0, None):
+            raise
+        _abort(f"{end.code}\n" if isinstance(end.code, str) else "")

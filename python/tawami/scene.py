@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
@@ -134,6 +135,13 @@ class Scene:
         self.num_particles = len(body)
         self.particles, self._location = body, location
         if self.grid.comm.size > 1:
+            parts = (body.x, body.volume, body.material)
+            digest = hashlib.sha1(b"".join(part.tobytes() for part in parts)).digest()
+            if len(set(self.grid.comm.allgather(digest))) > 1:
+                raise InputError(
+                    "the body is not the same on all ranks: expected the same positions, volumes and "
+                    "materials on each. Give random numbers a seed, or make it on one rank and bcast it"
+                )
             here = self.grid.rank_of_cell[location.cell] == self.grid.comm.rank
             mine = np.flatnonzero(here).astype(np.uint32)
             self.particles, self._location = body.select(mine), location.select(mine)
@@ -206,15 +214,14 @@ class Scene:
         force = np.zeros(self._field.layout.size)
         for edge, *components in self._tractions:
             nodes = self._field.edge_nodes(edge)
-            if self.grid.comm.allreduce(len(nodes)) == 0:
+            if len(nodes) == 0:
                 raise SupportError(
                     f"traction(edge='{edge}'): no cell along that edge of the grid holds "
                     "particles; let the grid end where the body is loaded"
                 )
             x, y = nodes[..., 0].ravel(), nodes[..., 1].ravel()
             what = f"traction(edge='{edge}')"
-            with ranks.together(self.grid.comm):
-                values = [boundary.evaluate(c, x, y, what) for c in components]
+            values = [boundary.evaluate(c, x, y, what) for c in components]
             force += self._field.traction(edge, np.stack(values, axis=-1).reshape(nodes.shape))
         return force
 
