@@ -104,7 +104,8 @@ class FastField(Field):
         if self.grid.comm.size > 1:
             own = (reduction.own.stop - reduction.own.start, reduction.size)
             numbers = PETSc.LGMap().create(used.astype(PETSc.IntType), comm=self.grid.comm)
-            unassembled = PETSc.Mat().createIS((own, own), numbers, numbers, comm=self.grid.comm)
+            maps = {"lgmapr": numbers, "lgmapc": numbers}  # their position changed with petsc4py
+            unassembled = PETSc.Mat().createIS((own, own), **maps, comm=self.grid.comm)
             unassembled.setISLocalMat(matrix)
             numbers.destroy()
             self._petsc["unassembled"], self._petsc["reduced"] = unassembled, PETSc.Mat()
