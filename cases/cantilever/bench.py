@@ -30,6 +30,7 @@ from ufl import div, dot, grad, inner
 import tawami
 from cases.cantilever import mpm
 from cases.cantilever.beam import NU, D, E, L, P
+from tawami.compilation import compile_form
 from tawami.environment import header
 from tawami.output import result_folder, whole_file
 from tawami.ranks import mpirun
@@ -158,8 +159,9 @@ def measure(setting: Setting) -> dict[str, Any]:
     comm = MPI.COMM_WORLD
     warnings.simplefilter("ignore", InexactSumWarning)  # of the nonlinear term; the same for all
     start = perf_counter()
-    mpm.build("u_epsv", "paper", 2, alpha=0.1, assembly=setting.path).solve()  # forms, libraries
-    warm = perf_counter() - start
+    compile_form(comm, tawami.Form.load("u_epsv"), {"stabilisation": "laplacian"})
+    forms = perf_counter() - start
+    mpm.build("u_epsv", "paper", 2, alpha=0.1, assembly=setting.path).solve()  # libraries
     options: dict[str, Any] = {"alpha": 0.1, "per_axis": setting.per_axis, "assembly": setting.path}
     start, busy = perf_counter(), process_time()
     scene = mpm.build("u_epsv", "paper", setting.n, **options)
@@ -172,7 +174,7 @@ def measure(setting: Setting) -> dict[str, Any]:
         "particles": scene.num_particles,
         "unknowns": solution.unknowns,
         "deflection_m": -float(solution.displacement((L, 0.0))[1]),
-        "forms_and_libraries_s": warm,
+        "forms_s": forms,
         "built_s": built,
         "solve_s": wall,
         **{stage: watch.seconds.get(stage, 0.0) for stage in STAGES},
@@ -284,6 +286,7 @@ def print_ratios(rows: Sequence[dict[str, Any]]) -> None:
         print_step(row)
     ratio = outside_the_solver(reference) / outside_the_solver(fast)
     print(f"\nall but the linear solver, reference over fast: {ratio:.2f}")
+    print(f"forms in a warm start: {np.median([row['forms_s'] for row in rows]):.3f} s (aim: 0.1)")
     for row in of(n=64):
         print(
             f"n = 64, {row['particles']} particles, {row['threads']} threads: scene and solve "
