@@ -6,9 +6,10 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
+use crate::finite_strain::{Plane, Trial};
 use crate::grid::Location;
 use crate::kinematics::{Increments, Kinematics};
-use crate::material::{Material, Moduli, Strain, Stress};
+use crate::material::{Material, Moduli, Stress};
 use crate::particles::Particles;
 use crate::tensor::{Sym, COMPONENTS, IN_PLANE, UNIT};
 
@@ -21,6 +22,10 @@ pub enum Operator {
     Deviator,
     /// Mean stress [Pa].
     Mean,
+    /// P = tau f^-T (xx, xy, yx, yy) [Pa]; finite strain only.
+    Nominal,
+    /// ln J_f; finite strain only.
+    LnJ,
 }
 
 impl Operator {
@@ -28,17 +33,25 @@ impl Operator {
     #[must_use]
     pub fn components(self) -> usize {
         match self {
+            Self::Nominal => 4,
             Self::Sigma | Self::Deviator => 3,
-            Self::Mean => 1,
+            Self::Mean | Self::LnJ => 1,
         }
     }
 
-    /// The operator's components of a stress (or of its derivative in some direction).
+    /// Whether it belongs to finite strain.
+    #[must_use]
+    pub fn finite(self) -> bool {
+        matches!(self, Self::Nominal | Self::LnJ)
+    }
+
+    /// A small-strain operator's components of a stress (or of its derivative in some direction).
     fn of(self, s: &Sym, m: f64, out: &mut [f64]) {
         match self {
             Self::Sigma => IN_PLANE.iter().zip(out).for_each(|(&i, o)| *o = s[i] + m * UNIT[i]),
             Self::Deviator => IN_PLANE.iter().zip(out).for_each(|(&i, o)| *o = s[i]),
             Self::Mean => out[0] = m,
+            Self::Nominal | Self::LnJ => {}
         }
     }
 }
@@ -51,8 +64,22 @@ pub enum Part {
     /// Its derivative with respect to the in-plane strain (xx, yy, gamma_xy) of `sym grad u`:
     /// 3 numbers per component, strain fastest.
     Strain,
+    /// Its derivative with respect to grad u (xx, xy, yx, yy): 4 numbers per component; finite strain.
+    Gradient,
     /// Its derivative with respect to the volumetric strain: 1 number per component.
     Volume,
+}
+
+impl Part {
+    /// Numbers per component.
+    #[must_use]
+    pub fn width(self) -> usize {
+        match self {
+            Self::Value | Self::Volume => 1,
+            Self::Strain => 3,
+            Self::Gradient => 4,
+        }
+    }
 }
 
 /// One entry of the particle data: `part` of `operator`, from `column` on.
@@ -83,6 +110,7 @@ fn write(request: &Request, kinematics: Kinematics, stress: &Stress, c: &Moduli,
     match request.part {
         Part::Value => request.operator.of(&stress.deviator, stress.mean, out),
         Part::Volume => request.operator.of(&c.dev_vol, c.mean_vol, out),
+        Part::Gradient => {}
         Part::Strain => {
             for (j, e) in UNIT_DEVIATORS.iter().enumerate() {
                 let mut ds: Sym = std::array::from_fn(|i| dot(&c.dev_dev[i], e));
@@ -96,6 +124,41 @@ fn write(request: &Request, kinematics: Kinematics, stress: &Stress, c: &Moduli,
                 (0..n).for_each(|i| out[3 * i + j] = column[i]);
             }
         }
+    }
+}
+
+/// `write` for finite strain: the volume follows ln J_f, or a field of its own.
+fn write_finite(
+    request: &Request,
+    trial: &Trial,
+    own: bool,
+    tau: &Stress,
+    c: &Moduli,
+    row: &mut [f64],
+) {
+    const UNITS: [Plane; 4] = [
+        [[1.0, 0.0], [0.0, 0.0]],
+        [[0.0, 1.0], [0.0, 0.0]],
+        [[0.0, 0.0], [1.0, 0.0]],
+        [[0.0, 0.0], [0.0, 1.0]],
+    ];
+    let out = &mut row[request.column..];
+    match (request.operator, request.part) {
+        (Operator::Nominal, Part::Value) => out[..4].copy_from_slice(&trial.nominal(tau)),
+        (Operator::Nominal, Part::Volume) => {
+            out[..4].copy_from_slice(&trial.nominal_change(tau, c, &[[0.0; 2]; 2], 1.0));
+        }
+        (Operator::Nominal, Part::Gradient) => {
+            for (k, unit) in UNITS.iter().enumerate() {
+                let dv = if own { 0.0 } else { trial.volume_change(unit) };
+                let change = trial.nominal_change(tau, c, unit, dv);
+                (0..4).for_each(|i| out[4 * i + k] = change[i]);
+            }
+        }
+        (Operator::LnJ, Part::Value) => out[0] = trial.ln_j,
+        (Operator::LnJ, Part::Volume) => out[0] = 0.0,
+        (Operator::LnJ, Part::Gradient) => out[..4].copy_from_slice(&trial.ln_j_gradient()),
+        _ => {}
     }
 }
 
@@ -116,6 +179,9 @@ pub enum Response<'a> {
     Given(&'a [f64], &'a [f64]),
 }
 
+/// Most history variables that a law may have.
+pub const MAX_HISTORY: usize = 8;
+
 /// What the particle stage works on.
 #[derive(Clone, Copy)]
 pub struct Stage<'a> {
@@ -123,20 +189,53 @@ pub struct Stage<'a> {
     pub location: &'a Location,
     /// The laws, or what was computed in their place.
     pub response: Response<'a>,
+    /// Where the history variables of each law stand in [`Particles::history`].
+    pub history: &'a [Vec<usize>],
     /// How the strain follows from the increments.
     pub kinematics: Kinematics,
+    /// Whether strains are finite.
+    pub finite: bool,
     /// The increments of the current Newton iterate.
     pub increments: Increments<'a>,
 }
 
+/// What a particle answers to the increments.
+struct Answer {
+    /// Change of the volume that its law got.
+    volume: f64,
+    stress: Stress,
+    moduli: Moduli,
+    trial: Option<Trial>,
+    history: [f64; MAX_HISTORY],
+}
+
 impl Stage<'_> {
-    /// Strain, stress and tangent of particle `p`.
-    fn respond(&self, particles: &Particles, p: usize) -> (Strain, Stress, Moduli) {
-        let strain = self.increments.strain(self.kinematics, self.location, p);
+    /// Strain, stress and tangent of particle `p`; `None` if it is turned inside out.
+    fn respond(&self, particles: &Particles, p: usize) -> Option<Answer> {
+        let (mut before, mut after) = ([0.0; MAX_HISTORY], [0.0; MAX_HISTORY]);
+        let mut strain = self.increments.strain(self.kinematics, self.location, p);
+        let volume = strain.volume;
+        let mut trial = None;
         let (stress, moduli) = match self.response {
             Response::Laws(laws) => {
+                let number = particles.material[p] as usize;
+                let (law, places) = (&laws[number], &self.history[number]);
+                for (value, &place) in before.iter_mut().zip(places) {
+                    *value = particles.history[place].1[p];
+                }
                 let old: Sym = std::array::from_fn(|i| particles.stress[[p, i]]);
-                laws[particles.material[p] as usize].respond(&strain, &Stress::from(&old))
+                let mut old = Stress::from(&old);
+                if self.finite {
+                    let own = self.kinematics != Kinematics::Displacement;
+                    let g = self.increments.grad_u(self.location, p);
+                    let elastic = law.elastic_strain(&old);
+                    trial = Some(Trial::new(&g, own.then_some(volume), &elastic)?);
+                    // the law sees the whole elastic strain, from no stress
+                    strain = trial.as_ref().map_or(strain, |t| t.strain);
+                    old = Stress { deviator: [0.0; COMPONENTS], mean: 0.0 };
+                }
+                let (before, after) = (&before[..places.len()], &mut after[..places.len()]);
+                law.respond(&strain, &old, before, after)
             }
             Response::Given(stress, tangent) => {
                 let stress: Sym = std::array::from_fn(|i| stress[COMPONENTS * p + i]);
@@ -145,20 +244,35 @@ impl Stage<'_> {
                 (Stress::from(&stress), Moduli::from(&std::array::from_fn(row)))
             }
         };
-        (strain, stress, moduli)
+        let volume = match (&trial, self.kinematics) {
+            (Some(trial), Kinematics::Displacement) => trial.ln_j,
+            _ => volume,
+        };
+        Some(Answer { volume, stress, moduli, trial, history: after })
     }
 
-    /// Strain increment of particle `p` as one tensor.
+    /// Strain increment of particle `p` as one tensor; small strain.
     #[must_use]
     pub fn strain(&self, p: usize) -> Sym {
         let strain = self.increments.strain(self.kinematics, self.location, p);
         std::array::from_fn(|i| strain.deviator[i] + strain.volume / 3.0 * UNIT[i])
     }
 
+    /// div u (ln J_f at finite strain) at particle `p`.
+    #[must_use]
+    pub fn volume_change(&self, p: usize) -> f64 {
+        let g = self.increments.grad_u(self.location, p);
+        if self.finite {
+            // NaN where f turns the particle inside out: no iterate to accept
+            return (g[0][0] + g[1][1] + g[0][0] * g[1][1] - g[0][1] * g[1][0]).ln_1p();
+        }
+        g[0][0] + g[1][1]
+    }
+
     /// Write what is requested into the particle data (particles x `columns`, at least one).
     ///
     /// # Errors
-    /// [`Error::CoupledLaw`] where B-bar meets a law it has no tangent for.
+    /// [`Error::CoupledLaw`] where B-bar meets a law it has no tangent for, [`Error::Inverted`].
     ///
     /// # Panics
     /// If a request reaches outside the columns; callers check at the border.
@@ -169,29 +283,44 @@ impl Stage<'_> {
         columns: usize,
         data: &mut [f64],
     ) -> Result<()> {
+        let own = self.kinematics != Kinematics::Displacement;
         let of = |(p, row): (usize, &mut [f64])| {
-            let (_, stress, moduli) = self.respond(particles, p);
+            let Some(Answer { stress, moduli, trial, .. }) = self.respond(particles, p) else {
+                return Some((p, true));
+            };
             for request in requests {
-                write(request, self.kinematics, &stress, &moduli, row);
+                match &trial {
+                    Some(trial) => write_finite(request, trial, own, &stress, &moduli, row),
+                    None => write(request, self.kinematics, &stress, &moduli, row),
+                }
             }
-            (self.kinematics == Kinematics::Cell && couples(&moduli)).then_some(p)
+            (self.kinematics == Kinematics::Cell && couples(&moduli)).then_some((p, false))
         };
-        let coupled = data.par_chunks_exact_mut(columns).enumerate().filter_map(of).min();
-        coupled.map_or(Ok(()), |p| Err(Error::CoupledLaw { index: particles.number[p] as usize }))
+        let first = data.par_chunks_exact_mut(columns).enumerate().filter_map(of).min();
+        first.map_or(Ok(()), |(p, inverted)| {
+            let index = particles.number[p] as usize;
+            Err(if inverted { Error::Inverted { index } } else { Error::CoupledLaw { index } })
+        })
     }
 
-    /// Accept the increments: stress, displacement and (where stored) eps_v of the particles.
-    pub fn commit(&self, particles: &mut Particles) {
+    /// Accept the increments: stress (tau at finite strain), history, displacement and (where stored)
+    /// eps_v of the particles.
+    ///
+    /// # Errors
+    /// [`Error::Inverted`]; then nothing has changed.
+    pub fn commit(&self, particles: &mut Particles) -> Result<()> {
         let of = |p: usize| {
-            let (strain, mut stress, _) = self.respond(particles, p);
+            let mut answer = self.respond(particles, p).ok_or(p)?;
             if self.kinematics == Kinematics::Deviatoric {
-                stress.mean += self.increments.volumetric_at(self.location, p);
+                answer.stress.mean += self.increments.volumetric_at(self.location, p);
             }
             let u = self.increments.u.value(self.location.cell[p] as usize, self.location.xi[p]);
-            (stress, u, strain.volume)
+            Ok((answer.stress, u, answer.volume, answer.history))
         };
-        let new: Vec<_> = (0..particles.len()).into_par_iter().map(of).collect();
-        for (p, (stress, u, volume)) in new.into_iter().enumerate() {
+        let new: std::result::Result<Vec<_>, usize> =
+            (0..particles.len()).into_par_iter().map(of).collect();
+        let new = new.map_err(|p| Error::Inverted { index: particles.number[p] as usize })?;
+        for (p, (stress, u, volume, history)) in new.into_iter().enumerate() {
             for (i, unit) in UNIT.iter().enumerate() {
                 particles.stress[[p, i]] = stress.deviator[i] + stress.mean * unit;
             }
@@ -200,7 +329,12 @@ impl Stage<'_> {
             if let Some(eps_v) = &mut particles.eps_v {
                 eps_v[p] += volume;
             }
+            let places = self.history.get(particles.material[p] as usize);
+            for (&place, value) in places.into_iter().flatten().zip(history) {
+                particles.history[place].1[p] = value;
+            }
         }
+        Ok(())
     }
 }
 

@@ -105,6 +105,12 @@ pub enum Error {
         /// The first such particle.
         index: usize,
     },
+    /// An iterate that turns a particle inside out.
+    #[error("the increment turns particle {index} inside out (det f <= 0)")]
+    Inverted {
+        /// The first such particle.
+        index: usize,
+    },
     /// A law whose mean stress and deviator depend on each other met B-bar.
     #[error(
         "the law of particle {index} couples mean stress and deviator: the tangent of the \

@@ -59,15 +59,9 @@ pub struct Increments<'a> {
 
 impl Increments<'_> {
     /// Displacement gradient at particle `p`.
-    fn grad_u(&self, location: &Location, p: usize) -> [[f64; 2]; 2] {
-        self.u.gradient(location.cell[p] as usize, location.xi[p])
-    }
-
-    /// div u at particle `p`.
     #[must_use]
-    pub fn div_u(&self, location: &Location, p: usize) -> f64 {
-        let g = self.grad_u(location, p);
-        g[0][0] + g[1][1]
+    pub fn grad_u(&self, location: &Location, p: usize) -> [[f64; 2]; 2] {
+        self.u.gradient(location.cell[p] as usize, location.xi[p])
     }
 
     /// The bilinear field at particle `p`; 0 where the form has none.

@@ -24,6 +24,7 @@ mod assembly;
 pub mod basis;
 pub mod constitutive;
 pub mod error;
+pub mod finite_strain;
 pub mod grid;
 pub mod interpolation;
 pub mod kinematics;

@@ -22,6 +22,8 @@ pub struct Particles {
     pub displacement: Array2<f64>,
     /// Volumetric strain eps_v, n; only with forms that have this field.
     pub eps_v: Option<Array1<f64>>,
+    /// History variables of the laws by name, n each; only those that the laws have.
+    pub history: Vec<(&'static str, Array1<f64>)>,
 }
 
 impl Particles {
@@ -48,6 +50,7 @@ impl Particles {
             stress: Array2::zeros((n, COMPONENTS)),
             displacement: Array2::zeros((n, 2)),
             eps_v: None,
+            history: Vec::new(),
             number: (0..n as u32).collect(),
             x,
             volume,
@@ -73,6 +76,7 @@ impl Particles {
             stress: self.stress.select(all, &rows),
             displacement: self.displacement.select(all, &rows),
             eps_v: self.eps_v.as_ref().map(per_particle),
+            history: self.history.iter().map(|(name, a)| (*name, per_particle(a))).collect(),
         }
     }
 
@@ -93,6 +97,9 @@ impl Particles {
         finite("displacement", flat(&self.displacement), 2)?;
         if let Some(eps_v) = &self.eps_v {
             finite("eps_v", flat(eps_v), 1)?;
+        }
+        for (name, values) in &self.history {
+            finite(name, flat(values), 1)?;
         }
         match self.volume.iter().position(|&v| v <= 0.0) {
             Some(p) => Err(Error::Volume { index: self.number[p] as usize, value: self.volume[p] }),
@@ -119,10 +126,27 @@ impl Particles {
         }
     }
 
+    /// Make room for the history variables of a law, zero at first.
+    pub fn add_history(&mut self, names: &[&'static str]) {
+        for &name in names {
+            if !self.history.iter().any(|(known, _)| *known == name) {
+                self.history.push((name, Array1::zeros(self.len())));
+            }
+        }
+    }
+
+    /// Where the history variables of a law stand; `None` if one is not there.
+    #[must_use]
+    pub fn history_of(&self, names: &[&str]) -> Option<Vec<usize>> {
+        let place = |name: &&str| self.history.iter().position(|(known, _)| known == name);
+        names.iter().map(place).collect()
+    }
+
     /// Bytes that one particle takes.
     #[must_use]
     pub fn bytes_per_particle(&self) -> usize {
-        let doubles = 2 + 1 + COMPONENTS + 2 + usize::from(self.eps_v.is_some());
+        let doubles =
+            2 + 1 + COMPONENTS + 2 + usize::from(self.eps_v.is_some()) + self.history.len();
         8 * doubles + 4 + 4
     }
 }

@@ -28,6 +28,10 @@ FORMS: dict[str, dict[str, Any]] = {
     "u_epsv_projection": {"form": "u_epsv", "alpha": 0.1, "stabilisation": "projection"},
     "u_p": {"form": "u_p", "alpha": 0.1},
 }
+FINITE: dict[str, dict[str, Any]] = {
+    "u_finite": {"form": "u_finite"},
+    "u_epsv_finite": {"form": "u_epsv_finite", "alpha": 0.1},
+}
 BASES = ("quadratic_spline", "bilinear", "biquadratic")
 
 

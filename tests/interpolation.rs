@@ -88,7 +88,9 @@ fn one_particle(kinematics: Kinematics, p: f64) -> Particles {
     let stage = Stage {
         location: &location,
         response: Response::Laws(&materials),
+        history: &[vec![]],
         kinematics,
+        finite: false,
         increments: Increments {
             u: Field { grid, basis, coefficients: &u },
             volumetric: Some(Field { grid, basis: Basis::Bilinear, coefficients: &v }),
@@ -97,7 +99,7 @@ fn one_particle(kinematics: Kinematics, p: f64) -> Particles {
     let mut data = Array2::zeros((1, 3));
     let request = Request { operator: Operator::Sigma, part: Part::Value, column: 0 };
     stage.evaluate(&particles, &[request], 3, data.as_slice_mut().unwrap()).unwrap();
-    stage.commit(&mut particles);
+    stage.commit(&mut particles).unwrap();
     if kinematics != Kinematics::Deviatoric {
         for (k, i) in [(0, 0), (1, 1), (2, 3)] {
             assert_eq!(data[[0, k]], particles.stress[[0, i]]);

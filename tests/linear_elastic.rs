@@ -29,7 +29,7 @@ proptest! {
         let law = LinearElastic::from_e_nu(e, nu).unwrap();
         let old = Stress { deviator: [1.0, -3.0, 2.0, 5.0], mean: -7.0 };
         let increment = Strain { deviator: deviator(&strain), volume: trace(&strain) };
-        let (stress, c) = law.respond(&increment, &old);
+        let (stress, c) = law.respond(&increment, &old, &[], &mut []);
         for i in 0..4 {
             let linear: f64 = (0..4).map(|j| c.dev_dev[i][j] * increment.deviator[j]).sum();
             let expected = old.deviator[i] + linear + c.dev_vol[i] * increment.volume;
@@ -42,7 +42,7 @@ proptest! {
         let free = Stress { deviator: [0.0; 4], mean: 0.0 };
         let uniaxial = [strain[0], 0.0, 0.0, strain[3]];
         let increment = Strain { deviator: deviator(&uniaxial), volume: trace(&uniaxial) };
-        let (stress, _) = law.respond(&increment, &free);
+        let (stress, _) = law.respond(&increment, &free, &[], &mut []);
         let modulus = e * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu));
         prop_assert!((stress.deviator[0] + stress.mean - modulus * strain[0]).abs() < 1e-8);
         let shear = e / (2.0 * (1.0 + nu)) * strain[3]; // gamma, not eps_xy
@@ -62,7 +62,8 @@ fn an_incompressible_material_takes_a_strain_without_volume() {
     let law = LinearElastic::from_e_nu(3.0, 0.5).unwrap();
     assert!(law.bulk_modulus().is_infinite() && close(law.shear_modulus(), 1.0, 1e-15));
     let increment = Strain { deviator: [1.0, -1.0, 0.0, 0.0], volume: 0.0 };
-    let (stress, _) = law.respond(&increment, &Stress { deviator: [0.0; 4], mean: 4.0 });
+    let (stress, _) =
+        law.respond(&increment, &Stress { deviator: [0.0; 4], mean: 4.0 }, &[], &mut []);
     assert!(close(stress.mean, 4.0, 1e-15) && close(stress.deviator[0], 2.0, 1e-15));
 }
 

@@ -9,7 +9,7 @@ import venv
 from pathlib import Path
 
 import pytest
-from conftest import FORMS
+from conftest import FINITE, FORMS
 
 from tawami import environment
 from tawami.formulation import shipped
@@ -96,7 +96,7 @@ import logging; logging.disable(logging.INFO)
 from mpi4py import MPI
 import tawami
 assert "empty" in tawami.__file__, tawami.__file__
-for options in {list(FORMS.values())!r}:
+for options in {[*FORMS.values(), *FINITE.values()]!r}:
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.5, cells=(4, 2))
     body = tawami.box(grid, (0, 0), (2, 1))
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1e3, nu=0.4999), **options)
@@ -108,6 +108,6 @@ for options in {list(FORMS.values())!r}:
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
     run = python(code, executable=executable, cwd=tmp_path, env=environment)
     assert run.returncode == 0, run.stderr
-    lines = run.stdout.splitlines()[-len(FORMS) :]  # MPI may have had its say before
+    lines = run.stdout.splitlines()[-len(FORMS) - len(FINITE) :]  # MPI may have had its say before
     assert {line.split()[0] for line in lines} == set(shipped())
     assert all(line.endswith("True") for line in lines)

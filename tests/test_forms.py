@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from conftest import FORMS, grid_of
+from conftest import FINITE, FORMS, grid_of
 from ufl import SpatialCoordinate, div, dot, grad, inner, sym
 
 import tawami
@@ -58,7 +58,24 @@ def test_a_form_in_a_file_works_like_a_shipped_one(random_scene, tmp_path):
 
 
 def test_every_shipped_form_is_in_the_tests():
-    assert {options["form"] for options in FORMS.values()} == set(shipped())
+    tested = [*FORMS.values(), *FINITE.values()]
+    assert {options["form"] for options in tested} == set(shipped())
+
+
+def test_a_quantity_of_the_law_times_constants_of_the_particle(random_scene):
+    def scaled(w, sum_p, sigma, mu):
+        return sum_p(2 * sigma * mu, grad(w))
+
+    def plain(w, sum_p, sigma):
+        return sum_p(sigma, grad(w))
+
+    scenes = [random_scene(form=form_of(function)) for function in (scaled, plain)]
+    mu = scenes[0]._constants["mu"]
+    scenes[1].particles.volume[:] *= 2 * mu
+    c = np.random.default_rng(0).standard_normal(scenes[0].num_coefficients)
+    for function in (lambda s: s.residual(c), lambda s: s.tangent(c).toarray()):
+        a, b = map(function, scenes)
+        assert np.abs(a - b).max() < 1e-13 * np.abs(b).max()
 
 
 def test_a_form_nonlinear_in_the_fields_has_the_right_tangent(random_scene):
@@ -184,7 +201,11 @@ def test_wrong_declarations(make, message):
         (lambda w, sum_p, ds: sum_p(div(w)) - w[1] * ds, "linear in the traction t"),
         (lambda w, sum_p, dx: sum_p(div(w)) + w[1] * dx(1), r"as dx\(1\): expected dx"),
         (lambda w, sum_c, sigma_m: sum_c(sigma_m, div(w)), "needs kinematics 'cell'"),
-        (lambda w, sum_p, sigma: sum_p(sigma * 2, grad(w)), "its residual raised"),
+        (lambda w, sum_p, sigma: sum_p(sigma + 2, grad(w)), "its residual raised"),
+        (
+            lambda w, sum_p, sigma: sum_p(sigma * w[0], grad(w)),
+            "a quantity of the law combines with particle constants only",
+        ),
         (
             lambda w, sum_p, K: sum_p(K * div(w), div(w)),
             "a particle constant combines with numbers",

@@ -14,7 +14,7 @@ from tawami.errors import (
 )
 from tawami.formulation import Form
 from tawami.grid import Grid
-from tawami.materials import linear_elastic
+from tawami.materials import drucker_prager, linear_elastic, von_mises
 from tawami.numpy_law import NumpyLaw
 from tawami.ranks import run
 from tawami.scene import Scene, Solution
@@ -36,6 +36,8 @@ __all__ = [
     "SupportError",
     "TawamiError",
     "box",
+    "drucker_prager",
     "linear_elastic",
     "run",
+    "von_mises",
 ]

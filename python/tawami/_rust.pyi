@@ -11,6 +11,7 @@ __all__ = [
     "Assembler",
     "Grid",
     "InputError",
+    "InvertedError",
     "Location",
     "Material",
     "Particles",
@@ -34,6 +35,9 @@ class TawamiError(Exception):
 
 class InputError(TawamiError):
     """An input is wrong; the message says which."""
+
+class InvertedError(TawamiError):
+    """An iterate turns a particle inside out."""
 
 @final
 class Grid:
@@ -80,6 +84,11 @@ class Particles:
     def bytes_per_particle(self) -> int: ...
     def select(self, particles: _Numbers) -> Particles: ...
     def add_eps_v(self) -> None: ...
+    def move_to(self, x: _Floats) -> None: ...
+    def add_history(self, materials: Sequence[Material]) -> None: ...
+    @property
+    def history_names(self) -> list[str]: ...
+    def history(self, name: str) -> _Floats: ...
     def check(self) -> None: ...
     def check_materials(self, materials: Sequence[Material], kinematics: str) -> None: ...
     def __len__(self) -> int: ...
@@ -92,6 +101,17 @@ class Material:
     def linear_elastic_e_one_minus_2nu(e: float, one_minus_2nu: float) -> Material: ...
     @staticmethod
     def linear_elastic_k_mu(k: float, mu: float) -> Material: ...
+    @staticmethod
+    def von_mises(k: float, mu: float, yield_stress: float, hardening: float) -> Material: ...
+    @staticmethod
+    def drucker_prager(
+        elastic: tuple[float, float],
+        phi: float,
+        c: float,
+        psi: float,
+        eps_v_max: float,
+        tiny: bool,
+    ) -> Material: ...
     @property
     def bulk_modulus(self) -> float: ...
     @property
@@ -140,6 +160,7 @@ class Stage:
         location: Location,
         materials: Sequence[Material],
         kinematics: str,
+        finite: bool,
         basis: str,
     ) -> Stage: ...
     def evaluate(

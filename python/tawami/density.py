@@ -16,12 +16,19 @@ from tawami.errors import FormError
 
 #: Points that densities are given at: the full rule, the cell's centre; or one mean per cell.
 Rule = Literal["particle", "centre", "mean"]
-Part = Literal["value", "strain", "volume"]
+Part = Literal["value", "strain", "gradient", "volume"]
 
 #: Quadrature degree of each rule: 5 x 5 points make the tangent of quadratic splines exact.
 DEGREE: Mapping[Rule, int] = {"particle": 8, "centre": 1}
-#: Components of the quantities that the material law gives.
-LAW = {"sigma": 3, "s": 3, "sigma_m": 1}
+#: Components of the quantities that the material law gives, at small and at finite strain.
+LAW: Mapping[str, Mapping[str, int]] = {
+    "small": {"sigma": 3, "s": 3, "sigma_m": 1},
+    "finite": {"P": 4, "ln_J": 1},
+}
+COMPONENTS = {**LAW["small"], **LAW["finite"]}
+#: Numbers per component of the parts of a law quantity: itself, and its derivatives with respect to
+#: the strain (xx, yy, gamma_xy), grad u (xx, xy, yx, yy) and the volumetric strain.
+WIDTH: Mapping[Part, int] = {"value": 1, "strain": 3, "gradient": 4, "volume": 1}
 
 OPERATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
     "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power
@@ -40,7 +47,9 @@ class ParticleScalar:
     text: str
     evaluate: Callable[[Mapping[str, Any]], Any] = field(compare=False)
 
-    def _binary(self, other: Any, symbol: str, *, swap: bool = False) -> ParticleScalar:
+    def _binary(self, other: Any, symbol: str, *, swap: bool = False) -> Any:
+        if isinstance(other, LawQuantity) and symbol == "*":
+            return other * self
         if not isinstance(other, ParticleScalar):
             if not isinstance(other, (int, float)):
                 raise FormError(
@@ -56,39 +65,52 @@ class ParticleScalar:
             f"({a.text} {symbol} {b.text})", lambda v: operation(a.evaluate(v), b.evaluate(v))
         )
 
-    def __add__(self, other: Any) -> ParticleScalar:
+    def __add__(self, other: Any) -> Any:
         return self._binary(other, "+")
 
-    def __radd__(self, other: Any) -> ParticleScalar:
+    def __radd__(self, other: Any) -> Any:
         return self._binary(other, "+", swap=True)
 
-    def __sub__(self, other: Any) -> ParticleScalar:
+    def __sub__(self, other: Any) -> Any:
         return self._binary(other, "-")
 
-    def __rsub__(self, other: Any) -> ParticleScalar:
+    def __rsub__(self, other: Any) -> Any:
         return self._binary(other, "-", swap=True)
 
-    def __mul__(self, other: Any) -> ParticleScalar:
+    def __mul__(self, other: Any) -> Any:
         return self._binary(other, "*")
 
-    def __rmul__(self, other: Any) -> ParticleScalar:
+    def __rmul__(self, other: Any) -> Any:
         return self._binary(other, "*", swap=True)
 
-    def __truediv__(self, other: Any) -> ParticleScalar:
+    def __truediv__(self, other: Any) -> Any:
         return self._binary(other, "/")
 
-    def __rtruediv__(self, other: Any) -> ParticleScalar:
+    def __rtruediv__(self, other: Any) -> Any:
         return self._binary(other, "/", swap=True)
 
-    def __pow__(self, other: Any) -> ParticleScalar:
+    def __pow__(self, other: Any) -> Any:
         return self._binary(other, "**")
 
 
 @dataclass(frozen=True)
 class LawQuantity:
-    """A quantity that the material law gives, with its consistent tangent."""
+    """A quantity that the material law gives, with its consistent tangent; times a constant of the
+    particle where there is one.
+    """
 
     name: str
+    factor: ParticleScalar | None = None
+
+    def __mul__(self, other: Any) -> LawQuantity:
+        if not isinstance(other, (int, float, ParticleScalar)):
+            raise FormError(
+                f"'{self.name} * ...': a quantity of the law combines with particle constants only, not "
+                f"with {type(other).__name__}. Put it into sum_p({self.name}, expression) instead"
+            )
+        return LawQuantity(self.name, (self.factor or ONE) * other)
+
+    __rmul__ = __mul__
 
 
 Quantity = ParticleScalar | LawQuantity
@@ -110,4 +132,4 @@ class Density:
         """Number of components."""
         if isinstance(self.quantity, ParticleScalar):
             return 1
-        return LAW[self.quantity.name] * (3 if self.part == "strain" else 1)
+        return COMPONENTS[self.quantity.name] * WIDTH[self.part]

@@ -1,11 +1,13 @@
 """The contract of a weak form: what a file in `forms/` declares.
 
-A form declares `fields`, `kinematics`, optionally `parameters` and `options`, and a function
-`residual` whose arguments are picked by their names:
+A form declares `fields`, `kinematics`, optionally `parameters`, `options` and `strain`, and a
+function `residual` whose arguments are picked by their names:
 
 ========================= ========================================================================
 the fields, the tests     u, w, eps_v, q, ... as declared in `fields`
 sigma, s, sigma_m         in-plane stress, its (three-dimensional) deviator, mean stress: of the law
+P, ln_J                   instead of these with `strain = "finite"`: tau f^-T and ln det f of the step,
+                          f = I + grad u, tau the Kirchhoff stress of the law; `K * ln_J` works
 K, mu                     bulk and shear modulus of the particle; `K**2 / mu`, `1 / K` work
 sum_p(D, f), sum_p(f)     sum over particles of V_p D_p : f(x_p), and of V_p f(x_p); exact for f up
                           to degree 4 along x and along y (a warning tells of more)
@@ -32,7 +34,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from tawami.density import LAW
+from tawami.density import COMPONENTS, LAW
 from tawami.errors import FormError, InputError
 from tawami.inputs import number
 
@@ -44,7 +46,9 @@ KINEMATICS: Mapping[str, tuple[str, ...]] = {
     "deviatoric": ("pressure",),
 }
 #: Names that every form has.
-RESERVED = frozenset((*LAW, "K", "mu", "t", "h", "dx", "dx_c", "ds", "sum_p", "sum_c", "cell_mean"))
+RESERVED = frozenset(
+    (*COMPONENTS, "K", "mu", "t", "h", "dx", "dx_c", "ds", "sum_p", "sum_c", "cell_mean")
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +64,7 @@ class Form:
         parameters: Numbers that may change without compiling again: name -> {"default": ...,
             "minimum": ..., "maximum": ...}, the limits optional.
         options: Choices that make a different form: name -> the possible values, default first.
+        strain: 'small', or 'finite': logarithmic elastic strains, the grid reset after each step.
         name: What messages call it.
 
     Raises:
@@ -71,6 +76,7 @@ class Form:
     residual: Callable[..., Any]
     parameters: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     options: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    strain: str = "small"
     name: str = "of the driver script"
 
     def __post_init__(self) -> None:
@@ -91,6 +97,13 @@ class Form:
                 self._fail(f"field '{name}' is of kind '{kind}': expected one of {listed(KINDS)}")
         if self.kinematics not in KINEMATICS:
             self._fail(f"kinematics = '{self.kinematics}': expected one of {listed(KINEMATICS)}")
+        if self.strain not in LAW:
+            self._fail(f"strain = '{self.strain}': expected one of {listed(LAW)}")
+        if self.strain == "finite" and self.kinematics not in ("displacement", "mixed"):
+            self._fail(
+                f"strain = 'finite' with the kinematics '{self.kinematics}': expected 'displacement' or "
+                "'mixed'"
+            )
         wanted = ("displacement", *KINEMATICS[self.kinematics])
         if tuple(kinds) != wanted:
             self._fail(
@@ -187,6 +200,7 @@ def _from_module(module: ModuleType, _residual: Any, name: str | None = None) ->
         residual=module.residual,
         parameters=getattr(module, "parameters", {}),
         options=getattr(module, "options", {}),
+        strain=getattr(module, "strain", "small"),
         name=name,
     )
 

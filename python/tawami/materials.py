@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from numbers import Real
+from typing import Any
 
 from tawami import _rust
 from tawami.errors import InputError
@@ -51,3 +53,66 @@ def linear_elastic(
         return makers[tuple(values)](first, second)
     except InputError as error:
         raise InputError(f"linear_elastic: {error}") from None
+
+
+def von_mises(
+    elastic: _rust.Material, *, yield_stress: float, hardening: float = 0.0
+) -> _rust.Material:
+    """Von Mises plasticity: `q = sqrt(3 J2) <= yield_stress + hardening * plastic_strain`.
+
+    Args:
+        elastic: Elastic part, as linear_elastic(...) makes it; nu < 0.5.
+        yield_stress: In uniaxial tension [Pa].
+        hardening: Hardening modulus [Pa].
+
+    History: `plastic_strain`, the equivalent plastic strain.
+
+    Raises:
+        InputError: A parameter out of its range.
+    """
+    K, mu = _moduli("von_mises", elastic)
+    return _made("von_mises", _rust.Material.von_mises, K, mu, yield_stress, hardening)
+
+
+def drucker_prager(
+    elastic: _rust.Material,
+    *,
+    phi: float,
+    c: float = 0.0,
+    psi: float = 0.0,
+    eps_v_max: float = math.inf,
+    tiny_angle: bool = False,
+) -> _rust.Material:
+    """Drucker-Prager plasticity whose limit states in plane strain are those of Mohr-Coulomb.
+
+    Args:
+        elastic: Elastic part, as linear_elastic(...) makes it; nu < 0.5.
+        phi: Friction angle [degrees].
+        c: Cohesion [Pa].
+        psi: Dilatancy angle [degrees], at most phi.
+        eps_v_max: Plastic volumetric strain at which dilatancy ends.
+        tiny_angle: Take a friction angle between 0 and 1.6 degrees as it is: it is not in radians.
+
+    History: `plastic_strain`, the multiplier of sqrt(J2); `plastic_volume`.
+
+    Raises:
+        InputError: A parameter out of its range.
+    """
+    K, mu = _moduli("drucker_prager", elastic)
+    make = _rust.Material.drucker_prager
+    return _made("drucker_prager", make, (K, mu), phi, c, psi, eps_v_max, tiny_angle)
+
+
+def _moduli(name: str, elastic: Any) -> tuple[float, float]:
+    if not isinstance(elastic, _rust.Material):
+        raise InputError(
+            f"{name}: elastic = {elastic!r}: expected a material of linear_elastic(...)"
+        )
+    return elastic.bulk_modulus, elastic.shear_modulus
+
+
+def _made(name: str, make: Callable[..., _rust.Material], *parameters: Any) -> _rust.Material:
+    try:
+        return make(*parameters)
+    except (InputError, TypeError) as error:
+        raise InputError(f"{name}: {error}") from None

@@ -95,6 +95,7 @@ class Newton:
             rule: np.zeros((len(particles), compiled.columns(rule))) for rule in compiled.densities
         }
         self._requests: dict[Rule, list[tuple[str, str, int]]] = {r: [] for r in self.data}
+        self._factors: dict[Rule, list[tuple[slice, Array]]] = {r: [] for r in self.data}
         for rule, densities in compiled.densities.items():
             for density, column in densities.items():
                 with ranks.together(field.grid.comm):
@@ -114,6 +115,11 @@ class Newton:
     def _place(self, rule: Rule, density: Density, column: int) -> None:
         if isinstance(density.quantity, LawQuantity):
             self._requests[rule].append((density.quantity.name, density.part, column))
+            if density.quantity.factor is not None:
+                place = slice(column, column + density.size)
+                self._factors[rule].append(
+                    (place, density.quantity.factor.evaluate(self.constants))
+                )
         elif isinstance(density.quantity, ParticleScalar):
             with np.errstate(all="ignore"):
                 values = density.quantity.evaluate(self.constants)
@@ -136,6 +142,8 @@ class Newton:
                     fields = self.field.layout.split(coefficients)
                     with ranks.together(self._comm):
                         self.stage.evaluate(*fields, requests, self.data[rule])
+                    for place, factor in self._factors[rule]:
+                        self.data[rule][:, place] *= factor[:, None]
         return self.field.residual(coefficients, self.data)
 
     def _measures(
@@ -220,7 +228,10 @@ class Newton:
         krylov: list[int] = []
         while True:
             coefficients = reduction.selection @ unknowns + reduction.offset
-            internal = self.internal(coefficients)
+            try:
+                internal = self.internal(coefficients)
+            except _rust.InvertedError as error:
+                self._fail(history, f"Then {error}")
             with self.stopwatch("measures"):
                 history.append(self._measures(internal, external, coefficients, reduction))
             if not np.isfinite(_worst(history[-1])):

@@ -32,7 +32,10 @@ FIELDS: dict[str, type[Field]] = {"fast": FastField, "reference": Field}
 
 
 class Scene:
-    """A static scene of small strain.
+    """A static scene.
+
+    With a form of finite strain every `solve` is one step: the particles move, the grid is reset, and
+    what supports prescribe are displacements of the step. Their stress is Kirchhoff's then.
 
     Args:
         grid: The background grid.
@@ -47,6 +50,7 @@ class Scene:
         max_iterations: Newton iterations before the step is given up.
         assembly: 'fast', kernels called from Rust, or 'reference', dolfinx and P^T K P: the same
             numbers to round-off.
+        density: Mass density at the start [kg/m3], one for all materials or one each; gravity needs it.
         parameters: What the form names: alpha, stabilisation, ...
 
     Attributes:
@@ -75,6 +79,7 @@ class Scene:
         tolerance: float = 1e-6,
         max_iterations: int = 20,
         assembly: Literal["fast", "reference"] = "fast",
+        density: float | Sequence[float] | None = None,
         **parameters: Any,
     ) -> None:
         if basis not in BASES:
@@ -106,29 +111,59 @@ class Scene:
         numbers = inputs.numbering("material_of", numbers, len(x))
         whole = _rust.Particles(x, volume, numbers)
         whole.check_materials(materials, self.form.kinematics)
+        whole.add_history(materials)
         self._distribute(whole, grid.rust.locate(whole.x))
         self._compiled = compile_form(grid.comm, self.form, options)
         if self.form.kinematics == "mixed":
             self.particles.add_eps_v()
+        self._finite = self.form.strain == "finite"
+        if self._finite and law is not None:
+            raise InputError(
+                f"form {self.form.name} has finite strains: expected a law in Rust, a NumpyLaw has "
+                "small ones only"
+            )
+        if self._finite and grid.comm.size > 1:
+            raise InputError(
+                f"form {self.form.name} has finite strains, with which particles move: expected one "
+                "rank for now"
+            )
         moduli = np.array([(m.bulk_modulus, m.shear_modulus) for m in materials])
         of_particle = moduli[self.particles.material]
         self._constants = {"K": of_particle[:, 0], "mu": of_particle[:, 1]}
+        self._density = None
+        if density is not None:
+            each = np.broadcast_to(np.asarray(density, dtype=float), (len(materials),))
+            for rho in each:
+                inputs.number("density", float(rho), low=0.0)
+            self._density = each[self.particles.material]
+        self._materials, self._law, self._values = materials, law, values
+        self._side, self._limits = FIELDS[assembly], (tolerance, max_iterations)
         self.stopwatch = Stopwatch()
+        self._attach()
+        self._gravity = (0.0, 0.0)
+        self._edges: list[tuple[Edge, int, Profile]] = []
+        self._points: list[tuple[Sequence[float], int, float]] = []
+        self._tractions: list[tuple[Edge, Profile, Profile]] = []
+        self._total = np.zeros(self._field.layout.size)
+
+    def _attach(self) -> None:
+        """Field side, laws and Newton's method for the particles where they are now."""
+        tolerance, max_iterations = self._limits
         with self.stopwatch("set-up"):
-            self._field = FIELDS[assembly](
-                grid, self._compiled, basis, self._location, self.particles.volume, values,
-                self.stopwatch,
+            self._field = self._side(
+                self.grid, self._compiled, self.basis, self._location, self.particles.volume,
+                self._values, self.stopwatch,
             )  # fmt: skip
-        stage = _rust.Stage(self.particles, self._location, materials, self.form.kinematics, basis)
+        stage = _rust.Stage(
+            self.particles, self._location, self._materials, self.form.kinematics, self._finite,
+            self.basis,
+        )  # fmt: skip
+        law = self._law
         self._stage = NumpyStage(stage, self.particles, law) if law is not None else stage
         self._newton = Newton(
             self._field, self._compiled, self._stage, self.particles, self._location,
             self._constants, self.stopwatch, tolerance=tolerance, max_iterations=max_iterations,
         )  # fmt: skip
-        self._edges: list[tuple[Edge, int, Profile]] = []
-        self._points: list[tuple[Sequence[float], int, float]] = []
-        self._tractions: list[tuple[Edge, Profile, Profile]] = []
-        self._total = np.zeros(self._field.layout.size)
 
     def _distribute(self, body: _rust.Particles, location: _rust.Location) -> None:
         """Keep the particles in this rank's cells."""
@@ -198,6 +233,28 @@ class Scene:
         components = inputs.pair(what, value, "components (t_x, t_y)")
         self._tractions.append((edge, *components))
 
+    def gravity(self, acceleration: Sequence[float]) -> None:
+        """Load the body by its weight.
+
+        Args:
+            acceleration: (b_x, b_y) [m/s2], in place of what was set before.
+
+        Raises:
+            InputError: No density, or not two finite numbers.
+        """
+        if self._density is None:
+            raise InputError("gravity(...) needs Scene(..., density=...) [kg/m3]")
+        self._gravity = inputs.point("gravity", acceleration)
+
+    def _weight(self) -> Array:
+        """External forces on all coefficients of the weight, sum_p N_i m_p b."""
+        force = np.zeros(self._field.layout.size)
+        if self._density is not None and any(self._gravity):
+            data = self._density[:, None] * np.array(self._gravity)
+            sums = _rust.nodal_sums(self._location, self.particles.volume, data, self.basis)
+            force[: self._field.layout.num_displacement] = sums.ravel()
+        return ranks.sum_of(self.grid.comm, force)
+
     def _reduction(self) -> Reduction:
         field = self._field
         held = [
@@ -211,7 +268,7 @@ class Scene:
         return Reduction(field.layout, held, points, self._total)
 
     def _external(self) -> Array:
-        force = np.zeros(self._field.layout.size)
+        force = self._weight()
         for edge, *components in self._tractions:
             nodes = self._field.edge_nodes(edge)
             if len(nodes) == 0:
@@ -283,10 +340,21 @@ class Scene:
             reduction = self._reduction()
             external = self._external()
         step = self._newton.solve(reduction, external)
+        fields = self._field.layout.split(step.coefficients)
+        moved = None
+        if self._finite:  # where they go is known before anything changes
+            moved = self.particles.x + _rust.interpolate(self._location, self.basis, 2, fields[0])
+            location = self.grid.rust.locate(moved)
         with self.stopwatch("commit"), ranks.together(self.grid.comm):
-            self._stage.commit(*self._field.layout.split(step.coefficients))
-        self._total = self._total + step.coefficients
-        return Solution(self, step, reduction.size, self._total)
+            self._stage.commit(*fields)
+        solution = Solution(self, step, reduction.size, self._total + step.coefficients)
+        if moved is None:
+            self._total = self._total + step.coefficients
+        else:
+            self.particles.move_to(moved)
+            self._location = location
+            self._attach()
+        return solution
 
 
 class Solution:

@@ -12,6 +12,7 @@ import ufl
 
 from tawami import _dolfinx
 from tawami.density import (
+    COMPONENTS,
     DEGREE,
     LAW,
     MU,
@@ -19,6 +20,7 @@ from tawami.density import (
     Density,
     K,
     LawQuantity,
+    Part,
     ParticleScalar,
     Quantity,
     Rule,
@@ -67,7 +69,7 @@ class Symbols:
             **self.fields,
             **self.tests,
             **self.constants,
-            **{name: LawQuantity(name) for name in LAW},
+            **{name: LawQuantity(name) for name in LAW[form.strain]},
             **options,
             "K": K,
             "mu": MU,
@@ -106,8 +108,9 @@ class Symbols:
             return ONE * quantity
         if not isinstance(quantity, (ParticleScalar, LawQuantity)):
             raise FormError(
-                f"form {self.form.name}: {caller} takes a particle quantity (sigma, s, sigma_m, K, "
-                f"mu, or arithmetic of K and mu) first, not {quantity}"
+                f"form {self.form.name}: {caller} takes a particle quantity "
+                f"({', '.join(LAW[self.form.strain])}, K, mu, or arithmetic of K and mu) first, "
+                f"not {quantity}"
             )
         return quantity
 
@@ -125,7 +128,11 @@ class Symbols:
         if rule == "particle":
             self._check_degree(expression)
         c = self.density(Density(rule, quantity))
-        weight = ufl.as_matrix([[c[0], c[2]], [c[2], c[1]]]) if len(c) == 3 else c[0]
+        weight = c[0]
+        if len(c) == 3:
+            weight = ufl.as_matrix([[c[0], c[2]], [c[2], c[1]]])
+        elif len(c) == 4:
+            weight = ufl.as_matrix([[c[0], c[1]], [c[2], c[3]]])
         if weight.ufl_shape != expression.ufl_shape:
             raise FormError(
                 f"form {self.form.name}: {caller} got a quantity of shape {weight.ufl_shape} and an "
@@ -210,18 +217,21 @@ class Symbols:
         return residual
 
     def _direction(self, density: Density) -> Any:
-        """Change of a law quantity with the fields: C : strain(du) + c d_eps_v."""
+        """Change of a law quantity with the fields: C : strain(du) (or grad(du)) + c d_eps_v."""
         assert isinstance(density.quantity, LawQuantity)
-        kinematics, n = self.form.kinematics, LAW[density.quantity.name]
+        kinematics, n = self.form.kinematics, COMPONENTS[density.quantity.name]
         du, *volumetric = self.trials.values()
         change = [ufl.as_ufl(0.0)] * n
+        part: Part = "gradient" if self.form.strain == "finite" else "strain"
         if density.rule == "particle":
-            e = ufl.sym(ufl.grad(du))
-            strain = (e[0, 0], e[1, 1], 2 * e[0, 1])
-            c = self.density(Density(density.rule, density.quantity, "strain"))
-            change = [sum(c[3 * i + j] * strain[j] for j in range(3)) for i in range(n)]
+            g, e = ufl.grad(du), ufl.sym(ufl.grad(du))
+            direction = (e[0, 0], e[1, 1], 2 * e[0, 1])
+            if part == "gradient":
+                direction = (g[0, 0], g[0, 1], g[1, 0], g[1, 1])
+            c, m = self.density(Density(density.rule, density.quantity, part)), len(direction)
+            change = [sum(c[m * i + j] * direction[j] for j in range(m)) for i in range(n)]
         volume = None
-        if kinematics == "mixed":
+        if kinematics == "mixed" and density.quantity.name != "ln_J":
             volume = volumetric[0]
         elif kinematics == "cell" and density.rule == "centre":
             volume = ufl.div(du)

@@ -1,6 +1,6 @@
 //! Isotropic linear elasticity: `s += 2 mu dev(d_eps)`, `sigma_m += K d_eps_v`.
 
-use super::{Material, Moduli, Strain, Stress};
+use super::{deviatoric_stiffness, Material, Moduli, Strain, Stress};
 use crate::error::{Error, Result};
 use crate::tensor::COMPONENTS;
 
@@ -81,9 +81,14 @@ impl Material for LinearElastic {
         self.bulk
     }
 
-    fn respond(&self, increment: &Strain, old: &Stress) -> (Stress, Moduli) {
-        // The strain holds gamma_xy = 2 eps_xy, hence mu and not 2 mu for the shear.
-        let stiffness = [2.0 * self.mu, 2.0 * self.mu, 2.0 * self.mu, self.mu];
+    fn respond(
+        &self,
+        increment: &Strain,
+        old: &Stress,
+        _history: &[f64],
+        _new: &mut [f64],
+    ) -> (Stress, Moduli) {
+        let stiffness = deviatoric_stiffness(self.mu);
         let deviator =
             std::array::from_fn(|i| old.deviator[i] + stiffness[i] * increment.deviator[i]);
         // An incompressible material has no volume change: 0 times infinity must stay 0.

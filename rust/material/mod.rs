@@ -3,9 +3,13 @@
 //!
 //! Deviatoric and volumetric parts travel separately (see [`crate::kinematics`]).
 
+mod drucker_prager;
 mod linear_elastic;
+mod von_mises;
 
+pub use drucker_prager::{DruckerPrager, Friction};
 pub use linear_elastic::LinearElastic;
+pub use von_mises::VonMises;
 
 use crate::tensor::{deviator, mean, Sym, Tangent, COMPONENTS};
 
@@ -71,6 +75,37 @@ pub trait Material: Send + Sync {
     /// Bulk modulus K [Pa] of the elastic part; infinite where the material is incompressible.
     fn bulk_modulus(&self) -> f64;
 
-    /// Stress at the end of the step and its tangent, from the increment and the old stress.
-    fn respond(&self, increment: &Strain, old: &Stress) -> (Stress, Moduli);
+    /// Names of the history variables, all zero at first.
+    fn history(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// Stress at the end of the step and its tangent, from the increment and the old stress; `new` are
+    /// the history variables at the end.
+    fn respond(
+        &self,
+        increment: &Strain,
+        old: &Stress,
+        history: &[f64],
+        new: &mut [f64],
+    ) -> (Stress, Moduli);
+
+    /// The elastic strain behind a stress; where stress is linear in it, as here, it is enough.
+    fn elastic_strain(&self, stress: &Stress) -> Strain {
+        let stiffness = deviatoric_stiffness(self.shear_modulus());
+        Strain {
+            deviator: std::array::from_fn(|i| stress.deviator[i] / stiffness[i]),
+            volume: stress.mean / self.bulk_modulus(),
+        }
+    }
+}
+
+/// `s = 2 mu e` component by component: the strain holds gamma_xy = 2 eps_xy, hence mu for the shear.
+pub(crate) fn deviatoric_stiffness(mu: f64) -> Sym {
+    [2.0 * mu, 2.0 * mu, 2.0 * mu, mu]
+}
+
+/// `sqrt(s : s)` of a stress.
+pub(crate) fn norm(s: &Sym) -> f64 {
+    (s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + 2.0 * s[3] * s[3]).sqrt()
 }

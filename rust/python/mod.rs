@@ -17,10 +17,14 @@ use crate::error::Error;
 
 create_exception!(tawami, TawamiError, PyException, "Base of every error that tawami raises.");
 create_exception!(tawami, InputError, TawamiError, "An input is wrong; the message says which.");
+create_exception!(tawami, InvertedError, TawamiError, "An iterate turns a particle inside out.");
 
 impl From<Error> for PyErr {
     fn from(error: Error) -> Self {
-        InputError::new_err(error.to_string())
+        match error {
+            Error::Inverted { .. } => InvertedError::new_err(error.to_string()),
+            _ => InputError::new_err(error.to_string()),
+        }
     }
 }
 
@@ -47,6 +51,7 @@ fn view<'py, T: Element, D: Dimension, O: PyClass>(
 fn _rust(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("TawamiError", m.py().get_type::<TawamiError>())?;
     m.add("InputError", m.py().get_type::<InputError>())?;
+    m.add("InvertedError", m.py().get_type::<InvertedError>())?;
     m.add_class::<grid::PyGrid>()?;
     m.add_class::<grid::PyLocation>()?;
     m.add_class::<grid::PyActive>()?;

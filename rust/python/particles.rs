@@ -5,9 +5,9 @@ use std::sync::Arc;
 use numpy::{PyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use super::{require, view};
+use super::{require, view, InputError};
 use crate::constitutive;
-use crate::material::{LinearElastic, Material};
+use crate::material::{DruckerPrager, Friction, LinearElastic, Material, VonMises};
 use crate::particles::Particles;
 
 /// The same array, not writeable from Python: the cells of the particles and their laws' constants
@@ -48,6 +48,38 @@ impl PyParticles {
         let inside = particles.iter().all(|&p| (p as usize) < self.0.len());
         require(inside, "a selection of other particles")?;
         Ok(Self(self.0.select(particles)))
+    }
+
+    fn add_history(&mut self, materials: Vec<PyRef<PyMaterial>>) {
+        for law in laws(&materials) {
+            self.0.add_history(law.history());
+        }
+    }
+
+    /// Put the particles elsewhere.
+    fn move_to(&mut self, x: PyReadonlyArray2<f64>) -> PyResult<()> {
+        require(x.as_array().dim() == self.0.x.dim(), "positions of other particles")?;
+        self.0.x.assign(&x.as_array());
+        Ok(())
+    }
+
+    /// Names of the history variables.
+    #[getter]
+    fn history_names(&self) -> Vec<&'static str> {
+        self.0.history.iter().map(|(name, _)| *name).collect()
+    }
+
+    /// A history variable by its name.
+    fn history<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let object = slf.borrow();
+        let Some((_, array)) = object.0.history.iter().find(|(known, _)| *known == name) else {
+            let known: Vec<_> = object.0.history.iter().map(|(name, _)| *name).collect();
+            return Err(InputError::new_err(format!(
+                "history '{name}': the laws of this scene have {known:?}"
+            )));
+        };
+        // SAFETY: as in `view`; never reallocated once a scene is made.
+        Ok(unsafe { PyArray::borrow_from_array(array, slf.clone().into_any()) })
     }
 
     fn add_eps_v(&mut self) {
@@ -120,6 +152,26 @@ impl PyMaterial {
     #[staticmethod]
     fn linear_elastic_k_mu(k: f64, mu: f64) -> PyResult<Self> {
         Ok(Self(Arc::new(LinearElastic::from_k_mu(k, mu)?)))
+    }
+
+    #[staticmethod]
+    fn von_mises(k: f64, mu: f64, yield_stress: f64, hardening: f64) -> PyResult<Self> {
+        let elastic = LinearElastic::from_k_mu(k, mu)?;
+        Ok(Self(Arc::new(VonMises::new(elastic, yield_stress, hardening)?)))
+    }
+
+    #[staticmethod]
+    fn drucker_prager(
+        elastic: (f64, f64),
+        phi: f64,
+        c: f64,
+        psi: f64,
+        eps_v_max: f64,
+        tiny: bool,
+    ) -> PyResult<Self> {
+        let elastic = LinearElastic::from_k_mu(elastic.0, elastic.1)?;
+        let friction = Friction { phi, c, psi, eps_v_max, tiny };
+        Ok(Self(Arc::new(DruckerPrager::new(elastic, friction)?)))
     }
 
     #[getter]

@@ -11,7 +11,7 @@ use super::grid::{field, PyLocation};
 use super::particles::{laws, PyMaterial, PyParticles};
 use super::require;
 use crate::basis::Basis;
-use crate::constitutive::{Operator, Part, Request, Response, Stage};
+use crate::constitutive::{Operator, Part, Request, Response, Stage, MAX_HISTORY};
 use crate::grid::Location;
 use crate::kinematics::{Increments, Kinematics};
 use crate::material::Material;
@@ -23,7 +23,9 @@ pub(super) struct PyStage {
     particles: Py<PyParticles>,
     location: Arc<Location>,
     materials: Vec<Arc<dyn Material>>,
+    history: Vec<Vec<usize>>,
     kinematics: Kinematics,
+    finite: bool,
     basis: Basis,
 }
 
@@ -57,7 +59,9 @@ impl PyStage {
         Ok(run(&Stage {
             location: &self.location,
             response,
+            history: &self.history,
             kinematics: self.kinematics,
+            finite: self.finite,
             increments,
         }))
     }
@@ -72,14 +76,26 @@ impl PyStage {
         location: &PyLocation,
         materials: Vec<PyRef<PyMaterial>>,
         kinematics: &str,
+        finite: bool,
         basis: &str,
     ) -> PyResult<Self> {
         require(particles.borrow(py).0.len() == location.0.len(), "location of other particles")?;
+        let materials = laws(&materials);
+        let mut history = Vec::new();
+        for law in &materials {
+            let names = law.history();
+            require(names.len() <= MAX_HISTORY, "a law with more history than there is room for")?;
+            let places = particles.borrow(py).0.history_of(names);
+            require(places.is_some(), "particles without the history of their laws")?;
+            history.extend(places);
+        }
         Ok(Self {
             particles,
             location: Arc::clone(&location.0),
-            materials: laws(&materials),
+            materials,
+            history,
             kinematics: kinematics.parse()?,
+            finite,
             basis: basis.parse()?,
         })
     }
@@ -101,8 +117,8 @@ impl PyStage {
         require(rows == particles.0.len(), "data of other particles")?;
         let requests: Vec<Request> = requests.iter().map(request).collect::<PyResult<_>>()?;
         let fits = |r: &Request| {
-            let per_component = if r.part == Part::Strain { 3 } else { 1 };
-            r.column + r.operator.components() * per_component <= columns
+            r.operator.finite() == self.finite
+                && r.column + r.operator.components() * r.part.width() <= columns
         };
         require(requests.iter().all(fits), "a request reaches outside the particle data")?;
         if requests.is_empty() {
@@ -122,7 +138,7 @@ impl PyStage {
         given: Option<Given>,
     ) -> PyResult<()> {
         let mut particles = self.particles.borrow_mut(py);
-        self.with(&u, volumetric.as_ref(), given.as_ref(), |s| s.commit(&mut particles.0))
+        Ok(self.with(&u, volumetric.as_ref(), given.as_ref(), |s| s.commit(&mut particles.0))??)
     }
 
     /// Strain increments at the particles (xx, yy, zz, gamma_xy): n x 4.
@@ -139,7 +155,7 @@ impl PyStage {
         strains.as_flattened().to_pyarray(py).reshape([self.location.len(), COMPONENTS])
     }
 
-    /// div u and the bilinear field (0 if there is none) at the particles: n x 2.
+    /// div u (ln J_f at finite strain) and the bilinear field (0 if there is none) at the particles: n x 2.
     #[pyo3(signature = (u, volumetric))]
     fn volume_strains<'py>(
         &self,
@@ -148,9 +164,7 @@ impl PyStage {
         volumetric: Option<PyReadonlyArray1<f64>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let location = &self.location;
-        let of = |s: &Stage, p| {
-            [s.increments.div_u(location, p), s.increments.volumetric_at(location, p)]
-        };
+        let of = |s: &Stage, p| [s.volume_change(p), s.increments.volumetric_at(location, p)];
         let strains: Vec<[f64; 2]> = self.with(&u, volumetric.as_ref(), None, |s| {
             (0..location.len()).into_par_iter().map(|p| of(s, p)).collect()
         })?;
@@ -163,11 +177,14 @@ pub(super) fn request((operator, part, column): &(String, String, usize)) -> PyR
         "sigma" => Operator::Sigma,
         "s" => Operator::Deviator,
         "sigma_m" => Operator::Mean,
+        "P" => Operator::Nominal,
+        "ln_J" => Operator::LnJ,
         other => return Err(PyRuntimeError::new_err(format!("internal: operator '{other}'"))),
     };
     let part = match part.as_str() {
         "value" => Part::Value,
         "strain" => Part::Strain,
+        "gradient" => Part::Gradient,
         "volume" => Part::Volume,
         other => return Err(PyRuntimeError::new_err(format!("internal: part '{other}'"))),
     };

@@ -1,0 +1,151 @@
+//! Drucker-Prager plasticity: `sqrt(J2) + A p <= c B`, p the mean stress, tension positive.
+//!
+//! The cone that gives the limit states of Mohr-Coulomb in plane strain, with flow of its own:
+//!
+//! ```text
+//! Ab = 3 tan psi / sqrt(9 + 12 tan^2 psi)     d = sqrt(1 - Ab^2/3) + Ab sin phi / 3
+//! A = sin phi / d        B = cos phi / d
+//! ```
+//!
+//! (the often quoted 3 tan phi / sqrt(9 + 12 tan^2 phi) is the associated case psi = phi only).
+//! Return to the cone: `d_gamma = F / (mu + K A Ab)`, `sqrt(J2) -= mu d_gamma`, `p -= K Ab d_gamma`;
+//! where that passes the apex, s = 0 and p = c B / A, which also cuts off tension at psi = 0.
+
+use super::{deviatoric_stiffness, norm, LinearElastic, Material, Moduli, Strain, Stress};
+use crate::error::{Error, Result};
+use crate::tensor::COMPONENTS;
+
+/// Below this a friction angle is taken for one in radians.
+const RADIANS: f64 = 1.6;
+
+/// Drucker-Prager plasticity.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DruckerPrager {
+    elastic: LinearElastic,
+    a: f64,
+    strength: f64,
+    flow: f64,
+    eps_v_max: f64,
+}
+
+/// Parameters of [`DruckerPrager`] beside its elastic law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Friction {
+    /// Friction angle phi [degrees].
+    pub phi: f64,
+    /// Cohesion c [Pa].
+    pub c: f64,
+    /// Dilatancy angle psi [degrees].
+    pub psi: f64,
+    /// Plastic volumetric strain at which dilatancy ends.
+    pub eps_v_max: f64,
+    /// Take a friction angle between 0 and 1.6 degrees as it is.
+    pub tiny: bool,
+}
+
+impl DruckerPrager {
+    /// From the elastic law and the angles.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming the parameter that is out of range.
+    pub fn new(elastic: LinearElastic, friction: Friction) -> Result<Self> {
+        let Friction { phi, c, psi, eps_v_max, tiny } = friction;
+        let refuse = |name, value, expected| Err(Error::Parameter { name, value, expected });
+        if !(0.0..90.0).contains(&phi) {
+            return refuse("phi", phi, "a friction angle in degrees, 0 <= phi < 90");
+        }
+        if phi > 0.0 && phi < RADIANS && !tiny {
+            let expected = "degrees: below 1.6 it looks like radians. With tiny_angle=True it is taken as it is";
+            return refuse("phi", phi, expected);
+        }
+        if !(0.0..=phi).contains(&psi) {
+            return refuse("psi", psi, "a dilatancy angle in degrees, 0 <= psi <= phi");
+        }
+        if !(c >= 0.0 && c.is_finite()) {
+            return refuse("c", c, "a cohesion of at least 0 Pa");
+        }
+        if phi == 0.0 && c == 0.0 {
+            return refuse(
+                "c",
+                c,
+                "a positive cohesion where phi = 0: without both there is no strength",
+            );
+        }
+        if eps_v_max.is_nan() || eps_v_max < 0.0 {
+            return refuse("eps_v_max", eps_v_max, "a plastic volumetric strain of at least 0");
+        }
+        let (phi, tan_psi) = (phi.to_radians(), psi.to_radians().tan());
+        let flow = 3.0 * tan_psi / (9.0 + 12.0 * tan_psi * tan_psi).sqrt();
+        let d = (1.0 - flow * flow / 3.0).sqrt() + flow * phi.sin() / 3.0;
+        Ok(Self { elastic, a: phi.sin() / d, strength: c * phi.cos() / d, flow, eps_v_max })
+    }
+}
+
+impl Material for DruckerPrager {
+    fn shear_modulus(&self) -> f64 {
+        self.elastic.shear_modulus()
+    }
+
+    fn bulk_modulus(&self) -> f64 {
+        self.elastic.bulk_modulus()
+    }
+
+    fn history(&self) -> &'static [&'static str] {
+        &["plastic_strain", "plastic_volume"]
+    }
+
+    fn respond(
+        &self,
+        increment: &Strain,
+        old: &Stress,
+        history: &[f64],
+        new: &mut [f64],
+    ) -> (Stress, Moduli) {
+        let (trial, mut moduli) = self.elastic.respond(increment, old, &[], &mut []);
+        new.copy_from_slice(history);
+        let (mu, bulk) = (self.shear_modulus(), self.bulk_modulus());
+        let root = norm(&trial.deviator) / 2.0_f64.sqrt();
+        let excess = root + self.a * trial.mean - self.strength;
+        if excess <= 0.0 {
+            return (trial, moduli);
+        }
+        let flow = if history[1] < self.eps_v_max { self.flow } else { 0.0 };
+        let stiffness = mu + bulk * self.a * flow;
+        let gamma = excess / stiffness;
+        if mu * gamma >= root {
+            // the apex; a > 0, for with phi = 0 gamma = (root - c) / mu
+            let mean = self.strength / self.a;
+            new[0] += root / mu;
+            new[1] += (trial.mean - mean) / bulk;
+            let nothing = [0.0; COMPONENTS];
+            moduli = Moduli {
+                dev_dev: [nothing; COMPONENTS],
+                dev_vol: nothing,
+                mean_dev: nothing,
+                mean_vol: 0.0,
+            };
+            return (Stress { deviator: nothing, mean }, moduli);
+        }
+        new[0] += gamma;
+        new[1] += flow * gamma;
+        let n = trial.deviator.map(|s| s / root);
+        let keep = 1.0 - mu * gamma / root;
+        let stress = Stress {
+            deviator: trial.deviator.map(|s| keep * s),
+            mean: trial.mean - bulk * flow * gamma,
+        };
+        let elastic = deviatoric_stiffness(mu);
+        let along = mu * mu * (gamma / root - 1.0 / stiffness);
+        let cross = mu * bulk / stiffness;
+        for i in 0..COMPONENTS {
+            for j in 0..COMPONENTS {
+                let diagonal = if i == j { keep * elastic[i] } else { 0.0 };
+                moduli.dev_dev[i][j] = diagonal + along * n[i] * n[j];
+            }
+            moduli.dev_vol[i] = -cross * self.a * n[i];
+            moduli.mean_dev[i] = -cross * flow * n[i];
+        }
+        moduli.mean_vol = bulk * (1.0 - bulk * flow * self.a / stiffness);
+        (stress, moduli)
+    }
+}

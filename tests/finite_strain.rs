@@ -1,0 +1,150 @@
+//! Hencky elasticity of finite strain: closed forms, objectivity, derivatives against differences.
+
+use proptest::prelude::*;
+use tawami::finite_strain::{Plane, Trial};
+use tawami::material::{LinearElastic, Material, Moduli, Strain, Stress};
+
+const NONE: Strain = Strain { deviator: [0.0; 4], volume: 0.0 };
+const FREE: Stress = Stress { deviator: [0.0; 4], mean: 0.0 };
+
+fn law() -> LinearElastic {
+    LinearElastic::from_k_mu(5.0, 2.0).unwrap()
+}
+
+fn respond(trial: &Trial) -> (Stress, Moduli) {
+    law().respond(&trial.strain, &FREE, &[], &mut [])
+}
+
+fn rotation(angle: f64) -> Plane {
+    let (s, c) = angle.sin_cos();
+    [[c, -s], [s, c]]
+}
+
+fn minus_unit(f: &Plane) -> Plane {
+    [[f[0][0] - 1.0, f[0][1]], [f[1][0], f[1][1] - 1.0]]
+}
+
+fn times(a: &Plane, b: &Plane) -> Plane {
+    std::array::from_fn(|i| std::array::from_fn(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j]))
+}
+
+#[test]
+fn plane_stretches_give_the_logarithms() {
+    let (a, b) = (1.7_f64, 0.6_f64);
+    let trial = Trial::new(&[[a - 1.0, 0.0], [0.0, b - 1.0]], None, &NONE).unwrap();
+    let third = (a * b).ln() / 3.0;
+    let expected = [a.ln() - third, b.ln() - third, -third, 0.0];
+    for (x, y) in trial.strain.deviator.iter().zip(expected) {
+        assert!((x - y).abs() < 1e-14);
+    }
+    assert!((trial.strain.volume - (a * b).ln()).abs() < 1e-15);
+    // P = tau f^-T: the axial one over its own stretch
+    let (tau, _) = respond(&trial);
+    let p = trial.nominal(&tau);
+    assert!((p[0] - (4.0 * expected[0] + 15.0 * third) / a).abs() < 1e-13);
+    assert!((p[3] - (4.0 * expected[1] + 15.0 * third) / b).abs() < 1e-13);
+}
+
+#[test]
+fn what_turns_a_particle_inside_out_is_refused() {
+    for g in [[[-1.0, 0.0], [0.0, 0.0]], [[-1.5, 0.0], [0.0, 0.0]], [[f64::NAN, 0.0], [0.0, 0.0]]] {
+        assert!(Trial::new(&g, Some(0.0), &NONE).is_none());
+    }
+}
+
+prop_compose! {
+    fn gradients()(g in [[-0.3..0.3_f64, -0.3..0.3_f64], [-0.3..0.3_f64, -0.3..0.3_f64]]) -> Plane { g }
+}
+
+prop_compose! {
+    fn strains()(e in [-0.5..0.5_f64, -0.5..0.5_f64, -0.5..0.5_f64], volume in -0.3..0.3_f64) -> Strain {
+        Strain { deviator: [e[0], e[1], -e[0] - e[1], e[2]], volume }
+    }
+}
+
+proptest! {
+    #[test]
+    fn a_rotation_turns_the_stress_and_makes_none(angle in -7.0..7.0_f64, old in strains()) {
+        let q = rotation(angle);
+        let still = Trial::new(&[[0.0; 2]; 2], None, &old).unwrap();
+        let turned = Trial::new(&minus_unit(&q), None, &old).unwrap();
+        prop_assert!((turned.strain.volume - old.volume).abs() < 1e-14);
+        let ((s, _), (t, _)) = (respond(&still), respond(&turned));
+        // P f^T = tau turns with the body
+        let p = turned.nominal(&t);
+        let tau = times(&[[p[0], p[1]], [p[2], p[3]]], &[[q[0][0], q[1][0]], [q[0][1], q[1][1]]]);
+        let m = s.mean;
+        let before = [[s.deviator[0] + m, s.deviator[3]], [s.deviator[3], s.deviator[1] + m]];
+        let after = times(&times(&q, &before), &[[q[0][0], q[1][0]], [q[0][1], q[1][1]]]);
+        for i in 0..2 {
+            for j in 0..2 {
+                prop_assert!((tau[i][j] - after[i][j]).abs() < 1e-12);
+            }
+        }
+        prop_assert!((s.deviator[2] - t.deviator[2]).abs() < 1e-13);
+        let free = Trial::new(&minus_unit(&q), None, &NONE).unwrap();
+        prop_assert!(free.strain.deviator.iter().all(|e| e.abs() < 1e-14));
+    }
+
+    #[test]
+    fn steps_along_one_axis_add_up(a in 0.5..2.0_f64, b in 0.5..2.0_f64) {
+        let stretch = |a: f64| [[a - 1.0, 0.0], [0.0, 0.0]];
+        let first = Trial::new(&stretch(a), None, &NONE).unwrap();
+        let second = Trial::new(&stretch(b), None, &first.strain).unwrap();
+        let once = Trial::new(&stretch(a * b), None, &NONE).unwrap();
+        for k in 0..4 {
+            prop_assert!((second.strain.deviator[k] - once.strain.deviator[k]).abs() < 1e-13);
+        }
+        prop_assert!((second.strain.volume - once.strain.volume).abs() < 1e-14);
+    }
+
+    #[test]
+    fn derivatives_are_differences(g in gradients(), old in strains(), dg in gradients(), mixed: bool, dv in -0.3..0.3_f64) {
+        let (h, volume) = (1e-6, 0.07);
+        let at = |s: f64| {
+            let moved = std::array::from_fn(|i| std::array::from_fn(|j| g[i][j] + s * dg[i][j]));
+            let trial = Trial::new(&moved, mixed.then_some(volume + s * dv), &old).unwrap();
+            let (tau, c) = respond(&trial);
+            (trial.nominal(&tau), trial, tau, c)
+        };
+        let (_, trial, tau, c) = at(0.0);
+        let dv = if mixed { dv } else { trial.volume_change(&dg) };
+        let (plus, minus) = (at(h), at(-h));
+        let exact = trial.nominal_change(&tau, &c, &dg, dv);
+        for ((a, b), exact) in plus.0.iter().zip(minus.0).zip(exact) {
+            let difference = (a - b) / (2.0 * h);
+            prop_assert!((difference - exact).abs() < 1e-7, "{} {}", difference, exact);
+        }
+        let slope: f64 = trial.ln_j_gradient().iter().zip(dg.as_flattened()).map(|(a, b)| a * b).sum();
+        prop_assert!(((plus.1.ln_j - minus.1.ln_j) / (2.0 * h) - slope).abs() < 1e-8);
+    }
+
+    #[test]
+    fn small_gradients_give_the_small_strain(g in gradients()) {
+        let scale = 1e-7;
+        let small = g.map(|row| row.map(|x| scale * x));
+        let trial = Trial::new(&small, None, &NONE).unwrap();
+        let third = (g[0][0] + g[1][1]) / 3.0;
+        let expected = [g[0][0] - third, g[1][1] - third, -third, g[0][1] + g[1][0]];
+        for (e, expected) in trial.strain.deviator.iter().zip(expected) {
+            prop_assert!((e / scale - expected).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn equal_eigenvalues_are_no_special_case(t in 0.0..1e-3_f64) {
+        // nearly equal principal stretches: the divided difference stays that of the logarithm
+        let g = [[0.1 + t, 0.0], [0.0, 0.1]];
+        let trial = Trial::new(&g, None, &NONE).unwrap();
+        let (tau, c) = respond(&trial);
+        let shear = [[0.0, 1.0], [1.0, 0.0]];
+        let change = trial.nominal_change(&tau, &c, &shear, 0.0);
+        let (h, at) = (1e-6, |s: f64| {
+            let trial = Trial::new(&[[0.1 + t, s], [s, 0.1]], None, &NONE).unwrap();
+            trial.nominal(&respond(&trial).0)
+        });
+        for ((a, b), change) in at(h).iter().zip(at(-h)).zip(change) {
+            prop_assert!(((a - b) / (2.0 * h) - change).abs() < 1e-7);
+        }
+    }
+}
