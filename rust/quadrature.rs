@@ -39,6 +39,13 @@ impl Rule {
         Self { points, weights, barycentric }
     }
 
+    /// The ends of the interval with half its length each (trapezoidal): products of its polynomials
+    /// are the bilinear functions.
+    #[must_use]
+    pub fn ends() -> Self {
+        Self { points: vec![0.0, 1.0], weights: vec![0.5, 0.5], barycentric: vec![-1.0, 1.0] }
+    }
+
     /// Values at `t` of the Lagrange polynomials of the points, into `l`.
     pub fn lagrange(&self, t: f64, l: &mut [f64]) {
         for (i, li) in l.iter_mut().enumerate() {

@@ -68,7 +68,9 @@ def test_a_rotation_of_the_body_makes_no_force(random_scene, finite, angle):
 
 def test_small_increments_give_the_small_strain(random_scene, finite):
     small = {"u_finite": "u", "u_epsv_finite": "u_epsv"}[finite["form"]]
-    scene, other = random_scene(**finite), random_scene(**finite | {"form": small})
+    consistent = {"theta": 0.0} if small == "u_epsv" else {}
+    scene = random_scene(**finite, **consistent)
+    other = random_scene(**finite | {"form": small})
     c = 1e-8 * np.random.default_rng(0).standard_normal(scene.num_coefficients)
     a, b = scene.residual(c), other.residual(c)
     assert np.abs(a - b).max() < 1e-6 * np.abs(b).max()

@@ -155,6 +155,26 @@ def form_of(function, fields=None, kinematics="displacement", **more):
     return Form(fields or {"u": ("displacement", "w")}, kinematics, function, **more)
 
 
+@pytest.mark.parametrize("assembly", ["fast", "reference"])
+def test_sums_at_vertices_are_row_sum_lumped(random_scene, assembly):
+    """sum_p V_p K_p M_v(x_p) on the diagonal, M_v written out once more here."""
+
+    def lumped(w, q, eps_v, sigma, K, sum_p, sum_v):
+        return sum_p(sigma, grad(w)) + sum_v(K, q * eps_v)
+
+    form = form_of(lumped, BOTH, "mixed")
+    scene = random_scene(form=form, assembly=assembly)
+    c = np.zeros(scene.num_coefficients)
+    n = scene._field.layout.num_displacement
+    block = scene.tangent(c).toarray()[n:, n:]
+    grid = scene.grid
+    s = (np.array(scene.particles.x) - grid.origin) / grid.h
+    weight = scene.particles.volume * scene._constants["K"]
+    hats = [np.maximum(0, 1 - np.abs(s[:, [k]] - np.arange(grid.cells[k] + 1))) for k in range(2)]
+    expected = np.einsum("p,pj,pi->ji", weight, hats[1], hats[0]).ravel()
+    assert np.abs(block - np.diag(expected)).max() < 1e-12 * expected.max()
+
+
 BOTH = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
 WRONG = [
     (lambda: Form.load("u_eps"), r"'u_eps' is not shipped: expected one of 'u', 'u_bbar'"),
@@ -202,6 +222,7 @@ def test_wrong_declarations(make, message):
         (lambda w, sum_p, dx: sum_p(div(w)) + w[1] * dx(1), r"as dx\(1\): expected dx"),
         (lambda w, sum_c, sigma_m: sum_c(sigma_m, div(w)), "needs kinematics 'cell'"),
         (lambda w, sum_p, sigma: sum_p(sigma + 2, grad(w)), "its residual raised"),
+        (lambda w, sum_v, sigma: sum_v(sigma, grad(w)), r"sum_v\(sigma, ...\): expected constants"),
         (
             lambda w, sum_p, sigma: sum_p(sigma * w[0], grad(w)),
             "a quantity of the law combines with particle constants only",

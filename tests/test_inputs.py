@@ -326,6 +326,6 @@ def test_internal_shapes_are_checked_at_the_border_and_never_panic():
         scene._stage.evaluate(u, v, [("sigma", "value", 0)], data)
     with pytest.raises(RuntimeError, match="row of no active cell"):
         _rust.densities(
-            scene._location, scene.particles.volume, data, [(0, 0)],
+            scene._location, scene.particles.volume, data, [(0, 0)], False,
             np.array([999], dtype=np.uint32), [0], 0, np.zeros((1, 1)),
         )  # fmt: skip

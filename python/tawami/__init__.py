@@ -2,6 +2,7 @@
 
 from tawami._rust import Material
 from tawami.body import Body, box
+from tawami.dynamics import Dynamics
 from tawami.errors import (
     ConvergenceError,
     FormError,
@@ -22,6 +23,7 @@ from tawami.scene import Scene, Solution
 __all__ = [
     "Body",
     "ConvergenceError",
+    "Dynamics",
     "Form",
     "FormError",
     "Grid",

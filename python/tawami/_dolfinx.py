@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tawami.density import DEGREE, Rule
 from tawami.errors import MissingDependencyError
 
 if "petsc4py" not in sys.modules:
@@ -87,6 +88,10 @@ if OLD:
         """Element of vectors constant in each cell."""
         return ufl.VectorElement("DG", CELL, 0, dim=components)
 
+    def at_vertices(components: int) -> Any:
+        """Element of vectors given at the vertices."""
+        return ufl.VectorElement("Lagrange", CELL, 1, dim=components)
+
     def _space(mesh: Any, element: Any) -> Any:
         return dolfinx.fem.FunctionSpace(mesh, element)
 
@@ -114,6 +119,10 @@ else:
         """Element of vectors constant in each cell."""
         return basix.ufl.element("DG", CELL, 0, shape=(components,))
 
+    def at_vertices(components: int) -> Any:
+        """Element of vectors given at the vertices."""
+        return basix.ufl.element("Lagrange", CELL, 1, shape=(components,))
+
     def _space(mesh: Any, element: Any) -> Any:
         return dolfinx.fem.functionspace(mesh, element)
 
@@ -127,6 +136,13 @@ def reference_points(degree: int) -> Array:
     """Points of the quadrature rule of a degree: points x 2, in reference axes."""
     points = basix.make_quadrature(basix.CellType.quadrilateral, degree)[0]
     return np.asarray(points, dtype=np.float64)
+
+
+def rule_points(rule: Rule) -> Array:
+    """Points of a rule of densities; none for means over cells."""
+    if rule == "mean":
+        return np.empty((0, 2))
+    return reference_nodes(1) if rule == "vertex" else reference_points(DEGREE[rule])
 
 
 def reference_nodes(degree: int) -> Array:

@@ -22,6 +22,7 @@ __all__ = [
     "basis_len",
     "densities",
     "gauss",
+    "gradients",
     "interpolate",
     "nodal_sums",
 ]
@@ -117,7 +118,7 @@ class Material:
     @property
     def shear_modulus(self) -> float: ...
 
-_Source = tuple[_Floats, Sequence[tuple[int, int]], Sequence[int]]
+_Source = tuple[_Floats, Sequence[tuple[int, int]], bool, Sequence[int]]
 _Kernel = tuple[int, int, int, Sequence[_Source | None], Sequence[float]]
 _Starts = npt.NDArray[np.int32]
 _Selection = tuple[_Starts, _Starts, _Floats, npt.NDArray[np.int64]]
@@ -183,6 +184,7 @@ class Stage:
 def interpolate(
     location: Location, basis: str, components: int, coefficients: _Floats
 ) -> _Floats: ...
+def gradients(location: Location, basis: str, coefficients: _Floats) -> _Floats: ...
 def basis_1d(
     basis: str, n: int, cell: npt.NDArray[np.int64], t: _Floats
 ) -> tuple[npt.NDArray[np.int64], _Floats]: ...
@@ -193,6 +195,7 @@ def densities(
     volume: _Floats,
     data: _Floats,
     points: Sequence[tuple[int, int]],
+    vertices: bool,
     rows: _Numbers,
     columns: Sequence[int],
     offset: int,

@@ -118,10 +118,12 @@ def _by_rule(form: Any) -> list[Any]:
     evaluated under the rule with one point is then taken from there under the other rule as well,
     and UFL 2022 takes two integrals of one integrand under two rules for one.
     """
-    rules: dict[int, list[Any]] = {}
+    rules: dict[tuple[int, str], list[Any]] = {}
     for integral in form.integrals():
-        rules.setdefault(integral.metadata()["quadrature_degree"], []).append(integral)
-    return [ufl.Form(rules[degree]) for degree in sorted(rules, reverse=True)]
+        metadata = integral.metadata()
+        rule = (metadata["quadrature_degree"], metadata.get("quadrature_rule", "default"))
+        rules.setdefault(rule, []).append(integral)
+    return [ufl.Form(rules[rule]) for rule in sorted(rules, reverse=True)]
 
 
 def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
@@ -154,7 +156,7 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
         raise FormError(f"form {form.name}: the traction t belongs into terms with ds, not with dx")
     with _refusals(form):
         tangent = symbols.tangent(cells)
-    densities: dict[Rule, dict[Density, int]] = {"particle": {}, "centre": {}, "mean": {}}
+    densities: dict[Rule, dict[Density, int]] = {rule: {} for rule in (*DEGREE, "mean")}
     width = dict.fromkeys(densities, 0)
     for density in symbols.placeholders:
         densities[density.rule][density] = width[density.rule]
@@ -179,8 +181,9 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
                 first, start = len(columns), densities[rule][density]
                 exchange[symbol] = ufl.as_vector([together[first + k] for k in range(density.size)])
                 columns += range(start, start + density.size)
-            points = len(_dolfinx.reference_points(DEGREE[rule])) if rule != "mean" else 1
-            kinds[together] = Slot(rule, points * size, tuple(columns))
+            kinds[together] = Slot(
+                rule, max(len(_dolfinx.rule_points(rule)), 1) * size, tuple(columns)
+            )
         ufl_form = ufl.replace(ufl_form, exchange)
         with _refusals(form):
             # FFCx checks this too, but in newer versions it then leaves its cache locked

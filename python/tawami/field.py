@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from tawami import _dolfinx, _rust, ranks
 from tawami.basis import Basis
 from tawami.compilation import CompiledForm, Integral
-from tawami.density import DEGREE, Rule
+from tawami.density import Rule
 from tawami.grid import Edge, Grid
 from tawami.petsc import Handles, aij, rows_of
 from tawami.reduction import Layout, Reduction
@@ -66,9 +66,9 @@ class Field:
         self.active = ranks.any_of(grid.comm, active)
         self.layout = Layout(grid, basis, self._space, self.active)
         #: Indices of the points of each rule; none for means over cells.
-        self._points: dict[Rule, list[tuple[int, int]]] = {"mean": []}
-        for rule in DEGREE:
-            self._points[rule] = self._point_indices(rule)
+        self._points: dict[Rule, list[tuple[int, int]]] = {
+            rule: self._point_indices(rule) for rule in compiled.densities
+        }
         self._packed: dict[int, Array] = {}
         self._reduction: Reduction | None = None
         self._petsc = Handles(self, grid.comm)
@@ -84,11 +84,14 @@ class Field:
         }
 
     def _point_indices(self, rule: Rule) -> list[tuple[int, int]]:
-        """Indices along x and y, in the Gauss rule, of each point of dolfinx' rule."""
-        reference = _dolfinx.reference_points(DEGREE[rule])
-        points = self.grid.rectangle.to_grid_axes(reference)
-        gauss, _ = _rust.gauss(round(len(points) ** 0.5))
-        near = np.abs(points[:, :, None] - gauss[None, None, :])
+        """Indices along x and y, in the rule of one axis, of each point of dolfinx' rule."""
+        points = self.grid.rectangle.to_grid_axes(_dolfinx.rule_points(rule))
+        if rule == "mean":
+            return []
+        along = np.array([0.0, 1.0])
+        if rule != "vertex":
+            along, _ = _rust.gauss(round(len(points) ** 0.5))
+        near = np.abs(points[:, :, None] - along[None, None, :])
         if near.min(axis=2).max() > 1e-12:
             raise RuntimeError("internal: dolfinx' quadrature is not the tensor Gauss rule")
         return [(int(a), int(b)) for a, b in near.argmin(axis=2)]
@@ -108,7 +111,7 @@ class Field:
                 rule = slot.source
                 _rust.densities(
                     self._location, self._volume, data[rule], self._points[rule],
-                    self._rows, list(slot.columns), offset, packed,
+                    rule == "vertex", self._rows, list(slot.columns), offset, packed,
                 )  # fmt: skip
             offset += slot.width
         return packed

@@ -12,6 +12,8 @@ K, mu                     bulk and shear modulus of the particle; `K**2 / mu`, `
 sum_p(D, f), sum_p(f)     sum over particles of V_p D_p : f(x_p), and of V_p f(x_p); exact for f up
                           to degree 4 along x and along y (a warning tells of more)
 sum_c(D, f), sum_c(f)     the same with f taken at the centre of the particle's cell
+sum_v(D, f), sum_v(f)     the same with f taken at the vertices of the particle's cell and summed with
+                          the weights of the bilinear functions: q eps_v is row-sum lumped
 cell_mean(D)              volume-weighted mean over the particles of each cell
 dx, dx_c, ds              area of the cells with particles (full rule, one point); loaded edges
 t, h                      traction [Pa], cell size [m]
@@ -47,7 +49,7 @@ KINEMATICS: Mapping[str, tuple[str, ...]] = {
 }
 #: Names that every form has.
 RESERVED = frozenset(
-    (*COMPONENTS, "K", "mu", "t", "h", "dx", "dx_c", "ds", "sum_p", "sum_c", "cell_mean")
+    (*COMPONENTS, "K", "mu", "t", "h", "dx", "dx_c", "ds", "sum_p", "sum_c", "sum_v", "cell_mean")
 )
 
 

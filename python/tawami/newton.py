@@ -35,6 +35,32 @@ STRAIN_FLOOR = 1e-7
 
 
 @dataclass(frozen=True)
+class Inertia:
+    """Forces `m_i a_i` of the lumped mass, `a = slope u - offset` in the increments u of the step.
+
+    Attributes:
+        mass: Of each displacement coefficient [kg per metre depth].
+        slope: [1/s2]
+        offset: [m/s2]
+    """
+
+    mass: Array
+    slope: float
+    offset: Array
+
+    def acceleration(self, u: Array) -> Array:
+        """At the end of the step, of each displacement coefficient [m/s2]."""
+        return np.asarray(self.slope * u - self.offset)
+
+    def force(self, coefficients: Array) -> Array:
+        """On all coefficients."""
+        n = len(self.mass)
+        forces = np.zeros(len(coefficients))
+        forces[:n] = self.mass * self.acceleration(coefficients[:n])
+        return forces
+
+
+@dataclass(frozen=True)
 class Converged:
     """A converged step.
 
@@ -147,15 +173,22 @@ class Newton:
         return self.field.residual(coefficients, self.data)
 
     def _measures(
-        self, internal: Array, external: Array, coefficients: Array, reduction: Reduction
+        self,
+        forces: tuple[Array, ...],
+        out_of_balance: Array,
+        coefficients: Array,
+        reduction: Reduction,
+        inertia: Inertia | None,
     ) -> tuple[float, float | None]:
         n = self.field.layout.num_displacement
-        free = reduction.selection.T @ (internal - external)
+        free = reduction.selection.T @ out_of_balance
         of_u = reduction.unknowns < n
-        scale = max(float(np.linalg.norm(f[:n])) for f in (internal, external))
+        scale = max(float(np.linalg.norm(force[:n])) for force in forces)
         # Forces of a body that supports move rigidly are round-off: it is in equilibrium.
         moved = np.abs(reduction.offset[:n]).max()
         round_off = 1e-14 * self._stiffest * moved * np.sqrt(n)
+        if inertia is not None:  # and those of one that coasts
+            round_off += 1e-13 * float(np.linalg.norm(inertia.mass * inertia.offset))
         momentum = float(np.linalg.norm(free[of_u])) / scale if scale > round_off else 0.0
         volume = None
         if self.kind is not None:
@@ -208,12 +241,20 @@ class Newton:
         scale[~of_u] = np.where(to_field > 0, to_field, 1) / np.sqrt(mu_i * volume)
         return scale
 
-    def solve(self, reduction: Reduction, external: Array) -> Converged:
+    def solve(
+        self,
+        reduction: Reduction,
+        external: Array,
+        inertia: Inertia | None = None,
+        guess: Array | None = None,
+    ) -> Converged:
         """Increments that balance the external forces.
 
         Args:
             reduction: What the supports leave free.
             external: External forces on all coefficients.
+            inertia: Of a dynamic step.
+            guess: Increments of all fields to start from; zero without it.
 
         Raises:
             ConvergenceError: Not below the tolerance within `max_iterations`, or not finite.
@@ -223,7 +264,7 @@ class Newton:
         mean_stress = self.particles.stress[:, :3].mean(axis=1)
         squares = ranks.sum_of(self._comm, np.array([np.sum(mean_stress**2), len(mean_stress)]))
         self._p_ref = float(np.sqrt(squares[0] / squares[1]))
-        unknowns = np.zeros(reduction.size)
+        unknowns = np.zeros(reduction.size) if guess is None else guess[reduction.unknowns]
         linear, history = self._linear, History()
         krylov: list[int] = []
         while True:
@@ -232,8 +273,13 @@ class Newton:
                 internal = self.internal(coefficients)
             except _rust.InvertedError as error:
                 self._fail(history, f"Then {error}")
+            forces: tuple[Array, ...] = (internal, external)
+            rest = internal - external
+            if inertia is not None:
+                forces += (inertia.force(coefficients),)
+                rest += forces[-1]
             with self.stopwatch("measures"):
-                history.append(self._measures(internal, external, coefficients, reduction))
+                history.append(self._measures(forces, rest, coefficients, reduction, inertia))
             if not np.isfinite(_worst(history[-1])):
                 self._fail(history, "an infinite or undefined number came up")
             if _worst(history[-1]) < self.tolerance:
@@ -241,7 +287,9 @@ class Newton:
             if len(history) > self.max_iterations:
                 self._fail(history, "Take a smaller load, or check material and supports")
             matrix = self.field.tangent(coefficients, self.data, reduction)
-            right = reduction.selection.T @ (external - internal)
+            if inertia is not None:
+                self._add_mass(matrix, inertia, reduction)
+            right = -(reduction.selection.T @ rest)
             scale = functools.partial(self._scale, matrix, reduction)
             change = linear.solve(matrix, scale, right[reduction.own], self._forcing(history))
             krylov.append(linear.iterations)
@@ -249,6 +297,17 @@ class Newton:
                 self._report_singular(reduction)
             unknowns += ranks.joined(self._comm, change)
             self.stopwatch.lap()
+
+    def _add_mass(self, matrix: Any, inertia: Inertia, reduction: Reduction) -> None:
+        """The lumped mass on the diagonal of the reduced tangent."""
+        own = reduction.unknowns[reduction.own]
+        of_u = own < len(inertia.mass)
+        diagonal = matrix.createVecLeft()
+        values = np.zeros(len(own))
+        values[of_u] = inertia.slope * inertia.mass[own[of_u]]
+        diagonal.setArray(values)
+        matrix.setDiagonal(diagonal, addv=True)
+        diagonal.destroy()
 
     def _forcing(self, history: History) -> float:
         """How well the next linear system is to be solved: no worse than what Newton can make of it

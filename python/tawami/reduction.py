@@ -156,6 +156,7 @@ class Reduction:
         points: Multi-point constraints with their prescribed values.
         start: Coefficients that are there already; values are prescribed for the sum of these and
             the increments, unknowns are increments.
+        moving: Rigid motions may be free: inertia holds the body.
 
     Attributes:
         size: Number of unknowns.
@@ -169,7 +170,13 @@ class Reduction:
     """
 
     def __init__(
-        self, layout: Layout, held: Sequence[Held], points: Sequence[PointHeld], start: Array
+        self,
+        layout: Layout,
+        held: Sequence[Held],
+        points: Sequence[PointHeld],
+        start: Array,
+        *,
+        moving: bool = False,
     ) -> None:
         self.layout = layout
         total = np.zeros(layout.size)
@@ -179,7 +186,8 @@ class Reduction:
         tolerance = 1e-9 * max(sizes, default=0.0)  # where supports meet: round-off
         for support in held:
             _hold(support, fixed, total, tolerance)
-        _check_rigid_motions(layout, fixed, points)
+        if not moving:
+            _check_rigid_motions(layout, fixed, points)
         dependent, involved, weights, values = _eliminate(points, fixed, total, start, tolerance)
         free = layout.active & ~fixed
         free[dependent] = False

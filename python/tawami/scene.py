@@ -22,7 +22,7 @@ from tawami.fast_field import FastField
 from tawami.field import Field
 from tawami.formulation import Form
 from tawami.grid import Edge, Grid
-from tawami.newton import Converged, History, Newton
+from tawami.newton import Converged, History, Inertia, Newton
 from tawami.numpy_law import NumpyLaw, NumpyStage
 from tawami.reduction import Reduction
 from tawami.stopwatch import Stopwatch
@@ -255,17 +255,19 @@ class Scene:
             force[: self._field.layout.num_displacement] = sums.ravel()
         return ranks.sum_of(self.grid.comm, force)
 
-    def _reduction(self) -> Reduction:
+    def _reduction(self, *, moving: bool = False) -> Reduction:
+        """What the supports leave free; a moving body may have left one, and may turn freely."""
         field = self._field
         held = [
             boundary.held_edge(self.grid, self.basis, field.active, edge, component, value)
             for edge, component, value in self._edges
+            if not moving or len(field.edge_nodes(edge))
         ]
         points = [
             boundary.held_point(self.grid, self.basis, field.active, point, component, value)
             for point, component, value in self._points
         ]
-        return Reduction(field.layout, held, points, self._total)
+        return Reduction(field.layout, held, points, self._total, moving=moving)
 
     def _external(self) -> Array:
         force = self._weight()
@@ -339,7 +341,17 @@ class Scene:
         with self.stopwatch("set-up"):
             reduction = self._reduction()
             external = self._external()
-        step = self._newton.solve(reduction, external)
+        return self._advance(reduction, external)
+
+    def _advance(
+        self,
+        reduction: Reduction,
+        external: Array,
+        inertia: Inertia | None = None,
+        guess: Array | None = None,
+    ) -> Solution:
+        """One step: find it, store it in the particles, move them where strains are finite."""
+        step = self._newton.solve(reduction, external, inertia, guess)
         fields = self._field.layout.split(step.coefficients)
         moved = None
         if self._finite:  # where they go is known before anything changes

@@ -14,6 +14,7 @@ from tawami import _dolfinx
 from tawami.density import (
     COMPONENTS,
     DEGREE,
+    FAMILY,
     LAW,
     MU,
     ONE,
@@ -61,7 +62,10 @@ class Symbols:
             name: ufl.Constant(domain, count=k) for k, name in enumerate(("h", *form.parameters))
         }
         self.measures = {
-            rule: ufl.dx(domain=domain, metadata={"quadrature_degree": degree})
+            rule: ufl.dx(
+                domain=domain,
+                metadata={"quadrature_degree": degree, "quadrature_rule": FAMILY[rule]},
+            )
             for rule, degree in DEGREE.items()
         }
         self.placeholders: dict[Density, Any] = {}
@@ -79,6 +83,7 @@ class Symbols:
             "ds": ufl.ds(domain=domain, metadata={"quadrature_degree": 4}),
             "sum_p": functools.partial(self._sum, "particle"),
             "sum_c": functools.partial(self._sum, "centre"),
+            "sum_v": functools.partial(self._sum, "vertex"),
             "cell_mean": self._cell_mean,
         }
 
@@ -89,9 +94,12 @@ class Symbols:
 
     def space(self, rule: Rule, size: int) -> Any:
         """Space of vectors of a size at the points of a rule."""
-        element = (
-            _dolfinx.per_cell(size) if rule == "mean" else _dolfinx.at_points(DEGREE[rule], size)
-        )
+        if rule == "mean":
+            element = _dolfinx.per_cell(size)
+        elif rule == "vertex":
+            element = _dolfinx.at_vertices(size)
+        else:
+            element = _dolfinx.at_points(DEGREE[rule], size)
         return ufl.FunctionSpace(self.domain, element)
 
     def density(self, density: Density) -> Any:
@@ -105,7 +113,7 @@ class Symbols:
 
     def _quantity(self, quantity: Any, caller: str) -> Quantity:
         if isinstance(quantity, (int, float)):
-            return ONE * quantity
+            return ParticleScalar(repr(quantity), lambda v: quantity * ONE.evaluate(v))
         if not isinstance(quantity, (ParticleScalar, LawQuantity)):
             raise FormError(
                 f"form {self.form.name}: {caller} takes a particle quantity "
@@ -115,7 +123,7 @@ class Symbols:
         return quantity
 
     def _sum(self, rule: Rule, *arguments: Any) -> Any:
-        caller = {"particle": "sum_p", "centre": "sum_c"}[rule]
+        caller = {"particle": "sum_p", "centre": "sum_c", "vertex": "sum_v"}[rule]
         if len(arguments) not in (1, 2):
             raise FormError(
                 f"form {self.form.name}: {caller} takes (quantity, expression) or (expression), "
@@ -124,7 +132,7 @@ class Symbols:
         quantity = self._quantity(arguments[0], caller) if len(arguments) == 2 else ONE
         expression = ufl.as_ufl(arguments[-1])
         if isinstance(quantity, LawQuantity):
-            self._check_place(rule, quantity)
+            self._check_place(rule, quantity, caller)
         if rule == "particle":
             self._check_degree(expression)
         c = self.density(Density(rule, quantity))
@@ -140,10 +148,15 @@ class Symbols:
             )
         return ufl.inner(weight, expression) * self.measures[rule]
 
-    def _check_place(self, rule: Rule, quantity: LawQuantity) -> None:
+    def _check_place(self, rule: Rule, quantity: LawQuantity, caller: str) -> None:
         """In B-bar the deviator depends on the strain at the particle and the mean stress on that
         at the centre: only there are their tangents known.
         """
+        if rule == "vertex":
+            raise FormError(
+                f"form {self.form.name}: sum_v({quantity.name}, ...): expected constants of the "
+                "particle (K, mu): the stress depends on the strain at the particle"
+            )
         cell, centre = self.form.kinematics == "cell", rule == "centre"
         if not cell and centre:
             raise FormError(
@@ -152,7 +165,7 @@ class Symbols:
             )
         if cell and quantity.name != ("sigma_m" if centre else "s"):
             raise FormError(
-                f"form {self.form.name}: {'sum_c' if centre else 'sum_p'}({quantity.name}, ...) with "
+                f"form {self.form.name}: {caller}({quantity.name}, ...) with "
                 "kinematics 'cell': expected sum_p(s, ...) and sum_c(sigma_m, ...) only"
             )
 
@@ -225,7 +238,7 @@ class Symbols:
         part: Part = "gradient" if self.form.strain == "finite" else "strain"
         if density.rule == "particle":
             g, e = ufl.grad(du), ufl.sym(ufl.grad(du))
-            direction = (e[0, 0], e[1, 1], 2 * e[0, 1])
+            direction: tuple[Any, ...] = (e[0, 0], e[1, 1], 2 * e[0, 1])
             if part == "gradient":
                 direction = (g[0, 0], g[0, 1], g[1, 0], g[1, 1])
             c, m = self.density(Density(density.rule, density.quantity, part)), len(direction)

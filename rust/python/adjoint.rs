@@ -27,8 +27,8 @@ pub(super) fn points_per_axis(
 }
 
 /// Densities of particle data in the rows of a packed coefficient array; see `adjoint.rs`.
-/// `points` holds the indices along x and y of each quadrature point; none asks for the mean over
-/// the particles of a cell instead.
+/// `points` holds the indices along x and y of each quadrature point (Gauss, or the vertices); none
+/// asks for the mean over the particles of a cell instead.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn densities(
@@ -36,6 +36,7 @@ pub(super) fn densities(
     volume: PyReadonlyArray1<f64>,
     data: PyReadonlyArray2<f64>,
     points: Vec<[usize; 2]>,
+    vertices: bool,
     rows: PyReadonlyArray1<u32>,
     columns: Vec<usize>,
     offset: usize,
@@ -56,7 +57,8 @@ pub(super) fn densities(
             adjoint::cell_mean(location, a, volume, data, &columns, row);
         });
     } else {
-        let rule = Rule::gauss(per_axis);
+        require(!vertices || per_axis == 2, "a cell has two vertices along each axis")?;
+        let rule = if vertices { Rule::ends() } else { Rule::gauss(per_axis) };
         let densities = Densities { rule: &rule, points: &points, columns: &columns };
         adjoint::pack(rows, (offset, length), width, out, |a, row| {
             densities.of_cell(location, a, volume, data, row);

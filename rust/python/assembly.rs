@@ -14,8 +14,9 @@ use crate::assembly::{self, Cells, Kernel, Pattern, Selection, Slot, TabulateTen
 use crate::grid::Location;
 use crate::quadrature::Rule;
 
-/// Particle data of one rule, and at which points: indices along x and y, or none for cell means.
-type Source<'py> = (PyReadonlyArray2<'py, f64>, Vec<[usize; 2]>, Vec<usize>);
+/// Particle data of one rule, at which points (indices along x and y, or none for cell means), whether
+/// these are the vertices rather than Gauss points, and which columns.
+type Source<'py> = (PyReadonlyArray2<'py, f64>, Vec<[usize; 2]>, bool, Vec<usize>);
 
 /// Address of an FFCx kernel, its rank, the number of its packed coefficients, these in packed order
 /// (none stands for the fields), and its constants.
@@ -27,16 +28,20 @@ pub(super) struct PyAssembler {
     location: Arc<Location>,
     cells: Cells,
     rules: Vec<Rule>,
+    ends: Rule,
 }
 
 impl PyAssembler {
     fn kernels<'a>(&'a self, rank: usize, kernels: &'a [KernelOf]) -> PyResult<Vec<Kernel<'a>>> {
         let slot = |source: &'a Option<Source>| -> PyResult<Slot<'a>> {
-            let Some((data, points, columns)) = source else { return Ok(Slot::Fields) };
+            let Some((data, points, vertices, columns)) = source else { return Ok(Slot::Fields) };
             let data = data.as_array();
-            Ok(match points_per_axis(&self.location, &data, points, columns)? {
+            let per_axis = points_per_axis(&self.location, &data, points, columns)?;
+            require(!vertices || per_axis == 2, "a cell has two vertices along each axis")?;
+            let rule = if *vertices { &self.ends } else { &self.rules[per_axis] };
+            Ok(match per_axis {
                 0 => Slot::Means(columns, data),
-                n => Slot::Densities(Densities { rule: &self.rules[n], points, columns }, data),
+                _ => Slot::Densities(Densities { rule, points, columns }, data),
             })
         };
         kernels
@@ -86,7 +91,7 @@ impl PyAssembler {
         require(vertices.iter().flatten().all(|&p| p < 2), "vertices of a cell")?;
         let cells = Cells { basis: basis.parse()?, nodes, vertices, bilinear };
         let rules = (0..=MAX_POINTS).map(Rule::gauss).collect();
-        Ok(Self { location: Arc::clone(&location.0), cells, rules })
+        Ok(Self { location: Arc::clone(&location.0), cells, rules, ends: Rule::ends() })
     }
 
     /// The form's vector on all coefficients.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use rayon::prelude::*;
 
 use super::require;
 use crate::active::Active;
@@ -157,6 +158,21 @@ pub(super) fn interpolate<'py>(
         _ => return Err(PyRuntimeError::new_err("internal: fields have 1 or 2 components")),
     };
     values.to_pyarray(py).reshape([location.0.len(), components])
+}
+
+/// Gradients of a displacement at points (xx, xy, yx, yy: d u_x/dx, d u_x/dy, ...): points x 4.
+#[pyfunction]
+pub(super) fn gradients<'py>(
+    py: Python<'py>,
+    location: &PyLocation,
+    basis: &str,
+    coefficients: PyReadonlyArray1<f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let location = &location.0;
+    let u = field::<2>(location.grid, basis.parse()?, &coefficients)?;
+    let at = |p: usize| u.gradient(location.cell[p] as usize, location.xi[p]);
+    let values: Vec<[[f64; 2]; 2]> = (0..location.len()).into_par_iter().map(at).collect();
+    values.as_flattened().as_flattened().to_pyarray(py).reshape([location.len(), 4])
 }
 
 /// Functions of a basis on a row of `n` cells at positions `t` of `cell`: index of the first one

@@ -61,6 +61,7 @@ fn _rust(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<assembly::PyPattern>()?;
     m.add_class::<stage::PyStage>()?;
     m.add_function(wrap_pyfunction!(grid::interpolate, m)?)?;
+    m.add_function(wrap_pyfunction!(grid::gradients, m)?)?;
     m.add_function(wrap_pyfunction!(grid::basis_1d, m)?)?;
     m.add_function(wrap_pyfunction!(grid::basis_len, m)?)?;
     m.add_function(wrap_pyfunction!(grid::gauss, m)?)?;

@@ -1,0 +1,57 @@
+"""The collapse of the pile in its first tenth of a second."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cases import collapse
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return {form: collapse.solve(form, end=0.1) for form in collapse.FORMS}
+
+
+def test_every_step_converges_at_its_first_size(runs):
+    run = runs["u_epsv_finite"]
+    assert len(run.dt) == 100
+    assert run.dt == pytest.approx([1e-3] * 100)
+    assert np.mean(run.iterations) <= 3.5
+    assert max(run.iterations) <= 5
+
+
+def test_the_mean_stress_is_smoother_than_that_of_displacement_alone(runs):
+    mixed, displacement = (np.median(runs[form].roughness[1:]) for form in collapse.FORMS)
+    assert 2 * mixed < displacement
+
+
+def test_energy_is_dissipated_and_the_pile_runs_out(runs):
+    for run in runs.values():
+        total = np.array(run.kinetic) + run.potential
+        assert (np.diff(total) < 0).all()
+        assert (np.diff(run.runout) > 0).all()
+        assert run.runout[-1] == pytest.approx(0.224, abs=0.003)
+
+
+def test_two_step_sizes_run_out_alike(runs):
+    fine = collapse.solve("u_epsv_finite", end=0.1, dt=5e-4, every=40)
+    assert fine.runout[-1] == pytest.approx(runs["u_epsv_finite"].runout[-1], rel=0.02)
+
+
+def test_the_start_is_that_of_the_pile():
+    motion = collapse.build("u_epsv_finite")
+    scene = motion.scene
+    assert len(scene.particles) == 800
+    assert motion.mass.sum() == pytest.approx(2040 * 0.2 * 0.1)
+    stress, y = scene.particles.stress, scene.particles.x[:, 1]
+    assert stress[:, 1] == pytest.approx(-2040 * 9.81 * (0.1 - y))
+    assert stress[:, 0] == pytest.approx(0.5 * stress[:, 1])
+    assert stress[:, 2] == pytest.approx(0.75 * stress[:, 1])
+
+
+def test_roughness_tells_a_chequerboard_from_a_plane():
+    x = np.stack(np.meshgrid(np.arange(20), np.arange(20)), axis=-1).reshape(-1, 2) * 0.5
+    assert collapse.roughness(x, 3.0 + x @ [1.0, -2.0], 1.0) < 1e-12
+    board = (-1.0) ** (2 * x).sum(axis=1)
+    assert collapse.roughness(x, board, 1.0) > 0.5
