@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import tawami
 from cases.cantilever import mpm
@@ -44,3 +45,16 @@ def test_the_law_in_numpy_is_linear_elasticity():
     rust = tawami.linear_elastic(K=names["K"], mu=names["mu"])
     u = [mpm.build("u_epsv", "clamped", 4, material=m).solve().u for m in (names["my_law"], rust)]
     assert np.allclose(u[0], u[1], rtol=0, atol=1e-9 * np.abs(u[1]).max())
+
+
+def test_the_block_in_motion_keeps_its_angular_momentum(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(next(block for block in BLOCKS if "tawami.Dynamics" in block))
+    run = subprocess.run(
+        [sys.executable, script.name], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    x = (np.arange(8) + 0.5) / 16 - 0.25
+    size = 1000.0 / 16**2  # kg per metre depth of a particle
+    assert float(run.stdout.split()[-1]) == pytest.approx(
+        3.0 * size * 2 * 8 * (x**2).sum(), rel=5e-3
+    )
