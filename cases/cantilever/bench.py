@@ -195,10 +195,9 @@ def measure(setting: Setting) -> dict[str, Any]:
     busy = process_time()
     solution = scene.solve()
     cpu = comm.allreduce(process_time() - busy)
-    ends = [{}, *scene.stopwatch.laps]
     iterations = [
         sum(now.get(stage, 0.0) - before.get(stage, 0.0) for stage in STAGES)
-        for before, now in pairwise(ends)
+        for before, now in pairwise(scene.stopwatch.laps)
     ]
     later = list(zip(iterations[1:], solution.krylov[1:], strict=True))
     return result | {

@@ -261,6 +261,7 @@ class Newton:
             SingularError: The tangent cannot be solved; the message names the cells.
         """
         clean_up(self._comm)
+        self.stopwatch.start()
         mean_stress = self.particles.stress[:, :3].mean(axis=1)
         squares = ranks.sum_of(self._comm, np.array([np.sum(mean_stress**2), len(mean_stress)]))
         self._p_ref = float(np.sqrt(squares[0] / squares[1]))

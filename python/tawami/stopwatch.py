@@ -13,7 +13,7 @@ class Stopwatch:
     Attributes:
         seconds: Wall time of each stage so far.
         cpu: Processor time of each stage so far, of all threads.
-        laps: What `seconds` was at the end of each Newton iteration.
+        laps: What `seconds` was at the start of the last step and after each of its Newton iterations.
     """
 
     def __init__(self) -> None:
@@ -30,6 +30,10 @@ class Stopwatch:
         finally:
             self.seconds[stage] = self.seconds.get(stage, 0.0) + perf_counter() - start
             self.cpu[stage] = self.cpu.get(stage, 0.0) + process_time() - busy
+
+    def start(self) -> None:
+        """A step begins."""
+        self.laps = [dict(self.seconds)]
 
     def lap(self) -> None:
         """A Newton iteration ends."""
