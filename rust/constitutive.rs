@@ -356,6 +356,9 @@ pub fn check_materials(
         if law.bulk_modulus().is_infinite() && kinematics != Kinematics::Deviatoric {
             return Err(Error::Incompressible { index });
         }
+        if law.pressure_dependent() && kinematics == Kinematics::Deviatoric {
+            return Err(Error::PressureDependent { index });
+        }
     }
     Ok(())
 }

@@ -105,6 +105,14 @@ pub enum Error {
         /// The first such particle.
         index: usize,
     },
+    /// A law that needs the mean stress met kinematics that do not give it.
+    #[error(
+        "the strength of particle {index} depends on the mean stress, which the kinematics          'deviatoric' (u-p) do not give to the law. Use form 'u_epsv'"
+    )]
+    PressureDependent {
+        /// The first such particle.
+        index: usize,
+    },
     /// An iterate that turns a particle inside out.
     #[error("the increment turns particle {index} inside out (det f <= 0)")]
     Inverted {

@@ -31,6 +31,13 @@ fn laws() -> Vec<Box<dyn Material>> {
         Box::new(cone(30.0, 0.1, 12.0)),
         Box::new(cone(0.0, 0.3, 0.0)),
         Box::new(cone(45.0, 0.0, 45.0)),
+        Box::new(
+            DruckerPrager::new(
+                elastic(),
+                Friction { eps_v_max: 0.02, ..friction(30.0, 0.1, 20.0) },
+            )
+            .unwrap(),
+        ),
     ]
 }
 
@@ -44,7 +51,7 @@ prop_compose! {
 
 proptest! {
     #[test]
-    fn tangents_are_differences(e in strains(), de in strains(), which in 0..6_usize) {
+    fn tangents_are_differences(e in strains(), de in strains(), which in 0..7_usize) {
         let law = &*laws()[which];
         let history = history_of(law);
         let old = Stress { deviator: [0.1, -0.05, -0.05, 0.02], mean: -0.3 };
@@ -71,7 +78,7 @@ proptest! {
     }
 
     #[test]
-    fn stress_is_admissible_and_no_strain_changes_nothing(e in strains(), which in 0..6_usize) {
+    fn stress_is_admissible_and_no_strain_changes_nothing(e in strains(), which in 0..7_usize) {
         let law = &*laws()[which];
         let history = history_of(law);
         let mut new = history.clone();
@@ -156,8 +163,11 @@ fn dilatancy_ends_where_it_is_told_to() {
     let old = Stress { deviator: [0.0; 4], mean: -1.0 };
     let shear = strain(&[0.5, -0.5, 0.0, 0.0]);
     let mut new = [0.0; 2];
-    law.respond(&shear, &old, &[0.0, 0.004], &mut new);
-    assert!(new[1] > 0.004);
+    let (stress, _) = law.respond(&shear, &old, &[0.0, 0.004], &mut new);
+    assert!((new[1] - 0.005).abs() < 1e-15);
+    assert!((stress.mean - (old.mean - 5.0 * 0.001)).abs() < 1e-14);
+    law.respond(&strain(&[0.15, -0.15, 0.0, 0.0]), &old, &[0.0, 0.0], &mut new);
+    assert!(new[1] > 0.0 && new[1] < 0.0051);
     law.respond(&shear, &old, &[0.0, 0.005], &mut new);
     assert_eq!(new[1], 0.005);
 }

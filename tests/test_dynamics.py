@@ -107,16 +107,21 @@ def test_a_body_at_rest_stays_at_rest():
 
 def test_a_step_that_fails_changes_nothing():
     scene = block(max_iterations=1, tolerance=1e-12)
+    scene.gravity((0, -G))
     motion = tawami.Dynamics(scene, velocity=spin(scene, 5.0))
-    before = [np.array(a) for a in (scene.particles.x, scene.particles.stress, motion.velocity)]
+
+    def state():
+        arrays = (scene.particles.x, scene.particles.stress, motion.velocity, motion.acceleration)
+        return [np.array(a) for a in (*arrays, motion.velocity_gradient)]
+
+    before = state()
     with pytest.raises(tawami.ConvergenceError):
         motion.step(0.02)
     with pytest.raises(tawami.ConvergenceError) as error:
         motion.run(0.02, 0.02, smallest=0.015)
     assert "at 0 s, with the smallest step of 0.02 s" in error.value.__notes__[0]
     assert len(error.value.history) == 2
-    after = (scene.particles.x, scene.particles.stress, motion.velocity)
-    for a, b in zip(before, after, strict=True):
+    for a, b in zip(before, state(), strict=True):
         np.testing.assert_array_equal(a, b)
     assert motion.steps == 0
 
@@ -130,6 +135,55 @@ def test_steps_are_halved_and_grow_again():
     assert motion.time == pytest.approx(0.3)
     assert min(sizes) < 0.1
     assert any(later > earlier for earlier, later in pairwise(sizes))
+
+
+def falling_on_the_floor():
+    """A block on a floor that it cannot leave or slide on, moving down at 1 m/s."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(8, 8))
+    body = tawami.box(grid, (0.25, 0.0), (0.75, 0.5))
+    material = tawami.linear_elastic(E=1e5, nu=0.3)
+    scene = tawami.Scene(grid, body, material, form="u_epsv_finite", density=1000.0)
+    scene.fix("bottom", "x")
+    scene.fix("bottom", "y")
+    return scene
+
+
+def test_the_impulse_of_a_support_reaches_the_particles():
+    """In no time at all: the lumped mass of the functions that the floor holds comes to rest."""
+    scene = falling_on_the_floor()
+    motion = tawami.Dynamics(scene, velocity=(0.0, -1.0))
+    before = motion.linear_momentum[1]
+    # functions of the floor: the first spline, (1 - t)^2 in the first row of cells
+    t = scene.particles.x[:, 1] / scene.grid.h
+    stopped = motion.mass @ np.where(t < 1, (1 - t) ** 2, 0.0)
+    motion.step(1e-5)
+    assert motion.linear_momentum[1] - before == pytest.approx(stopped, rel=1e-4)
+
+
+def test_damping_is_a_rate():
+    """The velocity lies between those of FLIP and of PIC, exp(-dt/damping) of the way."""
+    found = {}
+    for name, options in (
+        ("flip", {}), ("pic", {"transfer": "tpic"}), ("damped", {"damping": 0.02}),
+    ):  # fmt: skip
+        scene = falling_on_the_floor()
+        rough = 0.3 * np.random.default_rng(0).standard_normal((64, 2))
+        motion = tawami.Dynamics(scene, velocity=rough, **options)
+        motion.step(0.01)
+        found[name] = motion.velocity
+    expected = found["pic"] + np.exp(-0.5) * (found["flip"] - found["pic"])
+    assert found["damped"] == pytest.approx(expected, abs=1e-9)
+    assert np.abs(found["flip"] - found["pic"]).max() > 0.01
+
+
+def test_gamma_above_one_half_damps():
+    energies = []
+    for gamma in (0.5, 1.0):
+        scene = falling_on_the_floor()
+        motion = tawami.Dynamics(scene, velocity=(0.0, -0.05), gamma=gamma)
+        motion.run(0.4, 0.01)
+        energies.append(motion.kinetic_energy)
+    assert energies[1] < 0.5 * energies[0]
 
 
 def test_a_particle_that_would_leave_stops_the_run():
@@ -155,12 +209,29 @@ def test_wrong_input_gets_a_sentence(random_scene):
     ):
         with pytest.raises(tawami.InputError, match=words):
             tawami.Dynamics(scene, **options)
+    with pytest.raises(tawami.InputError, match="damping = 'a': expected a time"):
+        tawami.Dynamics(scene, damping="a")
+    with pytest.raises(tawami.InputError, match="its lumped masses are not all positive"):
+        tawami.Dynamics(block(basis="biquadratic"))
+    for change, words in (
+        (lambda s: s.hold((0, 0), "x"), "expected a scene without"),
+        (lambda s: s.traction("left", (1.0, 0.0)), "expected a scene without"),
+        (lambda s: (s._edges.clear(), s.fix("bottom", "y", 1e-3)), "Dynamics holds edges at zero"),
+    ):
+        other = falling_on_the_floor()
+        change(other)
+        with pytest.raises(tawami.InputError, match=words):
+            tawami.Dynamics(other).step(0.01)
     motion = tawami.Dynamics(scene)
     for dt in (0.0, -1.0, np.nan):
         with pytest.raises(tawami.InputError, match="dt = "):
             motion.step(dt)
     with pytest.raises(tawami.InputError, match="dt = 2 s is longer than the 1 s until end"):
         motion.run(1.0, 2.0)
+    motion.velocity_gradient[3] = np.nan
+    with pytest.raises(tawami.InputError, match="velocity_gradient of 1 particles is not finite"):
+        motion.step(0.01)
+    motion.velocity_gradient[3] = 0.0
     motion.velocity[5] = np.nan
     with pytest.raises(
         tawami.InputError, match="velocity of 1 particles is not finite, the first is 5"

@@ -144,3 +144,7 @@ def test_what_is_not_there_yet_has_a_sentence(random_scene):
         random_scene().gravity((0, -10))
     with pytest.raises(tawami.InputError, match="density = -1.0: expected a finite number"):
         random_scene(density=-1.0)
+    with pytest.raises(
+        tawami.InputError, match="density has 3 values: expected one, or one for each"
+    ):
+        random_scene(density=[1.0, 2.0, 3.0])

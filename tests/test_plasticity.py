@@ -81,3 +81,12 @@ def test_a_block_in_plane_compression_beyond_yield(form):
     assert np.abs(solution.stress[:, 1]).max() < 1e-4
     with pytest.raises(tawami.InputError, match="history 'damage': the laws of this scene have"):
         scene.particles.history("damage")
+
+
+def test_a_strength_that_depends_on_the_mean_stress_needs_a_form_that_gives_it():
+    grid = grid_of()
+    body = tawami.box(grid, grid.origin, grid.upper)
+    with pytest.raises(
+        tawami.InputError, match="the strength of particle 0 depends on the mean stress"
+    ):
+        tawami.Scene(grid, body, tawami.drucker_prager(ELASTIC, phi=30.0), form="u_p")

@@ -16,7 +16,7 @@ v_i is the mapped value before supports are imposed, so that their impulse reach
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -43,7 +43,7 @@ class Dynamics:
     """Motion of the particles of a scene with a form of finite strain and a density.
 
     Args:
-        scene: The scene, its supports and loads; prescribed displacements are zero for now.
+        scene: The scene, its supports along edges, held at zero for now, and its weight.
         velocity: Velocities at the start [m/s]: one for all particles, or particles x 2.
         transfer: 'affine_flip', 'flip', 'tpic' or 'pic'.
         damping: Time in which velocities of FLIP relax towards those of PIC [s]: per step a share
@@ -78,7 +78,16 @@ class Dynamics:
             )
         if transfer not in TRANSFERS:
             raise InputError(f"transfer = {transfer!r}: expected one of {', '.join(TRANSFERS)}")
-        if not damping > 0:
+        if scene.basis == "biquadratic":
+            raise InputError(
+                "Dynamics with the basis 'biquadratic': its lumped masses are not all positive; use "
+                "'quadratic_spline'"
+            )
+        if not scene._density.min() > 0:
+            raise InputError(
+                "Dynamics: a density of 0: expected more than 0 kg/m3 for every material"
+            )
+        if not isinstance(damping, (int, float)) or not damping > 0:
             raise InputError(f"damping = {damping!r}: expected a time in s, more than 0")
         self.gamma = inputs.number("gamma", gamma, low=0.5, high=1.0)
         self.beta = (self.gamma + 0.5) ** 2 / 4
@@ -94,7 +103,6 @@ class Dynamics:
         self.acceleration, self.velocity_gradient = np.zeros((n, 2)), np.zeros((n, 2, 2))
         self._acceleration_gradient = np.zeros((n, 2, 2))
         self.time, self.steps = 0.0, 0
-        self._started = False
 
     # -- one step ------------------------------------------------------------
 
@@ -108,8 +116,14 @@ class Dynamics:
         dt = inputs.number("dt", dt, low=sys.float_info.min)
         scene = self.scene
         scene.particles.check()
-        for name in ("velocity", "acceleration"):
-            bad = np.flatnonzero(~np.isfinite(getattr(self, name)).all(axis=1))
+        if scene._points or scene._tractions:
+            raise InputError(
+                "Dynamics knows supports along edges and weight so far: expected a scene without "
+                "hold(...) and traction(...)"
+            )
+        for name in ("velocity", "acceleration", "velocity_gradient"):
+            values = getattr(self, name).reshape(len(self.mass), -1)
+            bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
             if len(bad):
                 raise InputError(
                     f"{name} of {len(bad)} particles is not finite, the first is {bad[0]}, at "
@@ -117,12 +131,17 @@ class Dynamics:
                 )
         location, basis = scene._location, scene.basis
         reduction, external = scene._reduction(moving=True), scene._external()
+        if reduction.offset.any():
+            raise InputError(
+                "Dynamics holds edges at zero so far: expected fix(edge, component) without a value"
+            )
         n = scene._field.layout.num_displacement
         mass = self._sums(np.ones((len(self.mass), 1)))[:, 0]
-        if not self._started:
-            self._start(reduction, external, mass)
+        acceleration = self.acceleration
+        if self.steps == 0:
+            acceleration = self._first_acceleration(reduction, external, mass)
         mapped_v = self._mapped(self.velocity, self.velocity_gradient, mass)
-        mapped_a = self._mapped(self.acceleration, self._acceleration_gradient, mass)
+        mapped_a = self._mapped(acceleration, self._acceleration_gradient, mass)
         v, a = mapped_v.copy(), mapped_a.copy()
         held = np.ones(2 * len(mass), dtype=bool)
         held[reduction.unknowns[reduction.unknowns < n]] = False
@@ -131,16 +150,21 @@ class Dynamics:
         slope = 1 / (self.beta * dt**2)
         offset = slope * (dt * v + dt**2 * (0.5 - self.beta) * a)
         inertia = Inertia(np.repeat(mass, 2), slope, offset.ravel())
-        guess = self._guess(dt * v)
-        solution = scene._advance(reduction, external, inertia, guess)
 
-        u = solution.u
-        a1 = inertia.acceleration(u).reshape(-1, 2)
-        v1 = v + dt * ((1 - self.gamma) * a + self.gamma * a1)
-        v1.ravel()[held] = a1.ravel()[held] = 0.0
-        self._return(location, basis, u, mapped_v, v1, a1, dt)
-        self.time, self.steps = self.time + dt, self.steps + 1
-        return solution
+        def also(u: Array) -> Callable[[], None]:
+            a1 = inertia.acceleration(u).reshape(-1, 2)
+            v1 = v + dt * ((1 - self.gamma) * a + self.gamma * a1)
+            v1.ravel()[held] = a1.ravel()[held] = 0.0
+            found = self._returned(location, basis, u, mapped_v, v1, a1, dt)
+            found |= {"time": self.time + dt, "steps": self.steps + 1}
+
+            def store() -> None:
+                for name, value in found.items():
+                    setattr(self, name, value)
+
+            return store
+
+        return scene._advance(reduction, external, inertia, self._guess(dt * v), also)
 
     def _sums(self, data: Array) -> Array:
         """sum_p m_p D_p N_i."""
@@ -167,7 +191,7 @@ class Dynamics:
             momentum, mass[:, None], out=np.zeros_like(momentum), where=mass[:, None] > 0
         )
 
-    def _start(self, reduction: Any, external: Array, mass: Array) -> None:
+    def _first_acceleration(self, reduction: Any, external: Array, mass: Array) -> Array:
         """Accelerations of the particles from the momentum equation: g in free fall, 0 in rest."""
         scene = self.scene
         n = scene._field.layout.num_displacement
@@ -177,8 +201,7 @@ class Dynamics:
         free = np.zeros(n, dtype=bool)
         free[reduction.unknowns[reduction.unknowns < n]] = True
         a.ravel()[~free] = 0.0
-        self.acceleration = _rust.interpolate(scene._location, scene.basis, 2, a.ravel())
-        self._started = True
+        return _rust.interpolate(scene._location, scene.basis, 2, a.ravel())
 
     def _guess(self, u: Array) -> Array:
         """u = dt v, eps_v the lumped projection of its ln det f."""
@@ -197,29 +220,28 @@ class Dynamics:
             )
         return guess
 
-    def _return(
+    def _returned(
         self, location: _rust.Location, basis: str, u: Array, before: Array, v1: Array, a1: Array,
         dt: float,
-    ) -> None:  # fmt: skip
-        """From the grid of the step back to the particles."""
+    ) -> dict[str, Any]:  # fmt: skip
+        """From the grid of the step back to the particles: their new arrays by name."""
 
         def at_particles(values: Array) -> Array:
             return _rust.interpolate(location, basis, 2, np.ascontiguousarray(values).ravel())
 
         affine, flip = TRANSFERS[self.transfer]
-        pic = at_particles(v1)
+        velocity = pic = at_particles(v1)
         if flip:
             moved = self.velocity + at_particles(v1 - before)
-            self.velocity = pic + np.exp(-dt / self.damping) * (moved - pic)
-        else:
-            self.velocity = pic
-        self.acceleration = at_particles(a1)
+            velocity = pic + np.exp(-dt / self.damping) * (moved - pic)
+        found: dict[str, Any] = {"velocity": velocity, "acceleration": at_particles(a1)}
         if affine:
             f = np.eye(2) + _rust.gradients(location, basis, u).reshape(-1, 2, 2)
             inverse = np.linalg.inv(f)
             for name, field in (("velocity_gradient", v1), ("_acceleration_gradient", a1)):
                 gradient = _rust.gradients(location, basis, np.ascontiguousarray(field).ravel())
-                setattr(self, name, gradient.reshape(-1, 2, 2) @ inverse)
+                found[name] = gradient.reshape(-1, 2, 2) @ inverse
+        return found
 
     # -- many steps ----------------------------------------------------------
 

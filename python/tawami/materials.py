@@ -90,10 +90,10 @@ def drucker_prager(
         phi: Friction angle [degrees].
         c: Cohesion [Pa].
         psi: Dilatancy angle [degrees], at most phi.
-        eps_v_max: Plastic volumetric strain at which dilatancy ends.
+        eps_v_max: Plastic volumetric strain at which dilatancy ends; the strength stays that of psi.
         tiny_angle: Take a friction angle between 0 and 1.6 degrees as it is: it is not in radians.
 
-    History: `plastic_strain`, the multiplier of sqrt(J2); `plastic_volume`.
+    History: `plastic_strain`, the multiplier of sqrt(J2); `dilatancy`, the plastic volumetric strain.
 
     Raises:
         InputError: A parameter out of its range.

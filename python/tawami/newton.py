@@ -323,10 +323,10 @@ class Newton:
             f"{k}: {u:.2e}" + ("" if q is None else f", {q:.2e}")
             for k, (u, q) in enumerate(history)
         )
+        so_far = f"measures of momentum and volume by iteration: {rows}. " if history else ""
         raise ConvergenceError(
-            f"Newton did not converge in {len(history) - 1} iterations to {self.tolerance:g}; "
-            f"measures of momentum and volume by iteration: {rows}. Nothing was changed in the "
-            f"particles. {advice}",
+            f"Newton did not converge in {max(len(history) - 1, 0)} iterations to {self.tolerance:g}; "
+            f"{so_far}Nothing was changed in the particles. {advice}",
             history,
         )
 

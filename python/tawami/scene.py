@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
@@ -132,38 +132,42 @@ class Scene:
         self._constants = {"K": of_particle[:, 0], "mu": of_particle[:, 1]}
         self._density = None
         if density is not None:
-            each = np.broadcast_to(np.asarray(density, dtype=float), (len(materials),))
-            for rho in each:
-                inputs.number("density", float(rho), low=0.0)
+            given = list(density) if isinstance(density, Sequence) else [density] * len(materials)
+            if len(given) != len(materials):
+                raise InputError(
+                    f"density has {len(given)} values: expected one, or one for each of the "
+                    f"{len(materials)} materials"
+                )
+            each = np.array([inputs.number("density", rho, low=0.0) for rho in given])
             self._density = each[self.particles.material]
         self._materials, self._law, self._values = materials, law, values
         self._side, self._limits = FIELDS[assembly], (tolerance, max_iterations)
         self.stopwatch = Stopwatch()
-        self._attach()
+        self._field, self._stage, self._newton = self._attached(self._location)
         self._gravity = (0.0, 0.0)
         self._edges: list[tuple[Edge, int, Profile]] = []
         self._points: list[tuple[Sequence[float], int, float]] = []
         self._tractions: list[tuple[Edge, Profile, Profile]] = []
         self._total = np.zeros(self._field.layout.size)
 
-    def _attach(self) -> None:
-        """Field side, laws and Newton's method for the particles where they are now."""
+    def _attached(self, location: _rust.Location) -> tuple[Field, _rust.Stage | NumpyStage, Newton]:
+        """Field side, laws and Newton's method for the particles in these places."""
         tolerance, max_iterations = self._limits
         with self.stopwatch("set-up"):
-            self._field = self._side(
-                self.grid, self._compiled, self.basis, self._location, self.particles.volume,
+            field = self._side(
+                self.grid, self._compiled, self.basis, location, self.particles.volume,
                 self._values, self.stopwatch,
             )  # fmt: skip
-        stage = _rust.Stage(
-            self.particles, self._location, self._materials, self.form.kinematics, self._finite,
-            self.basis,
+        kinematics, law = self.form.kinematics, self._law
+        rust = _rust.Stage(
+            self.particles, location, self._materials, kinematics, self._finite, self.basis
+        )
+        stage = rust if law is None else NumpyStage(rust, self.particles, law)
+        newton = Newton(
+            field, self._compiled, stage, self.particles, location, self._constants, self.stopwatch,
+            tolerance=tolerance, max_iterations=max_iterations,
         )  # fmt: skip
-        law = self._law
-        self._stage = NumpyStage(stage, self.particles, law) if law is not None else stage
-        self._newton = Newton(
-            self._field, self._compiled, self._stage, self.particles, self._location,
-            self._constants, self.stopwatch, tolerance=tolerance, max_iterations=max_iterations,
-        )  # fmt: skip
+        return field, stage, newton
 
     def _distribute(self, body: _rust.Particles, location: _rust.Location) -> None:
         """Keep the particles in this rank's cells."""
@@ -349,23 +353,31 @@ class Scene:
         external: Array,
         inertia: Inertia | None = None,
         guess: Array | None = None,
+        also: Callable[[Array], Callable[[], None]] | None = None,
     ) -> Solution:
-        """One step: find it, store it in the particles, move them where strains are finite."""
+        """One step: find it, store it in the particles, move them where strains are finite.
+
+        What may fail comes before anything changes; `also` gets the increments of the displacement
+        and returns what is to be stored besides.
+        """
         step = self._newton.solve(reduction, external, inertia, guess)
         fields = self._field.layout.split(step.coefficients)
-        moved = None
-        if self._finite:  # where they go is known before anything changes
+        if self._finite:
             moved = self.particles.x + _rust.interpolate(self._location, self.basis, 2, fields[0])
             location = self.grid.rust.locate(moved)
+            attached = self._attached(location)
+        store = also(fields[0]) if also is not None else None
         with self.stopwatch("commit"), ranks.together(self.grid.comm):
             self._stage.commit(*fields)
+        if store is not None:
+            store()
         solution = Solution(self, step, reduction.size, self._total + step.coefficients)
-        if moved is None:
-            self._total = self._total + step.coefficients
-        else:
+        if self._finite:
             self.particles.move_to(moved)
             self._location = location
-            self._attach()
+            self._field, self._stage, self._newton = attached
+        else:
+            self._total = self._total + step.coefficients
         return solution
 
 

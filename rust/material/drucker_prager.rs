@@ -10,6 +10,7 @@
 //! (the often quoted 3 tan phi / sqrt(9 + 12 tan^2 phi) is the associated case psi = phi only).
 //! Return to the cone: `d_gamma = F / (mu + K A Ab)`, `sqrt(J2) -= mu d_gamma`, `p -= K Ab d_gamma`;
 //! where that passes the apex, s = 0 and p = c B / A, which also cuts off tension at psi = 0.
+//! Dilatancy ends at a plastic volumetric strain of `eps_v_max`; A and B stay those of psi.
 
 use super::{deviatoric_stiffness, norm, LinearElastic, Material, Moduli, Strain, Stress};
 use crate::error::{Error, Result};
@@ -90,8 +91,12 @@ impl Material for DruckerPrager {
         self.elastic.bulk_modulus()
     }
 
+    fn pressure_dependent(&self) -> bool {
+        true
+    }
+
     fn history(&self) -> &'static [&'static str] {
-        &["plastic_strain", "plastic_volume"]
+        &["plastic_strain", "dilatancy"]
     }
 
     fn respond(
@@ -109,14 +114,18 @@ impl Material for DruckerPrager {
         if excess <= 0.0 {
             return (trial, moduli);
         }
-        let flow = if history[1] < self.eps_v_max { self.flow } else { 0.0 };
-        let stiffness = mu + bulk * self.a * flow;
-        let gamma = excess / stiffness;
+        let (mut flow, mut stiffness) = (self.flow, mu + bulk * self.a * self.flow);
+        let (mut gamma, mut dilation) = (excess / stiffness, flow * excess / stiffness);
+        let left = (self.eps_v_max - history[1]).max(0.0);
+        if dilation > left {
+            // what is left of the dilatancy, the rest at constant volume
+            (flow, stiffness, dilation) = (0.0, mu, left);
+            gamma = (excess - self.a * bulk * left) / mu;
+        }
         if mu * gamma >= root {
             // the apex; a > 0, for with phi = 0 gamma = (root - c) / mu
             let mean = self.strength / self.a;
             new[0] += root / mu;
-            new[1] += (trial.mean - mean) / bulk;
             let nothing = [0.0; COMPONENTS];
             moduli = Moduli {
                 dev_dev: [nothing; COMPONENTS],
@@ -127,12 +136,12 @@ impl Material for DruckerPrager {
             return (Stress { deviator: nothing, mean }, moduli);
         }
         new[0] += gamma;
-        new[1] += flow * gamma;
+        new[1] += dilation;
         let n = trial.deviator.map(|s| s / root);
         let keep = 1.0 - mu * gamma / root;
         let stress = Stress {
             deviator: trial.deviator.map(|s| keep * s),
-            mean: trial.mean - bulk * flow * gamma,
+            mean: trial.mean - bulk * dilation,
         };
         let elastic = deviatoric_stiffness(mu);
         let along = mu * mu * (gamma / root - 1.0 / stiffness);

@@ -75,6 +75,11 @@ pub trait Material: Send + Sync {
     /// Bulk modulus K [Pa] of the elastic part; infinite where the material is incompressible.
     fn bulk_modulus(&self) -> f64;
 
+    /// Whether the deviator depends on the mean stress: not where the form alone knows it (u-p).
+    fn pressure_dependent(&self) -> bool {
+        false
+    }
+
     /// Names of the history variables, all zero at first.
     fn history(&self) -> &'static [&'static str] {
         &[]
