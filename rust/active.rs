@@ -16,6 +16,13 @@ pub struct Active {
 /// First and last cell along each axis.
 pub type Rectangle = [[usize; 2]; 2];
 
+/// The cells of the support of a function, x fastest, on a grid of so many cells.
+#[must_use]
+pub fn support(basis: Basis, cells: [usize; 2], function: usize) -> Rectangle {
+    let width = basis.len(cells[0]);
+    [basis.support(cells[0], function % width), basis.support(cells[1], function / width)]
+}
+
 impl Active {
     /// From the indices of the cells that hold particles.
     #[must_use]
@@ -112,9 +119,8 @@ impl Active {
     /// The active cells (i, j) in the support of a function.
     #[must_use]
     pub fn support(&self, basis: Basis, function: usize) -> Vec<[usize; 2]> {
-        let [nx, ny] = self.grid.cells;
-        let width = basis.len(nx);
-        let (x, y) = (basis.support(nx, function % width), basis.support(ny, function / width));
+        let nx = self.grid.cells[0];
+        let [x, y] = support(basis, self.grid.cells, function);
         let cells = (y[0]..=y[1]).flat_map(|j| (x[0]..=x[1]).map(move |i| [i, j]));
         cells.filter(|&[i, j]| self.cells[i + j * nx]).collect()
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::finite_strain::{Plane, Trial};
+use crate::finite_strain::{det_minus_one, Plane, Trial};
 use crate::grid::Location;
 use crate::kinematics::{Increments, Kinematics};
 use crate::material::{Material, Moduli, Stress};
@@ -264,7 +264,7 @@ impl Stage<'_> {
         let g = self.increments.grad_u(self.location, p);
         if self.finite {
             // NaN where f turns the particle inside out: no iterate to accept
-            return (g[0][0] + g[1][1] + g[0][0] * g[1][1] - g[0][1] * g[1][0]).ln_1p();
+            return det_minus_one(&g).ln_1p();
         }
         g[0][0] + g[1][1]
     }

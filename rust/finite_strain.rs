@@ -71,6 +71,12 @@ fn rotated(a: &Plane, v: &Plane) -> Plane {
     multiply(&multiply(v, a), &transposed(v))
 }
 
+/// `det f - 1`, without the loss of digits where grad u is small.
+#[must_use]
+pub fn det_minus_one(g: &Plane) -> f64 {
+    g[0][0] + g[1][1] + g[0][0] * g[1][1] - g[0][1] * g[1][0]
+}
+
 impl Trial {
     /// From the gradient of the displacement increment and the elastic strain before it; the volume
     /// changes by `volume`, or by ln J_f where there is no field for it. `None` if f is not
@@ -78,7 +84,7 @@ impl Trial {
     #[must_use]
     pub fn new(g: &Plane, volume: Option<f64>, old: &Strain) -> Option<Self> {
         let f = [[1.0 + g[0][0], g[0][1]], [g[1][0], 1.0 + g[1][1]]];
-        let change = g[0][0] + g[1][1] + g[0][0] * g[1][1] - g[0][1] * g[1][0];
+        let change = det_minus_one(g);
         let j = 1.0 + change;
         if !j.is_finite() || j <= 0.0 {
             return None;

@@ -132,6 +132,7 @@ def domain() -> Any:
     return ufl.Mesh(lagrange(1, 2))
 
 
+@functools.cache
 def reference_points(degree: int) -> Array:
     """Points of the quadrature rule of a degree: points x 2, in reference axes."""
     points = basix.make_quadrature(basix.CellType.quadrilateral, degree)[0]
@@ -145,6 +146,7 @@ def rule_points(rule: Rule) -> Array:
     return reference_nodes(1) if rule == "vertex" else reference_points(DEGREE[rule])
 
 
+@functools.cache
 def reference_nodes(degree: int) -> Array:
     """Nodes of the scalar Lagrange element, in its order: nodes x 2, in reference axes."""
     element = basix.create_element(

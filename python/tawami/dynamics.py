@@ -23,12 +23,12 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami import _rust, inputs
-from tawami.basis import greville_1d
 from tawami.errors import ConvergenceError, InputError, SingularError
 from tawami.newton import Inertia
 from tawami.scene import Scene, Solution
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 Transfer = Literal["affine_flip", "flip", "tpic", "pic"]
 #: Whether a transfer maps the gradient of the velocity, and whether it adds the grid's change.
 TRANSFERS: dict[str, tuple[bool, bool]] = {
@@ -137,14 +137,14 @@ class Dynamics:
             )
         n = scene._field.layout.num_displacement
         mass = self._sums(np.ones((len(self.mass), 1)))[:, 0]
+        held = np.ones(n, dtype=bool)
+        held[reduction.unknowns[reduction.unknowns < n]] = False
         acceleration = self.acceleration
         if self.steps == 0:
-            acceleration = self._first_acceleration(reduction, external, mass)
+            acceleration = self._first_acceleration(external, mass, held)
         mapped_v = self._mapped(self.velocity, self.velocity_gradient, mass)
         mapped_a = self._mapped(acceleration, self._acceleration_gradient, mass)
         v, a = mapped_v.copy(), mapped_a.copy()
-        held = np.ones(2 * len(mass), dtype=bool)
-        held[reduction.unknowns[reduction.unknowns < n]] = False
         v.ravel()[held] = a.ravel()[held] = 0.0
 
         slope = 1 / (self.beta * dt**2)
@@ -176,31 +176,25 @@ class Dynamics:
         affine, _ = TRANSFERS[self.transfer]
         scene = self.scene
         if affine:
-            grid = scene.grid
-            x = np.array(scene.particles.x) - grid.origin
+            x = np.array(scene.particles.x) - scene.grid.origin
             data = np.column_stack(
                 [values - np.einsum("pij,pj->pi", gradient, x), gradient.reshape(-1, 4)]
             )
             sums = self._sums(data)
-            gx, gy = (grid.h * greville_1d(scene.basis, n) for n in grid.cells)
-            points = np.stack([np.tile(gx, len(gy)), np.repeat(gy, len(gx))], axis=1)
+            points = scene._field.layout.greville - scene.grid.origin
             momentum = sums[:, :2] + np.einsum("ikl,il->ik", sums[:, 2:].reshape(-1, 2, 2), points)
         else:
             momentum = self._sums(values)
-        return np.divide(
-            momentum, mass[:, None], out=np.zeros_like(momentum), where=mass[:, None] > 0
-        )
+        return _over(momentum, mass[:, None])
 
-    def _first_acceleration(self, reduction: Any, external: Array, mass: Array) -> Array:
+    def _first_acceleration(self, external: Array, mass: Array, held: Mask) -> Array:
         """Accelerations of the particles from the momentum equation: g in free fall, 0 in rest."""
         scene = self.scene
         n = scene._field.layout.num_displacement
         internal = scene._newton.internal(np.zeros(scene.num_coefficients))
         force = (external - internal)[:n].reshape(-1, 2)
-        a = np.divide(force, mass[:, None], out=np.zeros_like(force), where=mass[:, None] > 0)
-        free = np.zeros(n, dtype=bool)
-        free[reduction.unknowns[reduction.unknowns < n]] = True
-        a.ravel()[~free] = 0.0
+        a = _over(force, mass[:, None])
+        a.ravel()[held] = 0.0
         return _rust.interpolate(scene._location, scene.basis, 2, a.ravel())
 
     def _guess(self, u: Array) -> Array:
@@ -210,14 +204,12 @@ class Dynamics:
         n = scene._field.layout.num_displacement
         guess[:n] = u.ravel()
         if len(guess) > n:
-            g = _rust.gradients(scene._location, scene.basis, guess[:n])
-            change: Array = g[:, 0] + g[:, 3] + g[:, 0] * g[:, 3] - g[:, 1] * g[:, 2]
+            ln_j = scene._stage.volume_strains(guess[:n], None)[:, 0]
             weight = scene._constants["K"] * scene.particles.volume
-            data = np.column_stack([np.log1p(np.maximum(change, -0.5)), np.ones(len(weight))])
+            # a guess that halves a particle or turns it inside out is not followed that far
+            data = np.column_stack([np.fmax(ln_j, np.log(0.5)), np.ones(len(weight))])
             sums = _rust.nodal_sums(scene._location, weight, data, "bilinear")
-            guess[n:] = np.divide(
-                sums[:, 0], sums[:, 1], out=np.zeros(len(sums)), where=sums[:, 1] > 0
-            )
+            guess[n:] = _over(sums[:, 0], sums[:, 1])
         return guess
 
     def _returned(
@@ -303,3 +295,8 @@ class Dynamics:
     def kinetic_energy(self) -> float:
         """1/2 sum m v^2 [J per metre depth]."""
         return float(0.5 * self.mass @ (self.velocity**2).sum(axis=1))
+
+
+def _over(sums: Array, weights: Array) -> Array:
+    """Means from weighted sums; 0 for functions without particles."""
+    return np.asarray(np.divide(sums, weights, out=np.zeros_like(sums), where=weights > 0))

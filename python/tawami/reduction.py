@@ -115,6 +115,16 @@ class Layout:
         functions = np.where(weights == 0, 0, functions)
         return functions.reshape(-1, 9), weights.reshape(-1, 9), width * height
 
+    @functools.cached_property
+    def greville(self) -> Array:
+        """Greville points [m] of the displacement functions, functions x 2."""
+        grid = self.grid
+        x, y = (
+            grid.origin[axis] + grid.h * greville_1d(self.basis, grid.cells[axis])
+            for axis in range(2)
+        )
+        return np.stack([np.tile(x, len(y)), np.repeat(y, len(x))], axis=1)
+
     def split(self, coefficients: Array) -> tuple[Array, Array | None]:
         """Coefficients of the displacement and of the bilinear field (None if there is none)."""
         n = self.num_displacement
@@ -131,12 +141,7 @@ class Layout:
         """Coefficients of the translations in x and y and of the rotation (coefficients x 3), the
         centre [m] of a part of the body and the length [m] that scales the rotation to order 1.
         """
-        grid = self.grid
-        x, y = (
-            grid.origin[axis] + grid.h * greville_1d(self.basis, grid.cells[axis])
-            for axis in range(2)
-        )
-        points = np.stack([np.tile(x, len(y)), np.repeat(y, len(x))], axis=1)
+        points = self.greville
         mine = points[part[::2]]
         centre = mine.mean(axis=0)
         length = float(np.ptp(mine, axis=0).max())

@@ -86,11 +86,17 @@ impl Cells {
         DISPLACEMENT + if self.bilinear { 4 } else { 0 }
     }
 
+    /// Number of displacement coefficients on a grid; those of the bilinear field follow.
+    #[must_use]
+    pub fn displacement(&self, cells: [usize; 2]) -> usize {
+        2 * self.basis.len(cells[0]) * self.basis.len(cells[1])
+    }
+
     /// Number of coefficients of all fields on a grid.
     #[must_use]
     pub fn coefficients(&self, cells: [usize; 2]) -> usize {
         let vertices = if self.bilinear { (cells[0] + 1) * (cells[1] + 1) } else { 0 };
-        2 * self.basis.len(cells[0]) * self.basis.len(cells[1]) + vertices
+        self.displacement(cells) + vertices
     }
 
     pub(super) fn local(&self, location: &Location, a: usize) -> Local {
@@ -121,7 +127,7 @@ impl Cells {
             }
         }
         if self.bilinear {
-            let first = 2 * row * self.basis.len(ny);
+            let first = self.displacement([nx, ny]);
             let at = |&[p, q]: &[usize; 2]| first + i + p + (nx + 1) * (j + q);
             local.coefficients.extend(self.vertices.iter().map(at));
         }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::element::{tabulate, Cells, Kernel, Local, MAX_DOFS};
 use super::{colours, Shared};
-use crate::active::Active;
+use crate::active::{support, Active};
 use crate::basis::Basis;
 use crate::grid::Location;
 
@@ -98,17 +98,14 @@ impl Functions {
     /// The fields of the cells' forms.
     fn of(cells: &Cells, grid: [usize; 2]) -> Vec<Self> {
         let u = Self { basis: cells.basis, cells: grid, first: 0, components: 2 };
-        let first = 2 * u.basis.len(grid[0]) * u.basis.len(grid[1]);
+        let first = cells.displacement(grid);
         let bilinear = Self { basis: Basis::Bilinear, cells: grid, first, components: 1 };
         std::iter::once(u).chain(cells.bilinear.then_some(bilinear)).collect()
     }
 
     /// Cells of the support of the function that a coefficient belongs to.
     fn support(&self, coefficient: usize) -> [[usize; 2]; 2] {
-        let function = (coefficient - self.first) / self.components;
-        let width = self.basis.len(self.cells[0]);
-        let of = [function % width, function / width];
-        [0, 1].map(|axis| self.basis.support(self.cells[axis], of[axis]))
+        support(self.basis, self.cells, (coefficient - self.first) / self.components)
     }
 
     /// Append the unknowns whose functions share an active cell with a support.
