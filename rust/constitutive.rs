@@ -11,7 +11,7 @@ use crate::grid::Location;
 use crate::kinematics::{Increments, Kinematics};
 use crate::material::{Material, Moduli, Stress};
 use crate::particles::Particles;
-use crate::tensor::{Sym, COMPONENTS, IN_PLANE, UNIT};
+use crate::tensor::{dot, Sym, COMPONENTS, IN_PLANE, UNIT};
 
 /// A quantity of the law that a form may name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,6 +24,10 @@ pub enum Operator {
     Mean,
     /// P = tau f^-T (xx, xy, yx, yy) [Pa]; finite strain only.
     Nominal,
+    /// P_s = s f^-T (xx, xy, yx, yy) [Pa], the deviator's part of P; finite strain only.
+    NominalDeviator,
+    /// Mean Kirchhoff stress [Pa]; finite strain only.
+    MeanKirchhoff,
     /// ln J_f; finite strain only.
     LnJ,
 }
@@ -33,16 +37,16 @@ impl Operator {
     #[must_use]
     pub fn components(self) -> usize {
         match self {
-            Self::Nominal => 4,
+            Self::Nominal | Self::NominalDeviator => 4,
             Self::Sigma | Self::Deviator => 3,
-            Self::Mean | Self::LnJ => 1,
+            Self::Mean | Self::MeanKirchhoff | Self::LnJ => 1,
         }
     }
 
     /// Whether it belongs to finite strain.
     #[must_use]
     pub fn finite(self) -> bool {
-        matches!(self, Self::Nominal | Self::LnJ)
+        !matches!(self, Self::Sigma | Self::Deviator | Self::Mean)
     }
 
     /// A small-strain operator's components of a stress (or of its derivative in some direction).
@@ -51,7 +55,7 @@ impl Operator {
             Self::Sigma => IN_PLANE.iter().zip(out).for_each(|(&i, o)| *o = s[i] + m * UNIT[i]),
             Self::Deviator => IN_PLANE.iter().zip(out).for_each(|(&i, o)| *o = s[i]),
             Self::Mean => out[0] = m,
-            Self::Nominal | Self::LnJ => {}
+            _ => {}
         }
     }
 }
@@ -100,10 +104,6 @@ const UNIT_DEVIATORS: [Sym; 3] = [
     [0.0, 0.0, 0.0, 1.0],
 ];
 
-fn dot(a: &Sym, b: &Sym) -> f64 {
-    (0..COMPONENTS).map(|i| a[i] * b[i]).sum()
-}
-
 fn write(request: &Request, kinematics: Kinematics, stress: &Stress, c: &Moduli, row: &mut [f64]) {
     let n = request.operator.components();
     let out = &mut row[request.column..];
@@ -143,30 +143,35 @@ fn write_finite(
         [[0.0, 0.0], [0.0, 1.0]],
     ];
     let out = &mut row[request.column..];
+    let (mut tau, mut c) = (*tau, *c);
+    if request.operator == Operator::NominalDeviator {
+        (tau.mean, c.mean_dev, c.mean_vol) = (0.0, [0.0; COMPONENTS], 0.0);
+    }
     match (request.operator, request.part) {
-        (Operator::Nominal, Part::Value) => out[..4].copy_from_slice(&trial.nominal(tau)),
-        (Operator::Nominal, Part::Volume) => {
-            out[..4].copy_from_slice(&trial.nominal_change(tau, c, &[[0.0; 2]; 2], 1.0));
+        (Operator::Nominal | Operator::NominalDeviator, Part::Value) => {
+            out[..4].copy_from_slice(&trial.nominal(&tau));
         }
-        (Operator::Nominal, Part::Gradient) => {
+        (Operator::Nominal | Operator::NominalDeviator, Part::Volume) => {
+            out[..4].copy_from_slice(&trial.nominal_change(&tau, &c, &[[0.0; 2]; 2], 1.0));
+        }
+        (Operator::Nominal | Operator::NominalDeviator, Part::Gradient) => {
             for (k, unit) in UNITS.iter().enumerate() {
                 let dv = if own { 0.0 } else { trial.volume_change(unit) };
-                let change = trial.nominal_change(tau, c, unit, dv);
+                let change = trial.nominal_change(&tau, &c, unit, dv);
                 (0..4).for_each(|i| out[4 * i + k] = change[i]);
             }
+        }
+        (Operator::MeanKirchhoff, Part::Value) => out[0] = tau.mean,
+        (Operator::MeanKirchhoff, Part::Volume) => out[0] = c.mean_vol,
+        (Operator::MeanKirchhoff, Part::Gradient) => {
+            let changes = UNITS.iter().map(|unit| trial.mean_change(&c, unit));
+            out.iter_mut().zip(changes).for_each(|(o, change)| *o = change);
         }
         (Operator::LnJ, Part::Value) => out[0] = trial.ln_j,
         (Operator::LnJ, Part::Volume) => out[0] = 0.0,
         (Operator::LnJ, Part::Gradient) => out[..4].copy_from_slice(&trial.ln_j_gradient()),
         _ => {}
     }
-}
-
-/// Whether mean stress and deviator depend on each other beyond round-off.
-fn couples(c: &Moduli) -> bool {
-    let cross = c.dev_vol.iter().chain(&c.mean_dev).fold(0.0_f64, |a, b| a.max(b.abs()));
-    let own = c.dev_dev.iter().flatten().fold(c.mean_vol.abs(), |a, b| a.max(b.abs()));
-    cross > 1e-12 * own
 }
 
 /// Where stress and tangent come from.
@@ -214,7 +219,7 @@ impl Stage<'_> {
     fn respond(&self, particles: &Particles, p: usize) -> Option<Answer> {
         let (mut before, mut after) = ([0.0; MAX_HISTORY], [0.0; MAX_HISTORY]);
         let mut strain = self.increments.strain(self.kinematics, self.location, p);
-        let volume = strain.volume;
+        let mut volume = strain.volume;
         let mut trial = None;
         let (stress, moduli) = match self.response {
             Response::Laws(laws) => {
@@ -226,10 +231,19 @@ impl Stage<'_> {
                 let old: Sym = std::array::from_fn(|i| particles.stress[[p, i]]);
                 let mut old = Stress::from(&old);
                 if self.finite {
-                    let own = self.kinematics != Kinematics::Displacement;
+                    let own = match self.kinematics {
+                        Kinematics::Displacement => None,
+                        Kinematics::Cell => {
+                            let change =
+                                det_minus_one(&self.increments.grad_u_of_cell(self.location, p));
+                            Some((change > -1.0).then(|| change.ln_1p())?)
+                        }
+                        _ => Some(volume),
+                    };
                     let g = self.increments.grad_u(self.location, p);
                     let elastic = law.elastic_strain(&old);
-                    trial = Some(Trial::new(&g, own.then_some(volume), &elastic)?);
+                    volume = own.unwrap_or(volume);
+                    trial = Some(Trial::new(&g, own, &elastic)?);
                     // the law sees the whole elastic strain, from no stress
                     strain = trial.as_ref().map_or(strain, |t| t.strain);
                     old = Stress { deviator: [0.0; COMPONENTS], mean: 0.0 };
@@ -272,7 +286,7 @@ impl Stage<'_> {
     /// Write what is requested into the particle data (particles x `columns`, at least one).
     ///
     /// # Errors
-    /// [`Error::CoupledLaw`] where B-bar meets a law it has no tangent for, [`Error::Inverted`].
+    /// [`Error::Inverted`], naming the first such particle.
     ///
     /// # Panics
     /// If a request reaches outside the columns; callers check at the border.
@@ -286,7 +300,7 @@ impl Stage<'_> {
         let own = self.kinematics != Kinematics::Displacement;
         let of = |(p, row): (usize, &mut [f64])| {
             let Some(Answer { stress, moduli, trial, .. }) = self.respond(particles, p) else {
-                return Some((p, true));
+                return Some(p);
             };
             for request in requests {
                 match &trial {
@@ -294,13 +308,10 @@ impl Stage<'_> {
                     None => write(request, self.kinematics, &stress, &moduli, row),
                 }
             }
-            (self.kinematics == Kinematics::Cell && couples(&moduli)).then_some((p, false))
+            None
         };
         let first = data.par_chunks_exact_mut(columns).enumerate().filter_map(of).min();
-        first.map_or(Ok(()), |(p, inverted)| {
-            let index = particles.number[p] as usize;
-            Err(if inverted { Error::Inverted { index } } else { Error::CoupledLaw { index } })
-        })
+        first.map_or(Ok(()), |p| Err(Error::Inverted { index: particles.number[p] as usize }))
     }
 
     /// Accept the increments: stress (tau at finite strain), history, displacement and (where stored)

@@ -119,15 +119,6 @@ pub enum Error {
         /// The first such particle.
         index: usize,
     },
-    /// A law whose mean stress and deviator depend on each other met B-bar.
-    #[error(
-        "the law of particle {index} couples mean stress and deviator: the tangent of the \
-         kinematics 'cell' (B-bar) has no such terms. Use form 'u_epsv'"
-    )]
-    CoupledLaw {
-        /// The first such particle.
-        index: usize,
-    },
 }
 
 impl Error {

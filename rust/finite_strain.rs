@@ -11,7 +11,7 @@
 //! isotropic law is that of small strains (formulation: Simo and Hughes 1998, chapter 9).
 
 use crate::material::{Moduli, Strain, Stress};
-use crate::tensor::{deviator, Sym, COMPONENTS};
+use crate::tensor::{deviator, dot, Sym};
 
 /// In-plane second-order tensor, `[row][column]`.
 pub type Plane = [[f64; 2]; 2];
@@ -126,10 +126,8 @@ impl Trial {
         [i[0][0], i[1][0], i[0][1], i[1][1]]
     }
 
-    /// Change of P with a change `dg` of grad u, the volume changing by `dv`.
-    #[must_use]
-    pub fn nominal_change(&self, tau: &Stress, c: &Moduli, dg: &Plane, dv: f64) -> [f64; 4] {
-        let dl = multiply(dg, &self.inverse);
+    /// Change of the deviator of the elastic strain with a change `dg` of grad u.
+    fn strain_change(&self, dl: &Plane) -> Sym {
         let third = (dl[0][0] + dl[1][1]) / 3.0;
         let iso = [[dl[0][0] - third, dl[0][1]], [dl[1][0], dl[1][1] - third]];
         let half = multiply(&iso, &self.be);
@@ -142,10 +140,22 @@ impl Trial {
         let scaled: Plane =
             std::array::from_fn(|i| std::array::from_fn(|j| self.theta[i][j] * turned[i][j]));
         let de = rotated(&scaled, &self.vectors);
-        let strain: Sym = [de[0][0], de[1][1], -third, 2.0 * de[0][1]];
-        let dot = |a: &Sym| (0..COMPONENTS).map(|k| a[k] * strain[k]).sum::<f64>();
-        let ds: Sym = std::array::from_fn(|k| dot(&c.dev_dev[k]) + c.dev_vol[k] * dv);
-        let dt = in_plane(&ds, dot(&c.mean_dev) + c.mean_vol * dv);
+        [de[0][0], de[1][1], -third, 2.0 * de[0][1]]
+    }
+
+    /// Change of the mean stress with a change `dg` of grad u, the volume kept.
+    #[must_use]
+    pub fn mean_change(&self, c: &Moduli, dg: &Plane) -> f64 {
+        dot(&c.mean_dev, &self.strain_change(&multiply(dg, &self.inverse)))
+    }
+
+    /// Change of P with a change `dg` of grad u, the volume changing by `dv`.
+    #[must_use]
+    pub fn nominal_change(&self, tau: &Stress, c: &Moduli, dg: &Plane, dv: f64) -> [f64; 4] {
+        let dl = multiply(dg, &self.inverse);
+        let strain = self.strain_change(&dl);
+        let ds: Sym = std::array::from_fn(|k| dot(&c.dev_dev[k], &strain) + c.dev_vol[k] * dv);
+        let dt = in_plane(&ds, dot(&c.mean_dev, &strain) + c.mean_vol * dv);
         let t = in_plane(&tau.deviator, tau.mean);
         // d(tau f^-T) = d tau f^-T - tau dl^T f^-T
         let turn = multiply(&t, &transposed(&dl));

@@ -64,6 +64,12 @@ impl Increments<'_> {
         self.u.gradient(location.cell[p] as usize, location.xi[p])
     }
 
+    /// Displacement gradient at the centre of the cell of particle `p`.
+    #[must_use]
+    pub fn grad_u_of_cell(&self, location: &Location, p: usize) -> [[f64; 2]; 2] {
+        self.u.gradient(location.cell[p] as usize, [0.5, 0.5])
+    }
+
     /// The bilinear field at particle `p`; 0 where the form has none.
     #[must_use]
     pub fn volumetric_at(&self, location: &Location, p: usize) -> f64 {
@@ -82,7 +88,7 @@ impl Increments<'_> {
             Kinematics::Displacement => div,
             Kinematics::Mixed => self.volumetric_at(location, p),
             Kinematics::Cell => {
-                let c = self.u.gradient(location.cell[p] as usize, [0.5, 0.5]);
+                let c = self.grad_u_of_cell(location, p);
                 c[0][0] + c[1][1]
             }
             Kinematics::Deviatoric => 0.0,

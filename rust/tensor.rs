@@ -21,6 +21,12 @@ pub const UNIT: Sym = [1.0, 1.0, 1.0, 0.0];
 /// Positions of the in-plane components xx, yy, xy in a [`Sym`].
 pub const IN_PLANE: [usize; 3] = [0, 1, 3];
 
+/// Sum of the products of the components: the work of a stress on a strain.
+#[must_use]
+pub fn dot(a: &Sym, b: &Sym) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
 /// Sum of the normal components.
 #[must_use]
 pub fn trace(a: &Sym) -> f64 {

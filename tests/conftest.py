@@ -31,6 +31,7 @@ FORMS: dict[str, dict[str, Any]] = {
 FINITE: dict[str, dict[str, Any]] = {
     "u_finite": {"form": "u_finite"},
     "u_epsv_finite": {"form": "u_epsv_finite", "alpha": 0.1},
+    "u_bbar_finite": {"form": "u_bbar_finite"},
 }
 BASES = ("quadratic_spline", "bilinear", "biquadratic")
 

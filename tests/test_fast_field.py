@@ -214,9 +214,9 @@ def test_arrays_that_do_not_fit_are_refused_and_never_panic(random_scene):
         _selection(identity(len(c), format="csr"), np.arange(len(c)))
     )
     with pytest.raises(RuntimeError, match="a kernel of other coefficients"):
-        field._assembler.matrix(wrong, volume, c, pattern, np.zeros(len(pattern.columns)))
+        field._assembler.matrix(wrong, [], volume, c, pattern, np.zeros(len(pattern.columns)))
     with pytest.raises(RuntimeError, match="another pattern"):
-        field._assembler.matrix(kernels, volume, c, pattern, np.zeros(3))
+        field._assembler.matrix(kernels, [], volume, c, pattern, np.zeros(3))
     with pytest.raises(RuntimeError, match="not a selection of these coefficients"):
         field._assembler.pattern(_selection(identity(3, format="csr"), np.arange(3)))
 

@@ -67,7 +67,7 @@ def test_a_rotation_of_the_body_makes_no_force(random_scene, finite, angle):
 
 
 def test_small_increments_give_the_small_strain(random_scene, finite):
-    small = {"u_finite": "u", "u_epsv_finite": "u_epsv"}[finite["form"]]
+    small = finite["form"].removesuffix("_finite")
     consistent = {"theta": 0.0} if small == "u_epsv" else {}
     scene = random_scene(**finite, **consistent)
     other = random_scene(**finite | {"form": small})
@@ -88,7 +88,9 @@ def test_plane_tension_against_the_closed_form(finite, nu):
     log = brentq(lambda e: bar * e / np.exp(e) - P, 0.0, 0.9)
     grid = tawami.Grid(grid_of().comm, origin=(0, 0), h=0.5, cells=(4, 2))
     body = tawami.box(grid, (0, 0), (2, 1), per_axis=3, gauss=True)
-    scene = tawami.Scene(grid, body, law, tolerance=1e-10, **finite)
+    # quadratic B-bar misses the patch test (README, Limits)
+    basis = "bilinear" if finite["form"] == "u_bbar_finite" else "quadratic_spline"
+    scene = tawami.Scene(grid, body, law, tolerance=1e-10, basis=basis, **finite)
     scene.fix("left", "x")
     scene.fix("bottom", "y")
     scene.traction("right", (P, 0.0))
@@ -98,7 +100,7 @@ def test_plane_tension_against_the_closed_form(finite, nu):
     grid = tawami.Grid(grid.comm, origin=(0, 0), h=0.5, cells=(4, 2))
     coefficients = scene._newton.solve(scene._reduction(), scene._external()).coefficients
     u = scene.split(coefficients)[0].reshape(-1, 2)
-    x, y = (0.5 * greville("quadratic_spline", n) for n in grid.cells)
+    x, y = (0.5 * greville(basis, n) for n in grid.cells)
     stretch = np.array([np.exp(log), np.exp(-ratio * log)])
     points = np.stack([np.tile(x, len(y)), np.repeat(y, len(x))], axis=1)
     assert np.abs(u - (stretch - 1) * points).max() < 1e-8
@@ -117,7 +119,8 @@ def test_a_particle_turned_inside_out_is_no_iterate():
 
 
 @pytest.mark.parametrize(
-    ("form", "height", "stress"), [("u_finite", 3e-3, 0.025), ("u_epsv_finite", 3e-3, 0.025)]
+    ("form", "height", "stress"),
+    [("u_finite", 3e-3, 0.025), ("u_epsv_finite", 3e-3, 0.025), ("u_bbar_finite", 6e-3, 0.025)],
 )
 def test_a_column_under_its_weight(form, height, stress):
     """Across many cells; the closed form is an integral of Lambert's W."""
@@ -133,8 +136,8 @@ def test_what_is_not_there_yet_has_a_sentence(random_scene):
         tawami.FormError, match="strain = 'huge': expected one of 'small', 'finite'"
     ):
         Form({"u": ("displacement", "w")}, "displacement", lambda w: w, strain="huge")
-    with pytest.raises(tawami.FormError, match="strain = 'finite' with the kinematics 'cell'"):
-        Form({"u": ("displacement", "w")}, "cell", lambda w: w, strain="finite")
+    with pytest.raises(tawami.FormError, match="strain = 'finite' with the kinematics 'deviatoric'"):
+        Form({"u": ("displacement", "w")}, "deviatoric", lambda w: w, strain="finite")
     law = tawami.NumpyLaw(lambda e, s: (s, np.zeros((len(e), 4, 4))), K=1.0, mu=1.0)
     grid = grid_of()
     body = tawami.box(grid, grid.origin, grid.upper)

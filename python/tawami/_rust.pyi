@@ -140,6 +140,7 @@ class Assembler:
     def matrix(
         self,
         kernels: Sequence[_Kernel],
+        couplings: Sequence[Sequence[_Kernel]],
         volume: _Floats,
         coefficients: _Floats,
         pattern: Pattern,

@@ -64,6 +64,7 @@ class CompiledForm:
         residual: Its integrals over cells, one per quadrature rule.
         traction: Its integral over loaded edges, if it has one.
         tangent: Derivative of `residual`, one per quadrature rule.
+        couplings: What it has besides: products of two integrals of rank 1, cell by cell.
         densities: Particle data per rule: each density with its first column.
     """
 
@@ -72,6 +73,7 @@ class CompiledForm:
     residual: tuple[Integral, ...]
     traction: Integral | None
     tangent: tuple[Integral, ...]
+    couplings: tuple[tuple[Integral, Integral], ...]
     densities: Mapping[Rule, Mapping[Density, int]]
 
     def columns(self, rule: Rule) -> int:
@@ -155,7 +157,7 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
     if symbols.traction in cells.coefficients():
         raise FormError(f"form {form.name}: the traction t belongs into terms with ds, not with dx")
     with _refusals(form):
-        tangent = symbols.tangent(cells)
+        tangent, couplings = symbols.tangent(cells), symbols.couplings(cells)
     densities: dict[Rule, dict[Density, int]] = {rule: {} for rule in (*DEGREE, "mean")}
     width = dict.fromkeys(densities, 0)
     for density in symbols.placeholders:
@@ -201,6 +203,7 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
         residual=tuple(integral(part) for part in _by_rule(cells)),
         traction=integral(edges, facets=True) if edges is not None else None,
         tangent=tuple(integral(part) for part in _by_rule(tangent)),
+        couplings=tuple((integral(left), integral(right)) for left, right in couplings),
         densities=densities,
     )
 

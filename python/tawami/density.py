@@ -26,7 +26,7 @@ FAMILY: Mapping[Rule, str] = {"particle": "default", "centre": "default", "verte
 #: Components of the quantities that the material law gives, at small and at finite strain.
 LAW: Mapping[str, Mapping[str, int]] = {
     "small": {"sigma": 3, "s": 3, "sigma_m": 1},
-    "finite": {"P": 4, "ln_J": 1},
+    "finite": {"P": 4, "P_s": 4, "tau_m": 1, "ln_J": 1},
 }
 COMPONENTS = {**LAW["small"], **LAW["finite"]}
 #: Numbers per component of the parts of a law quantity: itself, and its derivatives with respect to

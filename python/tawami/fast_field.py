@@ -74,7 +74,8 @@ class FastField(Field):
                 self._new_pattern(reduction)
         with self.stopwatch("tangent"):
             kernels = self._kernels(self.compiled.tangent, data)
-            self._assembler.matrix(kernels, self._volume, coefficients, *self._pattern)
+            couplings = [self._kernels(pair, data) for pair in self.compiled.couplings]
+            self._assembler.matrix(kernels, couplings, self._volume, coefficients, *self._pattern)
             self._petsc["of cells"].assemble()
         if self.grid.comm.size == 1:
             return self._petsc["of cells"]

@@ -116,6 +116,17 @@ class Field:
             offset += slot.width
         return packed
 
+    def _of_each_cell(self, integral: Integral, nodal: Array, data: Mapping[Rule, Array]) -> Array:
+        """The vector that each cell gives: active cells x its degrees of freedom."""
+        packed, rows = self._pack(integral, nodal, data), []
+        for k in range(len(self._cells)):
+            cell, vector = slice(k, k + 1), np.zeros(self._space.size)
+            entities = self.grid.rectangle.entities(self._cells[cell], None)
+            form = self._space.form(integral.kernel, integral.rank, entities)
+            self._add_vector(vector, form, integral, packed[cell])
+            rows.append(vector[self._space.dofs[self._cells[k]]])
+        return np.array(rows)
+
     def _constants(self, integral: Integral) -> Array:
         return np.array([self._values[name] for name in integral.constants], dtype=float)
 
@@ -232,5 +243,10 @@ class Field:
             with self.stopwatch("tangent"):
                 form, constants = self._forms[id(integral)], self._constants(integral)
                 _dolfinx.add_matrix(matrix, form, integral.kernel, constants, packed)
+        for left, right in self.compiled.couplings:
+            sides = [self._of_each_cell(integral, nodal, data) for integral in (left, right)]
+            for dofs, row, column in zip(self._space.dofs[self._cells], *sides, strict=True):
+                dofs = dofs.astype(np.int32)
+                matrix.setValuesLocal(dofs, dofs, np.outer(row, column), addv=True)
         matrix.assemble()
         return matrix

@@ -6,8 +6,9 @@ function `residual` whose arguments are picked by their names:
 ========================= ========================================================================
 the fields, the tests     u, w, eps_v, q, ... as declared in `fields`
 sigma, s, sigma_m         in-plane stress, its (three-dimensional) deviator, mean stress: of the law
-P, ln_J                   instead of these with `strain = "finite"`: tau f^-T and ln det f of the step,
-                          f = I + grad u, tau the Kirchhoff stress of the law; `K * ln_J` works
+P, P_s, tau_m, ln_J       instead of these with `strain = "finite"`: tau f^-T, s f^-T and ln det f of the
+                          step, f = I + grad u, tau = s + tau_m I the Kirchhoff stress of the law;
+                          `K * ln_J` works
 K, mu                     bulk and shear modulus of the particle; `K**2 / mu`, `1 / K` work
 sum_p(D, f), sum_p(f)     sum over particles of V_p D_p : f(x_p), and of V_p f(x_p); exact for f up
                           to degree 4 along x and along y (a warning tells of more)
@@ -101,10 +102,10 @@ class Form:
             self._fail(f"kinematics = '{self.kinematics}': expected one of {listed(KINEMATICS)}")
         if self.strain not in LAW:
             self._fail(f"strain = '{self.strain}': expected one of {listed(LAW)}")
-        if self.strain == "finite" and self.kinematics not in ("displacement", "mixed"):
+        if self.strain == "finite" and self.kinematics == "deviatoric":
             self._fail(
-                f"strain = 'finite' with the kinematics '{self.kinematics}': expected 'displacement' or "
-                "'mixed'"
+                "strain = 'finite' with the kinematics 'deviatoric': expected 'displacement', 'mixed' "
+                "or 'cell'"
             )
         wanted = ("displacement", *KINEMATICS[self.kinematics])
         if tuple(kinds) != wanted:

@@ -149,8 +149,8 @@ class Symbols:
         return ufl.inner(weight, expression) * self.measures[rule]
 
     def _check_place(self, rule: Rule, quantity: LawQuantity, caller: str) -> None:
-        """In B-bar the deviator depends on the strain at the particle and the mean stress on that
-        at the centre: only there are their tangents known.
+        """In B-bar the deviator is taken at the particle and the mean stress at the centre: only
+        there are their tangents known.
         """
         if rule == "vertex":
             raise FormError(
@@ -163,10 +163,11 @@ class Symbols:
                 f"form {self.form.name}: sum_c({quantity.name}, ...) needs kinematics 'cell': "
                 "elsewhere the stress depends on the strain at the particle"
             )
-        if cell and quantity.name != ("sigma_m" if centre else "s"):
+        s, mean = ("P_s", "tau_m") if self.form.strain == "finite" else ("s", "sigma_m")
+        if cell and quantity.name != (mean if centre else s):
             raise FormError(
                 f"form {self.form.name}: {caller}({quantity.name}, ...) with "
-                "kinematics 'cell': expected sum_p(s, ...) and sum_c(sigma_m, ...) only"
+                f"kinematics 'cell': expected sum_p({s}, ...) and sum_c({mean}, ...) only"
             )
 
     def _check_degree(self, expression: Any) -> None:
@@ -229,29 +230,65 @@ class Symbols:
                 )
         return residual
 
+    def _strain_change(self, quantity: LawQuantity, du: Any) -> list[Any]:
+        """Change of a law quantity with the strain (or grad u) at the particle."""
+        g, e = ufl.grad(du), ufl.sym(ufl.grad(du))
+        part: Part = "strain"
+        direction: tuple[Any, ...] = (e[0, 0], e[1, 1], 2 * e[0, 1])
+        if self.form.strain == "finite":
+            part, direction = "gradient", (g[0, 0], g[0, 1], g[1, 0], g[1, 1])
+        c, m = self.density(Density("particle", quantity, part)), len(direction)
+        n = COMPONENTS[quantity.name]
+        return [sum(c[m * i + j] * direction[j] for j in range(m)) for i in range(n)]
+
+    def _volume_change(self, du: Any) -> Any:
+        """Change of div u (ln det f) where it is taken from the displacement."""
+        if self.form.strain == "small":
+            return ufl.div(du)
+        u = next(iter(self.fields.values()))
+        return ufl.inner(ufl.inv(ufl.Identity(2) + ufl.grad(u)).T, ufl.grad(du))
+
     def _direction(self, density: Density) -> Any:
         """Change of a law quantity with the fields: C : strain(du) (or grad(du)) + c d_eps_v."""
         assert isinstance(density.quantity, LawQuantity)
         kinematics, n = self.form.kinematics, COMPONENTS[density.quantity.name]
         du, *volumetric = self.trials.values()
         change = [ufl.as_ufl(0.0)] * n
-        part: Part = "gradient" if self.form.strain == "finite" else "strain"
         if density.rule == "particle":
-            g, e = ufl.grad(du), ufl.sym(ufl.grad(du))
-            direction: tuple[Any, ...] = (e[0, 0], e[1, 1], 2 * e[0, 1])
-            if part == "gradient":
-                direction = (g[0, 0], g[0, 1], g[1, 0], g[1, 1])
-            c, m = self.density(Density(density.rule, density.quantity, part)), len(direction)
-            change = [sum(c[m * i + j] * direction[j] for j in range(m)) for i in range(n)]
+            change = self._strain_change(density.quantity, du)
         volume = None
         if kinematics == "mixed" and density.quantity.name != "ln_J":
             volume = volumetric[0]
         elif kinematics == "cell" and density.rule == "centre":
-            volume = ufl.div(du)
+            volume = self._volume_change(du)
         if volume is not None:
             c = self.density(Density(density.rule, density.quantity, "volume"))
             change = [change[i] + c[i] * volume for i in range(n)]
         return ufl.as_vector(change)
+
+    def couplings(self, residual: Any) -> list[tuple[Any, Any]]:
+        """What the tangent of B-bar has besides: the deviator at the particles changes with the volume
+        at the centre, and the mean stress there with the strain at the particles. The centre being
+        one point of the cell, each is a product of two linear forms of the cell, (left, right).
+        """
+        if self.form.kinematics != "cell":
+            return []
+        du = next(iter(self.tests.values()))
+        at_centre, at_particles = self.measures["centre"], self.measures["particle"]
+        area = self.constants["h"] ** 2
+        products = []
+        for density, symbol in list(self.placeholders.items()):
+            if not isinstance(density.quantity, LawQuantity) or density.part != "value":
+                continue
+            if density.rule == "particle":
+                change = self.density(Density("particle", density.quantity, "volume"))
+                of_volume = self._volume_change(du) / area * at_centre
+                products.append((_with(residual, symbol, change), of_volume))
+            else:
+                (of_strain,) = self._strain_change(density.quantity, du)
+                one = ufl.as_vector([1 / area])
+                products.append((_with(residual, symbol, one), of_strain * at_particles))
+        return products
 
     def tangent(self, residual: Any) -> Any:
         """Derivative with respect to the fields, the law's part by its consistent tangent."""
@@ -263,3 +300,11 @@ class Symbols:
                 # Linear in each density: what is bilinear after the exchange is its share.
                 tangent += ufl.lhs(ufl.replace(residual, {symbol: self._direction(density)}))
         return tangent
+
+
+def _with(form: Any, symbol: Any, value: Any) -> Any:
+    """The terms of a form with a symbol that they are linear in, another value in its place."""
+    slope = ufl.derivative(form, symbol, ufl.Argument(symbol.ufl_function_space(), 2))
+    slope = ufl.algorithms.expand_derivatives(slope)
+    (argument,) = (a for a in slope.arguments() if a.number() == 2)
+    return ufl.replace(slope, {argument: value})

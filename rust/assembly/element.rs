@@ -57,6 +57,15 @@ pub struct Kernel<'a> {
     pub constants: Vec<f64>,
 }
 
+/// What the matrix of a cell is made of: `sum kernels + sum left right^T`.
+pub struct Bilinear<'a> {
+    /// Kernels of rank 2.
+    pub kernels: Vec<Kernel<'a>>,
+    /// Pairs of kernels of rank 1, whose products couple what is taken at the particles with what is
+    /// taken at the cell's centre (B-bar).
+    pub couplings: Vec<[Kernel<'a>; 2]>,
+}
+
 /// Where the kernels' degrees of freedom are in a cell, and the coefficients behind them.
 #[derive(Debug, Clone)]
 pub struct Cells {
@@ -182,6 +191,37 @@ impl Local {
         }
         let rest = &a[DISPLACEMENT * columns..];
         out[of_u..][..rest.len()].copy_from_slice(rest);
+    }
+}
+
+impl Bilinear<'_> {
+    /// Matrix of the a-th active cell, into `element`.
+    ///
+    /// # Safety
+    /// As [`matrix`](super::matrix).
+    pub(super) unsafe fn tabulate(
+        &self,
+        cells: &Cells,
+        location: &Location,
+        volume: &[f64],
+        at: (usize, &Local, &[f64]),
+        packed: &mut Vec<f64>,
+        element: &mut [f64],
+    ) {
+        // SAFETY: the caller's; kernels of rank 2 write `dofs x dofs` numbers.
+        unsafe { tabulate(cells, &self.kernels, location, volume, at, packed, element) };
+        let n = cells.dofs();
+        for pair in &self.couplings {
+            let mut sides = [[0.0; MAX_DOFS]; 2];
+            for (kernel, side) in pair.iter().zip(&mut sides) {
+                let kernel = std::slice::from_ref(kernel);
+                // SAFETY: the caller's; kernels of rank 1 write `dofs` numbers.
+                unsafe { tabulate(cells, kernel, location, volume, at, packed, &mut side[..n]) };
+            }
+            for (row, left) in element.chunks_exact_mut(n).zip(&sides[0]) {
+                row.iter_mut().zip(&sides[1]).for_each(|(e, right)| *e += left * right);
+            }
+        }
     }
 }
 

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use crate::grid::Location;
 
-pub use element::{Cells, Kernel, Slot, TabulateTensor};
+pub use element::{Bilinear, Cells, Kernel, Slot, TabulateTensor};
 pub use reduced::{matrix, pattern, Pattern, Selection};
 
 use element::{tabulate, MAX_DOFS};

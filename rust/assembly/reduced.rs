@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use ndarray::Array1;
 use rayon::prelude::*;
 
-use super::element::{tabulate, Cells, Kernel, Local, MAX_DOFS};
+use super::element::{Bilinear, Cells, Local, MAX_DOFS};
 use super::{colours, Shared};
 use crate::active::{support, Active};
 use crate::basis::Basis;
@@ -209,12 +209,12 @@ fn reach(
 /// this selection; `values` are then of no use.
 ///
 /// # Safety
-/// As [`vector`](super::vector), with kernels of rank 2; `values` is as long as the columns of the
+/// As [`vector`](super::vector), with kernels of the ranks that `form` says; `values` is as long as the columns of the
 /// pattern, whose rows are disjoint (`start` ascends).
 #[allow(clippy::too_many_arguments)]
 pub unsafe fn matrix(
     cells: &Cells,
-    kernels: &[Kernel],
+    form: &Bilinear,
     location: &Location,
     volume: &[f64],
     coefficients: &[f64],
@@ -233,8 +233,8 @@ pub unsafe fn matrix(
         let (n, m) = (cells.dofs(), local.coefficients.len());
         let element = &mut work.element[..n * n];
         let at = (a, &local, coefficients);
-        // SAFETY: the caller's; kernels of rank 2 write `dofs x dofs` numbers.
-        unsafe { tabulate(cells, kernels, location, volume, at, &mut work.packed, element) };
+        // SAFETY: the caller's.
+        unsafe { form.tabulate(cells, location, volume, at, &mut work.packed, element) };
         // T^T A, then (T^T (T^T A)^T)^T = T^T A T
         local.transposed(element, n, &mut work.half);
         transpose(&work.half[..m * n], n, &mut work.turned);

@@ -10,7 +10,7 @@ use super::adjoint::points_per_axis;
 use super::grid::PyLocation;
 use super::{require, view, InputError};
 use crate::adjoint::{Densities, MAX_POINTS};
-use crate::assembly::{self, Cells, Kernel, Pattern, Selection, Slot, TabulateTensor};
+use crate::assembly::{self, Bilinear, Cells, Kernel, Pattern, Selection, Slot, TabulateTensor};
 use crate::grid::Location;
 use crate::quadrature::Rule;
 
@@ -132,10 +132,12 @@ impl PyAssembler {
         Ok(PyPattern { location: Arc::clone(&self.location), selection, pattern })
     }
 
-    /// Fill the values of the reduced matrix in its pattern.
+    /// Fill the values of the reduced matrix in its pattern; `couplings` are pairs of rank 1.
+    #[allow(clippy::too_many_arguments)]
     fn matrix(
         &self,
         kernels: Vec<KernelOf>,
+        couplings: Vec<[KernelOf; 2]>,
         volume: PyReadonlyArray1<f64>,
         coefficients: PyReadonlyArray1<f64>,
         pattern: &PyPattern,
@@ -145,14 +147,19 @@ impl PyAssembler {
         require(volume.len() == self.location.len(), "volumes of other particles")?;
         let mine = Arc::ptr_eq(&pattern.location, &self.location);
         require(mine && values.len() == pattern.pattern.columns.len(), "another pattern")?;
-        let kernels = self.kernels(2, &kernels)?;
+        let pair = |pair| -> PyResult<[Kernel; 2]> {
+            let kernels = self.kernels(1, pair)?;
+            kernels.try_into().map_err(|_| PyRuntimeError::new_err("internal: not a pair"))
+        };
+        let couplings = couplings.iter().map(|p| pair(p)).collect::<PyResult<_>>()?;
+        let form = Bilinear { kernels: self.kernels(2, &kernels)?, couplings };
         let coefficients = self.coefficients(&coefficients)?;
-        // SAFETY: kernels as in `kernels`, of rank 2; the pattern is one that `assembly::pattern`
+        // SAFETY: kernels as in `kernels`, of the ranks asked for; the pattern is one that `assembly::pattern`
         // made of this location, and the lengths were checked.
         let fits = unsafe {
             assembly::matrix(
                 &self.cells,
-                &kernels,
+                &form,
                 &self.location,
                 volume,
                 coefficients,

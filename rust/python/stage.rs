@@ -178,6 +178,8 @@ pub(super) fn request((operator, part, column): &(String, String, usize)) -> PyR
         "s" => Operator::Deviator,
         "sigma_m" => Operator::Mean,
         "P" => Operator::Nominal,
+        "P_s" => Operator::NominalDeviator,
+        "tau_m" => Operator::MeanKirchhoff,
         "ln_J" => Operator::LnJ,
         other => return Err(PyRuntimeError::new_err(format!("internal: operator '{other}'"))),
     };

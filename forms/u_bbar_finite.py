@@ -1,0 +1,16 @@
+"""B-bar at finite strain, updated Lagrangian: the volume of the step is ln det f at the cell's centre.
+
+The deviator is tested at the particle, the mean stress with tr(grad w f_c^-1) at the centre.
+"""
+
+from ufl import Identity, dot, grad, inner, inv
+
+fields = {"u": ("displacement", "w")}
+kinematics = "cell"
+strain = "finite"
+
+
+def residual(u, w, P_s, tau_m, t, sum_p, sum_c, ds):
+    """R_u(w) = sum_p V0_p { s_p f^-T : grad w + tau_m,p (f_c^-T : grad w)_c } - loads; c: cell centre."""
+    f_c = Identity(2) + grad(u)
+    return sum_p(P_s, grad(w)) + sum_c(tau_m, inner(inv(f_c).T, grad(w))) - dot(t, w) * ds
