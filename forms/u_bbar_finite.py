@@ -11,6 +11,6 @@ strain = "finite"
 
 
 def residual(u, w, P_s, tau_m, t, sum_p, sum_c, ds):
-    """R_u(w) = sum_p V0_p { s_p f^-T : grad w + tau_m,p (f_c^-T : grad w)_c } - loads; c: cell centre."""
+    """R_u(w) = sum_p V0_p { s_p f^-T : grad w + tau_m,p (f_c^-T : grad w)_c } - loads, c the centre."""
     f_c = Identity(2) + grad(u)
     return sum_p(P_s, grad(w)) + sum_c(tau_m, inner(inv(f_c).T, grad(w))) - dot(t, w) * ds

@@ -136,7 +136,9 @@ def test_what_is_not_there_yet_has_a_sentence(random_scene):
         tawami.FormError, match="strain = 'huge': expected one of 'small', 'finite'"
     ):
         Form({"u": ("displacement", "w")}, "displacement", lambda w: w, strain="huge")
-    with pytest.raises(tawami.FormError, match="strain = 'finite' with the kinematics 'deviatoric'"):
+    with pytest.raises(
+        tawami.FormError, match="strain = 'finite' with the kinematics 'deviatoric'"
+    ):
         Form({"u": ("displacement", "w")}, "deviatoric", lambda w: w, strain="finite")
     law = tawami.NumpyLaw(lambda e, s: (s, np.zeros((len(e), 4, 4))), K=1.0, mu=1.0)
     grid = grid_of()
