@@ -212,6 +212,8 @@ struct Answer {
     moduli: Moduli,
     trial: Option<Trial>,
     history: [f64; MAX_HISTORY],
+    /// Work of the stress on the plastic strain of the step [J/m3].
+    dissipated: f64,
 }
 
 impl Stage<'_> {
@@ -219,7 +221,7 @@ impl Stage<'_> {
     fn respond(&self, particles: &Particles, p: usize) -> Option<Answer> {
         let (mut before, mut after) = ([0.0; MAX_HISTORY], [0.0; MAX_HISTORY]);
         let mut strain = self.increments.strain(self.kinematics, self.location, p);
-        let mut volume = strain.volume;
+        let (mut volume, mut dissipated) = (strain.volume, 0.0);
         let mut trial = None;
         let (stress, moduli) = match self.response {
             Response::Laws(laws) => {
@@ -249,7 +251,14 @@ impl Stage<'_> {
                     old = Stress { deviator: [0.0; COMPONENTS], mean: 0.0 };
                 }
                 let (before, after) = (&before[..places.len()], &mut after[..places.len()]);
-                law.respond(&strain, &old, before, after)
+                let (new, moduli) = law.respond(&strain, &old, before, after);
+                if !places.is_empty() {
+                    let (start, end) = (law.elastic_strain(&old), law.elastic_strain(&new));
+                    let plastic = |i| start.deviator[i] + strain.deviator[i] - end.deviator[i];
+                    dissipated = dot(&new.deviator, &std::array::from_fn(plastic))
+                        + new.mean * (start.volume + strain.volume - end.volume);
+                }
+                (new, moduli)
             }
             Response::Given(stress, tangent) => {
                 let stress: Sym = std::array::from_fn(|i| stress[COMPONENTS * p + i]);
@@ -262,7 +271,7 @@ impl Stage<'_> {
             (Some(trial), Kinematics::Displacement) => trial.ln_j,
             _ => volume,
         };
-        Some(Answer { volume, stress, moduli, trial, history: after })
+        Some(Answer { volume, stress, moduli, trial, history: after, dissipated })
     }
 
     /// Strain increment of particle `p` as one tensor; small strain.
@@ -315,23 +324,26 @@ impl Stage<'_> {
     }
 
     /// Accept the increments: stress (tau at finite strain), history, displacement and (where stored)
-    /// eps_v of the particles.
+    /// eps_v of the particles. Returns what the laws dissipate in the step [J per metre depth].
     ///
     /// # Errors
     /// [`Error::Inverted`]; then nothing has changed.
-    pub fn commit(&self, particles: &mut Particles) -> Result<()> {
+    pub fn commit(&self, particles: &mut Particles) -> Result<f64> {
         let of = |p: usize| {
             let mut answer = self.respond(particles, p).ok_or(p)?;
             if self.kinematics == Kinematics::Deviatoric {
                 answer.stress.mean += self.increments.volumetric_at(self.location, p);
             }
             let u = self.increments.u.value(self.location.cell[p] as usize, self.location.xi[p]);
-            Ok((answer.stress, u, answer.volume, answer.history))
+            Ok((answer, u))
         };
         let new: std::result::Result<Vec<_>, usize> =
             (0..particles.len()).into_par_iter().map(of).collect();
         let new = new.map_err(|p| Error::Inverted { index: particles.number[p] as usize })?;
-        for (p, (stress, u, volume, history)) in new.into_iter().enumerate() {
+        let mut dissipated = 0.0;
+        for (p, (answer, u)) in new.into_iter().enumerate() {
+            let Answer { stress, volume, history, .. } = answer;
+            dissipated += particles.volume[p] * answer.dissipated;
             for (i, unit) in UNIT.iter().enumerate() {
                 particles.stress[[p, i]] = stress.deviator[i] + stress.mean * unit;
             }
@@ -345,7 +357,7 @@ impl Stage<'_> {
                 particles.history[place].1[p] = value;
             }
         }
-        Ok(())
+        Ok(dissipated)
     }
 }
 

@@ -47,7 +47,7 @@ pub enum Error {
     )]
     NotFinite {
         /// Name of the array.
-        name: &'static str,
+        name: String,
         /// How many entries are not finite.
         count: usize,
         /// The first such entry.
@@ -136,12 +136,12 @@ impl Error {
 pub type Result<T> = std::result::Result<T, Error>;
 
 /// Index and value of the first entry that is not finite, and how many there are.
-pub(crate) fn check_finite(name: &'static str, values: &[f64], per_particle: usize) -> Result<()> {
+pub(crate) fn check_finite(name: &str, values: &[f64], per_particle: usize) -> Result<()> {
     let mut bad = values.iter().enumerate().filter(|(_, v)| !v.is_finite());
     match bad.next() {
         None => Ok(()),
         Some((entry, &value)) => Err(Error::NotFinite {
-            name,
+            name: name.to_owned(),
             count: 1 + bad.count(),
             value,
             index: entry / per_particle,

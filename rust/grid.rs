@@ -78,13 +78,10 @@ impl Grid {
     /// `x` holds x, y of one particle after the other [m].
     ///
     /// # Errors
-    /// [`Error::NoParticles`], [`Error::NotFinite`], or [`Error::OutsideGrid`] with the number of
+    /// [`Error::NotFinite`], or [`Error::OutsideGrid`] with the number of
     /// particles outside and the first of them.
     pub fn locate(&self, x: &[f64]) -> Result<Location> {
         let n = x.len() / 2;
-        if n == 0 {
-            return Err(Error::NoParticles);
-        }
         check_finite("x", x, 2)?;
         let mut cell = Vec::with_capacity(n);
         let mut xi = Vec::with_capacity(n);

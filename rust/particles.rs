@@ -1,6 +1,6 @@
 //! Particle storage: structure of arrays, and only the arrays that the scene needs.
 
-use ndarray::{Array1, Array2, Axis};
+use ndarray::{s, Array1, Array2, ArrayView2, Axis};
 
 use crate::error::{check_finite, Error, Result};
 use crate::tensor::COMPONENTS;
@@ -24,6 +24,8 @@ pub struct Particles {
     pub eps_v: Option<Array1<f64>>,
     /// History variables of the laws by name, n each; only those that the laws have.
     pub history: Vec<(&'static str, Array1<f64>)>,
+    /// What a time integration carries by name (velocity, ...), n x width each.
+    pub carried: Vec<(String, Array2<f64>)>,
 }
 
 impl Particles {
@@ -51,6 +53,7 @@ impl Particles {
             displacement: Array2::zeros((n, 2)),
             eps_v: None,
             history: Vec::new(),
+            carried: Vec::new(),
             number: (0..n as u32).collect(),
             x,
             volume,
@@ -77,7 +80,49 @@ impl Particles {
             displacement: self.displacement.select(all, &rows),
             eps_v: self.eps_v.as_ref().map(per_particle),
             history: self.history.iter().map(|(name, a)| (*name, per_particle(a))).collect(),
+            carried: self.carried.iter().map(|(n, a)| (n.clone(), a.select(all, &rows))).collect(),
         }
+    }
+
+    /// All arrays of the particles side by side, a row each: as they travel between ranks.
+    #[must_use]
+    pub fn rows(&self) -> Array2<f64> {
+        let numbers = |a: &Array1<u32>| a.mapv(f64::from).insert_axis(Axis(1));
+        let column = |a: &Array1<f64>| a.to_owned().insert_axis(Axis(1));
+        let mut parts = vec![self.x.clone(), column(&self.volume), numbers(&self.material)];
+        parts.extend([numbers(&self.number), self.stress.clone(), self.displacement.clone()]);
+        parts.extend(self.eps_v.as_ref().map(column));
+        parts.extend(self.history.iter().map(|(_, a)| column(a)));
+        parts.extend(self.carried.iter().map(|(_, a)| a.clone()));
+        let views: Vec<_> = parts.iter().map(|a| a.view()).collect();
+        ndarray::concatenate(Axis(1), &views).unwrap_or_default()
+    }
+
+    /// Particles with the same arrays as these, from rows as [`Particles::rows`] makes them; `None`
+    /// if these have another width.
+    #[must_use]
+    pub fn of_rows(&self, rows: &ArrayView2<f64>) -> Option<Self> {
+        let mut first = 0;
+        let mut next = |width: usize| {
+            let part = rows.slice(s![.., first..first + width]).to_owned();
+            first += width;
+            part
+        };
+        if rows.ncols() != self.rows().ncols() {
+            return None;
+        }
+        let column = |a: Array2<f64>| a.column(0).to_owned();
+        Some(Self {
+            x: next(2),
+            volume: column(next(1)),
+            material: column(next(1)).mapv(|m| m as u32),
+            number: column(next(1)).mapv(|m| m as u32),
+            stress: next(COMPONENTS),
+            displacement: next(2),
+            eps_v: self.eps_v.as_ref().map(|_| column(next(1))),
+            history: self.history.iter().map(|(name, _)| (*name, column(next(1)))).collect(),
+            carried: self.carried.iter().map(|(n, a)| (n.clone(), next(a.ncols()))).collect(),
+        })
     }
 
     /// Check what a user may have written into the arrays: finite values, positive volumes.
@@ -88,7 +133,7 @@ impl Particles {
         fn flat<D: ndarray::Dimension>(a: &ndarray::Array<f64, D>) -> &[f64] {
             a.as_slice().unwrap_or_default()
         }
-        let finite = |name, values, per_particle| {
+        let finite = |name: &str, values, per_particle| {
             check_finite(name, values, per_particle).map_err(|e| e.of_body(&self.number))
         };
         finite("x", flat(&self.x), 2)?;
@@ -100,6 +145,9 @@ impl Particles {
         }
         for (name, values) in &self.history {
             finite(name, flat(values), 1)?;
+        }
+        for (name, values) in &self.carried {
+            finite(name, flat(values), values.ncols())?;
         }
         match self.volume.iter().position(|&v| v <= 0.0) {
             Some(p) => Err(Error::Volume { index: self.number[p] as usize, value: self.volume[p] }),
@@ -135,6 +183,13 @@ impl Particles {
         }
     }
 
+    /// Make room for an array of a time integration, zero at first; one of that name stays as it is.
+    pub fn carry(&mut self, name: &str, width: usize) {
+        if !self.carried.iter().any(|(known, _)| known == name) {
+            self.carried.push((name.to_owned(), Array2::zeros((self.len(), width))));
+        }
+    }
+
     /// Where the history variables of a law stand; `None` if one is not there.
     #[must_use]
     pub fn history_of(&self, names: &[&str]) -> Option<Vec<usize>> {
@@ -147,6 +202,7 @@ impl Particles {
     pub fn bytes_per_particle(&self) -> usize {
         let doubles =
             2 + 1 + COMPONENTS + 2 + usize::from(self.eps_v.is_some()) + self.history.len();
-        8 * doubles + 4 + 4
+        let carried: usize = self.carried.iter().map(|(_, a)| a.ncols()).sum();
+        8 * (doubles + carried) + 4 + 4
     }
 }

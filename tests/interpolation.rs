@@ -154,7 +154,7 @@ fn particle_arrays_are_checked() {
         Particles::new(x, Array1::from_vec(vec![1.0, v]), Array1::zeros(2))
     };
     assert!(make(0.0, 1.0).is_ok());
-    assert!(matches!(make(f64::NAN, 1.0), Err(Error::NotFinite { name: "x", count: 4, .. })));
+    assert!(matches!(make(f64::NAN, 1.0), Err(Error::NotFinite { count: 4, .. })));
     assert!(matches!(make(0.0, -1.0), Err(Error::Volume { index: 1, .. })));
     let empty = Particles::new(Array2::zeros((0, 2)), Array1::zeros(0), Array1::zeros(0));
     assert_eq!(empty.unwrap_err(), Error::NoParticles);

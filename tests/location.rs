@@ -78,9 +78,9 @@ fn particles_outside_are_counted_and_the_first_is_named() {
 #[test]
 fn bad_input_is_refused() {
     let grid = Grid::new([0.0, 0.0], 1.0, [2, 2]).unwrap();
-    assert_eq!(grid.locate(&[]).unwrap_err(), Error::NoParticles);
+    assert!(grid.locate(&[]).unwrap().is_empty());
     let error = grid.locate(&[0.5, 0.5, f64::NAN, 0.5]).unwrap_err();
-    assert!(matches!(error, Error::NotFinite { name: "x", index: 1, count: 1, .. }), "{error}");
+    assert!(matches!(error, Error::NotFinite { index: 1, count: 1, .. }), "{error}");
     for (h, cells) in [(0.0, [1, 1]), (f64::NAN, [1, 1]), (-1.0, [1, 1]), (1.0, [0, 1])] {
         assert!(matches!(Grid::new([0.0, 0.0], h, cells), Err(Error::Parameter { .. })));
     }

@@ -44,9 +44,10 @@ def close(a, b):
 
 def reduced(scene, c):
     """P^T K P as the field side gives it to the solver, at increments c."""
-    reduction = scene._reduction()
-    scene._newton.internal(c)
-    start, columns, values = scene._field.tangent(c, scene._newton.data, reduction).getValuesCSR()
+    reduction = scene.problem().reduction
+    scene.attached.newton.internal(c)
+    field, data = scene.attached.field, scene.attached.newton.data
+    start, columns, values = field.tangent(c, data, reduction).getValuesCSR()
     return csr_matrix((values, columns, start), shape=(reduction.size,) * 2).toarray()
 
 
@@ -144,9 +145,9 @@ for basis in ("quadratic_spline", "bilinear", "biquadratic"):
         scene.hold((0.71, 0.1 * row + 0.06), "y")
     c = np.random.default_rng(0).standard_normal(scene.num_coefficients)
     total.update(scene.residual(c).tobytes() + scene.tangent(c).data.tobytes())
-    field, reduction = scene._field, scene._reduction()
+    field, reduction = scene.attached.field, scene.problem().reduction
     for _ in range(3):
-        total.update(field.tangent(c, scene._newton.data, reduction).getValuesCSR()[2].tobytes())
+        total.update(field.tangent(c, scene.attached.newton.data, reduction).getValuesCSR()[2].tobytes())
 print(total.hexdigest())
 """
     outputs = set()
@@ -168,17 +169,17 @@ def test_one_field_with_several_reductions_in_turn(random_scene):
         scene.fix("left", "x")
         scene.hold((-0.9, 1.9), "y")
     close(*[reduced(scene, c) for scene in scenes])
-    reductions = [scene._reduction() for scene in scenes]
+    reductions = [scene.problem().reduction for scene in scenes]
     for scene in scenes:
         scene.hold((0.4, 1.3), "y")
     close(*[reduced(scene, c) for scene in scenes])
     values = []
     for scene, reduction in zip(scenes, reductions, strict=True):
-        matrix = scene._field.tangent(c, scene._newton.data, reduction)
+        matrix = scene.attached.field.tangent(c, scene.attached.newton.data, reduction)
         vector = matrix.createVecLeft()
         vector.set(3.0)
         matrix.diagonalScale(vector, vector)
-        again = scene._field.tangent(c, scene._newton.data, reduction)
+        again = scene.attached.field.tangent(c, scene.attached.newton.data, reduction)
         values.append(again.getValuesCSR()[2].sum())
     assert values[0] == pytest.approx(values[1], rel=1e-9)
 
@@ -202,9 +203,9 @@ def test_solving_again_with_other_supports():
 
 def test_arrays_that_do_not_fit_are_refused_and_never_panic(random_scene):
     scene = random_scene(form="u")
-    field, c = scene._field, np.zeros(scene.num_coefficients)
+    field, c = scene.attached.field, np.zeros(scene.num_coefficients)
     scene.residual(c)
-    kernels = field._kernels(field.compiled.tangent, scene._newton.data)
+    kernels = field._kernels(field.compiled.tangent, scene.attached.newton.data)
     volume = scene.particles.volume
     with pytest.raises(RuntimeError, match="a kernel of another rank"):
         field._assembler.vector(kernels, volume, c)

@@ -94,11 +94,13 @@ def test_plane_tension_against_the_closed_form(finite, nu):
     scene.fix("left", "x")
     scene.fix("bottom", "y")
     scene.traction("right", (P, 0.0))
-    with pytest.raises(tawami.InputError, match="outside the grid"):
+    with pytest.raises(tawami.InputError, match="would leave the grid, at"):
         scene.solve()  # it does not fit, and nothing has changed
     assert not scene.particles.stress.any()
     grid = tawami.Grid(grid.comm, origin=(0, 0), h=0.5, cells=(4, 2))
-    coefficients = scene._newton.solve(scene._reduction(), scene._external()).coefficients
+    coefficients = scene.attached.newton.solve(
+        scene.problem().reduction, scene.external()
+    ).coefficients
     u = scene.split(coefficients)[0].reshape(-1, 2)
     x, y = (0.5 * greville(basis, n) for n in grid.cells)
     stretch = np.array([np.exp(log), np.exp(-ratio * log)])

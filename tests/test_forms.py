@@ -70,7 +70,7 @@ def test_a_quantity_of_the_law_times_constants_of_the_particle(random_scene):
         return sum_p(sigma, grad(w))
 
     scenes = [random_scene(form=form_of(function)) for function in (scaled, plain)]
-    mu = scenes[0]._constants["mu"]
+    mu = scenes[0].constants["mu"]
     scenes[1].particles.volume[:] *= 2 * mu
     c = np.random.default_rng(0).standard_normal(scenes[0].num_coefficients)
     for function in (lambda s: s.residual(c), lambda s: s.tangent(c).toarray()):
@@ -165,11 +165,11 @@ def test_sums_at_vertices_are_row_sum_lumped(random_scene, assembly):
     form = form_of(lumped, BOTH, "mixed")
     scene = random_scene(form=form, assembly=assembly)
     c = np.zeros(scene.num_coefficients)
-    n = scene._field.layout.num_displacement
+    n = scene.attached.field.layout.num_displacement
     block = scene.tangent(c).toarray()[n:, n:]
     grid = scene.grid
     s = (np.array(scene.particles.x) - grid.origin) / grid.h
-    weight = scene.particles.volume * scene._constants["K"]
+    weight = scene.particles.volume * scene.constants["K"]
     hats = [np.maximum(0, 1 - np.abs(s[:, [k]] - np.arange(grid.cells[k] + 1))) for k in range(2)]
     expected = np.einsum("p,pj,pi->ji", weight, hats[1], hats[0]).ravel()
     assert np.abs(block - np.diag(expected)).max() < 1e-12 * expected.max()

@@ -40,16 +40,16 @@ def test_point_constraint_by_elimination_is_that_by_multiplier(basis, point, val
     # the same with Lagrange multipliers, by scipy
     n = scene.num_coefficients
     matrix = scene.tangent(np.zeros(n))
-    held = boundary.held_edge(scene.grid, basis, scene._field.active, "left", 0, 1e-3)
+    held = boundary.held_edge(scene.grid, basis, scene.attached.field.active, "left", 0, 1e-3)
     rows = [sp.csr_matrix(([1.0], ([0], [k])), shape=(1, n)) for k in held.indices]
     values = list(held.values)
     for place, v in ((point, value), ((0.3, 0.9), -value)):
-        p = boundary.held_point(scene.grid, basis, scene._field.active, place, 1, v)
+        p = boundary.held_point(scene.grid, basis, scene.attached.field.active, place, 1, v)
         rows.append(sp.csr_matrix((p.weights, (np.zeros(len(p.indices)), p.indices)), shape=(1, n)))
         values.append(v)
     b = sp.vstack(rows)
     saddle = sp.bmat([[matrix, b.T], [b, None]], format="csc")
-    right = np.concatenate([scene._external(), values])
+    right = np.concatenate([scene.external(), values])
     expected = np.linalg.solve(saddle.toarray(), right)[:n]
     mine = np.concatenate([solution.u, solution.volumetric])
     assert np.abs(mine - expected).max() < 1e-9 * np.abs(expected).max()
@@ -59,16 +59,17 @@ def test_point_constraint_by_elimination_is_that_by_multiplier(basis, point, val
 def test_profiles_are_projected_in_l2_and_reproduced_where_the_basis_can(basis):
     scene = beam(basis=basis)
     linear = boundary.held_edge(
-        scene.grid, basis, scene._field.active, "top", 0, lambda x, y: 2 + 3 * x
+        scene.grid, basis, scene.attached.field.active, "top", 0, lambda x, y: 2 + 3 * x
     )
     width = len(linear.indices)
-    u = np.zeros(scene._field.layout.num_displacement)
+    u = np.zeros(scene.attached.field.layout.num_displacement)
     u[linear.indices] = linear.values
     for x in np.linspace(-1, 1, 7):
         location = boundary.locate_point(scene.grid, (x, scene.grid.upper[1]), "test")
         assert _rust.interpolate(location, basis, 2, u)[0, 0] == pytest.approx(2 + 3 * x, abs=1e-13)
     # a cubic is not in the space: the error of the projection is orthogonal to it
-    cubic = boundary.held_edge(scene.grid, basis, scene._field.active, "top", 0, lambda x, y: x**3)
+    active = scene.attached.field.active
+    cubic = boundary.held_edge(scene.grid, basis, active, "top", 0, lambda x, y: x**3)
     t, w = np.polynomial.legendre.leggauss(6)
     total = np.zeros(width)
     for cell in range(4):
@@ -217,7 +218,7 @@ def test_a_traction_adds_up_to_its_integral(edge, basis):
     body = tawami.box(grid, lower, upper, per_axis=3)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3), form="u", basis=basis)
     scene.traction(edge, (lambda x, y: 1 + x * y + x**2 + y**2, lambda x, y: -2 * x + y))
-    force = scene._external().reshape(-1, 2)
+    force = scene.external().reshape(-1, 2)
     along = 1 if edge in ("left", "right") else 0
     t, w = np.polynomial.legendre.leggauss(4)
     half = (upper[along] - lower[along]) / 2
@@ -347,8 +348,8 @@ def test_hold_anywhere_holds_there(a, b):
 
 def test_reduction_selects_active_unsupported_coefficients_once():
     scene = beam()
-    layout = scene._field.layout
-    held = [boundary.held_edge(scene.grid, scene.basis, scene._field.active, "left", k, 0.0)
+    layout = scene.attached.field.layout
+    held = [boundary.held_edge(scene.grid, scene.basis, scene.attached.field.active, "left", k, 0.0)
             for k in range(2)]  # fmt: skip
     reduction = Reduction(layout, held, [], np.zeros(layout.size))
     assert reduction.size == layout.size - 2 * (3 + 2)

@@ -18,7 +18,9 @@ from tawami.grid import Grid
 from tawami.materials import drucker_prager, linear_elastic, von_mises
 from tawami.numpy_law import NumpyLaw
 from tawami.ranks import run
-from tawami.scene import Scene, Solution
+from tawami.scene import Scene
+from tawami.solution import Solution
+from tawami.stepping import ramp, settle
 
 __all__ = [
     "Body",
@@ -40,6 +42,8 @@ __all__ = [
     "box",
     "drucker_prager",
     "linear_elastic",
+    "ramp",
     "run",
+    "settle",
     "von_mises",
 ]

@@ -1,4 +1,4 @@
-"""Supports and loads, as linear constraints on the coefficients of the displacement."""
+"""Supports as linear constraints on the coefficients of the displacement."""
 
 from __future__ import annotations
 
@@ -38,6 +38,7 @@ class PointHeld:
     weights: Array
     value: float
     where: str
+    place: tuple[float, float]
 
 
 def component_index(component: str) -> int:
@@ -117,10 +118,16 @@ def held_edge(
     values = values[:, used]
     weighted = sp.diags(np.tile(weights, len(touched))) @ values
     coefficients = spsolve((weighted.T @ values).tocsc(), weighted.T @ prescribed)
-    width = _rust.basis_len(basis, grid.cells[0])
-    across = 0 if end == 0 else _rust.basis_len(basis, grid.cells[axis]) - 1
-    function = across + width * used if axis == 0 else used + width * across
-    return Held(2 * function + component, coefficients)
+    return Held(2 * edge_functions(grid, basis, edge)[used] + component, coefficients)
+
+
+def edge_functions(grid: Grid, basis: Basis, edge: Edge) -> npt.NDArray[np.int64]:
+    """The displacement functions that do not vanish on an edge of the grid, along it."""
+    axis, end = grid.edge(edge)
+    width, height = (_rust.basis_len(basis, n) for n in grid.cells)
+    numbers = np.arange(width * height).reshape(height, width)
+    functions: npt.NDArray[np.int64] = np.take(numbers, end, axis=1 - axis)
+    return functions
 
 
 def held_point(
@@ -154,7 +161,8 @@ def held_point(
     wy = values_1d(basis, ny, m, np.clip(b + j - m, 0, 1))
     width = _rust.basis_len(basis, grid.cells[0])
     functions = (wx.indices[None, :] + width * wy.indices[:, None]).ravel().astype(np.int64)
-    return PointHeld(2 * functions + component, np.outer(wy.data, wx.data).ravel(), value, where)
+    weights = np.outer(wy.data, wx.data).ravel()
+    return PointHeld(2 * functions + component, weights, value, where, (point[0], point[1]))
 
 
 def _touching(t: float) -> tuple[int, ...]:

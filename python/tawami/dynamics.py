@@ -1,65 +1,54 @@
 """Dynamics: Newmark's method on the grid, and the transfers between particles and grid.
 
-Momentum is mapped with the lumped mass m_i = sum_p N_i m_p, x_i the Greville point of the spline:
-
-    (m v)_i = sum_p N_i m_p (v_p + C_p (x_i - x_p)),   likewise a with its gradient
     a1 = (u - dt v - dt^2 (1/2 - beta) a) / (beta dt^2),   v1 = v + dt ((1 - gamma) a + gamma a1)
 
-and after the solve
-
-    a_p = sum_i N_i a1_i     C_p = grad v1 f^-1     v_p += sum_i N_i (v1_i - v_i)      (FLIP)
-                                                    v_p  = sum_i N_i v1_i              (PIC)
-
-v_i is the mapped value before supports are imposed, so that their impulse reaches the particles.
+v and a are mapped from the particles (`tawami.transfer`) and obey the supports, by an impulse of
+these; at the end of the step what is prescribed replaces v1 and a1. At small strain particles do not
+move and v and a stay on the grid.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any, Literal
+from dataclasses import dataclass, fields
 
 import numpy as np
 import numpy.typing as npt
 
-from tawami import _rust, inputs
-from tawami.errors import ConvergenceError, InputError, SingularError
+from tawami import inputs, ranks
+from tawami.energy import Energies
+from tawami.errors import InputError
 from tawami.newton import Inertia
-from tawami.scene import Scene, Solution
+from tawami.reduction import Reduction
+from tawami.scene import Accepted, Problem, Scene
+from tawami.solution import Solution
+from tawami.stepping import Step, march
+from tawami.supports import Support
+from tawami.transfer import TRANSFERS, Name, gradient_of, to_grid
 
 Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
-Transfer = Literal["affine_flip", "flip", "tpic", "pic"]
-#: Whether a transfer maps the gradient of the velocity, and whether it adds the grid's change.
-TRANSFERS: dict[str, tuple[bool, bool]] = {
-    "affine_flip": (True, True),
-    "flip": (False, True),
-    "tpic": (True, False),
-    "pic": (False, False),
-}
 
 
 class Dynamics:
-    """Motion of the particles of a scene with a form of finite strain and a density.
+    """Motion of the particles of a scene with a density.
 
     Args:
-        scene: The scene, its supports along edges, held at zero for now, and its weight.
-        velocity: Velocities at the start [m/s]: one for all particles, or particles x 2.
-        transfer: 'affine_flip', 'flip', 'tpic' or 'pic'.
+        scene: The scene with its supports and loads; a prescribed motion is given by its velocity.
+        velocity: Velocities at the start [m/s]: one for all particles, or particles x 2 in the order of
+            the body.
+        transfer: 'affine_flip', 'flip', 'apic', 'tpic' or 'pic'; at finite strain.
         damping: Time in which velocities of FLIP relax towards those of PIC [s]: per step a share
             1 - exp(-dt/damping) of the difference goes; infinite for none.
         gamma: Newmark's; 1/2 is the trapezoidal rule, more damps. beta = (gamma + 1/2)^2 / 4.
 
     Attributes:
-        velocity: v_p [m/s], particles x 2.
-        acceleration: a_p [m/s2], particles x 2.
-        velocity_gradient: C_p [1/s], particles x 2 x 2.
-        mass: m_p [kg per metre depth].
+        energies: The balance of energy since the start.
         time: [s]
         steps: Number of steps accepted.
 
     Raises:
-        InputError: A scene without density or of small strain, or a parameter out of its range.
+        InputError: A scene without density, or a parameter out of its range.
     """
 
     def __init__(
@@ -67,15 +56,12 @@ class Dynamics:
         scene: Scene,
         *,
         velocity: npt.ArrayLike = (0.0, 0.0),
-        transfer: Transfer = "affine_flip",
+        transfer: Name = "affine_flip",
         damping: float = np.inf,
         gamma: float = 0.5,
     ) -> None:
-        if scene.form.strain != "finite" or scene._density is None:
-            raise InputError(
-                "Dynamics needs a form of finite strain, as 'u_epsv_finite', and "
-                "Scene(..., density=...) [kg/m3]"
-            )
+        if scene.mass is None:
+            raise InputError("Dynamics needs Scene(..., density=...) [kg/m3]")
         if transfer not in TRANSFERS:
             raise InputError(f"transfer = {transfer!r}: expected one of {', '.join(TRANSFERS)}")
         if scene.basis == "biquadratic":
@@ -83,7 +69,7 @@ class Dynamics:
                 "Dynamics with the basis 'biquadratic': its lumped masses are not all positive; use "
                 "'quadratic_spline'"
             )
-        if not scene._density.min() > 0:
+        if not scene.mass.min(initial=np.inf) > 0:
             raise InputError(
                 "Dynamics: a density of 0: expected more than 0 kg/m3 for every material"
             )
@@ -91,18 +77,54 @@ class Dynamics:
             raise InputError(f"damping = {damping!r}: expected a time in s, more than 0")
         self.gamma = inputs.number("gamma", gamma, low=0.5, high=1.0)
         self.beta = (self.gamma + 0.5) ** 2 / 4
-        self.scene, self.transfer, self.damping = scene, transfer, float(damping)
-        n = len(scene.particles)
+        self.scene, self.damping = scene, float(damping)
+        self.transfer, self._moves = TRANSFERS[transfer], scene.form.strain == "finite"
+        n = scene.num_particles
         try:
-            self.velocity = np.array(np.broadcast_to(np.asarray(velocity, dtype=float), (n, 2)))
+            given = np.broadcast_to(np.asarray(velocity, dtype=float), (n, 2))
         except ValueError:
             raise InputError(
                 f"velocity has shape {np.shape(velocity)}: expected two numbers, or {n} x 2"
             ) from None
-        self.mass = scene._density * scene.particles.volume
-        self.acceleration, self.velocity_gradient = np.zeros((n, 2)), np.zeros((n, 2, 2))
-        self._acceleration_gradient = np.zeros((n, 2, 2))
+        for name, width in (
+            ("velocity", 2), ("acceleration", 2),
+            ("velocity_gradient", 4), ("acceleration_gradient", 4),
+        ):  # fmt: skip
+            scene.particles.carry(name, width)
+            scene.particles.carried(name)[:] = 0.0
+        self.velocity[:] = given[scene.particles.number]
         self.time, self.steps = 0.0, 0
+        #: v and a of the grid where it stays, functions x 2.
+        self._kept: tuple[Array, Array] | None = None
+        self.energies = Energies(kinetic=self.kinetic_energy, elastic=self.elastic_energy)
+
+    # -- what the particles carry --------------------------------------------
+
+    @property
+    def velocity(self) -> Array:
+        """v_p [m/s], a view: particles x 2."""
+        return self.scene.particles.carried("velocity")
+
+    @property
+    def acceleration(self) -> Array:
+        """a_p [m/s2], a view: particles x 2."""
+        return self.scene.particles.carried("acceleration")
+
+    @property
+    def velocity_gradient(self) -> Array:
+        """C_p [1/s], a view: particles x 2 x 2."""
+        return self.scene.particles.carried("velocity_gradient").reshape(-1, 2, 2)
+
+    @property
+    def _acceleration_gradient(self) -> Array:
+        return self.scene.particles.carried("acceleration_gradient").reshape(-1, 2, 2)
+
+    @property
+    def mass(self) -> Array:
+        """m_p [kg per metre depth]."""
+        mass = self.scene.mass
+        assert mass is not None
+        return mass
 
     # -- one step ------------------------------------------------------------
 
@@ -114,136 +136,140 @@ class Dynamics:
             InputError: dt, or what is not finite, or a particle that would leave the grid.
         """
         dt = inputs.number("dt", dt, low=sys.float_info.min)
-        scene = self.scene
-        scene.particles.check()
-        if scene._points or scene._tractions:
-            raise InputError(
-                "Dynamics knows supports along edges and weight so far: expected a scene without "
-                "hold(...) and traction(...)"
-            )
-        for name in ("velocity", "acceleration", "velocity_gradient"):
-            values = getattr(self, name).reshape(len(self.mass), -1)
-            bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
-            if len(bad):
+        scene, attached = self.scene, self.scene.attached
+        with ranks.together(scene.grid.comm):
+            scene.particles.check()
+        supports = scene.supports
+        for support in supports.all:
+            if support.velocity is None and not support.still and support.applied < 1.0:
                 raise InputError(
-                    f"{name} of {len(bad)} particles is not finite, the first is {bad[0]}, at "
-                    f"{self.time:g} s"
+                    f"{support} prescribes a displacement that the body does not have yet: expected "
+                    "fix(..., velocity=...) for a motion, or ramp(scene) before Dynamics"
                 )
-        location, basis = scene._location, scene.basis
-        reduction, external = scene._reduction(moving=True), scene._external()
-        if reduction.offset.any():
-            raise InputError(
-                "Dynamics holds edges at zero so far: expected fix(edge, component) without a value"
-            )
-        n = scene._field.layout.num_displacement
-        mass = self._sums(np.ones((len(self.mass), 1)))[:, 0]
-        held = np.ones(n, dtype=bool)
-        held[reduction.unknowns[reduction.unknowns < n]] = False
-        acceleration = self.acceleration
-        if self.steps == 0:
-            acceleration = self._first_acceleration(external, mass, held)
-        mapped_v = self._mapped(self.velocity, self.velocity_gradient, mass)
-        mapped_a = self._mapped(acceleration, self._acceleration_gradient, mass)
-        v, a = mapped_v.copy(), mapped_a.copy()
-        v.ravel()[held] = a.ravel()[held] = 0.0
+        zero, end = np.zeros(attached.layout.size), self.time + dt
+        mass = attached.sums(self.mass, np.ones((len(self.mass), 1)))[:, 0]
+        external, before = scene.external(), self._from_particles(mass)
 
-        slope = 1 / (self.beta * dt**2)
-        offset = slope * (dt * v + dt**2 * (0.5 - self.beta) * a)
-        inertia = Inertia(np.repeat(mass, 2), slope, offset.ravel())
+        def prescribed(rate: Callable[[Support], float]) -> Array:
+            if not any(support.velocity is not None for support in supports.all):
+                return zero
+            return supports.reduction(attached, rate, zero, moving=True).offset
 
-        def also(u: Array) -> Callable[[], None]:
-            a1 = inertia.acceleration(u).reshape(-1, 2)
-            v1 = v + dt * ((1 - self.gamma) * a + self.gamma * a1)
-            v1.ravel()[held] = a1.ravel()[held] = 0.0
-            found = self._returned(location, basis, u, mapped_v, v1, a1, dt)
-            found |= {"time": self.time + dt, "steps": self.steps + 1}
+        def way(support: Support) -> float:
+            return 0.5 * dt * (support.velocity_at(self.time) + support.velocity_at(end))
 
-            def store() -> None:
-                for name, value in found.items():
-                    setattr(self, name, value)
+        speed = prescribed(lambda support: support.velocity_at(self.time))
+        speed1 = prescribed(lambda support: support.velocity_at(end))
+        change = (speed1 - speed) / dt
+        masses = np.repeat(mass, 2)
+        state: _GridState
+
+        def problem() -> Problem:
+            nonlocal state
+            reduction = supports.reduction(attached, way, zero, moving=True)
+            v, a = before
+            if self.steps == 0:
+                a = self._first_acceleration(external, mass, a)
+            v = reduction.imposed(v.ravel(), masses, speed).reshape(-1, 2)
+            a = reduction.imposed(a.ravel(), masses, change).reshape(-1, 2)
+            slope = 1 / (self.beta * dt**2)
+            offset = slope * (dt * v + dt**2 * (0.5 - self.beta) * a)
+            impulse = masses * (v - before[0]).ravel() / dt
+            inertia = Inertia(masses, slope, offset.ravel(), impulse)
+            state = _GridState(v, a, reduction, inertia)
+            return Problem(reduction, external, inertia, self._guess(dt * v))
+
+        def also(accepted: Accepted) -> Callable[[float], None]:
+            a1 = state.inertia.acceleration(accepted.u.ravel()).reshape(-1, 2)
+            v1 = state.v + dt * ((1 - self.gamma) * state.a + self.gamma * a1)
+            v1 = state.reduction.imposed(v1.ravel(), masses, speed1).reshape(-1, 2)
+            a1 = state.reduction.imposed(a1.ravel(), masses, change).reshape(-1, 2)
+            carried = self._to_particles(accepted.u, before[0], v1, a1, dt)
+            losses = self._losses(mass, (before[0], state.v, v1), accepted, external)
+
+            def store(dissipated: float) -> None:
+                for name, values in carried.items():
+                    scene.particles.carried(name)[:] = values.reshape(len(values), -1)
+                self._kept = None if self._moves else (v1, a1)
+                self.time, self.steps = end, self.steps + 1
+                self._balance(losses, dissipated)
 
             return store
 
-        return scene._advance(reduction, external, inertia, self._guess(dt * v), also)
+        solution = scene.advance(problem, also, end)
+        scene.accept(1.0)
+        return solution
 
-    def _sums(self, data: Array) -> Array:
-        """sum_p m_p D_p N_i."""
-        scene = self.scene
-        return _rust.nodal_sums(scene._location, self.mass, data, scene.basis)
-
-    def _mapped(self, values: Array, gradient: Array, mass: Array) -> Array:
-        """Velocity or acceleration of the grid from that of the particles: functions x 2."""
-        affine, _ = TRANSFERS[self.transfer]
-        scene = self.scene
-        if affine:
-            x = np.array(scene.particles.x) - scene.grid.origin
-            data = np.column_stack(
-                [values - np.einsum("pij,pj->pi", gradient, x), gradient.reshape(-1, 4)]
+    def _from_particles(self, mass: Array) -> tuple[Array, Array]:
+        """v and a of the grid, functions x 2."""
+        if self._kept is not None:
+            return self._kept
+        x, attached = np.array(self.scene.particles.x), self.scene.attached
+        v, a = (
+            _over(to_grid(attached, x, self.mass, values, gradient), mass[:, None])
+            for values, gradient in (
+                (self.velocity, self.velocity_gradient),
+                (self.acceleration, self._acceleration_gradient),
             )
-            sums = self._sums(data)
-            points = scene._field.layout.greville - scene.grid.origin
-            momentum = sums[:, :2] + np.einsum("ikl,il->ik", sums[:, 2:].reshape(-1, 2, 2), points)
-        else:
-            momentum = self._sums(values)
-        return _over(momentum, mass[:, None])
+        )
+        return v, a
 
-    def _first_acceleration(self, external: Array, mass: Array, held: Mask) -> Array:
-        """Accelerations of the particles from the momentum equation: g in free fall, 0 in rest."""
+    def _first_acceleration(self, external: Array, mass: Array, zero: Array) -> Array:
+        """From the momentum equation: g in free fall, 0 in rest."""
         scene = self.scene
-        n = scene._field.layout.num_displacement
-        internal = scene._newton.internal(np.zeros(scene.num_coefficients))
-        force = (external - internal)[:n].reshape(-1, 2)
-        a = _over(force, mass[:, None])
-        a.ravel()[held] = 0.0
-        return _rust.interpolate(scene._location, scene.basis, 2, a.ravel())
+        internal = scene.attached.newton.internal(np.zeros(scene.num_coefficients))
+        force = (external - internal)[: zero.size].reshape(-1, 2)
+        return _over(force, mass[:, None])
 
     def _guess(self, u: Array) -> Array:
-        """u = dt v, eps_v the lumped projection of its ln det f."""
+        """u = dt v, eps_v the lumped projection of its div u (ln det f)."""
         scene = self.scene
         guess = np.zeros(scene.num_coefficients)
-        n = scene._field.layout.num_displacement
+        n = u.size
         guess[:n] = u.ravel()
-        if len(guess) > n:
-            ln_j = scene._stage.volume_strains(guess[:n], None)[:, 0]
-            weight = scene._constants["K"] * scene.particles.volume
+        if scene.form.kinematics == "mixed":
+            ln_j = scene.attached.stage.volume_strains(guess[:n], None)[:, 0]
+            weight = scene.constants["K"] * scene.particles.volume
             # a guess that halves a particle or turns it inside out is not followed that far
             data = np.column_stack([np.fmax(ln_j, np.log(0.5)), np.ones(len(weight))])
-            sums = _rust.nodal_sums(scene._location, weight, data, "bilinear")
+            sums = scene.attached.sums(weight, data, "bilinear")
             guess[n:] = _over(sums[:, 0], sums[:, 1])
         return guess
 
-    def _returned(
-        self, location: _rust.Location, basis: str, u: Array, before: Array, v1: Array, a1: Array,
-        dt: float,
-    ) -> dict[str, Any]:  # fmt: skip
-        """From the grid of the step back to the particles: their new arrays by name."""
-
-        def at_particles(values: Array) -> Array:
-            return _rust.interpolate(location, basis, 2, np.ascontiguousarray(values).ravel())
-
-        affine, flip = TRANSFERS[self.transfer]
-        velocity = pic = at_particles(v1)
-        if flip:
-            moved = self.velocity + at_particles(v1 - before)
+    def _to_particles(
+        self, u: Array, before: Array, v1: Array, a1: Array, dt: float
+    ) -> dict[str, Array]:
+        """What the particles carry at the end of the step, by name."""
+        attached, x = self.scene.attached, np.array(self.scene.particles.x)
+        velocity = pic = attached.at_particles(v1)
+        if self.transfer.flip and self._moves:
+            moved = self.velocity + attached.at_particles(v1 - before)
             velocity = pic + np.exp(-dt / self.damping) * (moved - pic)
-        found: dict[str, Any] = {"velocity": velocity, "acceleration": at_particles(a1)}
-        if affine:
-            f = np.eye(2) + _rust.gradients(location, basis, u).reshape(-1, 2, 2)
-            inverse = np.linalg.inv(f)
-            for name, field in (("velocity_gradient", v1), ("_acceleration_gradient", a1)):
-                gradient = _rust.gradients(location, basis, np.ascontiguousarray(field).ravel())
-                found[name] = gradient.reshape(-1, 2, 2) @ inverse
-        return found
+        f = np.eye(2) + attached.gradients(u)
+        return {
+            "velocity": velocity,
+            "acceleration": attached.at_particles(a1),
+            "velocity_gradient": gradient_of(self.transfer, attached, x, v1, f),
+            "acceleration_gradient": gradient_of(self.transfer, attached, x, a1, f),
+        }
 
     # -- many steps ----------------------------------------------------------
 
-    def run(self, end: float, dt: float, *, smallest: float | None = None) -> list[Solution]:
+    def run(
+        self,
+        end: float,
+        dt: float,
+        *,
+        smallest: float | None = None,
+        each: Callable[[Solution], None] | None = None,
+    ) -> list[Step]:
         """Steps until `end` [s]; one that fails is halved, and the size grows again after three.
 
         Args:
             end: Time of the end [s].
             dt: Size of a step [s].
             smallest: Size below which the run ends [s]; dt/1024 by default.
+            each: Called with the solution of each accepted step.
 
         Returns:
             The accepted steps.
@@ -260,41 +286,77 @@ class Dynamics:
                 f"dt = {dt:g} s is longer than the {left:g} s until end = {end:g} s: expected a shorter "
                 "step"
             )
-        smallest = dt / 1024 if smallest is None else inputs.number("smallest", smallest, low=0.0)
-        size, good, accepted = dt, 0, []
-        while end - self.time > 1e-9 * dt:
-            now = min(size, end - self.time)
-            try:
-                accepted.append(self.step(now))
-            except (ConvergenceError, SingularError) as error:
-                size, good = now / 2, 0
-                if size < smallest:
-                    error.add_note(f"at {self.time:g} s, with the smallest step of {now:g} s")
-                    raise
-                continue
-            good += 1
-            if good >= 3 and size < dt:
-                size, good = min(2 * size, dt), 0
-        return accepted
+        least = dt / 1024 if smallest is None else inputs.number("smallest", smallest, low=0.0)
+        return march(self.time, end, dt, least, lambda _, size: self.step(size), "s", each)
 
     # -- what is conserved ---------------------------------------------------
+
+    def _sum(self, value: float) -> float:
+        """Over the ranks."""
+        return float(ranks.sum_of(self.scene.grid.comm, np.array([value]))[0])
 
     @property
     def linear_momentum(self) -> Array:
         """sum m v [kg m/s per metre depth]."""
-        return np.asarray(self.mass @ self.velocity)
+        return ranks.sum_of(self.scene.grid.comm, np.asarray(self.mass @ self.velocity))
 
     def angular_momentum(self, about: Sequence[float] = (0.0, 0.0)) -> float:
         """sum m (x - about) x v [kg m2/s per metre depth], the part of the affine velocity fields, which
         is of the size of a particle, left out.
         """
-        x = np.array(self.scene.particles.x) - np.asarray(about)
-        return float(self.mass @ (x[:, 0] * self.velocity[:, 1] - x[:, 1] * self.velocity[:, 0]))
+        x, v = np.array(self.scene.particles.x) - np.asarray(about), self.velocity
+        return self._sum(self.mass @ (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0]))
 
     @property
     def kinetic_energy(self) -> float:
         """1/2 sum m v^2 [J per metre depth]."""
-        return float(0.5 * self.mass @ (self.velocity**2).sum(axis=1))
+        return self._sum(0.5 * self.mass @ (self.velocity**2).sum(axis=1))
+
+    @property
+    def elastic_energy(self) -> float:
+        """What the laws store [J per metre depth]."""
+        return self._sum(self.scene.attached.stage.elastic_energy())
+
+    def _losses(
+        self,
+        mass: Array,
+        velocities: tuple[Array, Array, Array],
+        accepted: Accepted,
+        external: Array,
+    ) -> Energies:
+        """What the step adds to the balance on the grid, with the kinetic energy that it ends with."""
+        mapped, imposed, end = (0.5 * float(mass @ (v**2).sum(axis=1)) for v in velocities)
+        friction = self.scene.supports.friction(accepted.forces)
+        work = external[: accepted.u.size].reshape(-1, 2) + accepted.forces
+        return Energies(
+            kinetic=end,
+            external=float((work - friction).ravel() @ accepted.u.ravel()),
+            friction=-float(friction.ravel() @ accepted.u.ravel()),
+            transfer=self.energies.kinetic - mapped,
+            impact=mapped - imposed,
+        )
+
+    def _balance(self, step: Energies, dissipated: float) -> None:
+        """Add a step to the balance, the particles having what they have at its end."""
+        before, kinetic = self.energies, self.kinetic_energy if self._moves else step.kinetic
+        step.dissipated = self._sum(dissipated)
+        step.transfer += step.kinetic - kinetic
+        elastic = self.elastic_energy
+        gained = kinetic + elastic - before.kinetic - before.elastic
+        lost = step.dissipated + step.friction + step.transfer + step.impact
+        step.integration = step.external - gained - lost
+        sums = {f.name: getattr(before, f.name) + getattr(step, f.name) for f in fields(Energies)}
+        self.energies = Energies(**sums | {"kinetic": kinetic, "elastic": elastic})
+
+
+@dataclass(frozen=True)
+class _GridState:
+    """v and a that a step starts from, functions x 2, and what they were made with."""
+
+    v: Array
+    a: Array
+    reduction: Reduction
+    inertia: Inertia
 
 
 def _over(sums: Array, weights: Array) -> Array:

@@ -1,6 +1,7 @@
 """Newton's method for one step, stopped by two measures (README, The method).
 
-momentum   |R_u| / max(|f_int|, |f_ext|), norms over all displacement coefficients
+momentum   |R_u| / max(|f_int|, |f_ext|, |f_inertia|), norms over all displacement coefficients; in a
+           static step f_int at its beginning too, for a body that is unloaded
 volume     |R_q| / |sum_p V_p W_p q (max(|div u|, |eps_v|) + p_ref/K_p + floor)|, W = K for a field
            eps_v and 1 for a field p (then eps_v is p/K)
 """
@@ -8,12 +9,13 @@ volume     |R_q| / |sum_p V_p W_p q (max(|div u|, |eps_v|) + p_ref/K_p + floor)|
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import scipy.sparse as sp
 from mpi4py import MPI
 
 from tawami import _rust, ranks
@@ -42,11 +44,14 @@ class Inertia:
         mass: Of each displacement coefficient [kg per metre depth].
         slope: [1/s2]
         offset: [m/s2]
+        impulse: Of the supports at the beginning of the step, over its length: what changed the
+            velocities that came from the particles into those they prescribe [N per metre depth].
     """
 
     mass: Array
     slope: float
     offset: Array
+    impulse: Array
 
     def acceleration(self, u: Array) -> Array:
         """At the end of the step, of each displacement coefficient [m/s2]."""
@@ -66,6 +71,7 @@ class Converged:
 
     Attributes:
         coefficients: Increments of all fields.
+        forces: What supports and walls give on all coefficients [N per metre depth].
         history: (momentum, volume) measures of every residual, the first before any solve.
         krylov: FGMRES iterations of every solve; 0 where the tangent was factorised.
         condition: Estimate of the condition number of the tangent last factorised, scaled; 1 if none
@@ -74,6 +80,7 @@ class Converged:
     """
 
     coefficients: Array
+    forces: Array
     history: History
     krylov: list[int]
     condition: float
@@ -128,7 +135,7 @@ class Newton:
                     self._place(rule, density, column)
         volumetric = list(compiled.form.fields.values())[1:]
         self.kind = volumetric[0][0] if volumetric else None
-        self._p_ref = 0.0
+        self._p_ref = self._started = 0.0
         self._comm = field.grid.comm
         self._linear = LinearSolver(self._comm, stopwatch)
         softer = np.minimum(constants["K"], 1e4 * constants["mu"])
@@ -183,7 +190,7 @@ class Newton:
         n = self.field.layout.num_displacement
         free = reduction.selection.T @ out_of_balance
         of_u = reduction.unknowns < n
-        scale = max(float(np.linalg.norm(force[:n])) for force in forces)
+        scale = max(self._started, *(float(np.linalg.norm(force[:n])) for force in forces))
         # Forces of a body that supports move rigidly are round-off: it is in equilibrium.
         moved = np.abs(reduction.offset[:n]).max()
         round_off = 1e-14 * self._stiffest * moved * np.sqrt(n)
@@ -247,6 +254,7 @@ class Newton:
         external: Array,
         inertia: Inertia | None = None,
         guess: Array | None = None,
+        friction: Callable[[Array], Array] | None = None,
     ) -> Converged:
         """Increments that balance the external forces.
 
@@ -255,6 +263,8 @@ class Newton:
             external: External forces on all coefficients.
             inertia: Of a dynamic step.
             guess: Increments of all fields to start from; zero without it.
+            friction: Gives forces on the body (functions x 2) from what is out of balance, which is
+                what supports have to give; their change with it is left out of the tangent.
 
         Raises:
             ConvergenceError: Not below the tolerance within `max_iterations`, or not finite.
@@ -265,6 +275,10 @@ class Newton:
         mean_stress = self.particles.stress[:, :3].mean(axis=1)
         squares = ranks.sum_of(self._comm, np.array([np.sum(mean_stress**2), len(mean_stress)]))
         self._p_ref = float(np.sqrt(squares[0] / squares[1]))
+        self._started = 0.0
+        if inertia is None and squares[0] > 0:  # a body that is unloaded ends without forces
+            start = self.internal(np.zeros(len(external)))[: self.field.layout.num_displacement]
+            self._started = float(np.linalg.norm(start))
         unknowns = np.zeros(reduction.size) if guess is None else guess[reduction.unknowns]
         linear, history = self._linear, History()
         krylov: list[int] = []
@@ -279,12 +293,22 @@ class Newton:
             if inertia is not None:
                 forces += (inertia.force(coefficients),)
                 rest += forces[-1]
+            held = rest
+            if inertia is not None:
+                held = rest.copy()
+                held[: len(inertia.impulse)] += inertia.impulse
+            if friction is not None:
+                n = self.field.layout.num_displacement
+                rest = rest.copy()
+                rest[:n] -= friction(held[:n].reshape(-1, 2)).ravel()
             with self.stopwatch("measures"):
                 history.append(self._measures(forces, rest, coefficients, reduction, inertia))
             if not np.isfinite(_worst(history[-1])):
                 self._fail(history, "an infinite or undefined number came up")
             if _worst(history[-1]) < self.tolerance:
-                return Converged(coefficients, history, krylov, linear.condition, linear.symmetric)
+                return Converged(
+                    coefficients, held, history, krylov, linear.condition, linear.symmetric
+                )
             if len(history) > self.max_iterations:
                 self._fail(history, "Take a smaller load, or check material and supports")
             matrix = self.field.tangent(coefficients, self.data, reduction)
@@ -300,15 +324,15 @@ class Newton:
             self.stopwatch.lap()
 
     def _add_mass(self, matrix: Any, inertia: Inertia, reduction: Reduction) -> None:
-        """The lumped mass on the diagonal of the reduced tangent."""
-        own = reduction.unknowns[reduction.own]
-        of_u = own < len(inertia.mass)
-        diagonal = matrix.createVecLeft()
-        values = np.zeros(len(own))
-        values[of_u] = inertia.slope * inertia.mass[own[of_u]]
-        diagonal.setArray(values)
-        matrix.setDiagonal(diagonal, addv=True)
-        diagonal.destroy()
+        """S^T M S, M the lumped mass, to the reduced tangent: a diagonal but for point constraints."""
+        n = len(inertia.mass)
+        mass = sp.diags(np.pad(inertia.slope * inertia.mass, (0, len(reduction.offset) - n)))
+        reduced = (reduction.selection.T @ mass @ reduction.selection).tocsr()[reduction.own]
+        index = np.int32
+        matrix.setValuesCSR(
+            reduced.indptr.astype(index), reduced.indices.astype(index), reduced.data, addv=True
+        )
+        matrix.assemble()
 
     def _forcing(self, history: History) -> float:
         """How well the next linear system is to be solved: no worse than what Newton can make of it

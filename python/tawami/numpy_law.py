@@ -57,7 +57,7 @@ class NumpyStage:
 
     def __init__(self, stage: _rust.Stage, particles: _rust.Particles, law: NumpyLaw) -> None:
         self._stage, self._particles, self._law = stage, particles, law
-        self.volume_strains = stage.volume_strains
+        self.volume_strains, self.elastic_energy = stage.volume_strains, stage.elastic_energy
         self._latest: tuple[tuple[Array, ...], tuple[Array, Array]] | None = None
 
     def _given(self, u: Array, volumetric: Array | None) -> tuple[Array, Array]:
@@ -106,7 +106,8 @@ class NumpyStage:
         """As `_rust.Stage.evaluate`."""
         self._stage.evaluate(u, volumetric, requests, data, self._given(u, volumetric))
 
-    def commit(self, u: Array, volumetric: Array | None) -> None:
+    def commit(self, u: Array, volumetric: Array | None) -> float:
         """As `_rust.Stage.commit`."""
-        self._stage.commit(u, volumetric, self._given(u, volumetric))
+        dissipated = self._stage.commit(u, volumetric, self._given(u, volumetric))
         self._latest = None
+        return dissipated

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from tawami import ranks
 from tawami.basis import extraction
 from tawami.errors import OutputError
-from tawami.scene import Solution
+from tawami.solution import Solution
 
 Array = npt.NDArray[np.float64]
 

@@ -54,6 +54,12 @@ def joined(comm: Any, part: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return whole
 
 
+def exchanged(comm: Any, rows: npt.NDArray[Any], to: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Rows of all ranks that belong to this one; `to` says where each of its own belongs."""
+    parts = comm.alltoall([rows[to == rank] for rank in range(comm.size)])
+    return np.concatenate(parts)
+
+
 @contextmanager
 def together(comm: Any) -> Iterator[None]:
     """An error in the block, on whichever rank, is raised on all; the block must not communicate.

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
+from scipy.sparse.linalg import spsolve
 
 from tawami import _dolfinx, _rust
 from tawami.basis import Basis, greville_1d
@@ -169,6 +170,8 @@ class Reduction:
         own: The unknowns whose rows this rank keeps.
         selection: S, coefficients x unknowns.
         offset: Increments of the coefficients at zero unknowns.
+        fixed: Whether each coefficient is prescribed by itself, along an edge.
+        points: The multi-point constraints.
 
     Raises:
         SupportError: Supports that contradict each other, or that leave a rigid motion free.
@@ -184,8 +187,9 @@ class Reduction:
         moving: bool = False,
     ) -> None:
         self.layout = layout
+        self.points = points
         total = np.zeros(layout.size)
-        fixed = np.zeros(layout.size, dtype=bool)
+        self.fixed = fixed = np.zeros(layout.size, dtype=bool)
         sizes = [float(np.abs(support.values).max(initial=0.0)) for support in held]
         sizes += [abs(point.value) for point in points]
         tolerance = 1e-9 * max(sizes, default=0.0)  # where supports meet: round-off
@@ -212,12 +216,30 @@ class Reduction:
     def of_all(cls, layout: Layout) -> Reduction:
         """Every coefficient is an unknown, those of inactive functions too."""
         reduction = cls.__new__(cls)
-        reduction.layout = layout
+        reduction.layout, reduction.points = layout, []
+        reduction.fixed = np.zeros(layout.size, dtype=bool)
         reduction._number(np.ones(layout.size, dtype=bool))
         entries = (np.ones(layout.size), (reduction.unknowns, np.arange(layout.size)))
         reduction.selection = sp.csr_matrix(entries, shape=(layout.size, layout.size))
         reduction.offset = np.zeros(layout.size)
         return reduction
+
+    def imposed(self, values: Array, mass: Array, offset: Array) -> Array:
+        """The displacement field nearest to another one, in the norm of the lumped mass, that obeys the
+        supports: what an impulse of theirs makes of velocities.
+
+        Args:
+            values: Of all displacement coefficients.
+            mass: Of these [kg per metre depth].
+            offset: As `offset`, for the rate that `values` are.
+        """
+        n = len(values)
+        free = self.unknowns < n
+        s, g = self.selection[:n][:, free], offset[:n]
+        if not self.points:
+            return np.asarray(s @ (values - g)[self.unknowns[free]] + g)
+        weighted = s.T @ sp.diags(mass)
+        return np.asarray(s @ spsolve((weighted @ s).tocsc(), weighted @ (values - g)) + g)
 
     def _number(self, free: Mask) -> None:
         comm, unknowns = self.layout.grid.comm, np.flatnonzero(free)

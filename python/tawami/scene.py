@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
@@ -12,30 +15,66 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from tawami import _rust, boundary, inputs, ranks
+from tawami import _rust, inputs, ranks
+from tawami.attached import Attached
 from tawami.basis import BASES, Basis
 from tawami.body import Body
 from tawami.boundary import Component, Profile
 from tawami.compilation import compile_form
-from tawami.errors import InputError, SupportError
+from tawami.errors import ConvergenceError, InputError
 from tawami.fast_field import FastField
 from tawami.field import Field
 from tawami.formulation import Form
 from tawami.grid import Edge, Grid
-from tawami.newton import Converged, History, Inertia, Newton
+from tawami.loads import Loads, Traction
+from tawami.newton import Converged, Inertia, Newton
 from tawami.numpy_law import NumpyLaw, NumpyStage
 from tawami.reduction import Reduction
+from tawami.solution import Solution
 from tawami.stopwatch import Stopwatch
+from tawami.supports import Support, Supports, Velocity
 
 Array = npt.NDArray[np.float64]
 FIELDS: dict[str, type[Field]] = {"fast": FastField, "reference": Field}
+#: Times that a step is solved with other states of the walls before it is given up.
+PASSES = 40
+#: Times after which functions only let go of a wall.
+FREE = 8
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One step to solve; see `Newton.solve`."""
+
+    reduction: Reduction
+    external: Array
+    inertia: Inertia | None = None
+    guess: Array | None = None
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """A step that was solved, with the particles still where they were.
+
+    Attributes:
+        step: What Newton found.
+        u: Increments of the displacement, functions x 2.
+        forces: What supports and walls give, functions x 2 [N per metre depth].
+        dissipated: What the laws dissipate [J per metre depth], on this rank.
+    """
+
+    step: Converged
+    u: Array
+    forces: Array
+    dissipated: float = 0.0
 
 
 class Scene:
-    """A static scene.
+    """Particles on a grid with a weak form, supports and loads.
 
-    With a form of finite strain every `solve` is one step: the particles move, the grid is reset, and
-    what supports prescribe are displacements of the step. Their stress is Kirchhoff's then.
+    By itself it is static; `ramp` brings its loads up in steps, `Dynamics` sets it in motion. With a
+    form of finite strain every step moves the particles and resets the grid; their stress is
+    Kirchhoff's then.
 
     Args:
         grid: The background grid.
@@ -51,15 +90,20 @@ class Scene:
         assembly: 'fast', kernels called from Rust, or 'reference', dolfinx and P^T K P: the same
             numbers to round-off.
         density: Mass density at the start [kg/m3], one for all materials or one each; gravity needs it.
+        leaving: What to do with particles that leave the grid: 'stop' with an error before they do, or
+            'remove' them; `left` says which and where.
         parameters: What the form names: alpha, stabilisation, ...
 
     Attributes:
         particles: The particles on this rank: those in its cells; `number` says which of the body
-            they are. Their arrays are views of the storage, not copies: `x` [m], `material` and
+            they are. Where particles change rank or leave the grid this is another object after a
+            step. Their arrays are views of the storage, not copies: `x` [m], `material` and
             `number`, which cannot be written, `volume` [m2], `stress` [Pa] (xx, yy, zz, xy; tension
             positive), `displacement` [m], and `eps_v` with forms that have that field (None
             otherwise).
         num_particles: Number of particles of the body, on all ranks.
+        left: Number, position [m] and time [s] (NaN in a static scene) of the particles that left.
+        supports, loads: As fix(...), gravity(...) and their like have made them.
 
     Raises:
         InputError: Particles outside the grid, a body without particles, NaN, an incompressible
@@ -80,10 +124,13 @@ class Scene:
         max_iterations: int = 20,
         assembly: Literal["fast", "reference"] = "fast",
         density: float | Sequence[float] | None = None,
+        leaving: Literal["stop", "remove"] = "stop",
         **parameters: Any,
     ) -> None:
         if basis not in BASES:
             raise InputError(f"basis '{basis}': expected one of {', '.join(map(repr, BASES))}")
+        if leaving not in ("stop", "remove"):
+            raise InputError(f"leaving = {leaving!r}: expected 'stop' or 'remove'")
         if assembly not in FIELDS:
             raise InputError(f"assembly = {assembly!r}: expected 'fast' or 'reference'")
         if not isinstance(grid, Grid) or not isinstance(body, Body):
@@ -112,45 +159,27 @@ class Scene:
         whole = _rust.Particles(x, volume, numbers)
         whole.check_materials(materials, self.form.kinematics)
         whole.add_history(materials)
-        self._distribute(whole, grid.rust.locate(whole.x))
-        self._compiled = compile_form(grid.comm, self.form, options)
-        if self.form.kinematics == "mixed":
-            self.particles.add_eps_v()
+        self._materials, self._law, self._values = materials, law, values
+        self._moduli = np.array([(m.bulk_modulus, m.shear_modulus) for m in materials])
+        self._side, self._limits = FIELDS[assembly], (tolerance, max_iterations)
+        self._densities = None if density is None else _densities(density, len(materials))
         self._finite = self.form.strain == "finite"
         if self._finite and law is not None:
             raise InputError(
                 f"form {self.form.name} has finite strains: expected a law in Rust, a NumpyLaw has "
                 "small ones only"
             )
-        if self._finite and grid.comm.size > 1:
-            raise InputError(
-                f"form {self.form.name} has finite strains, with which particles move: expected one "
-                "rank for now"
-            )
-        moduli = np.array([(m.bulk_modulus, m.shear_modulus) for m in materials])
-        of_particle = moduli[self.particles.material]
-        self._constants = {"K": of_particle[:, 0], "mu": of_particle[:, 1]}
-        self._density = None
-        if density is not None:
-            given = list(density) if isinstance(density, Sequence) else [density] * len(materials)
-            if len(given) != len(materials):
-                raise InputError(
-                    f"density has {len(given)} values: expected one, or one for each of the "
-                    f"{len(materials)} materials"
-                )
-            each = np.array([inputs.number("density", rho, low=0.0) for rho in given])
-            self._density = each[self.particles.material]
-        self._materials, self._law, self._values = materials, law, values
-        self._side, self._limits = FIELDS[assembly], (tolerance, max_iterations)
+        location = self._distribute(whole, grid.rust.locate(whole.x))
+        self._compiled = compile_form(grid.comm, self.form, options)
+        if self.form.kinematics == "mixed":
+            self.particles.add_eps_v()
         self.stopwatch = Stopwatch()
-        self._field, self._stage, self._newton = self._attached(self._location)
-        self._gravity = (0.0, 0.0)
-        self._edges: list[tuple[Edge, int, Profile]] = []
-        self._points: list[tuple[Sequence[float], int, float]] = []
-        self._tractions: list[tuple[Edge, Profile, Profile]] = []
-        self._total = np.zeros(self._field.layout.size)
+        self._leaving, self.left = leaving, list[tuple[int, tuple[float, float], float]]()
+        self.attached = self._attach(location)
+        self.supports, self.loads = Supports(grid, basis), Loads(grid, self.num_particles)
+        self._total = np.zeros(self.num_coefficients)
 
-    def _attached(self, location: _rust.Location) -> tuple[Field, _rust.Stage | NumpyStage, Newton]:
+    def _attach(self, location: _rust.Location) -> Attached:
         """Field side, laws and Newton's method for the particles in these places."""
         tolerance, max_iterations = self._limits
         with self.stopwatch("set-up"):
@@ -164,57 +193,112 @@ class Scene:
         )
         stage = rust if law is None else NumpyStage(rust, self.particles, law)
         newton = Newton(
-            field, self._compiled, stage, self.particles, location, self._constants, self.stopwatch,
+            field, self._compiled, stage, self.particles, location, self.constants, self.stopwatch,
             tolerance=tolerance, max_iterations=max_iterations,
         )  # fmt: skip
-        return field, stage, newton
+        return Attached(location, field, stage, newton)
 
-    def _distribute(self, body: _rust.Particles, location: _rust.Location) -> None:
+    def _distribute(self, body: _rust.Particles, location: _rust.Location) -> _rust.Location:
         """Keep the particles in this rank's cells."""
-        self.num_particles = len(body)
-        self.particles, self._location = body, location
-        if self.grid.comm.size > 1:
-            parts = (body.x, body.volume, body.material)
-            digest = hashlib.sha1(b"".join(part.tobytes() for part in parts)).digest()
-            if len(set(self.grid.comm.allgather(digest))) > 1:
-                raise InputError(
-                    "the body is not the same on all ranks: expected the same positions, volumes and "
-                    "materials on each. Give random numbers a seed, or make it on one rank and bcast it"
-                )
-            here = self.grid.rank_of_cell[location.cell] == self.grid.comm.rank
-            mine = np.flatnonzero(here).astype(np.uint32)
-            self.particles, self._location = body.select(mine), location.select(mine)
+        self.num_particles, self.particles = len(body), body
+        if self.grid.comm.size == 1:
+            return location
+        parts = (body.x, body.volume, body.material)
+        digest = hashlib.sha1(b"".join(part.tobytes() for part in parts)).digest()
+        if len(set(self.grid.comm.allgather(digest))) > 1:
+            raise InputError(
+                "the body is not the same on all ranks: expected the same positions, volumes and "
+                "materials on each. Give random numbers a seed, or make it on one rank and bcast it"
+            )
+        here = self.grid.rank_of_cell[location.cell] == self.grid.comm.rank
+        mine = np.flatnonzero(here).astype(np.uint32)
+        self.particles = body.select(mine)
+        return location.select(mine)
 
-    def fix(self, edge: Edge, component: Component, value: Profile = 0.0) -> None:
+    @property
+    def constants(self) -> dict[str, Array]:
+        """K and mu [Pa] of each particle."""
+        of_particle = self._moduli[self.particles.material]
+        return {"K": of_particle[:, 0].copy(), "mu": of_particle[:, 1].copy()}
+
+    @property
+    def mass(self) -> Array | None:
+        """Mass of each particle [kg per metre depth]; None without a density."""
+        if self._densities is None:
+            return None
+        return np.asarray(self._densities[self.particles.material] * self.particles.volume)
+
+    # -- supports and loads --------------------------------------------------
+
+    def fix(
+        self,
+        edge: Edge,
+        component: Component,
+        value: Profile = 0.0,
+        *,
+        velocity: Velocity | None = None,
+    ) -> None:
         """Prescribe a displacement component along an edge of the grid.
 
         Args:
             edge: 'left', 'right', 'bottom' or 'top'.
             component: 'x' or 'y'.
-            value: Displacement [m] from the start: a number, or a function f(x, y) on arrays,
-                which is projected in L2 on the functions of the edge.
+            value: Displacement [m] from now on (at small strain from the start of the scene): a
+                number, or a function f(x, y) on arrays, which is projected in L2 on the functions of
+                the edge.
+            velocity: For `Dynamics`, in place of a value: a number [m/s], or a function of time [s].
 
         Raises:
             InputError: An unknown edge or component.
         """
-        self.grid.edge(edge)
-        self._edges.append((edge, boundary.component_index(component), value))
+        self.supports.fix(edge, component, value, velocity)
 
-    def hold(self, point: Sequence[float], component: Component, value: float = 0.0) -> None:
-        """Prescribe a displacement component at a point: a constraint on the interpolated value.
+    def hold(
+        self,
+        point: Sequence[float],
+        component: Component,
+        value: float = 0.0,
+        *,
+        velocity: Velocity | None = None,
+    ) -> None:
+        """Prescribe a displacement component at a point of the body: a constraint on the interpolated
+        value. Where particles move the point moves with them.
 
         Args:
             point: Position (x, y) [m].
             component: 'x' or 'y'.
-            value: Displacement [m] from the start.
+            value: Displacement [m], as in `fix`.
+            velocity: As in `fix`.
 
         Raises:
             InputError: A point outside the grid, or an unknown component.
         """
-        what = f"hold(point={point})"
-        boundary.locate_point(self.grid, point, what)
-        held = inputs.number(f"{what}: value", value)
-        self._points.append((point, boundary.component_index(component), held))
+        self.supports.hold(point, component, value, velocity)
+
+    def wall(self, edge: Edge, friction: float = 0.0, *, separates: bool = True) -> None:
+        """A wall along an edge of the grid, with Coulomb friction.
+
+        Args:
+            edge: 'left', 'right', 'bottom' or 'top'.
+            friction: Coefficient of friction; 0 is smooth, infinity does not slide.
+            separates: Whether the body may leave the wall.
+
+        Raises:
+            InputError: An unknown edge, a negative friction, or a wall that is there already.
+        """
+        self.supports.wall(edge, friction, separates)
+
+    def release(self, place: Edge | Sequence[float], component: Component | None = None) -> None:
+        """Take away what `fix`, `hold` or `wall` made.
+
+        Args:
+            place: Name of the edge, or point (x, y) [m].
+            component: 'x' or 'y'; both, and a wall, by default.
+
+        Raises:
+            InputError: Nothing of the kind is there.
+        """
+        self.supports.release(place, component)
 
     def traction(self, edge: Edge, value: tuple[Profile, Profile]) -> None:
         """Load an edge of the grid where the body touches it.
@@ -235,7 +319,20 @@ class Scene:
                 "- dot(t, w) * ds to its residual"
             )
         components = inputs.pair(what, value, "components (t_x, t_y)")
-        self._tractions.append((edge, *components))
+        self.loads.tractions.append(Traction(edge, components))
+
+    def load(self, particles: npt.ArrayLike, force: Sequence[float]) -> None:
+        """Load particles of the body, wherever they move: a traction on a surface that is not an edge
+        of the grid, in a direction that stays.
+
+        Args:
+            particles: A mask of the particles of the body, or their numbers.
+            force: (f_x, f_y) [N per metre depth], shared out evenly.
+
+        Raises:
+            InputError: No particle, or others than those of the body.
+        """
+        self.loads.add_forces(particles, force)
 
     def gravity(self, acceleration: Sequence[float]) -> None:
         """Load the body by its weight.
@@ -246,57 +343,21 @@ class Scene:
         Raises:
             InputError: No density, or not two finite numbers.
         """
-        if self._density is None:
+        if self._densities is None:
             raise InputError("gravity(...) needs Scene(..., density=...) [kg/m3]")
-        self._gravity = inputs.point("gravity", acceleration)
+        self.loads.gravity = np.array(inputs.point("gravity", acceleration))
 
-    def _weight(self) -> Array:
-        """External forces on all coefficients of the weight, sum_p N_i m_p b."""
-        force = np.zeros(self._field.layout.size)
-        if self._density is not None and any(self._gravity):
-            data = self._density[:, None] * np.array(self._gravity)
-            sums = _rust.nodal_sums(self._location, self.particles.volume, data, self.basis)
-            force[: self._field.layout.num_displacement] = sums.ravel()
-        return ranks.sum_of(self.grid.comm, force)
-
-    def _reduction(self, *, moving: bool = False) -> Reduction:
-        """What the supports leave free; a moving body may have left one, and may turn freely."""
-        field = self._field
-        held = [
-            boundary.held_edge(self.grid, self.basis, field.active, edge, component, value)
-            for edge, component, value in self._edges
-            if not moving or len(field.edge_nodes(edge))
-        ]
-        points = [
-            boundary.held_point(self.grid, self.basis, field.active, point, component, value)
-            for point, component, value in self._points
-        ]
-        return Reduction(field.layout, held, points, self._total, moving=moving)
-
-    def _external(self) -> Array:
-        force = self._weight()
-        for edge, *components in self._tractions:
-            nodes = self._field.edge_nodes(edge)
-            if len(nodes) == 0:
-                raise SupportError(
-                    f"traction(edge='{edge}'): no cell along that edge of the grid holds "
-                    "particles; let the grid end where the body is loaded"
-                )
-            x, y = nodes[..., 0].ravel(), nodes[..., 1].ravel()
-            what = f"traction(edge='{edge}')"
-            values = [boundary.evaluate(c, x, y, what) for c in components]
-            force += self._field.traction(edge, np.stack(values, axis=-1).reshape(nodes.shape))
-        return force
+    # -- what it is made of --------------------------------------------------
 
     def split(self, coefficients: Array) -> tuple[Array, Array | None]:
         """Coefficients of the displacement and of the bilinear field (None if there is none)."""
-        return self._field.layout.split(coefficients)
+        return self.attached.field.layout.split(coefficients)
 
     @property
     def particles_per_cell(self) -> npt.NDArray[np.int64]:
         """Number of particles in each cell, x fastest; a call for all ranks."""
         nx, ny = self.grid.cells
-        counts = np.bincount(self._location.cell, minlength=nx * ny)
+        counts = np.bincount(self.attached.location.cell, minlength=nx * ny)
         return ranks.sum_of(self.grid.comm, counts)
 
     def residual(self, coefficients: Array) -> Array:
@@ -306,13 +367,13 @@ class Scene:
             coefficients: Increments of all fields: displacement (two per function, x fastest),
                 then the bilinear field, as `split` takes them apart.
         """
-        return self._newton.internal(self._coefficients(coefficients))
+        return self.attached.newton.internal(self._coefficients(coefficients))
 
     def tangent(self, coefficients: Array) -> sp.csr_matrix:
         """Derivative of :meth:`residual` as the form's tangent gives it, before supports."""
         coefficients = self._coefficients(coefficients)
-        self._newton.internal(coefficients)
-        return self._field.unreduced_tangent(coefficients, self._newton.data)
+        self.attached.newton.internal(coefficients)
+        return self.attached.field.unreduced_tangent(coefficients, self.attached.newton.data)
 
     def _coefficients(self, values: Array) -> Array:
         coefficients = inputs.array("coefficients", values, 1)
@@ -326,118 +387,204 @@ class Scene:
     @property
     def num_coefficients(self) -> int:
         """Number of coefficients of all fields, supports and empty cells included."""
-        size: int = self._field.layout.size
+        size: int = self.attached.field.layout.size
         return size
 
-    def solve(self) -> Solution:
+    # -- steps ---------------------------------------------------------------
+
+    def solve(self, part: float = 1.0) -> Solution:
         """Find equilibrium under the present supports and loads, and store it in the particles.
 
         May be called again after more supports or loads were added.
+
+        Args:
+            part: Share of the loads and prescribed displacements that are new since all of them were
+                solved for; `ramp` takes it from 0 to 1.
 
         Raises:
             SupportError: Supports that leave a rigid motion free or contradict each other.
             ConvergenceError: Newton did not converge; the particles are as they were.
             SingularError: The tangent cannot be solved; the message names the cells.
-            InputError: NaN or infinity in an array of the particles.
+            InputError: NaN or infinity in an array of the particles, a particle that would leave the
+                grid, or a support with a velocity.
         """
-        with ranks.together(self.grid.comm):
-            self.particles.check()
-        with self.stopwatch("set-up"):
-            reduction = self._reduction()
-            external = self._external()
-        return self._advance(reduction, external)
+        part = inputs.number("part", part, low=0.0, high=1.0)
+        for support in self.supports.all:
+            if support.velocity is not None:
+                raise InputError(
+                    f"{support} has a velocity, and solve() knows no time: expected a value, or "
+                    "Dynamics(scene)"
+                )
+        solution = self.advance(lambda: self.problem(part))
+        self.carry(part)
+        return solution
 
-    def _advance(
+    def problem(self, part: float = 1.0) -> Problem:
+        """The static problem under this share of what is new, in the present states of the walls."""
+        start = np.zeros_like(self._total) if self._finite else self._total
+
+        def amount(support: Support) -> float:
+            return support.at(part) - (support.applied if self._finite else 0.0)
+
+        with self.stopwatch("set-up"):
+            reduction = self.supports.reduction(self.attached, amount, start, moving=False)
+            return Problem(reduction, self.external(part))
+
+    def carry(self, part: float) -> None:
+        """This share of what was new is what the scene bears now."""
+        for support in self.supports.all:
+            support.applied = support.at(part)
+        if part == 1.0:
+            self.accept(1.0)
+
+    def accept(self, part: float) -> None:
+        """What is new from now on is what is missing to all of the loads and prescribed values, of
+        which this share is there.
+        """
+        for support in self.supports.all:
+            support.carried = support.at(part)
+        self.loads.accept(part)
+
+    def external(self, part: float = 1.0) -> Array:
+        """External forces on all coefficients [N per metre depth]."""
+        return self.loads.external(self.attached, self.particles, self.mass, part)
+
+    @contextmanager
+    def tolerance_of(self, tolerance: float) -> Iterator[None]:
+        """Newton's tolerance within a block."""
+        before = self._limits
+        try:
+            self._limits = (tolerance, before[1])
+            self.attached.newton.tolerance = tolerance
+            yield
+        finally:
+            self._limits = before
+            self.attached.newton.tolerance = before[0]
+
+    def advance(
         self,
-        reduction: Reduction,
-        external: Array,
-        inertia: Inertia | None = None,
-        guess: Array | None = None,
-        also: Callable[[Array], Callable[[], None]] | None = None,
+        problem: Callable[[], Problem],
+        also: Callable[[Accepted], Callable[[float], None]] | None = None,
+        time: float = np.nan,
     ) -> Solution:
         """One step: find it, store it in the particles, move them where strains are finite.
 
-        What may fail comes before anything changes; `also` gets the increments of the displacement
-        and returns what is to be stored besides.
+        Args:
+            problem: Makes the problem for the present states of the walls.
+            also: Gets the step and returns what stores it elsewhere, called with what the laws
+                dissipate [J per metre depth] after the particles have their stress and before they
+                move; what may fail comes first.
+            time: At its end [s].
         """
-        step = self._newton.solve(reduction, external, inertia, guess)
-        fields = self._field.layout.split(step.coefficients)
-        if self._finite:
-            moved = self.particles.x + _rust.interpolate(self._location, self.basis, 2, fields[0])
-            location = self.grid.rust.locate(moved)
-            attached = self._attached(location)
-        store = also(fields[0]) if also is not None else None
-        with self.stopwatch("commit"), ranks.together(self.grid.comm):
-            self._stage.commit(*fields)
+        with ranks.together(self.grid.comm):
+            self.particles.check()
+        walls = [copy.deepcopy(wall.state) for wall in self.supports.walls]
+        try:
+            step, reduction = self._settled(problem)
+            u = self.split(step.coefficients)[0].reshape(-1, 2)
+            moved = self._moved(u, time) if self._finite else None
+            n = u.size
+            accepted = Accepted(step, u, step.forces[:n].reshape(-1, 2))
+            store = also(accepted) if also is not None else None
+            with self.stopwatch("commit"), ranks.together(self.grid.comm):
+                dissipated = self.attached.stage.commit(*self.split(step.coefficients))
+        except Exception:
+            for wall, state in zip(self.supports.walls, walls, strict=True):
+                wall.state = state
+            raise
         if store is not None:
-            store()
-        solution = Solution(self, step, reduction.size, self._total + step.coefficients)
-        if self._finite:
-            self.particles.move_to(moved)
-            self._location = location
-            self._field, self._stage, self._newton = attached
-        else:
+            store(dissipated)
+        if moved is None:
             self._total = self._total + step.coefficients
+            return Solution(self, step, reduction, self._total)
+        self.supports.follow(u.ravel())
+        self.particles.move_to(moved)
+        solution = Solution(self, step, reduction, step.coefficients)
+        self._relocate(time)
         return solution
 
+    def _settled(self, problem: Callable[[], Problem]) -> tuple[Converged, Reduction]:
+        """A step in which no wall pulls, is passed through, or gives more friction than it has."""
+        newton, supports, step = self.attached.newton, self.supports, None
+        active = self.attached.layout.active[: self.attached.layout.num_displacement : 2]
+        friction = supports.friction if supports.walls else None
+        for attempt in range(PASSES):
+            now = problem()
+            guess = now.guess if step is None else step.coefficients
+            step = newton.solve(now.reduction, now.external, now.inertia, guess, friction)
+            n = self.attached.layout.num_displacement
+            forces, u = (part[:n].reshape(-1, 2) for part in (step.forces, step.coefficients))
+            if not supports.adapt(forces, u, active, monotone=attempt > FREE):
+                return step, now.reduction
+        assert step is not None
+        raise ConvergenceError(
+            f"contact and friction of the walls did not settle in {PASSES} solves. Nothing was changed "
+            "in the particles. Take a smaller step",
+            step.history,
+        )
 
-class Solution:
-    """Equilibrium of a scene. On several ranks all of it is on every rank, and arrays of particles
-    are in the order of the body.
+    def _moved(self, u: Array, time: float) -> Array:
+        """Positions at the end of the step."""
+        moved = np.asarray(self.particles.x + self.attached.at_particles(u))
+        outside = self._outside(moved)
+        with ranks.together(self.grid.comm):
+            if outside.any() and self._leaving == "stop":
+                p = np.flatnonzero(outside)[0]
+                when = "" if np.isnan(time) else f" at {time:g} s"
+                raise InputError(
+                    f"particle {self.particles.number[p]} would leave the grid{when}, at "
+                    f"({moved[p, 0]:g}, {moved[p, 1]:g}) m, and {outside.sum() - 1} others with it: "
+                    "expected a grid that holds the motion, or Scene(..., leaving='remove'). Nothing "
+                    "was changed"
+                )
+        staying = ranks.sum_of(self.grid.comm, np.array([np.sum(~outside)]))
+        if not staying[0]:
+            raise InputError("the last particle would leave the grid: nothing is left to compute")
+        return moved
 
-    Attributes:
-        scene: What was solved.
-        u: Coefficients of the displacement [m] since the start, two per function, x fastest.
-        volumetric: Coefficients of eps_v, or of p [Pa]; None with forms that have neither.
-        unknowns: Number of reduced unknowns.
-        iterations: Newton iterations of the last step.
-        history: (momentum, volume) measures of every residual of the last step.
-        krylov: FGMRES iterations of every linear solve of the last step; 0 where the tangent was
-            factorised.
-        x: Positions of the particles [m].
-        volume: Their volumes [m2].
-        stress: Their stress [Pa] (xx, yy, zz, xy), as it was when this was solved.
-        displacement_of_particles: Their displacement [m] since the start.
-        eps_v: Their volumetric strain; None with forms that do not have it.
-        condition: Estimate of the condition number of the tangent last factorised, scaled: its
-            Frobenius norm over the square root of its size, times that of its inverse as random
-            vectors show it.
-        symmetric: Whether that tangent was symmetric.
-    """
+    def _outside(self, x: Array) -> npt.NDArray[np.bool_]:
+        margin = 1e-9 * self.grid.h  # as Rust takes it
+        inside = (x >= np.subtract(self.grid.origin, margin)) & (
+            x <= np.add(self.grid.upper, margin)
+        )
+        return np.asarray(~inside.all(axis=1))
 
-    def __init__(self, scene: Scene, step: Converged, unknowns: int, total: Array) -> None:
-        self.scene = scene
-        self.u, self.volumetric = scene.split(total)
-        self.unknowns, self.iterations = unknowns, step.iterations
-        self.history: History = step.history
-        self.krylov = tuple(step.krylov)
-        self.condition, self.symmetric = step.condition, step.symmetric
-        particles, comm = scene.particles, scene.grid.comm
-        number = ranks.joined(comm, particles.number)
-
-        def whole(values: Array) -> Array:
-            if comm.size == 1:
-                return np.array(values)
-            ordered = np.empty((len(number), *values.shape[1:]))
-            ordered[number] = ranks.joined(comm, values)
-            return ordered
-
-        self.x, self.volume = whole(particles.x), whole(particles.volume)
-        self.stress = whole(particles.stress)
-        self.displacement_of_particles = whole(particles.displacement)
-        self.eps_v = None if particles.eps_v is None else whole(particles.eps_v)
-
-    def displacement(self, point: Sequence[float]) -> Array:
-        """Displacement (u_x, u_y) [m] of the grid at a point.
-
-        Raises:
-            InputError: The point is outside the grid.
+    def _relocate(self, time: float) -> None:
+        """Remove the particles that left, send those to their rank that belong to another, and attach
+        the others where they are.
         """
-        location = boundary.locate_point(self.scene.grid, point, "displacement(...)")
-        value = _rust.interpolate(location, self.scene.basis, 2, self.u)[0]
-        return np.asarray(value)
+        outside = self._outside(self.particles.x)
+        gone = [
+            (int(self.particles.number[p]), (float(self.particles.x[p, 0]),
+                                             float(self.particles.x[p, 1])), time)
+            for p in np.flatnonzero(outside)
+        ]  # fmt: skip
+        self.left += [particle for part in self.grid.comm.allgather(gone) for particle in part]
+        if outside.any():
+            self.particles = self.particles.select(np.flatnonzero(~outside).astype(np.uint32))
+        self.attached = self._attach(self._migrated())
 
-    @property
-    def mean_stress(self) -> Array:
-        """Mean stress [Pa] at the particles, (xx + yy + zz)/3, tension positive."""
-        return np.asarray(self.stress[:, :3].mean(axis=1))
+    def _migrated(self) -> _rust.Location:
+        """Each particle to the rank of its cell."""
+        comm = self.grid.comm
+        while True:
+            location = self.grid.rust.locate(self.particles.x)
+            if comm.size == 1:
+                return location
+            rank = self.grid.rank_of_cell[location.cell]
+            if not ranks.any_of(comm, np.array([(rank != comm.rank).any()]))[0]:
+                return location
+            rows = ranks.exchanged(comm, self.particles.rows(), rank)
+            particles = self.particles.of_rows(rows)
+            self.particles = particles.select(np.argsort(particles.number).astype(np.uint32))
+
+
+def _densities(density: float | Sequence[float], materials: int) -> Array:
+    """Density of each material [kg/m3]."""
+    given = list(density) if isinstance(density, Sequence) else [density] * materials
+    if len(given) != materials:
+        raise InputError(
+            f"density has {len(given)} values: expected one, or one for each of the {materials} "
+            "materials"
+        )
+    return np.array([inputs.number("density", rho, low=0.0) for rho in given])

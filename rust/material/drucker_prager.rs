@@ -12,7 +12,9 @@
 //! where that passes the apex, s = 0 and p = c B / A, which also cuts off tension at psi = 0.
 //! Dilatancy ends at a plastic volumetric strain of `eps_v_max`; A and B stay those of psi.
 
-use super::{deviatoric_stiffness, norm, LinearElastic, Material, Moduli, Strain, Stress};
+use super::{
+    deviatoric_stiffness, norm, LinearElastic, Material, Moduli, Strain, Stress, ROUND_OFF,
+};
 use crate::error::{Error, Result};
 use crate::tensor::COMPONENTS;
 
@@ -111,7 +113,7 @@ impl Material for DruckerPrager {
         let (mu, bulk) = (self.shear_modulus(), self.bulk_modulus());
         let root = norm(&trial.deviator) / 2.0_f64.sqrt();
         let excess = root + self.a * trial.mean - self.strength;
-        if excess <= 0.0 {
+        if excess <= ROUND_OFF * (root + trial.mean.abs()) {
             return (trial, moduli);
         }
         let (mut flow, mut stiffness) = (self.flow, mu + bulk * self.a * self.flow);

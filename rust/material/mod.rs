@@ -13,6 +13,10 @@ pub use von_mises::VonMises;
 
 use crate::tensor::{deviator, mean, Sym, Tangent, COMPONENTS};
 
+/// Beyond the yield surface by no more than this share of the stress is on it: a stored stress that
+/// was returned to the surface, and is unloaded, starts elastic.
+pub(crate) const ROUND_OFF: f64 = 1e-13;
+
 /// A strain increment in its two parts; order and signs as in [`crate::tensor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Strain {
@@ -102,6 +106,13 @@ pub trait Material: Send + Sync {
             deviator: std::array::from_fn(|i| stress.deviator[i] / stiffness[i]),
             volume: stress.mean / self.bulk_modulus(),
         }
+    }
+
+    /// Energy that the elastic strain stores [J/m3].
+    fn elastic_energy(&self, strain: &Strain) -> f64 {
+        let stiffness = deviatoric_stiffness(self.shear_modulus());
+        let twice: f64 = stiffness.iter().zip(strain.deviator).map(|(c, e)| c * e * e).sum();
+        0.5 * twice + 0.5 * self.bulk_modulus() * strain.volume * strain.volume
     }
 }
 

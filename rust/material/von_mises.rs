@@ -3,7 +3,9 @@
 //! Radial return (Simo and Hughes 1998, box 3.2): `d_kappa = (q_trial - sigma_y - H kappa) / (3 mu + H)`,
 //! `s = s_trial (1 - 3 mu d_kappa / q_trial)`; the volume stays elastic.
 
-use super::{deviatoric_stiffness, norm, LinearElastic, Material, Moduli, Strain, Stress};
+use super::{
+    deviatoric_stiffness, norm, LinearElastic, Material, Moduli, Strain, Stress, ROUND_OFF,
+};
 use crate::error::{Error, Result};
 use crate::tensor::COMPONENTS;
 
@@ -59,7 +61,7 @@ impl Material for VonMises {
         let size = norm(&stress.deviator);
         let q = 1.5_f64.sqrt() * size;
         let excess = q - self.yield_stress - self.hardening * history[0];
-        if excess <= 0.0 {
+        if excess <= ROUND_OFF * (q + stress.mean.abs()) {
             return (stress, moduli);
         }
         let kappa = excess / (3.0 * mu + self.hardening);

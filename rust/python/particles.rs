@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
 use super::{require, view, InputError};
@@ -48,6 +49,32 @@ impl PyParticles {
         let inside = particles.iter().all(|&p| (p as usize) < self.0.len());
         require(inside, "a selection of other particles")?;
         Ok(Self(self.0.select(particles)))
+    }
+
+    /// All arrays side by side, a row each.
+    fn rows<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        self.0.rows().to_pyarray(py)
+    }
+
+    /// Particles with the same arrays, from such rows.
+    fn of_rows(&self, rows: PyReadonlyArray2<f64>) -> PyResult<Self> {
+        let particles = self.0.of_rows(&rows.as_array()).map(Self);
+        particles.ok_or_else(|| PyRuntimeError::new_err("internal: rows of other particles"))
+    }
+
+    /// Make room for an array of a time integration.
+    fn carry(&mut self, name: &str, width: usize) {
+        self.0.carry(name, width);
+    }
+
+    /// An array of a time integration by its name: n x width.
+    fn carried<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let object = slf.borrow();
+        let Some((_, array)) = object.0.carried.iter().find(|(known, _)| known == name) else {
+            return Err(InputError::new_err(format!("no array '{name}': is this a static scene?")));
+        };
+        // SAFETY: as in `view`; never reallocated once it is there.
+        Ok(unsafe { PyArray::borrow_from_array(array, slf.clone().into_any()) })
     }
 
     fn add_history(&mut self, materials: Vec<PyRef<PyMaterial>>) {

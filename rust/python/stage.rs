@@ -128,7 +128,8 @@ impl PyStage {
         Ok(self.with(&u, volumetric.as_ref(), given.as_ref(), run)??)
     }
 
-    /// Accept the increments: stress, displacement and eps_v of the particles.
+    /// Accept the increments: stress, displacement and eps_v of the particles. Returns what the laws
+    /// dissipate [J per metre depth].
     #[pyo3(signature = (u, volumetric, given=None))]
     fn commit(
         &self,
@@ -136,9 +137,20 @@ impl PyStage {
         u: PyReadonlyArray1<f64>,
         volumetric: Option<PyReadonlyArray1<f64>>,
         given: Option<Given>,
-    ) -> PyResult<()> {
+    ) -> PyResult<f64> {
         let mut particles = self.particles.borrow_mut(py);
         Ok(self.with(&u, volumetric.as_ref(), given.as_ref(), |s| s.commit(&mut particles.0))??)
+    }
+
+    /// Energy that the laws store in the particles [J per metre depth].
+    fn elastic_energy(&self, py: Python) -> f64 {
+        let particles = &self.particles.borrow(py).0;
+        let of = |p: usize| {
+            let law = &self.materials[particles.material[p] as usize];
+            let stress: Sym = std::array::from_fn(|i| particles.stress[[p, i]]);
+            particles.volume[p] * law.elastic_energy(&law.elastic_strain(&(&stress).into()))
+        };
+        (0..particles.len()).map(of).sum()
     }
 
     /// Strain increments at the particles (xx, yy, zz, gamma_xy): n x 4.

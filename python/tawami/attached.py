@@ -1,0 +1,59 @@
+"""The particles where they are: field side, laws and Newton's method from one reset of the grid to the
+next.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami import _rust, ranks
+from tawami.basis import Basis
+from tawami.field import Field
+from tawami.newton import Newton
+from tawami.numpy_law import NumpyStage
+from tawami.reduction import Layout
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Attached:
+    """What belongs to the present cells of this rank's particles.
+
+    Attributes:
+        location: Where they are.
+        field: The field side.
+        stage: Their laws.
+        newton: The nonlinear problem of a step.
+    """
+
+    location: _rust.Location
+    field: Field
+    stage: _rust.Stage | NumpyStage
+    newton: Newton
+
+    @property
+    def layout(self) -> Layout:
+        """Where the coefficients stand."""
+        return self.field.layout
+
+    def sums(self, weight: Array, data: Array, basis: Basis | None = None) -> Array:
+        """Sums over all particles of the body on the functions of a basis, that of the displacement
+        by default: sum_p weight_p data_p N_i, functions x columns.
+        """
+        sums = _rust.nodal_sums(self.location, weight, data, basis or self.layout.basis)
+        return ranks.sum_of(self.layout.grid.comm, sums)
+
+    def at_particles(self, values: Array) -> Array:
+        """A displacement field (functions x 2) at this rank's particles, particles x 2."""
+        flat = np.ascontiguousarray(values).ravel()
+        return np.asarray(_rust.interpolate(self.location, self.layout.basis, 2, flat))
+
+    def gradients(self, values: Array) -> Array:
+        """Gradient of a displacement field (functions x 2) at the particles, particles x 2 x 2."""
+        flat = np.ascontiguousarray(values).ravel()
+        gradients = _rust.gradients(self.location, self.layout.basis, flat)
+        return np.asarray(gradients).reshape(-1, 2, 2)

@@ -1,0 +1,122 @@
+"""Loads of a scene: weight, tractions on edges of the grid, forces on particles that move with them.
+
+What is new since the last step that was solved in full comes by a share `part` from 0 to 1; what was
+there already stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami import _rust, boundary, inputs
+from tawami.attached import Attached
+from tawami.boundary import Profile
+from tawami.errors import InputError, SupportError
+from tawami.grid import Edge, Grid
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass
+class Traction:
+    """A traction (t_x, t_y) [Pa] on an edge of the grid; `carried` is 1 once the body has borne it."""
+
+    edge: Edge
+    value: tuple[Profile, Profile]
+    carried: float = 0.0
+
+
+@dataclass
+class Forces:
+    """Forces [N per metre depth] on particles of the body, particles of the body x 2."""
+
+    force: Array
+    carried: float = 0.0
+
+
+class Loads:
+    """The loads of one scene.
+
+    Args:
+        grid: The grid.
+        num_particles: Number of particles of the body.
+    """
+
+    def __init__(self, grid: Grid, num_particles: int) -> None:
+        self.grid, self.num_particles = grid, num_particles
+        self.gravity, self._carried_gravity = np.zeros(2), np.zeros(2)
+        self.tractions: list[Traction] = []
+        self.forces: list[Forces] = []
+
+    def add_forces(self, particles: npt.ArrayLike, force: Sequence[float]) -> None:
+        """Share a force [N per metre depth] out among particles of the body, a mask or numbers."""
+        total = np.array(inputs.point("load(...): force", force))
+        chosen = np.asarray(particles)
+        if chosen.dtype == bool and chosen.shape == (self.num_particles,):
+            chosen = np.flatnonzero(chosen)
+        inside = chosen.dtype.kind in "iu" and chosen.ndim == 1
+        if not (inside and ((chosen >= 0) & (chosen < self.num_particles)).all()):
+            raise InputError(
+                f"load(particles={particles!r}): expected a mask of the {self.num_particles} "
+                "particles of the body, or their numbers"
+            )
+        if chosen.size == 0:
+            raise InputError("load(...): no particle was chosen; the force would act on nothing")
+        each = np.zeros((self.num_particles, 2))
+        each[chosen] = total / len(chosen)
+        self.forces.append(Forces(each))
+
+    def external(
+        self, attached: Attached, particles: _rust.Particles, mass: Array | None, part: float
+    ) -> Array:
+        """External forces on all coefficients.
+
+        Args:
+            attached: The particles where they are.
+            particles: The particles of this rank.
+            mass: Their masses [kg per metre depth]; None where there is no density.
+            part: Share of the loads that are new.
+        """
+        on_particles = np.zeros((len(particles), 2))
+        gravity = self._gravity_at(part)
+        if mass is not None:
+            on_particles += mass[:, None] * gravity
+        for forces in self.forces:
+            on_particles += _share(forces, part) * forces.force[particles.number]
+        external = np.zeros(attached.layout.size)
+        if self.forces or gravity.any():
+            sums = attached.sums(np.ones(len(particles)), on_particles)
+            external[: sums.size] = sums.ravel()
+        for traction in self.tractions:
+            external += _share(traction, part) * self._on_edge(attached, traction)
+        return external
+
+    def _on_edge(self, attached: Attached, traction: Traction) -> Array:
+        edge, what = traction.edge, f"traction(edge='{traction.edge}')"
+        nodes = attached.field.edge_nodes(edge)
+        if len(nodes) == 0:
+            raise SupportError(
+                f"{what}: no cell along that edge of the grid holds particles; let the grid end where "
+                "the body is loaded, or use load(particles, force)"
+            )
+        x, y = nodes[..., 0].ravel(), nodes[..., 1].ravel()
+        values = [boundary.evaluate(component, x, y, what) for component in traction.value]
+        return attached.field.traction(edge, np.stack(values, axis=-1).reshape(nodes.shape))
+
+    def accept(self, part: float) -> None:
+        """This share of what is new is there now."""
+        self._carried_gravity = self._gravity_at(part)
+        loads: list[Traction | Forces] = [*self.tractions, *self.forces]
+        for load in loads:
+            load.carried = _share(load, part)
+
+    def _gravity_at(self, part: float) -> Array:
+        return np.asarray(self._carried_gravity + part * (self.gravity - self._carried_gravity))
+
+
+def _share(load: Traction | Forces, part: float) -> float:
+    return load.carried + part * (1.0 - load.carried)

@@ -1,0 +1,128 @@
+"""What a step gives back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami import _rust, boundary, ranks
+from tawami.errors import InputError
+from tawami.grid import EDGES
+from tawami.newton import Converged, History
+from tawami.reduction import Reduction
+
+if TYPE_CHECKING:
+    from tawami.scene import Scene
+
+Array = npt.NDArray[np.float64]
+
+
+class Solution:
+    """Equilibrium of a scene, or the end of a step. On several ranks all of it is on every rank, and
+    arrays of particles are in the order of their numbers.
+
+    Attributes:
+        scene: What was solved.
+        u: Coefficients of the displacement [m], two per function, x fastest: since the start, and of
+            the last step where strains are finite.
+        volumetric: Coefficients of eps_v, or of p [Pa]; None with forms that have neither.
+        unknowns: Number of reduced unknowns.
+        iterations: Newton iterations of the last step.
+        history: (momentum, volume) measures of every residual of the last step.
+        krylov: FGMRES iterations of every linear solve of the last step; 0 where the tangent was
+            factorised.
+        number: Numbers of the particles in the body, ascending: all, unless some have left.
+        x: Positions of the particles [m].
+        volume: Their volumes [m2] at the start.
+        stress: Their stress [Pa] (xx, yy, zz, xy), as it was when this was solved.
+        displacement_of_particles: Their displacement [m] since the start.
+        eps_v: Their volumetric strain; None with forms that do not have it.
+        condition: Estimate of the condition number of the tangent last factorised, scaled: its
+            Frobenius norm over the square root of its size, times that of its inverse as random
+            vectors show it.
+        symmetric: Whether that tangent was symmetric.
+    """
+
+    def __init__(
+        self, scene: Scene, step: Converged, reduction: Reduction, coefficients: Array
+    ) -> None:
+        self.scene = scene
+        self.u, self.volumetric = scene.split(coefficients)
+        self.unknowns, self.iterations = reduction.size, step.iterations
+        self.history: History = step.history
+        self.krylov = tuple(step.krylov)
+        self.condition, self.symmetric = step.condition, step.symmetric
+        self._forces, self._reduction = step.forces, reduction
+        particles, comm = scene.particles, scene.grid.comm
+        number = ranks.joined(comm, particles.number)
+        order = np.argsort(number)
+        self.number = number[order]
+
+        def whole(values: Any) -> Array:
+            return np.asarray(ranks.joined(comm, np.asarray(values))[order])
+
+        self.x, self.volume = whole(particles.x), whole(particles.volume)
+        self.stress = whole(particles.stress)
+        self.displacement_of_particles = whole(particles.displacement)
+        self.eps_v = None if particles.eps_v is None else whole(particles.eps_v)
+
+    def displacement(self, point: Sequence[float]) -> Array:
+        """Displacement (u_x, u_y) [m] of the grid at a point.
+
+        Raises:
+            InputError: The point is outside the grid.
+        """
+        location = boundary.locate_point(self.scene.grid, point, "displacement(...)")
+        value = _rust.interpolate(location, self.scene.basis, 2, self.u)[0]
+        return np.asarray(value)
+
+    def reaction(self, place: str | Sequence[float]) -> Array:
+        """Force (x, y) [N per metre depth] that a support or wall exerts on the body.
+
+        Args:
+            place: Name of an edge of the grid: the sum over the functions along it, so that what acts
+                at a corner belongs to both its edges; or the point (x, y) of a `hold` [m].
+
+        Raises:
+            InputError: No such edge, or no point held there.
+        """
+        n = len(self.u)
+        held = np.ones(n, dtype=bool)
+        held[self._reduction.unknowns[self._reduction.unknowns < n]] = False
+        forces = np.where(held, self._forces[:n], 0.0).reshape(-1, 2)
+        if isinstance(place, str):
+            if place not in EDGES:
+                raise InputError(f"reaction('{place}'): expected one of {', '.join(EDGES)}")
+            scene = self.scene
+            functions = boundary.edge_functions(scene.grid, scene.basis, place)
+            walls = [wall for wall in scene.supports.walls if wall.edge == place]
+            friction = sum((wall.friction_of(forces) for wall in walls), np.zeros_like(forces))
+            return np.asarray((forces + friction)[functions].sum(axis=0))
+        return self._at_point(place)
+
+    def _at_point(self, place: Sequence[float]) -> Array:
+        """Multipliers of the point constraints: what they add up to is out of balance by itself."""
+        points = self._reduction.points
+        mine = [np.allclose(point.place, place) for point in points]
+        if not any(mine):
+            raise InputError(f"reaction({tuple(place)}): no point is held there")
+        involved = np.unique(np.concatenate([point.indices for point in points]))
+        involved = involved[~self._reduction.fixed[involved]]
+        weights = np.zeros((len(involved), len(points)))
+        for k, point in enumerate(points):
+            for index, weight in zip(point.indices, point.weights, strict=True):
+                weights[involved == index, k] = weight
+        multipliers = np.linalg.lstsq(weights, self._forces[involved], rcond=None)[0]
+        force = np.zeros(2)
+        for point, multiplier, at_place in zip(points, multipliers, mine, strict=True):
+            if at_place:
+                force[point.indices[0] % 2] += multiplier
+        return force
+
+    @property
+    def mean_stress(self) -> Array:
+        """Mean stress [Pa] at the particles, (xx + yy + zz)/3, tension positive."""
+        return np.asarray(self.stress[:, :3].mean(axis=1))
