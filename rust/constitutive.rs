@@ -6,11 +6,12 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::finite_strain::{det_minus_one, Plane, Trial};
+use crate::finite_strain::{det_minus_one, Trial};
 use crate::grid::Location;
 use crate::kinematics::{Increments, Kinematics};
 use crate::material::{Material, Moduli, Stress};
 use crate::particles::Particles;
+use crate::plane::Plane;
 use crate::tensor::{Sym, COMPONENTS, IN_PLANE, UNIT};
 
 /// A quantity of the law that a form may name.
@@ -232,7 +233,7 @@ impl Stage<'_> {
                     trial = Some(Trial::new(&g, own.then_some(volume), &elastic)?);
                     // the law sees the whole elastic strain, from no stress
                     strain = trial.as_ref().map_or(strain, |t| t.strain);
-                    old = Stress { deviator: [0.0; COMPONENTS], mean: 0.0 };
+                    old = Stress::default();
                 }
                 let (before, after) = (&before[..places.len()], &mut after[..places.len()]);
                 law.respond(&strain, &old, before, after)

@@ -1,8 +1,9 @@
 //! Hencky elasticity of finite strain: closed forms, objectivity, derivatives against differences.
 
 use proptest::prelude::*;
-use tawami::finite_strain::{Plane, Trial};
+use tawami::finite_strain::Trial;
 use tawami::material::{LinearElastic, Material, Moduli, Strain, Stress};
+use tawami::plane::Plane;
 
 const NONE: Strain = Strain { deviator: [0.0; 4], volume: 0.0 };
 const FREE: Stress = Stress { deviator: [0.0; 4], mean: 0.0 };

@@ -4,10 +4,12 @@
 //! Deviatoric and volumetric parts travel separately (see [`crate::kinematics`]).
 
 mod drucker_prager;
+mod friction;
 mod linear_elastic;
 mod von_mises;
 
-pub use drucker_prager::{DruckerPrager, Friction};
+pub use drucker_prager::DruckerPrager;
+pub use friction::Friction;
 pub use linear_elastic::LinearElastic;
 pub use von_mises::VonMises;
 
@@ -23,7 +25,7 @@ pub struct Strain {
 }
 
 /// A stress in its two parts.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Stress {
     /// Deviator s [Pa].
     pub deviator: Sym,
@@ -32,7 +34,7 @@ pub struct Stress {
 }
 
 /// Consistent tangent of [`Stress`] with respect to [`Strain`] [Pa].
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Moduli {
     /// d s_i / d deviator_j, applied to deviatoric increments only.
     pub dev_dev: Tangent,
