@@ -339,15 +339,17 @@ impl Stage<'_> {
     }
 }
 
-/// Check that every particle names a material, and that incompressible ones meet kinematics that
-/// can take them.
+/// Check that every particle names a material, and that its law can be used with these kinematics and
+/// with finite or small strains.
 ///
 /// # Errors
-/// [`Error::UnknownMaterial`] or [`Error::Incompressible`], naming the first such particle.
+/// [`Error::UnknownMaterial`], [`Error::Incompressible`], [`Error::PressureDependent`] or
+/// [`Error::FiniteOnly`], naming the first such particle.
 pub fn check_materials(
     particles: &Particles,
     materials: &[Arc<dyn Material>],
     kinematics: Kinematics,
+    finite: bool,
 ) -> Result<()> {
     for (index, &m) in particles.material.iter().enumerate() {
         let Some(law) = materials.get(m as usize) else {
@@ -359,6 +361,9 @@ pub fn check_materials(
         }
         if law.pressure_dependent() && kinematics == Kinematics::Deviatoric {
             return Err(Error::PressureDependent { index });
+        }
+        if law.finite_only() && !finite {
+            return Err(Error::FiniteOnly { index });
         }
     }
     Ok(())

@@ -110,7 +110,7 @@ class Scene:
         numbers = np.zeros(len(x)) if material_of is None else material_of
         numbers = inputs.numbering("material_of", numbers, len(x))
         whole = _rust.Particles(x, volume, numbers)
-        whole.check_materials(materials, self.form.kinematics)
+        whole.check_materials(materials, self.form.kinematics, self.form.strain == "finite")
         whole.add_history(materials)
         self._distribute(whole, grid.rust.locate(whole.x))
         self._compiled = compile_form(grid.comm, self.form, options)

@@ -6,11 +6,14 @@
 mod drucker_prager;
 mod friction;
 mod linear_elastic;
+mod neo_hookean;
+mod principal;
 mod von_mises;
 
 pub use drucker_prager::DruckerPrager;
 pub use friction::Friction;
 pub use linear_elastic::LinearElastic;
+pub use neo_hookean::NeoHookean;
 pub use von_mises::VonMises;
 
 use crate::tensor::{deviator, mean, Sym, Tangent, COMPONENTS};
@@ -82,6 +85,11 @@ pub trait Material: Send + Sync {
         false
     }
 
+    /// Whether the law exists at finite strain only.
+    fn finite_only(&self) -> bool {
+        false
+    }
+
     /// Names of the history variables, all zero at first.
     fn history(&self) -> &'static [&'static str] {
         &[]
@@ -105,11 +113,26 @@ pub trait Material: Send + Sync {
             volume: stress.mean / self.bulk_modulus(),
         }
     }
+
+    /// Energy of an elastic strain [J/m3], `mu e : e + K/2 v^2`; its derivative is the stress.
+    fn elastic_energy(&self, strain: &Strain) -> f64 {
+        let stiffness = deviatoric_stiffness(self.shear_modulus());
+        let twice: f64 = stiffness.iter().zip(strain.deviator).map(|(c, e)| c * e * e).sum();
+        0.5 * twice + volumetric_energy(self.bulk_modulus(), strain.volume)
+    }
 }
 
 /// `s = 2 mu e` component by component: the strain holds gamma_xy = 2 eps_xy, hence mu for the shear.
 pub(crate) fn deviatoric_stiffness(mu: f64) -> Sym {
     [2.0 * mu, 2.0 * mu, 2.0 * mu, mu]
+}
+
+/// `K/2 v^2`; an incompressible material has no volume change, and no energy of it.
+pub(crate) fn volumetric_energy(bulk: f64, volume: f64) -> f64 {
+    if volume == 0.0 {
+        return 0.0;
+    }
+    0.5 * bulk * volume * volume
 }
 
 /// `sqrt(s : s)` of a stress.

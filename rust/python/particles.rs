@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 
 use super::{require, view, InputError};
 use crate::constitutive;
-use crate::material::{DruckerPrager, Friction, LinearElastic, Material, VonMises};
+use crate::material::{DruckerPrager, Friction, LinearElastic, Material, NeoHookean, VonMises};
 use crate::particles::Particles;
 
 /// The same array, not writeable from Python: the cells of the particles and their laws' constants
@@ -37,9 +37,14 @@ impl PyParticles {
         Ok(self.0.check()?)
     }
 
-    fn check_materials(&self, materials: Vec<PyRef<PyMaterial>>, kinematics: &str) -> PyResult<()> {
+    fn check_materials(
+        &self,
+        materials: Vec<PyRef<PyMaterial>>,
+        kinematics: &str,
+        finite: bool,
+    ) -> PyResult<()> {
         let laws = laws(&materials);
-        Ok(constitutive::check_materials(&self.0, &laws, kinematics.parse()?)?)
+        Ok(constitutive::check_materials(&self.0, &laws, kinematics.parse()?, finite)?)
     }
 
     /// Some of the particles.
@@ -172,6 +177,17 @@ impl PyMaterial {
         let elastic = LinearElastic::from_k_mu(elastic.0, elastic.1)?;
         let friction = Friction { phi, c, psi, eps_v_max, tiny };
         Ok(Self(Arc::new(DruckerPrager::new(elastic, friction)?)))
+    }
+
+    #[staticmethod]
+    fn neo_hookean(k: f64, mu: f64) -> PyResult<Self> {
+        Ok(Self(Arc::new(NeoHookean::new(LinearElastic::from_k_mu(k, mu)?))))
+    }
+
+    /// Whether the law exists at finite strain only.
+    #[getter]
+    fn finite_only(&self) -> bool {
+        self.0.finite_only()
     }
 
     #[getter]
