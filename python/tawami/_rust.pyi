@@ -116,6 +116,15 @@ class Material:
         tiny: bool,
     ) -> Material: ...
     @staticmethod
+    def mohr_coulomb(
+        elastic: tuple[float, float],
+        phi: float,
+        c: float,
+        psi: float,
+        eps_v_max: float,
+        tiny: bool,
+    ) -> Material: ...
+    @staticmethod
     def neo_hookean(k: float, mu: float) -> Material: ...
     @property
     def finite_only(self) -> bool: ...

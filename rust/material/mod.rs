@@ -6,6 +6,7 @@
 mod drucker_prager;
 mod friction;
 mod linear_elastic;
+mod mohr_coulomb;
 mod neo_hookean;
 mod principal;
 mod von_mises;
@@ -13,6 +14,7 @@ mod von_mises;
 pub use drucker_prager::DruckerPrager;
 pub use friction::Friction;
 pub use linear_elastic::LinearElastic;
+pub use mohr_coulomb::MohrCoulomb;
 pub use neo_hookean::NeoHookean;
 pub use von_mises::VonMises;
 

@@ -7,7 +7,9 @@ use pyo3::prelude::*;
 
 use super::{require, view, InputError};
 use crate::constitutive;
-use crate::material::{DruckerPrager, Friction, LinearElastic, Material, NeoHookean, VonMises};
+use crate::material::{
+    DruckerPrager, Friction, LinearElastic, Material, MohrCoulomb, NeoHookean, VonMises,
+};
 use crate::particles::Particles;
 
 /// The same array, not writeable from Python: the cells of the particles and their laws' constants
@@ -177,6 +179,20 @@ impl PyMaterial {
         let elastic = LinearElastic::from_k_mu(elastic.0, elastic.1)?;
         let friction = Friction { phi, c, psi, eps_v_max, tiny };
         Ok(Self(Arc::new(DruckerPrager::new(elastic, friction)?)))
+    }
+
+    #[staticmethod]
+    fn mohr_coulomb(
+        elastic: (f64, f64),
+        phi: f64,
+        c: f64,
+        psi: f64,
+        eps_v_max: f64,
+        tiny: bool,
+    ) -> PyResult<Self> {
+        let elastic = LinearElastic::from_k_mu(elastic.0, elastic.1)?;
+        let friction = Friction { phi, c, psi, eps_v_max, tiny };
+        Ok(Self(Arc::new(MohrCoulomb::new(elastic, friction)?)))
     }
 
     #[staticmethod]
