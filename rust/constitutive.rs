@@ -6,11 +6,12 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::finite_strain::{det_minus_one, Plane, Trial};
+use crate::finite_strain::{det_minus_one, Trial};
 use crate::grid::Location;
 use crate::kinematics::{Increments, Kinematics};
 use crate::material::{Material, Moduli, Stress};
 use crate::particles::Particles;
+use crate::plane::Plane;
 use crate::tensor::{dot, Sym, COMPONENTS, IN_PLANE, UNIT};
 
 /// A quantity of the law that a form may name.
@@ -248,7 +249,7 @@ impl Stage<'_> {
                     trial = Some(Trial::new(&g, own, &elastic)?);
                     // the law sees the whole elastic strain, from no stress
                     strain = trial.as_ref().map_or(strain, |t| t.strain);
-                    old = Stress { deviator: [0.0; COMPONENTS], mean: 0.0 };
+                    old = Stress::default();
                 }
                 let (before, after) = (&before[..places.len()], &mut after[..places.len()]);
                 let (new, moduli) = law.respond(&strain, &old, before, after);
@@ -361,15 +362,17 @@ impl Stage<'_> {
     }
 }
 
-/// Check that every particle names a material, and that incompressible ones meet kinematics that
-/// can take them.
+/// Check that every particle names a material, and that its law can be used with these kinematics and
+/// with finite or small strains.
 ///
 /// # Errors
-/// [`Error::UnknownMaterial`] or [`Error::Incompressible`], naming the first such particle.
+/// [`Error::UnknownMaterial`], [`Error::Incompressible`], [`Error::PressureDependent`] or
+/// [`Error::FiniteOnly`], naming the first such particle.
 pub fn check_materials(
     particles: &Particles,
     materials: &[Arc<dyn Material>],
     kinematics: Kinematics,
+    finite: bool,
 ) -> Result<()> {
     for (index, &m) in particles.material.iter().enumerate() {
         let Some(law) = materials.get(m as usize) else {
@@ -381,6 +384,9 @@ pub fn check_materials(
         }
         if law.pressure_dependent() && kinematics == Kinematics::Deviatoric {
             return Err(Error::PressureDependent { index });
+        }
+        if law.finite_only() && !finite {
+            return Err(Error::FiniteOnly { index });
         }
     }
     Ok(())

@@ -107,9 +107,19 @@ pub enum Error {
     },
     /// A law that needs the mean stress met kinematics that do not give it.
     #[error(
-        "the strength of particle {index} depends on the mean stress, which the kinematics          'deviatoric' (u-p) do not give to the law. Use form 'u_epsv'"
+        "the strength of particle {index} depends on the mean stress, which the kinematics \
+         'deviatoric' (u-p) do not give to the law. Use form 'u_epsv'"
     )]
     PressureDependent {
+        /// The first such particle.
+        index: usize,
+    },
+    /// A law of finite strain met a form of small strains.
+    #[error(
+        "the law of particle {index} exists at finite strain only, and the form has small strains: \
+         expected a form with strain = 'finite'. Use form 'u_epsv_finite' or 'u_finite'"
+    )]
+    FiniteOnly {
         /// The first such particle.
         index: usize,
     },

@@ -11,10 +11,8 @@
 //! isotropic law is that of small strains (formulation: Simo and Hughes 1998, chapter 9).
 
 use crate::material::{Moduli, Strain, Stress};
+use crate::plane::{eigen, multiply, rotated, transposed, Plane};
 use crate::tensor::{deviator, dot, Sym};
-
-/// In-plane second-order tensor, `[row][column]`.
-pub type Plane = [[f64; 2]; 2];
 
 /// Trial state of a particle in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,23 +30,6 @@ pub struct Trial {
     theta: Plane,
 }
 
-fn multiply(a: &Plane, b: &Plane) -> Plane {
-    std::array::from_fn(|i| std::array::from_fn(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j]))
-}
-
-fn transposed(a: &Plane) -> Plane {
-    [[a[0][0], a[1][0]], [a[0][1], a[1][1]]]
-}
-
-/// Eigenvalues and eigenvectors (columns) of a symmetric tensor.
-fn eigen(a: &Plane) -> ([f64; 2], Plane) {
-    let (middle, half) = (0.5 * (a[0][0] + a[1][1]), 0.5 * (a[0][0] - a[1][1]));
-    let radius = half.hypot(a[0][1]);
-    let angle = 0.5 * a[0][1].atan2(half);
-    let (s, c) = angle.sin_cos();
-    ([middle + radius, middle - radius], [[c, -s], [s, c]])
-}
-
 /// `ln(1 + x) / x`, 1 at 0.
 fn ln_1p_over(x: f64) -> f64 {
     if x.abs() < 1e-4 {
@@ -64,11 +45,6 @@ fn be_of(deviator: &Sym) -> Plane {
     let (e, v) = eigen(&[[deviator[0], shear], [shear, deviator[1]]]);
     let b = e.map(|e| (2.0 * e).exp());
     rotated(&[[b[0], 0.0], [0.0, b[1]]], &v)
-}
-
-/// `v a v^T`.
-fn rotated(a: &Plane, v: &Plane) -> Plane {
-    multiply(&multiply(v, a), &transposed(v))
 }
 
 /// `det f - 1`, without the loss of digits where grad u is small.

@@ -30,6 +30,7 @@ pub mod interpolation;
 pub mod kinematics;
 pub mod material;
 pub mod particles;
+pub mod plane;
 #[cfg(feature = "python")]
 mod python;
 pub mod quadrature;

@@ -86,6 +86,7 @@ def random_scene() -> Callable[..., tawami.Scene]:
         seed: int = 0,
         x: np.ndarray | None = None,
         cells: tuple[int, int] = (4, 3),
+        law: Callable[..., tawami.Material] = tawami.linear_elastic,
         **options: Any,
     ) -> tawami.Scene:
         random = np.random.default_rng(seed)
@@ -94,10 +95,7 @@ def random_scene() -> Callable[..., tawami.Scene]:
             size = grid.h * np.array(cells)
             x = grid.origin + size * random.random((count, 2))
         body = tawami.Body(x, random.uniform(0.01, 0.1, len(x)))
-        materials = [
-            tawami.linear_elastic(E=2.0, nu=0.3),
-            tawami.linear_elastic(E=7.0, nu=0.49),
-        ]
+        materials = [law(E=2.0, nu=0.3), law(E=7.0, nu=0.49)]
         numbers = random.integers(0, 2, len(x))
         return tawami.Scene(grid, body, materials, material_of=numbers, **options)
 

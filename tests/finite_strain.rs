@@ -1,18 +1,26 @@
-//! Hencky elasticity of finite strain: closed forms, objectivity, derivatives against differences.
+//! Elasticity of finite strain: closed forms, objectivity, derivatives against differences.
 
 use proptest::prelude::*;
-use tawami::finite_strain::{Plane, Trial};
-use tawami::material::{LinearElastic, Material, Moduli, Strain, Stress};
+use tawami::finite_strain::Trial;
+use tawami::material::{LinearElastic, Material, Moduli, NeoHookean, Strain, Stress};
+use tawami::plane::Plane;
 
 const NONE: Strain = Strain { deviator: [0.0; 4], volume: 0.0 };
 const FREE: Stress = Stress { deviator: [0.0; 4], mean: 0.0 };
 
-fn law() -> LinearElastic {
+fn hencky() -> LinearElastic {
     LinearElastic::from_k_mu(5.0, 2.0).unwrap()
 }
 
-fn respond(trial: &Trial) -> (Stress, Moduli) {
-    law().respond(&trial.strain, &FREE, &[], &mut [])
+fn law(neo_hookean: bool) -> Box<dyn Material> {
+    if neo_hookean {
+        return Box::new(NeoHookean::new(hencky()));
+    }
+    Box::new(hencky())
+}
+
+fn respond(law: &dyn Material, trial: &Trial) -> (Stress, Moduli) {
+    law.respond(&trial.strain, &FREE, &[], &mut [])
 }
 
 fn rotation(angle: f64) -> Plane {
@@ -39,7 +47,7 @@ fn plane_stretches_give_the_logarithms() {
     }
     assert!((trial.strain.volume - (a * b).ln()).abs() < 1e-15);
     // P = tau f^-T: the axial one over its own stretch
-    let (tau, _) = respond(&trial);
+    let (tau, _) = respond(&hencky(), &trial);
     let p = trial.nominal(&tau);
     assert!((p[0] - (4.0 * expected[0] + 15.0 * third) / a).abs() < 1e-13);
     assert!((p[3] - (4.0 * expected[1] + 15.0 * third) / b).abs() < 1e-13);
@@ -64,12 +72,15 @@ prop_compose! {
 
 proptest! {
     #[test]
-    fn a_rotation_turns_the_stress_and_makes_none(angle in -7.0..7.0_f64, old in strains()) {
+    fn a_rotation_turns_the_stress_and_makes_none(
+        angle in -7.0..7.0_f64, old in strains(), neo: bool,
+    ) {
+        let law = law(neo);
         let q = rotation(angle);
         let still = Trial::new(&[[0.0; 2]; 2], None, &old).unwrap();
         let turned = Trial::new(&minus_unit(&q), None, &old).unwrap();
         prop_assert!((turned.strain.volume - old.volume).abs() < 1e-14);
-        let ((s, _), (t, _)) = (respond(&still), respond(&turned));
+        let ((s, _), (t, _)) = (respond(&*law, &still), respond(&*law, &turned));
         // P f^T = tau turns with the body
         let p = turned.nominal(&t);
         let tau = times(&[[p[0], p[1]], [p[2], p[3]]], &[[q[0][0], q[1][0]], [q[0][1], q[1][1]]]);
@@ -99,12 +110,16 @@ proptest! {
     }
 
     #[test]
-    fn derivatives_are_differences(g in gradients(), old in strains(), dg in gradients(), mixed: bool, dv in -0.3..0.3_f64) {
+    fn derivatives_are_differences(
+        g in gradients(), old in strains(), dg in gradients(), mixed: bool, dv in -0.3..0.3_f64,
+        neo: bool,
+    ) {
+        let law = law(neo);
         let (h, volume) = (1e-6, 0.07);
         let at = |s: f64| {
             let moved = std::array::from_fn(|i| std::array::from_fn(|j| g[i][j] + s * dg[i][j]));
             let trial = Trial::new(&moved, mixed.then_some(volume + s * dv), &old).unwrap();
-            let (tau, c) = respond(&trial);
+            let (tau, c) = respond(&*law, &trial);
             (trial.nominal(&tau), trial, tau, c)
         };
         let (_, trial, tau, c) = at(0.0);
@@ -132,19 +147,38 @@ proptest! {
     }
 
     #[test]
-    fn equal_eigenvalues_are_no_special_case(t in 0.0..1e-3_f64) {
+    fn equal_eigenvalues_are_no_special_case(t in 0.0..1e-3_f64, neo: bool) {
+        let law = law(neo);
         // nearly equal principal stretches: the divided difference stays that of the logarithm
         let g = [[0.1 + t, 0.0], [0.0, 0.1]];
         let trial = Trial::new(&g, None, &NONE).unwrap();
-        let (tau, c) = respond(&trial);
+        let (tau, c) = respond(&*law, &trial);
         let shear = [[0.0, 1.0], [1.0, 0.0]];
         let change = trial.nominal_change(&tau, &c, &shear, 0.0);
         let (h, at) = (1e-6, |s: f64| {
             let trial = Trial::new(&[[0.1 + t, s], [s, 0.1]], None, &NONE).unwrap();
-            trial.nominal(&respond(&trial).0)
+            trial.nominal(&respond(&*law, &trial).0)
         });
         for ((a, b), change) in at(h).iter().zip(at(-h)).zip(change) {
             prop_assert!(((a - b) / (2.0 * h) - change).abs() < 1e-7);
         }
+    }
+
+    #[test]
+    fn the_stress_is_the_derivative_of_the_energy(
+        e in strains(), de in strains(), neo: bool, digits in 0..6_i32,
+    ) {
+        let (law, scale) = (law(neo), 10.0_f64.powi(-digits));
+        let moved = |s: f64| Strain {
+            deviator: std::array::from_fn(|k| scale * (e.deviator[k] + s * de.deviator[k])),
+            volume: scale * (e.volume + s * de.volume),
+        };
+        let (stress, _) = law.respond(&moved(0.0), &FREE, &[], &mut []);
+        let work = (0..4).map(|k| stress.deviator[k] * de.deviator[k]).sum::<f64>()
+            + stress.mean * de.volume;
+        let h = 1e-4;
+        let energy = |s| law.elastic_energy(&moved(s));
+        let difference = (energy(h) - energy(-h)) / (2.0 * h * scale);
+        prop_assert!((work - difference).abs() < 1e-6 * scale, "{work} {difference}");
     }
 }

@@ -10,7 +10,7 @@ use tawami::error::Error;
 use tawami::grid::Grid;
 use tawami::interpolation::Field;
 use tawami::kinematics::{Increments, Kinematics};
-use tawami::material::{LinearElastic, Material};
+use tawami::material::{LinearElastic, Material, NeoHookean};
 use tawami::particles::Particles;
 
 const CELLS: [usize; 2] = [4, 3];
@@ -138,13 +138,16 @@ fn materials_are_checked_before_anything_runs() {
     let laws: Vec<Arc<dyn Material>> = vec![
         Arc::new(LinearElastic::from_k_mu(1.0, 1.0).unwrap()),
         Arc::new(LinearElastic::from_e_nu(1.0, 0.5).unwrap()),
+        Arc::new(NeoHookean::new(LinearElastic::from_k_mu(1.0, 1.0).unwrap())),
     ];
-    let check = |k, kinematics| check_materials(&n(k), &laws, kinematics);
+    let check = |k, kinematics| check_materials(&n(k), &laws, kinematics, false);
     assert_eq!(check(0, Kinematics::Mixed), Ok(()));
     assert_eq!(check(1, Kinematics::Deviatoric), Ok(()));
     assert_eq!(check(1, Kinematics::Mixed), Err(Error::Incompressible { index: 1 }));
-    let unknown = Error::UnknownMaterial { index: 1, material: 2, count: 2 };
-    assert_eq!(check(2, Kinematics::Mixed), Err(unknown));
+    assert_eq!(check(2, Kinematics::Mixed), Err(Error::FiniteOnly { index: 1 }));
+    assert_eq!(check_materials(&n(2), &laws, Kinematics::Mixed, true), Ok(()));
+    let unknown = Error::UnknownMaterial { index: 1, material: 3, count: 3 };
+    assert_eq!(check(3, Kinematics::Mixed), Err(unknown));
 }
 
 #[test]

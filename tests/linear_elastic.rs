@@ -65,6 +65,7 @@ fn an_incompressible_material_takes_a_strain_without_volume() {
     let (stress, _) =
         law.respond(&increment, &Stress { deviator: [0.0; 4], mean: 4.0 }, &[], &mut []);
     assert!(close(stress.mean, 4.0, 1e-15) && close(stress.deviator[0], 2.0, 1e-15));
+    assert!(close(law.elastic_energy(&increment), 2.0, 1e-15));
 }
 
 #[test]

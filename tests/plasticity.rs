@@ -1,9 +1,9 @@
-//! Von Mises and Drucker-Prager: yield, tangents against differences, Mohr-Coulomb in plane strain.
+//! Von Mises, Drucker-Prager, Mohr-Coulomb: yield, tangents against differences, limit states.
 
 use proptest::prelude::*;
 use tawami::error::Error;
 use tawami::material::{
-    DruckerPrager, Friction, LinearElastic, Material, Strain, Stress, VonMises,
+    DruckerPrager, Friction, LinearElastic, Material, Moduli, MohrCoulomb, Strain, Stress, VonMises,
 };
 use tawami::tensor::{deviator, trace, Sym};
 
@@ -15,8 +15,16 @@ fn friction(phi: f64, c: f64, psi: f64) -> Friction {
     Friction { phi, c, psi, eps_v_max: f64::INFINITY, tiny: false }
 }
 
-fn cone(phi: f64, c: f64, psi: f64) -> DruckerPrager {
-    DruckerPrager::new(elastic(), friction(phi, c, psi)).unwrap()
+fn pyramid(phi: f64, c: f64, psi: f64) -> MohrCoulomb {
+    MohrCoulomb::new(elastic(), friction(phi, c, psi)).unwrap()
+}
+
+/// Both frictional laws with the same parameters.
+fn frictional(elastic: LinearElastic, friction: Friction) -> [Box<dyn Material>; 2] {
+    [
+        Box::new(DruckerPrager::new(elastic, friction).unwrap()),
+        Box::new(MohrCoulomb::new(elastic, friction).unwrap()),
+    ]
 }
 
 fn strain(e: &Sym) -> Strain {
@@ -24,21 +32,80 @@ fn strain(e: &Sym) -> Strain {
 }
 
 fn laws() -> Vec<Box<dyn Material>> {
-    vec![
+    let limited = Friction { eps_v_max: 0.02, ..friction(30.0, 0.1, 20.0) };
+    let frictions = [
+        friction(30.0, 0.1, 0.0),
+        friction(30.0, 0.1, 12.0),
+        friction(0.0, 0.3, 0.0),
+        friction(45.0, 0.0, 45.0),
+        limited,
+    ];
+    let mut laws: Vec<Box<dyn Material>> = vec![
         Box::new(VonMises::new(elastic(), 0.5, 0.0).unwrap()),
         Box::new(VonMises::new(elastic(), 0.5, 0.7).unwrap()),
-        Box::new(cone(30.0, 0.1, 0.0)),
-        Box::new(cone(30.0, 0.1, 12.0)),
-        Box::new(cone(0.0, 0.3, 0.0)),
-        Box::new(cone(45.0, 0.0, 45.0)),
-        Box::new(
-            DruckerPrager::new(
-                elastic(),
-                Friction { eps_v_max: 0.02, ..friction(30.0, 0.1, 20.0) },
-            )
-            .unwrap(),
-        ),
-    ]
+    ];
+    laws.extend(frictions.into_iter().flat_map(|f| frictional(elastic(), f)));
+    laws
+}
+
+fn difference(a: &Moduli, b: &Moduli) -> f64 {
+    let all = |m: &Moduli| {
+        let mut all = m.dev_dev.concat();
+        all.extend(m.dev_vol.iter().chain(&m.mean_dev).chain([&m.mean_vol]));
+        all
+    };
+    all(a).iter().zip(all(b)).fold(0.0, |most, (x, y)| most.max((x - y).abs()))
+}
+
+/// Derivatives of deviator and mean stress along `de`: from the tangent, and as differences.
+/// `None` across a kink: elastic on one side, another plane, or the apex.
+fn derivatives(law: &dyn Material, old: &Stress, e: &Sym, de: &Sym) -> Option<[[f64; 2]; 5]> {
+    let history = history_of(law);
+    let h = 1e-7;
+    let at = |s: f64| {
+        let moved = strain(&std::array::from_fn(|k| e[k] + s * de[k]));
+        law.respond(&moved, old, &history, &mut history.clone())
+    };
+    let ((plus, c), (minus, d), (_, moduli)) = (at(h), at(-h), at(0.0));
+    if difference(&c, &d) > 1e-4 * law.bulk_modulus() {
+        return None;
+    }
+    let direction = strain(de);
+    let dot = |a: &Sym| (0..4).map(|j| a[j] * direction.deviator[j]).sum::<f64>();
+    let slope = |i: usize| match i {
+        4 => dot(&moduli.mean_dev) + moduli.mean_vol * direction.volume,
+        i => dot(&moduli.dev_dev[i]) + moduli.dev_vol[i] * direction.volume,
+    };
+    let part = |s: &Stress, i: usize| if i == 4 { s.mean } else { s.deviator[i] };
+    let difference = |i: usize| (part(&plus, i) - part(&minus, i)) / (2.0 * h);
+    Some(std::array::from_fn(|i| [slope(i), difference(i)]))
+}
+
+/// Shear stress in the plane after shear at a mean in-plane stress of -1 until nothing changes;
+/// sigma_zz finds its place.
+fn limit_shear(law: &dyn Material) -> f64 {
+    let mut stress = Stress { deviator: [0.0; 4], mean: -1.0 };
+    let mut history = vec![0.0, 0.0];
+    for _ in 0..4000 {
+        let step = |volume: f64| {
+            let mut new = history.clone();
+            let e = [2e-3 + volume / 2.0, -2e-3 + volume / 2.0, 0.0, 0.0];
+            let (s, _) = law.respond(&strain(&e), &stress, &history, &mut new);
+            (s, new)
+        };
+        // the in-plane mean stress stays -1: one secant for the volume
+        let plane = |s: &Stress| 0.5 * (s.deviator[0] + s.deviator[1]) + s.mean;
+        let (mut a, mut b) = (0.0, 1e-5);
+        for _ in 0..30 {
+            let (fa, fb) = (plane(&step(a).0) + 1.0, plane(&step(b).0) + 1.0);
+            if (fb - fa).abs() < 1e-15 {
+                break;
+            }
+            (a, b) = (b, b - fb * (b - a) / (fb - fa));
+        }
+        (stress, history) = step(b);
+    }
+    0.5 * (stress.deviator[0] - stress.deviator[1])
 }
 
 fn history_of(law: &dyn Material) -> Vec<f64> {
@@ -51,34 +118,17 @@ prop_compose! {
 
 proptest! {
     #[test]
-    fn tangents_are_differences(e in strains(), de in strains(), which in 0..7_usize) {
-        let law = &*laws()[which];
-        let history = history_of(law);
+    fn tangents_are_differences(e in strains(), de in strains(), which in 0..laws().len()) {
         let old = Stress { deviator: [0.1, -0.05, -0.05, 0.02], mean: -0.3 };
-        let h = 1e-7;
-        let at = |s: f64| {
-            let moved = strain(&std::array::from_fn(|k| e[k] + s * de[k]));
-            let mut new = history.clone();
-            law.respond(&moved, &old, &history, &mut new)
-        };
-        let ((plus, c), (minus, d)) = (at(h), at(-h));
-        // not across a kink: elastic on one side, or the apex
-        prop_assume!((c.mean_vol - d.mean_vol).abs() < 1e-4 && (c.dev_dev[0][0] - d.dev_dev[0][0]).abs() < 1e-4);
-        let (_, c) = at(0.0);
-        let direction = strain(&de);
-        for i in 0..4 {
-            let slope = (0..4).map(|j| c.dev_dev[i][j] * direction.deviator[j]).sum::<f64>()
-                + c.dev_vol[i] * direction.volume;
-            let difference = (plus.deviator[i] - minus.deviator[i]) / (2.0 * h);
+        let compared = derivatives(&*laws()[which], &old, &e, &de);
+        prop_assume!(compared.is_some());
+        for [slope, difference] in compared.unwrap() {
             prop_assert!((slope - difference).abs() < 1e-5, "{which}: {slope} {difference}");
         }
-        let slope = (0..4).map(|j| c.mean_dev[j] * direction.deviator[j]).sum::<f64>()
-            + c.mean_vol * direction.volume;
-        prop_assert!((slope - (plus.mean - minus.mean) / (2.0 * h)).abs() < 1e-5);
     }
 
     #[test]
-    fn stress_is_admissible_and_no_strain_changes_nothing(e in strains(), which in 0..7_usize) {
+    fn stress_is_admissible_and_no_strain_changes_nothing(e in strains(), which in 0..laws().len()) {
         let law = &*laws()[which];
         let history = history_of(law);
         let mut new = history.clone();
@@ -95,33 +145,16 @@ proptest! {
     }
 
     #[test]
-    fn plane_strain_limits_are_those_of_mohr_coulomb(phi in 5.0..50.0_f64, part in 0.0..1.0_f64, c in 0.0..0.2_f64) {
-        // shear at a constant mean in-plane stress until nothing changes; sigma_zz finds its place
-        let law = cone(phi, c, part * phi);
-        let mut stress = Stress { deviator: [0.0; 4], mean: -1.0 };
-        let mut history = vec![0.0, 0.0];
-        for _ in 0..4000 {
-            let step = |volume: f64| {
-                let mut new = history.clone();
-                let e = [2e-3 + volume / 2.0, -2e-3 + volume / 2.0, 0.0, 0.0];
-                let (s, _) = law.respond(&strain(&e), &stress, &history, &mut new);
-                (s, new)
-            };
-            // the in-plane mean stress stays -1: one secant for the volume
-            let plane = |s: &Stress| 0.5 * (s.deviator[0] + s.deviator[1]) + s.mean;
-            let (mut a, mut b) = (0.0, 1e-5);
-            for _ in 0..30 {
-                let (fa, fb) = (plane(&step(a).0) + 1.0, plane(&step(b).0) + 1.0);
-                if (fb - fa).abs() < 1e-15 { break; }
-                (a, b) = (b, b - fb * (b - a) / (fb - fa));
-            }
-            let (s, new) = step(b);
-            (stress, history) = (s, new);
+    fn plane_strain_limits_are_those_of_mohr_coulomb(
+        phi in 5.0..50.0_f64, part in 0.0..1.0_f64, c in 0.0..0.2_f64,
+    ) {
+        let angle = phi.to_radians();
+        let expected = angle.sin() + c * angle.cos();
+        let laws = frictional(elastic(), friction(phi, c, part * phi));
+        for (law, tolerance) in laws.iter().zip([2e-3, 1e-10]) {
+            let shear = limit_shear(&**law);
+            prop_assert!((shear - expected).abs() < tolerance * expected, "{shear} {expected}");
         }
-        let shear = 0.5 * (stress.deviator[0] - stress.deviator[1]);
-        let phi = phi.to_radians();
-        let expected = phi.sin() + c * phi.cos();
-        prop_assert!((shear - expected).abs() < 2e-3 * expected, "{shear} {expected}");
     }
 }
 
@@ -143,15 +176,19 @@ fn von_mises_in_uniaxial_strain_follows_the_closed_form() {
 #[test]
 fn tension_beyond_the_apex_leaves_its_stress() {
     for (c, psi) in [(0.0, 0.0), (0.1, 0.0), (0.1, 20.0)] {
-        let law = cone(30.0, c, psi);
-        let free = Stress { deviator: [0.0; 4], mean: 0.0 };
-        let (stress, moduli) =
-            law.respond(&strain(&[0.3, 0.29, 0.3, 0.0]), &free, &[0.0; 2], &mut [0.0; 2]);
-        assert!(stress.deviator.iter().all(|&s| s == 0.0));
-        assert_eq!(moduli.mean_vol, 0.0);
-        // sin phi p = c cos phi in the plane for psi = 0
-        if psi == 0.0 {
-            assert!((stress.mean - c / 30.0_f64.to_radians().tan()).abs() < 1e-14);
+        for (which, law) in frictional(elastic(), friction(30.0, c, psi)).iter().enumerate() {
+            let (stress, moduli) = law.respond(
+                &strain(&[0.3, 0.29, 0.3, 0.0]),
+                &Stress::default(),
+                &[0.0; 2],
+                &mut [0.0; 2],
+            );
+            assert!(stress.deviator.iter().all(|&s| s == 0.0));
+            assert_eq!(moduli, Moduli::default());
+            // sin phi p = c cos phi: the pyramid's apex, and the cone's for psi = 0
+            if psi == 0.0 || which == 1 {
+                assert!((stress.mean - c / 30.0_f64.to_radians().tan()).abs() < 1e-14);
+            }
         }
     }
 }
@@ -159,25 +196,30 @@ fn tension_beyond_the_apex_leaves_its_stress() {
 #[test]
 fn dilatancy_ends_where_it_is_told_to() {
     let limited = Friction { eps_v_max: 0.005, ..friction(30.0, 0.0, 20.0) };
-    let law = DruckerPrager::new(elastic(), limited).unwrap();
-    let old = Stress { deviator: [0.0; 4], mean: -1.0 };
-    let shear = strain(&[0.5, -0.5, 0.0, 0.0]);
-    let mut new = [0.0; 2];
-    let (stress, _) = law.respond(&shear, &old, &[0.0, 0.004], &mut new);
-    assert!((new[1] - 0.005).abs() < 1e-15);
-    assert!((stress.mean - (old.mean - 5.0 * 0.001)).abs() < 1e-14);
-    law.respond(&strain(&[0.15, -0.15, 0.0, 0.0]), &old, &[0.0, 0.0], &mut new);
-    assert!(new[1] > 0.0 && new[1] < 0.0051);
-    law.respond(&shear, &old, &[0.0, 0.005], &mut new);
-    assert_eq!(new[1], 0.005);
+    for law in frictional(elastic(), limited) {
+        let old = Stress { deviator: [0.0; 4], mean: -1.0 };
+        let shear = strain(&[0.5, -0.5, 0.0, 0.0]);
+        let mut new = [0.0; 2];
+        let (stress, _) = law.respond(&shear, &old, &[0.0, 0.004], &mut new);
+        assert!((new[1] - 0.005).abs() < 1e-15);
+        assert!((stress.mean - (old.mean - 5.0 * 0.001)).abs() < 1e-14);
+        law.respond(&strain(&[0.13, -0.13, 0.0, 0.0]), &old, &[0.0, 0.0], &mut new);
+        assert!(new[1] > 0.0 && new[1] < 0.005);
+        law.respond(&shear, &old, &[0.0, 0.005], &mut new);
+        assert_eq!(new[1], 0.005);
+    }
 }
 
 #[test]
 fn parameters_out_of_range_are_named() {
-    let name = |f: Friction| match DruckerPrager::new(elastic(), f) {
-        Err(Error::Parameter { name, .. }) => name,
-        other => panic!("{other:?}"),
-    };
+    let name =
+        |f: Friction| match (DruckerPrager::new(elastic(), f), MohrCoulomb::new(elastic(), f)) {
+            (Err(Error::Parameter { name, .. }), Err(Error::Parameter { name: other, .. })) => {
+                assert_eq!(name, other);
+                name
+            }
+            other => panic!("{other:?}"),
+        };
     assert_eq!(name(friction(90.0, 0.0, 0.0)), "phi");
     assert_eq!(name(friction(-1.0, 0.0, 0.0)), "phi");
     assert_eq!(name(friction(f64::NAN, 0.0, 0.0)), "phi");
@@ -195,4 +237,158 @@ fn parameters_out_of_range_are_named() {
     };
     assert_eq!(name(0.0, 0.0), "yield_stress");
     assert_eq!(name(1.0, -1.0), "hardening");
+}
+
+/// Principal stresses, the largest first.
+fn principal(stress: &Stress) -> [f64; 3] {
+    let [xx, yy, zz, xy] = stress.deviator;
+    let (middle, radius) = (0.5 * (xx + yy), (0.5 * (xx - yy)).hypot(xy));
+    let mut values = [middle + radius, middle - radius, zz].map(|s| s + stress.mean);
+    values.sort_by(|a, b| b.total_cmp(a));
+    values
+}
+
+/// `s1 - s3 + (s1 + s3) sin phi - 2 c cos phi`.
+fn yield_function(phi: f64, c: f64, stress: &Stress) -> f64 {
+    let ([s1, _, s3], phi) = (principal(stress), phi.to_radians());
+    s1 - s3 + (s1 + s3) * phi.sin() - 2.0 * c * phi.cos()
+}
+
+/// The admissible stress nearest to a trial stress in the elastic energy, by Hildreth's method:
+/// the six planes one after the other, without a word about order, edges or apex.
+fn nearest(elastic: &LinearElastic, phi: f64, c: f64, trial: [f64; 3]) -> [f64; 3] {
+    let (mu, k) = (elastic.shear_modulus(), elastic.bulk_modulus());
+    let (sin, cos) = phi.to_radians().sin_cos();
+    let orders = [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)];
+    let planes = orders.map(|(i, j)| {
+        let mut normal = [0.0; 3];
+        (normal[i], normal[j]) = (1.0 + sin, sin - 1.0);
+        let stiff = normal.map(|n| 2.0 * mu * (n - 2.0 * sin / 3.0) + k * 2.0 * sin);
+        (normal, stiff)
+    });
+    let dot = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|i| a[i] * b[i]).sum::<f64>();
+    let (mut stress, mut multipliers) = (trial, [0.0_f64; 6]);
+    for _ in 0..20_000 {
+        let before = multipliers;
+        for ((normal, stiff), multiplier) in planes.iter().zip(&mut multipliers) {
+            let excess = (dot(normal, &stress) - 2.0 * c * cos) / dot(normal, stiff);
+            let change = excess.max(-*multiplier);
+            *multiplier += change;
+            (0..3).for_each(|i| stress[i] -= change * stiff[i]);
+        }
+        if multipliers == before {
+            break;
+        }
+    }
+    stress
+}
+
+prop_compose! {
+    /// Any strain, and ones with equal principal values: in the plane, or one of these and zz.
+    fn cornered()(e in strains(), corner in 0..4) -> Sym {
+        match corner {
+            0 => [e[0], e[0], e[2], 0.0],
+            1 => [e[0], e[1], e[0], 0.0],
+            2 => [e[0], e[0], e[0], 0.0],
+            _ => e,
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn associated_mohr_coulomb_is_the_closest_point(
+        e in cornered(), mean in -1.5..0.5_f64, phi in 0.0..60.0_f64, c in 0.01..0.3_f64,
+    ) {
+        let phi = if phi < 2.0 { 0.0 } else { phi };
+        let law = pyramid(phi, c, phi);
+        let old = Stress { deviator: [0.0; 4], mean };
+        let (trial, _) = elastic().respond(&strain(&e), &old, &[], &mut []);
+        let (stress, _) = law.respond(&strain(&e), &old, &[0.0; 2], &mut [0.0; 2]);
+        let expected = nearest(&elastic(), phi, c, principal(&trial));
+        for (s, expected) in principal(&stress).iter().zip(expected) {
+            prop_assert!((s - expected).abs() < 1e-7, "{stress:?} {expected:?}");
+        }
+        // and its principal directions are those of the trial stress
+        let (s, t) = (stress.deviator, trial.deviator);
+        prop_assert!(((s[0] - s[1]) * t[3] - (t[0] - t[1]) * s[3]).abs() < 1e-13);
+    }
+
+    #[test]
+    fn mohr_coulomb_is_never_exceeded_and_its_plastic_strain_is_what_is_left(
+        e in cornered(), mean in -1.5..0.5_f64, phi in 0.0..89.0_f64, part in 0.0..1.0_f64,
+        c in 0.01..0.3_f64, ratio in 0.0..6.0_f64,
+    ) {
+        let phi = if phi < 2.0 { 0.0 } else { phi };
+        let elastic = LinearElastic::from_k_mu(2.0 * 10.0_f64.powf(ratio), 2.0).unwrap();
+        let law = MohrCoulomb::new(elastic, friction(phi, c, part * phi)).unwrap();
+        let old = Stress { deviator: [0.0; 4], mean };
+        let mut increment = strain(&e);
+        increment.volume /= 10.0_f64.powf(ratio);
+        let mut new = [0.0; 2];
+        let (stress, moduli) = law.respond(&increment, &old, &[0.0; 2], &mut new);
+        prop_assert!(yield_function(phi, c, &stress) < 1e-14 * elastic.bulk_modulus().max(10.0));
+        let apex = moduli == Moduli::default();
+        let elastic_part = law.elastic_strain(&Stress { mean: stress.mean - mean, ..stress });
+        if !apex {
+            prop_assert!((increment.volume - elastic_part.volume - new[1]).abs() < 1e-14);
+        }
+        let part = |i: usize| increment.deviator[i] - elastic_part.deviator[i];
+        // half of gamma: the component of a tensor, as of a stress
+        let plastic = [part(0), part(1), part(2), 0.5 * part(3)];
+        let [e1, _, e3] = principal(&Stress { deviator: plastic, mean: 0.0 });
+        prop_assert!((e1 - e3 - new[0]).abs() < 1e-13, "{} {}", e1 - e3, new[0]);
+    }
+
+    #[test]
+    fn tangents_of_mohr_coulomb_hold_near_the_incompressible_limit(
+        e in strains(), de in strains(), part in 0.0..1.0_f64,
+    ) {
+        let elastic = LinearElastic::from_k_mu(2e6, 2.0).unwrap();
+        let law = MohrCoulomb::new(elastic, friction(30.0, 0.1, 30.0 * part)).unwrap();
+        let small = |e: &Sym| {
+            let volume = trace(e) * (1.0 - 1e-6) / 3.0;
+            [e[0] - volume, e[1] - volume, e[2] - volume, e[3]]
+        };
+        let old = Stress { deviator: [0.0; 4], mean: -0.5 };
+        let compared = derivatives(&law, &old, &small(&e), &small(&de));
+        prop_assume!(compared.is_some());
+        for [slope, difference] in compared.unwrap() {
+            prop_assert!((slope - difference).abs() < 1e-3, "{slope} {difference}");
+        }
+    }
+
+    #[test]
+    fn equal_principal_stresses_are_no_special_case(
+        gap in 0.0..1e-3_f64, exact: bool, zz in -0.3..0.3_f64, de in strains(),
+        which in 0..laws().len(),
+    ) {
+        let e = [if exact { 0.1 } else { 0.1 + gap }, 0.1, zz, 0.0];
+        let compared = derivatives(&*laws()[which], &Stress::default(), &e, &de);
+        prop_assume!(compared.is_some());
+        for [slope, difference] in compared.unwrap() {
+            prop_assert!((slope - difference).abs() < 1e-4, "{which}: {slope} {difference}");
+        }
+    }
+}
+
+#[test]
+fn tresca_in_shear_and_in_uniaxial_strain_follows_the_closed_form() {
+    let (c, mu, k) = (0.3, 2.0, 5.0);
+    let law = pyramid(0.0, c, 0.0);
+    assert!(!law.pressure_dependent() && pyramid(20.0, 0.0, 0.0).pressure_dependent());
+    let respond = |e: &Sym| {
+        let mut new = [0.0; 2];
+        (law.respond(&strain(e), &Stress::default(), &[0.0; 2], &mut new).0, new)
+    };
+    let gamma = 0.4;
+    let (stress, new) = respond(&[0.0, 0.0, 0.0, gamma]);
+    assert!((stress.deviator[3] - c).abs() < 1e-15 && stress.mean == 0.0);
+    assert!((new[0] - (gamma - c / mu)).abs() < 1e-15 && new[1] == 0.0);
+    // as von Mises with sigma_y = 2 c: an edge, where both agree
+    let e = 0.4;
+    let (stress, new) = respond(&[e, 0.0, 0.0, 0.0]);
+    assert!((1.5 * stress.deviator[0] - 2.0 * c).abs() < 1e-15);
+    assert!((stress.mean - k * e).abs() < 1e-15);
+    assert!((new[0] - (e - c / mu)).abs() < 1e-15);
 }

@@ -40,6 +40,16 @@ def body_of(grid: tawami.Grid) -> tawami.Body:
 def test_materials(parameters, message):
     with pytest.raises(tawami.InputError, match=message):
         tawami.linear_elastic(**parameters)
+    law = message.replace("linear_elastic", "neo_hookean")
+    with pytest.raises(tawami.InputError, match=law):
+        tawami.neo_hookean(**parameters)
+
+
+def test_a_neo_hookean_material_is_compressible():
+    with pytest.raises(
+        tawami.InputError, match="neo_hookean: K = inf: expected a positive, finite"
+    ):
+        tawami.neo_hookean(E=1.0, nu=0.5)
 
 
 @pytest.mark.parametrize("form", ["u", "u_bbar", "u_epsv"])

@@ -18,13 +18,16 @@ ELASTIC = tawami.linear_elastic(E=100.0, nu=0.3)
         ({"phi": 0.38}, "phi = 0.38: expected degrees: below 1.6 it looks like radians"),
         ({"phi": 20.0, "psi": 25.0}, "psi = 25: expected a dilatancy angle in degrees"),
         ({"phi": 20.0, "c": -1.0}, "c = -1: expected a cohesion"),
-        ({"phi": "steep"}, "drucker_prager: "),
+        ({"phi": 0.0}, "c = 0: expected a positive cohesion where phi = 0"),
+        ({"phi": 20.0, "eps_v_max": -1.0}, "eps_v_max = -1: expected a plastic volumetric strain"),
+        ({"phi": "steep"}, ""),
     ],
 )
-def test_wrong_angles_get_a_sentence(options, words):
+@pytest.mark.parametrize("law", [tawami.drucker_prager, tawami.mohr_coulomb])
+def test_wrong_angles_get_a_sentence(law, options, words):
     with pytest.raises(tawami.InputError) as error:
-        tawami.drucker_prager(ELASTIC, **options)
-    assert words in str(error.value)
+        law(ELASTIC, **options)
+    assert f"{law.__name__}: {words}" in str(error.value)
 
 
 def test_wrong_parameters_of_von_mises():
@@ -47,9 +50,11 @@ def test_the_tangent_is_the_difference_of_the_residual(options, path):
     laws = [
         tawami.von_mises(ELASTIC, yield_stress=0.4, hardening=5.0),
         tawami.drucker_prager(ELASTIC, phi=30.0, c=0.2, psi=10.0),
+        tawami.mohr_coulomb(ELASTIC, phi=30.0, c=0.2, psi=10.0),
+        tawami.mohr_coulomb(ELASTIC, phi=0.0, c=0.2),
     ]
     body = tawami.Body(x, np.full(80, 0.05))
-    numbers = random.integers(0, 2, 80)
+    numbers = random.integers(0, len(laws), 80)
     scene = tawami.Scene(grid, body, laws, material_of=numbers, assembly=path, **options)
     c = 0.02 * random.standard_normal(scene.num_coefficients)
     direction = random.standard_normal(len(c))
@@ -87,10 +92,11 @@ def test_a_block_in_plane_compression_beyond_yield(form):
         scene.particles.history("damage")
 
 
-def test_a_strength_that_depends_on_the_mean_stress_needs_a_form_that_gives_it():
+@pytest.mark.parametrize("law", [tawami.drucker_prager, tawami.mohr_coulomb])
+def test_a_strength_that_depends_on_the_mean_stress_needs_a_form_that_gives_it(law):
     grid = grid_of()
     body = tawami.box(grid, grid.origin, grid.upper)
     with pytest.raises(
         tawami.InputError, match="the strength of particle 0 depends on the mean stress"
     ):
-        tawami.Scene(grid, body, tawami.drucker_prager(ELASTIC, phi=30.0), form="u_p")
+        tawami.Scene(grid, body, law(ELASTIC, phi=30.0), form="u_p")

@@ -15,7 +15,13 @@ from tawami.errors import (
 )
 from tawami.formulation import Form
 from tawami.grid import Grid
-from tawami.materials import drucker_prager, linear_elastic, von_mises
+from tawami.materials import (
+    drucker_prager,
+    linear_elastic,
+    mohr_coulomb,
+    neo_hookean,
+    von_mises,
+)
 from tawami.numpy_law import NumpyLaw
 from tawami.ranks import run
 from tawami.scene import Scene
@@ -42,6 +48,8 @@ __all__ = [
     "box",
     "drucker_prager",
     "linear_elastic",
+    "mohr_coulomb",
+    "neo_hookean",
     "ramp",
     "run",
     "settle",

@@ -33,26 +33,35 @@ def linear_elastic(
     Raises:
         InputError: A parameter out of its range, or another combination.
     """
-    given = {"E": E, "nu": nu, "K": K, "mu": mu, "one_minus_2nu": one_minus_2nu}
-    values = {name: value for name, value in given.items() if value is not None}
-    makers: dict[tuple[str, ...], Callable[[float, float], _rust.Material]] = {
-        ("E", "nu"): _rust.Material.linear_elastic_e_nu,
-        ("K", "mu"): _rust.Material.linear_elastic_k_mu,
-        ("E", "one_minus_2nu"): _rust.Material.linear_elastic_e_one_minus_2nu,
-    }
-    if tuple(values) not in makers:
-        raise InputError(
-            f"linear_elastic got {', '.join(values) or 'nothing'}: expected (E, nu), (K, mu) or "
-            "(E, one_minus_2nu)"
-        )
-    for name, value in values.items():
-        if not isinstance(value, Real):
-            raise InputError(f"linear_elastic: {name} = {value!r}: expected a number")
-    first, second = (float(value) for value in values.values())
-    try:
-        return makers[tuple(values)](first, second)
-    except InputError as error:
-        raise InputError(f"linear_elastic: {error}") from None
+    return _elastic("linear_elastic", E=E, nu=nu, K=K, mu=mu, one_minus_2nu=one_minus_2nu)
+
+
+def neo_hookean(
+    *,
+    E: float | None = None,
+    nu: float | None = None,
+    K: float | None = None,
+    mu: float | None = None,
+    one_minus_2nu: float | None = None,
+) -> _rust.Material:
+    """Neo-Hookean elasticity: `tau = mu dev(be_bar) + K ln J I`, be_bar = J^(-2/3) F F^T.
+
+    At finite strain only. Give its constants at small strain as (E, nu), (K, mu), or
+    (E, one_minus_2nu); the last keeps its digits near nu = 0.5.
+
+    Args:
+        E: Young's modulus [Pa].
+        nu: Poisson's ratio, -1 < nu < 0.5.
+        K: Bulk modulus [Pa].
+        mu: Shear modulus [Pa].
+        one_minus_2nu: 1 - 2 nu, above 0 and below 3.
+
+    Raises:
+        InputError: A parameter out of its range, or another combination.
+    """
+    name = "neo_hookean"
+    elastic = _elastic(name, E=E, nu=nu, K=K, mu=mu, one_minus_2nu=one_minus_2nu)
+    return _made(name, _rust.Material.neo_hookean, elastic.bulk_modulus, elastic.shear_modulus)
 
 
 def von_mises(
@@ -103,8 +112,60 @@ def drucker_prager(
     return _made("drucker_prager", make, (K, mu), phi, c, psi, eps_v_max, tiny_angle)
 
 
+def mohr_coulomb(
+    elastic: _rust.Material,
+    *,
+    phi: float,
+    c: float = 0.0,
+    psi: float = 0.0,
+    eps_v_max: float = math.inf,
+    tiny_angle: bool = False,
+) -> _rust.Material:
+    """Mohr-Coulomb plasticity: `s1 - s3 + (s1 + s3) sin phi <= 2 c cos phi`, s1 >= s2 >= s3 the
+    principal stresses, tension positive; Tresca where phi = 0.
+
+    Args:
+        elastic: Elastic part, as linear_elastic(...) makes it; nu < 0.5.
+        phi: Friction angle [degrees].
+        c: Cohesion [Pa]; with phi = 0 the undrained strength s_u.
+        psi: Dilatancy angle [degrees], at most phi.
+        eps_v_max: Plastic volumetric strain at which dilatancy ends; the strength stays.
+        tiny_angle: Take a friction angle between 0 and 1.6 degrees as it is: it is not in radians.
+
+    History: `plastic_strain`, the sum over the steps of the greatest plastic shear (gamma: largest less
+    smallest principal value of the step's plastic strain); `dilatancy`, the plastic volumetric strain
+    but for what opens at the apex.
+
+    Raises:
+        InputError: A parameter out of its range.
+    """
+    K, mu = _moduli("mohr_coulomb", elastic)
+    make = _rust.Material.mohr_coulomb
+    return _made("mohr_coulomb", make, (K, mu), phi, c, psi, eps_v_max, tiny_angle)
+
+
+def _elastic(law: str, **given: float | None) -> _rust.Material:
+    """The linear law of two constants, for what `law` got."""
+    values = {name: value for name, value in given.items() if value is not None}
+    makers: dict[tuple[str, ...], Callable[[float, float], _rust.Material]] = {
+        ("E", "nu"): _rust.Material.linear_elastic_e_nu,
+        ("K", "mu"): _rust.Material.linear_elastic_k_mu,
+        ("E", "one_minus_2nu"): _rust.Material.linear_elastic_e_one_minus_2nu,
+    }
+    if tuple(values) not in makers:
+        raise InputError(
+            f"{law} got {', '.join(values) or 'nothing'}: expected (E, nu), (K, mu) or "
+            "(E, one_minus_2nu)"
+        )
+    for name, value in values.items():
+        if not isinstance(value, Real):
+            raise InputError(f"{law}: {name} = {value!r}: expected a number")
+    first, second = (float(value) for value in values.values())
+    return _made(law, makers[tuple(values)], first, second)
+
+
 def _moduli(name: str, elastic: Any) -> tuple[float, float]:
-    if not isinstance(elastic, _rust.Material):
+    if not isinstance(elastic, _rust.Material) or elastic.finite_only:
         raise InputError(
             f"{name}: elastic = {elastic!r}: expected a material of linear_elastic(...)"
         )

@@ -157,7 +157,7 @@ class Scene:
         numbers = np.zeros(len(x)) if material_of is None else material_of
         numbers = inputs.numbering("material_of", numbers, len(x))
         whole = _rust.Particles(x, volume, numbers)
-        whole.check_materials(materials, self.form.kinematics)
+        whole.check_materials(materials, self.form.kinematics, self.form.strain == "finite")
         whole.add_history(materials)
         self._materials, self._law, self._values = materials, law, values
         self._moduli = np.array([(m.bulk_modulus, m.shear_modulus) for m in materials])

@@ -12,14 +12,10 @@
 //! where that passes the apex, s = 0 and p = c B / A, which also cuts off tension at psi = 0.
 //! Dilatancy ends at a plastic volumetric strain of `eps_v_max`; A and B stay those of psi.
 
-use super::{
-    deviatoric_stiffness, norm, LinearElastic, Material, Moduli, Strain, Stress, ROUND_OFF,
-};
-use crate::error::{Error, Result};
+use super::{deviatoric_stiffness, norm, ROUND_OFF};
+use super::{Friction, LinearElastic, Material, Moduli, Strain, Stress};
+use crate::error::Result;
 use crate::tensor::COMPONENTS;
-
-/// Below this a friction angle is taken for one in radians.
-const RADIANS: f64 = 1.6;
 
 /// Drucker-Prager plasticity.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,52 +27,14 @@ pub struct DruckerPrager {
     eps_v_max: f64,
 }
 
-/// Parameters of [`DruckerPrager`] beside its elastic law.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Friction {
-    /// Friction angle phi [degrees].
-    pub phi: f64,
-    /// Cohesion c [Pa].
-    pub c: f64,
-    /// Dilatancy angle psi [degrees].
-    pub psi: f64,
-    /// Plastic volumetric strain at which dilatancy ends.
-    pub eps_v_max: f64,
-    /// Take a friction angle between 0 and 1.6 degrees as it is.
-    pub tiny: bool,
-}
-
 impl DruckerPrager {
     /// From the elastic law and the angles.
     ///
     /// # Errors
     /// [`Error::Parameter`] naming the parameter that is out of range.
     pub fn new(elastic: LinearElastic, friction: Friction) -> Result<Self> {
-        let Friction { phi, c, psi, eps_v_max, tiny } = friction;
-        let refuse = |name, value, expected| Err(Error::Parameter { name, value, expected });
-        if !(0.0..90.0).contains(&phi) {
-            return refuse("phi", phi, "a friction angle in degrees, 0 <= phi < 90");
-        }
-        if phi > 0.0 && phi < RADIANS && !tiny {
-            let expected = "degrees: below 1.6 it looks like radians. With tiny_angle=True it is taken as it is";
-            return refuse("phi", phi, expected);
-        }
-        if !(0.0..=phi).contains(&psi) {
-            return refuse("psi", psi, "a dilatancy angle in degrees, 0 <= psi <= phi");
-        }
-        if !(c >= 0.0 && c.is_finite()) {
-            return refuse("c", c, "a cohesion of at least 0 Pa");
-        }
-        if phi == 0.0 && c == 0.0 {
-            return refuse(
-                "c",
-                c,
-                "a positive cohesion where phi = 0: without both there is no strength",
-            );
-        }
-        if eps_v_max.is_nan() || eps_v_max < 0.0 {
-            return refuse("eps_v_max", eps_v_max, "a plastic volumetric strain of at least 0");
-        }
+        friction.check()?;
+        let Friction { phi, c, psi, eps_v_max, .. } = friction;
         let (phi, tan_psi) = (phi.to_radians(), psi.to_radians().tan());
         let flow = 3.0 * tan_psi / (9.0 + 12.0 * tan_psi * tan_psi).sqrt();
         let d = (1.0 - flow * flow / 3.0).sqrt() + flow * phi.sin() / 3.0;
@@ -128,14 +86,7 @@ impl Material for DruckerPrager {
             // the apex; a > 0, for with phi = 0 gamma = (root - c) / mu
             let mean = self.strength / self.a;
             new[0] += root / mu;
-            let nothing = [0.0; COMPONENTS];
-            moduli = Moduli {
-                dev_dev: [nothing; COMPONENTS],
-                dev_vol: nothing,
-                mean_dev: nothing,
-                mean_vol: 0.0,
-            };
-            return (Stress { deviator: nothing, mean }, moduli);
+            return (Stress { mean, ..Stress::default() }, Moduli::default());
         }
         new[0] += gamma;
         new[1] += dilation;

@@ -97,12 +97,7 @@ impl Material for LinearElastic {
         for i in 0..COMPONENTS {
             dev_dev[i][i] = stiffness[i];
         }
-        let moduli = Moduli {
-            dev_dev,
-            dev_vol: [0.0; COMPONENTS],
-            mean_dev: [0.0; COMPONENTS],
-            mean_vol: self.bulk,
-        };
+        let moduli = Moduli { dev_dev, mean_vol: self.bulk, ..Moduli::default() };
         (Stress { deviator, mean: old.mean + d_mean }, moduli)
     }
 }

@@ -4,11 +4,18 @@
 //! Deviatoric and volumetric parts travel separately (see [`crate::kinematics`]).
 
 mod drucker_prager;
+mod friction;
 mod linear_elastic;
+mod mohr_coulomb;
+mod neo_hookean;
+mod principal;
 mod von_mises;
 
-pub use drucker_prager::{DruckerPrager, Friction};
+pub use drucker_prager::DruckerPrager;
+pub use friction::Friction;
 pub use linear_elastic::LinearElastic;
+pub use mohr_coulomb::MohrCoulomb;
+pub use neo_hookean::NeoHookean;
 pub use von_mises::VonMises;
 
 use crate::tensor::{deviator, mean, Sym, Tangent, COMPONENTS};
@@ -27,7 +34,7 @@ pub struct Strain {
 }
 
 /// A stress in its two parts.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Stress {
     /// Deviator s [Pa].
     pub deviator: Sym,
@@ -36,7 +43,7 @@ pub struct Stress {
 }
 
 /// Consistent tangent of [`Stress`] with respect to [`Strain`] [Pa].
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Moduli {
     /// d s_i / d deviator_j, applied to deviatoric increments only.
     pub dev_dev: Tangent,
@@ -84,6 +91,11 @@ pub trait Material: Send + Sync {
         false
     }
 
+    /// Whether the law exists at finite strain only.
+    fn finite_only(&self) -> bool {
+        false
+    }
+
     /// Names of the history variables, all zero at first.
     fn history(&self) -> &'static [&'static str] {
         &[]
@@ -108,17 +120,25 @@ pub trait Material: Send + Sync {
         }
     }
 
-    /// Energy that the elastic strain stores [J/m3].
+    /// Energy of an elastic strain [J/m3], `mu e : e + K/2 v^2`; its derivative is the stress.
     fn elastic_energy(&self, strain: &Strain) -> f64 {
         let stiffness = deviatoric_stiffness(self.shear_modulus());
         let twice: f64 = stiffness.iter().zip(strain.deviator).map(|(c, e)| c * e * e).sum();
-        0.5 * twice + 0.5 * self.bulk_modulus() * strain.volume * strain.volume
+        0.5 * twice + volumetric_energy(self.bulk_modulus(), strain.volume)
     }
 }
 
 /// `s = 2 mu e` component by component: the strain holds gamma_xy = 2 eps_xy, hence mu for the shear.
 pub(crate) fn deviatoric_stiffness(mu: f64) -> Sym {
     [2.0 * mu, 2.0 * mu, 2.0 * mu, mu]
+}
+
+/// `K/2 v^2`; an incompressible material has no volume change, and no energy of it.
+pub(crate) fn volumetric_energy(bulk: f64, volume: f64) -> f64 {
+    if volume == 0.0 {
+        return 0.0;
+    }
+    0.5 * bulk * volume * volume
 }
 
 /// `sqrt(s : s)` of a stress.

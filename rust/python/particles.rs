@@ -8,7 +8,9 @@ use pyo3::prelude::*;
 
 use super::{require, view, InputError};
 use crate::constitutive;
-use crate::material::{DruckerPrager, Friction, LinearElastic, Material, VonMises};
+use crate::material::{
+    DruckerPrager, Friction, LinearElastic, Material, MohrCoulomb, NeoHookean, VonMises,
+};
 use crate::particles::Particles;
 
 /// The same array, not writeable from Python: the cells of the particles and their laws' constants
@@ -38,9 +40,14 @@ impl PyParticles {
         Ok(self.0.check()?)
     }
 
-    fn check_materials(&self, materials: Vec<PyRef<PyMaterial>>, kinematics: &str) -> PyResult<()> {
+    fn check_materials(
+        &self,
+        materials: Vec<PyRef<PyMaterial>>,
+        kinematics: &str,
+        finite: bool,
+    ) -> PyResult<()> {
         let laws = laws(&materials);
-        Ok(constitutive::check_materials(&self.0, &laws, kinematics.parse()?)?)
+        Ok(constitutive::check_materials(&self.0, &laws, kinematics.parse()?, finite)?)
     }
 
     /// Some of the particles.
@@ -199,6 +206,31 @@ impl PyMaterial {
         let elastic = LinearElastic::from_k_mu(elastic.0, elastic.1)?;
         let friction = Friction { phi, c, psi, eps_v_max, tiny };
         Ok(Self(Arc::new(DruckerPrager::new(elastic, friction)?)))
+    }
+
+    #[staticmethod]
+    fn mohr_coulomb(
+        elastic: (f64, f64),
+        phi: f64,
+        c: f64,
+        psi: f64,
+        eps_v_max: f64,
+        tiny: bool,
+    ) -> PyResult<Self> {
+        let elastic = LinearElastic::from_k_mu(elastic.0, elastic.1)?;
+        let friction = Friction { phi, c, psi, eps_v_max, tiny };
+        Ok(Self(Arc::new(MohrCoulomb::new(elastic, friction)?)))
+    }
+
+    #[staticmethod]
+    fn neo_hookean(k: f64, mu: f64) -> PyResult<Self> {
+        Ok(Self(Arc::new(NeoHookean::new(LinearElastic::from_k_mu(k, mu)?))))
+    }
+
+    /// Whether the law exists at finite strain only.
+    #[getter]
+    fn finite_only(&self) -> bool {
+        self.0.finite_only()
     }
 
     #[getter]
