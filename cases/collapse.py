@@ -79,7 +79,7 @@ def build(form: str, *, h: float = 0.01, nu: float = NU, alpha: float = 0.01) ->
     scene.fix("left", "x")
     scene.fix("bottom", "x")
     scene.fix("bottom", "y")
-    vertical = -RHO * G * (HEIGHT - body.x[:, 1])
+    vertical = -RHO * G * (HEIGHT - scene.particles.x[:, 1])
     horizontal = 0.5 * vertical
     scene.particles.stress[:, :3] = np.column_stack(
         [horizontal, vertical, 0.5 * (horizontal + vertical)]

@@ -37,9 +37,9 @@ from tqdm import tqdm
 
 import tawami
 from cases.energy import elastic
-from tawami.dynamics import Transfer
 from tawami.environment import header
 from tawami.output import result_folder, whole_file
+from tawami.transfer import TransferName
 
 Array = npt.NDArray[np.float64]
 
@@ -55,7 +55,7 @@ class Kind:
     """What differs from run to run."""
 
     form: str
-    transfer: Transfer
+    transfer: TransferName
     name: str
     colour: str
 

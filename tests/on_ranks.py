@@ -12,8 +12,10 @@ from conftest import BASES, FORMS, grid_of
 from mpi4py import MPI
 
 import tawami
+from cases import collapse
 from cases.cantilever import fem, mpm
 from tawami.formulation import Form
+from tawami.ranks import joined
 
 
 def beams() -> dict[str, float | np.ndarray]:
@@ -105,7 +107,41 @@ def singular() -> dict[str, np.ndarray]:
     raise AssertionError("a singular tangent was solved")
 
 
+def motion() -> dict[str, np.ndarray]:
+    """A pile that collapses across the ranks' cells, a block that slides into those of another rank;
+    one that loses particles.
+    """
+    found = {}
+    pile = collapse.build("u_epsv_finite", h=0.02)
+    pile.run(0.1, 1e-3)
+    found["motion pile momentum"] = pile.linear_momentum
+    found["motion pile energy"] = np.array(pile.energies.dissipated)
+    found |= {f"motion pile {k}": v for k, v in whole(pile).items()}
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(16, 8))
+    body = tawami.box(grid, (0.25, 0), (0.75, 0.5))
+    law = tawami.linear_elastic(E=1e5, nu=0.4)
+    for leaving, speed in (("stop", 5.0), ("remove", 9.0)):
+        scene = tawami.Scene(grid, body, law, form="u_epsv_finite", density=1e3, leaving=leaving)
+        scene.gravity((0, -10))
+        scene.wall("bottom", 0.2)
+        scene.load(body.x[:, 1] > 0.4, (10.0, -5.0))
+        block = tawami.Dynamics(scene, velocity=np.column_stack([speed + 0 * body.x[:, 0],
+                                                                 0 * body.x[:, 0]]))  # fmt: skip
+        block.run(0.15, 5e-3)
+        found |= {f"motion {leaving} {k}": v for k, v in whole(block).items()}
+        found[f"motion {leaving} left"] = np.array([len(scene.left)])
+    return found
+
+
+def whole(motion: tawami.Dynamics) -> dict[str, np.ndarray]:
+    """What the particles carry, in the order of their numbers."""
+    particles, comm = motion.scene.particles, motion.scene.grid.comm
+    order = np.argsort(joined(comm, particles.number))
+    arrays = {"x": particles.x, "stress": particles.stress, "velocity": motion.velocity}
+    return {name: joined(comm, np.array(values))[order] for name, values in arrays.items()}
+
+
 if __name__ == "__main__":
-    found = beams() | random_clouds() | nonlinear() | singular()
+    found = beams() | random_clouds() | nonlinear() | singular() | motion()
     if MPI.COMM_WORLD.rank == 0:
         np.savez(sys.argv[1], **found)

@@ -21,7 +21,7 @@ from mpi4py import MPI
 import tawami
 from cases.energy import elastic
 from cases.vibrating_beam.beam import AMPLITUDE, RHO, D, E, L, first_bending, lame, mode
-from tawami.dynamics import Transfer
+from tawami.transfer import TransferName
 
 Array = npt.NDArray[np.float64]
 
@@ -48,7 +48,7 @@ class Run:
 
     nu: float
     form: str
-    transfer: Transfer
+    transfer: TransferName
     n: int
     per_axis: int
     steps: int
@@ -79,7 +79,7 @@ class Run:
 
 
 def build(
-    nu: float, form: str, transfer: Transfer, *, n: int, per_axis: int, alpha: float
+    nu: float, form: str, transfer: TransferName, *, n: int, per_axis: int, alpha: float
 ) -> tawami.Dynamics:
     """The beam, straight, with the velocity of its first mode."""
     h = D / n
@@ -109,7 +109,7 @@ def build(
 def solve(
     nu: float,
     form: str = "u_epsv_finite",
-    transfer: Transfer = "affine_flip",
+    transfer: TransferName = "affine_flip",
     *,
     n: int = 4,
     per_axis: int = 2,

@@ -25,7 +25,7 @@ from tawami.scene import Accepted, Problem, Scene
 from tawami.solution import Solution
 from tawami.stepping import Step, march
 from tawami.supports import Support
-from tawami.transfer import TRANSFERS, Name, gradient_of, to_grid
+from tawami.transfer import TRANSFERS, TransferName, gradient_of, to_grid
 
 Array = npt.NDArray[np.float64]
 
@@ -56,7 +56,7 @@ class Dynamics:
         scene: Scene,
         *,
         velocity: npt.ArrayLike = (0.0, 0.0),
-        transfer: Name = "affine_flip",
+        transfer: TransferName = "affine_flip",
         damping: float = np.inf,
         gamma: float = 0.5,
     ) -> None:
@@ -189,7 +189,8 @@ class Dynamics:
 
             def store(dissipated: float) -> None:
                 for name, values in carried.items():
-                    scene.particles.carried(name)[:] = values.reshape(len(values), -1)
+                    array = scene.particles.carried(name)
+                    array[:] = values.reshape(array.shape)
                 self._kept = None if self._moves else (v1, a1)
                 self.time, self.steps = end, self.steps + 1
                 self._balance(losses, dissipated)

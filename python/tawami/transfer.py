@@ -22,7 +22,7 @@ import numpy.typing as npt
 from tawami.attached import Attached
 
 Array = npt.NDArray[np.float64]
-Name = Literal["affine_flip", "flip", "apic", "tpic", "pic"]
+TransferName = Literal["affine_flip", "flip", "apic", "tpic", "pic"]
 
 
 @dataclass(frozen=True)
