@@ -7,7 +7,7 @@ from math import factorial
 import numpy as np
 import pytest
 import shapely
-from conftest import grid_of
+from conftest import FORMS, grid_of
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from mpi4py import MPI
@@ -95,6 +95,60 @@ def test_sides_on_lines_of_the_grid_but_for_round_off_make_a_box(gauss):
     order, order_of_box = (np.lexsort(np.round(body.x, 9).T) for body in (made, box))
     assert made.x[order] == pytest.approx(box.x[order_of_box])
     assert made.volume[order] == pytest.approx(box.volume[order_of_box])
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_patch_test_of_a_slanted_bar(name):
+    """Pulled along its slanted, free sides: one stress, to round-off. But for B-bar: div w at the
+    centre of a cut cell is not its mean over what is left of the cell.
+    """
+    E, nu = 3.0, 0.45
+    along = np.array([2.0, 1.0]) / np.sqrt(5)
+    tension = np.outer(along, along)
+    gradient = (1 + nu) / E * (tension - nu * np.eye(2))  # plane strain
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.5, cells=(8, 8))
+    bar = tawami.polygon(grid, [(0, 0), (4, 2), (4, 4), (0, 2)], per_axis=3, gauss=True)
+    scene = tawami.Scene(grid, bar, tawami.linear_elastic(E=E, nu=nu), **FORMS[name])
+    for edge in ("left", "right"):
+        for k, component in enumerate("xy"):
+            row = gradient[k]
+            scene.fix(edge, component, lambda x, y, row=row: row[0] * x + row[1] * y)
+    error = scene.solve().stress - [tension[0, 0], tension[1, 1], nu, tension[0, 1]]
+    if name == "u_bbar":
+        assert np.abs(error).max() == pytest.approx(0.61, abs=0.01)
+    else:
+        assert np.abs(error).max() < 1e-11
+
+
+def shelf(name, width):
+    """A shelf 8 long under its weight; `width` of a cell in its uppermost row."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=1.0, cells=(8, 8))
+    body = tawami.polygon(grid, [(0, 0), (8, 0), (8, 4 + width), (0, 4 + width)])
+    rubber = tawami.linear_elastic(E=70.0, nu=0.4999)
+    scene = tawami.Scene(grid, body, rubber, density=1.0, **FORMS[name])
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    scene.gravity((0.0, -0.01))
+    return scene.solve()
+
+
+def test_small_parts_of_cells_cost_condition_and_leave_the_deflection():
+    whole = shelf("u_epsv", 0.0)
+    for width, condition in ((1e-2, 4e2), (1e-4, 3e4), (1e-5, 3e5)):
+        solution = shelf("u_epsv", width)
+        assert solution.condition == pytest.approx(condition, rel=0.5)
+        change = solution.displacement((8, 2))[1] / whole.displacement((8, 2))[1] - 1
+        assert abs(change) < width
+        assert np.abs(solution.mean_stress).max() == pytest.approx(0.295, abs=0.003)
+
+
+def test_what_small_parts_of_cells_do_to_others():
+    """README, Limits."""
+    assert shelf("u_bbar", 1e-2).condition == pytest.approx(2e8, rel=0.5)
+    assert np.abs(shelf("u_epsv_residual_based", 1e-2).mean_stress).max() > 1.9
+    assert np.abs(shelf("u_epsv", 1e-2).mean_stress).max() < 0.3
+    with pytest.raises(tawami.SingularError):
+        shelf("u_bbar", 2e-6)
 
 
 @pytest.mark.parametrize(
