@@ -26,8 +26,9 @@ from scipy.spatial import cKDTree
 from tqdm import tqdm
 
 import tawami
+from cases.figure import save
 from tawami.environment import header
-from tawami.output import result_folder, whole_file
+from tawami.output import result_folder
 
 Array = npt.NDArray[np.float64]
 
@@ -177,7 +178,7 @@ def film(runs: Sequence[Run], path: Path) -> None:
     figure.colorbar(
         shown, ax=panels, label="mean Kirchhoff stress [kPa], tension positive", aspect=50
     )
-    _save(figure, path)
+    save(figure, path, dpi=150)
 
 
 def histories(runs: Sequence[Run], path: Path) -> None:
@@ -198,13 +199,7 @@ def histories(runs: Sequence[Run], path: Path) -> None:
         axes.set_ylabel(label)
         axes.grid(alpha=0.3)
         axes.legend(fontsize=8)
-    _save(figure, path)
-
-
-def _save(figure: plt.Figure, path: Path) -> None:
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=150, format="png")
-    plt.close(figure)
+    save(figure, path, dpi=150)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

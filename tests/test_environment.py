@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import sysconfig
 import venv
 from pathlib import Path
 
@@ -82,7 +83,7 @@ def test_the_reference_blas_is_warned_of(monkeypatch, tmp_path):
 
 @pytest.mark.mpi
 def test_every_form_runs_from_an_installed_wheel(tmp_path):
-    """Built, installed in an empty environment, imported from there, and run."""
+    """Built, installed in an environment that has only its dependencies, imported from there, run."""
     build = [sys.executable, "-m", "maturin", "build", "--release", "--locked", "--quiet"]
     subprocess.run([*build, "--out", tmp_path], cwd=ROOT, check=True, capture_output=True)
     (wheel,) = tmp_path.glob("tawami-*.whl")
@@ -91,6 +92,8 @@ def test_every_form_runs_from_an_installed_wheel(tmp_path):
     executable = str(home / "bin" / "python")
     install = [executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", str(wheel)]
     subprocess.run(install, check=True, capture_output=True)
+    (packages,) = home.glob("lib/python*/site-packages")
+    (packages / "dependencies.pth").write_text(sysconfig.get_path("platlib"))
     code = f"""
 import logging; logging.disable(logging.INFO)
 from mpi4py import MPI

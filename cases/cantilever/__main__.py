@@ -6,7 +6,6 @@ python -m cases.cantilever [--results results/cantilever] [--cells 2,4,8,16,32]
 from __future__ import annotations
 
 import argparse
-import csv
 import logging
 import sys
 from collections.abc import Mapping, Sequence
@@ -26,9 +25,9 @@ from cases.cantilever.beam import (
     P,
     Row,
     point_support_growth,
-    table,
 )  # fmt: skip
 from cases.cantilever.study import CELLS, runs
+from cases.table import as_csv, as_text
 from tawami.environment import header
 from tawami.output import result_folder, whole_file, write_grid, write_particles
 
@@ -71,10 +70,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
             write_grid(folder / f"grid_{name}_{support}_n16.vtu", solution)
     if first:
         draw(rows, solutions, folder)
-        write_table(rows, folder / "cantilever.csv")
+        with whole_file(folder / "cantilever.csv") as part:
+            part.write_text(as_csv(rows, COLUMNS))
         with whole_file(folder / "report.md") as part:
             part.write_text(report(rows))
-    print(table(rows))
+    print(as_text(rows, COLUMNS))
     print(paper_support_in_words(rows))
     print(f"\n{len(work)} computations in {perf_counter() - start:.1f} s. Results: {folder}/")
     for name in sorted(path.name for path in folder.iterdir() if not path.name.startswith(".")):
@@ -90,16 +90,6 @@ def draw(
     figures.mean_stress_paper(three, folder / "mean_stress_paper.png")
     exact = {title: solutions["exact", title] for title in FIELDS}
     figures.mean_stress_exact(exact, folder / "mean_stress_exact.png")
-
-
-def write_table(rows: Sequence[Row], path: Path) -> None:
-    """The rows as CSV, numbers in full, blanks where a column has no meaning."""
-    with whole_file(path) as part, part.open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(COLUMNS)
-        for row in rows:
-            values = [getattr(row, column) for column in COLUMNS]
-            writer.writerow(["" if value is None else value for value in values])
 
 
 def paper_support_in_words(rows: Sequence[Row]) -> str:

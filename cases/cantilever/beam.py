@@ -90,19 +90,3 @@ def point_support_growth() -> float:
     strain), and the grid cuts this off at r ~ h.
     """
     return 2 * P * (3 - 4 * NU) / (8 * pi * MU * (1 - NU)) * log(2)
-
-
-def table(rows: list[Row]) -> str:
-    """Rows as text, aligned."""
-
-    def text(value: Any) -> str:
-        if value is None:
-            return "-"
-        return value if isinstance(value, str) else f"{value:.6g}"
-
-    lines = [COLUMNS] + [tuple(text(getattr(row, c)) for c in COLUMNS) for row in rows]
-    widths = [max(len(line[k]) for line in lines) for k in range(len(COLUMNS))]
-    return "\n".join(
-        "  ".join(f"{cell:>{width}}" for cell, width in zip(line, widths, strict=True))
-        for line in lines
-    )

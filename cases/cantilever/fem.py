@@ -10,18 +10,18 @@ python -m cases.cantilever.fem
 
 from __future__ import annotations
 
-import inspect
 import logging
 from collections.abc import Callable
 from time import perf_counter
 from typing import Any
 
-import dolfinx.fem.petsc
+import dolfinx
 import numpy as np
 import ufl
 from mpi4py import MPI
 
 from cases.cantilever.beam import (
+    COLUMNS,
     LAMBDA,
     MU,
     D,
@@ -32,30 +32,18 @@ from cases.cantilever.beam import (
     mean_stress,
     root_displacement_x,
     shear,
-    table,
 )  # fmt: skip
+from cases.finite_elements import (
+    function_space,
+    lagrange,
+    mixed_element,
+    nodal_value,
+    prescribed,
+    solution_of,
+)  # fmt: skip
+from cases.table import as_text
 
 METHODS = ("fem_q2", "fem_taylor_hood", "fem_q1_bbar")
-
-try:
-    from basix.ufl import element, mixed_element
-
-    function_space = dolfinx.fem.functionspace
-
-    def lagrange(degree: int, *shape: int) -> Any:
-        """Lagrange element on squares."""
-        return element("Lagrange", "quadrilateral", degree, shape=shape)
-except ImportError:  # dolfinx 0.5
-    function_space = dolfinx.fem.FunctionSpace
-
-    def lagrange(degree: int, *shape: int) -> Any:
-        """Lagrange element on squares."""
-        kind = ufl.VectorElement if shape else ufl.FiniteElement
-        return kind("Lagrange", "quadrilateral", degree)
-
-    def mixed_element(elements: list[Any]) -> Any:
-        """Mixed element."""
-        return ufl.MixedElement(*elements)
 
 
 def solve(method: str, support: str, n: int) -> Row:
@@ -95,23 +83,15 @@ def solve(method: str, support: str, n: int) -> Row:
     at_centre: Callable[[Any], Any] = lambda x: on_root(x) & np.isclose(x[1], 0.0)  # noqa: E731
     profile = root_displacement_x if support == "exact" else np.zeros_like
     supports = [
-        support_of(V, 0, on_root, lambda x: profile(x[1])),
-        support_of(V, 1, on_root if support == "clamped" else at_centre, lambda x: 0 * x[0]),
+        prescribed(V, 0, on_root, lambda x: profile(x[1])),
+        prescribed(V, 1, on_root if support == "clamped" else at_centre, lambda x: 0 * x[0]),
     ]
 
-    options = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
-    problem_class = dolfinx.fem.petsc.LinearProblem
-    prefix = "petsc_options_prefix" in inspect.signature(problem_class).parameters
-    extra = {"petsc_options_prefix": "cantilever_"} if prefix else {}
-    problem = problem_class(a, load, bcs=supports, petsc_options=options, **extra)
-    solution = problem.solve()
-    assert isinstance(solution, dolfinx.fem.Function)
+    solution = solution_of(a, load, supports)
 
     # -- results
-    V1, _ = V.sub(1).collapse()
-    tip_centre = dolfinx.fem.locate_dofs_geometrical(
-        (V.sub(1), V1), lambda x: np.isclose(x[0], L) & np.isclose(x[1], 0.0)
-    )[0]
+    at_tip: Callable[[Any], Any] = lambda x: np.isclose(x[0], L) & np.isclose(x[1], 0.0)  # noqa: E731
+    deflection = -nodal_value(W, V, 1, solution, at_tip)
     error = None
     if support == "exact":
         uh, ph = ufl.split(solution) if mixed else (solution, None)
@@ -120,8 +100,6 @@ def solve(method: str, support: str, n: int) -> Row:
         error = float(np.sqrt(
             integral((sigma_m - exact) ** 2 * dx_volume) / integral(exact**2 * dx_volume)
         ))  # fmt: skip
-    own = W.dofmap.index_map.size_local * W.dofmap.index_map_bs
-    deflection = sum(-float(solution.x.array[dof]) for dof in tip_centre if dof < own)
     held = sum(bc.dof_indices()[1] for bc in supports)
     size = W.dofmap.index_map.size_global * W.dofmap.index_map_bs
     return Row(
@@ -130,7 +108,7 @@ def solve(method: str, support: str, n: int) -> Row:
         n=n,
         alpha=None,
         particles_per_cell=None,
-        deflection_m=mesh.comm.allreduce(deflection),
+        deflection_m=deflection,
         mean_stress_l2=error,
         newton_iterations=1,
         unknowns=size - mesh.comm.allreduce(held),
@@ -144,15 +122,6 @@ def at_end(mesh: Any, x: float, tag: int) -> tuple[Any, Any]:
     return np.sort(facets), np.full(len(facets), tag, dtype=np.int32)
 
 
-def support_of(V: Any, component: int, where: Callable[[Any], Any], value: Any) -> Any:
-    """A displacement component prescribed at the nodes of a region."""
-    Vi, _ = V.sub(component).collapse()
-    prescribed = dolfinx.fem.Function(Vi)
-    prescribed.interpolate(value)
-    dofs = dolfinx.fem.locate_dofs_geometrical((V.sub(component), Vi), where)
-    return dolfinx.fem.dirichletbc(prescribed, dofs, V.sub(component))
-
-
 def integral(form: Any) -> float:
     """Value of a form without arguments, over all ranks."""
     value = dolfinx.fem.assemble_scalar(dolfinx.fem.form(form))
@@ -162,6 +131,6 @@ def integral(form: Any) -> float:
 if __name__ == "__main__":
     logging.disable(logging.INFO)  # the compilation of forms is talkative
     for kind in ("paper", "exact", "clamped"):
-        text = table([solve(m, kind, n) for m in METHODS for n in (2, 4, 8, 16)])
+        rows = [solve(m, kind, n) for m in METHODS for n in (2, 4, 8, 16)]
         if MPI.COMM_WORLD.rank == 0:
-            print(text)
+            print(as_text(rows, COLUMNS))

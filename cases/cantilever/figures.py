@@ -22,7 +22,7 @@ from cases.cantilever.beam import (
     mean_stress,
     point_support_growth,
 )  # fmt: skip
-from tawami.output import whole_file
+from cases.figure import save
 
 Values = npt.NDArray[np.float64]
 #: Largest mean stress of the closed form [Pa]: the range of the colours.
@@ -85,7 +85,7 @@ def deflection_error(rows: Sequence[Row], path: Path) -> None:
         axes.grid(alpha=0.3)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=9)
-    _save(figure, path)
+    save(figure, path)
 
 
 def _reference(axes: Axes, support: str, rows: Sequence[Row]) -> None:
@@ -118,7 +118,7 @@ def mean_stress_paper(solutions: Mapping[str, tawami.Solution], path: Path) -> N
     figure.colorbar(
         points, ax=panels, label="mean stress [kPa], tension positive", extend="both", aspect=40
     )
-    _save(figure, path)
+    save(figure, path)
 
 
 def mean_stress_exact(solutions: Mapping[str, tawami.Solution], path: Path) -> None:
@@ -159,7 +159,7 @@ def mean_stress_exact(solutions: Mapping[str, tawami.Solution], path: Path) -> N
         (differences, panels[1:, 1], "difference from the closed form [kPa]"),
     ):
         figure.colorbar(points, ax=column_of, label=label, extend="both", aspect=50)
-    _save(figure, path)
+    save(figure, path)
 
 
 def _titled(title: str, values: Values) -> str:
@@ -180,9 +180,3 @@ def _field(axes: Axes, solution: tawami.Solution, values: Values, scale: float) 
     axes.set_xlim(-0.02, L + 0.02)
     axes.set_ylim(-D / 2 - 0.02, D / 2 + 0.02)
     return squares
-
-
-def _save(figure: plt.Figure, path: Path) -> None:
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=160, format="png")
-    plt.close(figure)

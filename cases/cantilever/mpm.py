@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 import tawami
 from cases.cantilever.beam import (
+    COLUMNS,
     NU,
     D,
     E,
@@ -21,8 +22,8 @@ from cases.cantilever.beam import (
     mean_stress,
     root_displacement_x,
     shear,
-    table,
 )  # fmt: skip
+from cases.table import as_text
 
 
 def build(
@@ -105,8 +106,8 @@ def mean_stress_error(solution: tawami.Solution) -> float:
 def main() -> None:
     """Print the deflections with the support of the paper."""
     cells = (2, 4, 8, 16)
-    print(table([solve("u_epsv", "paper", n, alpha=0.1)[0] for n in cells]))
-    print(table([solve("u_bbar", "paper", n)[0] for n in cells]))
+    print(as_text([solve("u_epsv", "paper", n, alpha=0.1)[0] for n in cells], COLUMNS))
+    print(as_text([solve("u_bbar", "paper", n)[0] for n in cells], COLUMNS))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """tawami: implicit material point method with the mixed displacement - volumetric strain form."""
 
 from tawami._rust import Material
-from tawami.body import Body, box
+from tawami.body import Body, box, polygon
 from tawami.dynamics import Dynamics
 from tawami.errors import (
     ConvergenceError,
@@ -50,6 +50,7 @@ __all__ = [
     "linear_elastic",
     "mohr_coulomb",
     "neo_hookean",
+    "polygon",
     "ramp",
     "run",
     "settle",

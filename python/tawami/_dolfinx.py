@@ -139,6 +139,12 @@ def reference_points(degree: int) -> Array:
     return np.asarray(points, dtype=np.float64)
 
 
+def triangle_rule(degree: int) -> tuple[Array, Array]:
+    """Points and weights on the triangle (0, 0), (1, 0), (0, 1), all inside and positive."""
+    points, weights = basix.make_quadrature(basix.CellType.triangle, degree)
+    return np.asarray(points, dtype=np.float64), np.asarray(weights, dtype=np.float64)
+
+
 def rule_points(rule: Rule) -> Array:
     """Points of a rule of densities; none for means over cells."""
     if rule == "mean":
