@@ -37,8 +37,9 @@ from tqdm import tqdm
 
 import tawami
 from cases.energy import elastic
+from cases.figure import save
 from tawami.environment import header
-from tawami.output import result_folder, whole_file
+from tawami.output import result_folder
 from tawami.transfer import TransferName
 
 Array = npt.NDArray[np.float64]
@@ -243,7 +244,7 @@ def film(runs: Sequence[Run], path: Path) -> None:
         axes.set_xlabel("$x$ [m]")
     label = "mean stress / $\\rho \\omega^2 R^2$, averaged over the turn [-], tension positive"
     figure.colorbar(shown, ax=panels, aspect=50, label=label, extend="both")
-    _save(figure, path)
+    save(figure, path)
 
 
 def histories(runs: Sequence[Run], path: Path) -> None:
@@ -286,13 +287,7 @@ def histories(runs: Sequence[Run], path: Path) -> None:
     ticks = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2)
     error.set_yticks(ticks, [str(value) for value in ticks])
     error.set_yticks([], minor=True)
-    _save(figure, path)
-
-
-def _save(figure: plt.Figure, path: Path) -> None:
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=150, format="png")
-    plt.close(figure)
+    save(figure, path)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -354,3 +354,28 @@ def test_reduction_selects_active_unsupported_coefficients_once():
     reduction = Reduction(layout, held, [], np.zeros(layout.size))
     assert reduction.size == layout.size - 2 * (3 + 2)
     assert (reduction.selection.sum(axis=0) == 1).all()
+
+
+def test_a_part_of_an_edge_is_loaded_and_held():
+    """The load of two of four cells, and functions of the held ones only."""
+    grid = grid_of((4, 3))
+    body = tawami.box(grid, grid.origin, grid.upper)
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=10.0, nu=0.3), basis="bilinear")
+    scene.fix("bottom", "x", between=(-1.0, 0.0))
+    scene.fix("bottom", "y", between=(-1.0, 0.0))
+    scene.traction("top", (0.0, -3.0), between=(-0.5, 0.5))
+    force = scene.external()[: 2 * 20].reshape(-1, 2)
+    assert force[:, 1].sum() == pytest.approx(-3.0)
+    assert np.flatnonzero(force[15:, 1]).tolist() == [1, 2, 3]
+    reduction = scene.problem().reduction
+    assert np.flatnonzero(reduction.fixed).tolist() == [0, 1, 2, 3, 4, 5]
+    assert scene.solve().reaction("bottom") == pytest.approx([0.0, 3.0], abs=1e-5)
+
+
+@pytest.mark.parametrize("between", [(0.1, 0.5), (0.5, -0.5), (-1.0, 3.0), (0.0, 0.0)])
+def test_parts_of_edges_are_of_whole_cells(random_scene, between):
+    scene = random_scene()
+    with pytest.raises(tawami.InputError, match="expected two lines of the grid, in order, every 0.5"):
+        scene.fix("bottom", "x", between=between)
+    with pytest.raises(tawami.InputError, match="edge='bottom': between"):
+        scene.traction("bottom", (1.0, 0.0), between=between)

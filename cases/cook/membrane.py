@@ -23,6 +23,7 @@ from dataclasses import dataclass
 
 CORNERS = ((0.0, 0.0), (48.0, 44.0), (48.0, 60.0), (0.0, 44.0))
 LENGTH, HEIGHT = 48.0, 60.0  # of the smallest box around it
+CLAMPED = (0.0, 44.0)  # range of y on the left end
 LOADED = (44.0, 60.0)  # range of y on the right end
 MIDDLE = (48.0, 52.0)  # where the deflection is asked for
 

@@ -1,21 +1,16 @@
 """Cook's membrane by the material point method, on squares that its slanted sides cut.
 
 Lines of the grid run through the ends of the loaded side, and the grid ends there and at the clamp.
-Supports and loads are those of whole sides of cells. The cell above the clamp touches it at (0, 44)
-only, and its side is held as well: with exact integration and alpha = 0.01 half of the error.
+The cells above the clamp and below the load touch these edges at a corner only: they take no part.
 """
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
 import shapely
 from mpi4py import MPI
 
 import tawami
-from cases.cook.membrane import CORNERS, HEIGHT, LENGTH, LOADED, MIDDLE, SHEAR, E, Row
-
-Array = npt.NDArray[np.float64]
+from cases.cook.membrane import CLAMPED, CORNERS, HEIGHT, LENGTH, LOADED, MIDDLE, SHEAR, E, Row
 
 #: Name: form and its parameters.
 METHODS = {
@@ -46,25 +41,15 @@ def body_of(grid: tawami.Grid, kind: str) -> tawami.Body:
     raise tawami.InputError(f"body '{kind}': expected one of {', '.join(map(repr, BODIES))}")
 
 
-def end_shear(x: Array, y: Array) -> Array:
-    """Traction t_y on the right end.
-
-    The cell below the loaded side touches the right end at (48, 44) only, but it holds particles, so
-    that a traction is taken on its side too: a constant would add P h/16. Half of it at the node
-    that both cells share makes the total and its moment exact.
-    """
-    return SHEAR * np.where(np.isclose(y, LOADED[0]), 0.5, y > LOADED[0])
-
-
 def build(method: str, nu: float, h: float, body: str = "even") -> tawami.Scene:
     """The membrane as a scene on squares of side h, which divides 4."""
     cells = (round(LENGTH / h), round(HEIGHT / h))
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=h, cells=cells)
     material = tawami.linear_elastic(E=E, nu=nu)
     scene = tawami.Scene(grid, body_of(grid, body), material, **METHODS[method])
-    scene.fix("left", "x")
-    scene.fix("left", "y")
-    scene.traction("right", (0.0, end_shear))
+    scene.fix("left", "x", between=CLAMPED)
+    scene.fix("left", "y", between=CLAMPED)
+    scene.traction("right", (0.0, SHEAR), between=LOADED)
     return scene
 
 

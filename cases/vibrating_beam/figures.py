@@ -8,9 +8,9 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
+from cases.figure import save
 from cases.vibrating_beam.beam import AMPLITUDE, NUS
 from cases.vibrating_beam.mpm import Run
-from tawami.output import whole_file
 
 COLOURS = {
     "affine_flip": "tab:red",
@@ -55,7 +55,7 @@ def motion(runs: Sequence[Run], periods: Mapping[float, float], path: Path) -> N
         top.legend(fontsize=8, loc="upper center", ncols=3)
         middle.legend(fontsize=8, loc="lower left")
         bottom.legend(fontsize=8, loc="lower left")
-    _save(figure, path)
+    save(figure, path)
 
 
 def accuracy(
@@ -95,10 +95,4 @@ def accuracy(
             axes.legend(fontsize=8)
     panels[0, 0].set_ylabel("period, longer than by finite elements [%]")
     panels[1, 0].set_ylabel("energy lost in five periods [%]")
-    _save(figure, path)
-
-
-def _save(figure: plt.Figure, path: Path) -> None:
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=150, format="png")
-    plt.close(figure)
+    save(figure, path)

@@ -18,6 +18,8 @@ from tawami.grid import Edge, Grid
 
 Array = npt.NDArray[np.float64]
 Component = Literal["x", "y"]
+#: A part of an edge, from one line of the grid to another [m].
+Interval = tuple[float, float]
 #: A number, or a function of the position along an edge: f(x, y) on arrays.
 Profile = float | Callable[[Array, Array], Any]
 
@@ -82,6 +84,7 @@ def held_edge(
     edge: Edge,
     component: int,
     value: Profile,
+    between: Interval | None = None,
 ) -> Held:
     """One displacement component on an edge of the grid, the profile projected in L2.
 
@@ -94,13 +97,16 @@ def held_edge(
         edge: Name of the edge.
         component: 0 or 1.
         value: Displacement [m] along the edge.
+        between: Part of the edge [m]; all of it by default.
 
     Raises:
         SupportError: No cell along the edge holds particles.
     """
     axis, end = grid.edge(edge)
     along = 1 - axis
-    touched = np.flatnonzero(np.take(active, end, axis=1 - axis))
+    touched = np.flatnonzero(
+        np.take(active, end, axis=1 - axis) & cells_between(grid, edge, between)
+    )
     if len(touched) == 0:
         raise SupportError(
             f"fix(edge='{edge}'): no cell along that edge of the grid holds particles: the support "
@@ -119,6 +125,31 @@ def held_edge(
     weighted = sp.diags(np.tile(weights, len(touched))) @ values
     coefficients = spsolve((weighted.T @ values).tocsc(), weighted.T @ prescribed)
     return Held(2 * edge_functions(grid, basis, edge)[used] + component, coefficients)
+
+
+def cells_between(grid: Grid, edge: Edge, between: Interval | None) -> npt.NDArray[np.bool_]:
+    """Which cells along an edge lie in a part of it.
+
+    Raises:
+        InputError: The part does not go from one line of the grid to a later one.
+    """
+    axis = 1 - grid.edge(edge)[0]
+    n = grid.cells[axis]
+    if between is None:
+        return np.ones(n, dtype=bool)
+    a, b = inputs.pair(f"edge='{edge}': between", between, "positions [m]")
+    ends = (
+        np.array([inputs.number("between", end) for end in (a, b)]) - grid.origin[axis]
+    ) / grid.h
+    first, last = np.rint(ends).astype(int)
+    if not np.allclose(ends, [first, last], atol=1e-6) or not 0 <= first < last <= n:
+        raise InputError(
+            f"edge='{edge}': between = {between}: expected two lines of the grid, in order, every "
+            f"{grid.h:g} m from {grid.origin[axis]:g} to {grid.upper[axis]:g} m"
+        )
+    cell = np.arange(n)
+    inside: npt.NDArray[np.bool_] = (cell >= first) & (cell < last)
+    return inside
 
 
 def edge_functions(grid: Grid, basis: Basis, edge: Edge) -> npt.NDArray[np.int64]:

@@ -169,7 +169,7 @@ class Field:
         cells = self._cells[on_edge]
         cells = cells[self.grid.rectangle.facet_order(cells, local)]
         packed = np.zeros((len(cells), 9, 2))
-        place = np.searchsorted(self._along(edge), ij[cells, 1 - axis])
+        place = np.searchsorted(self.along(edge), ij[cells, 1 - axis])
         packed[:, self._nodes_on(edge)] = values[place]
         form = self._space.form(integral.kernel, 1, self.grid.rectangle.entities(cells, local))
         vector = np.zeros(self._space.size)
@@ -178,7 +178,7 @@ class Field:
         )
         return -self._sum(self.layout.extraction_on(cells).T @ vector)
 
-    def _along(self, edge: Edge) -> npt.NDArray[np.int64]:
+    def along(self, edge: Edge) -> npt.NDArray[np.int64]:
         """Numbers along an edge of its cells with particles, on whichever rank."""
         axis, end = self.grid.edge(edge)
         return np.flatnonzero(np.take(self.active, end, axis=1 - axis))
@@ -194,7 +194,7 @@ class Field:
         every rank.
         """
         axis, end = self.grid.edge(edge)
-        along = self._along(edge)
+        along = self.along(edge)
         ij = np.full((len(along), 2), self.grid.cells[axis] - 1 if end else 0)
         ij[:, 1 - axis] = along
         nodes = self.grid.rectangle.to_grid_axes(_dolfinx.reference_nodes(2))

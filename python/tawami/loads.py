@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from tawami import _rust, boundary, inputs
 from tawami.attached import Attached
-from tawami.boundary import Profile
+from tawami.boundary import Interval, Profile
 from tawami.errors import InputError, SupportError
 from tawami.grid import Edge, Grid
 
@@ -27,6 +27,7 @@ class Traction:
 
     edge: Edge
     value: tuple[Profile, Profile]
+    between: Interval | None = None
     carried: float = 0.0
 
 
@@ -97,15 +98,22 @@ class Loads:
 
     def _on_edge(self, attached: Attached, traction: Traction) -> Array:
         edge, what = traction.edge, f"traction(edge='{traction.edge}')"
-        nodes = attached.field.edge_nodes(edge)
-        if len(nodes) == 0:
+        nodes, loaded = attached.field.edge_nodes(edge), self._cells(attached, traction)
+        if not loaded.any():
             raise SupportError(
                 f"{what}: no cell along that edge of the grid holds particles; let the grid end where "
                 "the body is loaded, or use load(particles, force)"
             )
         x, y = nodes[..., 0].ravel(), nodes[..., 1].ravel()
         values = [boundary.evaluate(component, x, y, what) for component in traction.value]
-        return attached.field.traction(edge, np.stack(values, axis=-1).reshape(nodes.shape))
+        at_nodes = np.stack(values, axis=-1).reshape(nodes.shape)
+        return attached.field.traction(edge, np.where(loaded[:, None, None], at_nodes, 0.0))
+
+    def _cells(self, attached: Attached, traction: Traction) -> npt.NDArray[np.bool_]:
+        """Which cells with particles along its edge a traction loads."""
+        part = boundary.cells_between(self.grid, traction.edge, traction.between)
+        mask: npt.NDArray[np.bool_] = part[attached.field.along(traction.edge)]
+        return mask
 
     def accept(self, part: float) -> None:
         """This share of what is new is there now."""

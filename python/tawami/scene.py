@@ -19,7 +19,7 @@ from tawami import _rust, inputs, ranks
 from tawami.attached import Attached
 from tawami.basis import BASES, Basis
 from tawami.body import Body
-from tawami.boundary import Component, Profile
+from tawami.boundary import Component, Interval, Profile, cells_between
 from tawami.compilation import compile_form
 from tawami.errors import ConvergenceError, InputError
 from tawami.fast_field import FastField
@@ -237,6 +237,7 @@ class Scene:
         value: Profile = 0.0,
         *,
         velocity: Velocity | None = None,
+        between: Interval | None = None,
     ) -> None:
         """Prescribe a displacement component along an edge of the grid.
 
@@ -247,11 +248,12 @@ class Scene:
                 number, or a function f(x, y) on arrays, which is projected in L2 on the functions of
                 the edge.
             velocity: For `Dynamics`, in place of a value: a number [m/s], or a function of time [s].
+            between: Part of the edge, from one line of the grid to another [m].
 
         Raises:
-            InputError: An unknown edge or component.
+            InputError: An unknown edge or component, or a part that is not one of whole cells.
         """
-        self.supports.fix(edge, component, value, velocity)
+        self.supports.fix(edge, component, value, velocity, between)
 
     def hold(
         self,
@@ -300,16 +302,23 @@ class Scene:
         """
         self.supports.release(place, component)
 
-    def traction(self, edge: Edge, value: tuple[Profile, Profile]) -> None:
+    def traction(
+        self,
+        edge: Edge,
+        value: tuple[Profile, Profile],
+        *,
+        between: Interval | None = None,
+    ) -> None:
         """Load an edge of the grid where the body touches it.
 
         Args:
             edge: 'left', 'right', 'bottom' or 'top'.
             value: Traction (t_x, t_y) [Pa]: numbers, or functions f(x, y) on arrays, taken at the
                 biquadratic nodes of the grid (exact up to parabolas).
+            between: Part of the edge, from one line of the grid to another [m].
 
         Raises:
-            InputError: An unknown edge, or a form without a term `dot(t, w) * ds`.
+            InputError: An unknown edge or part of it, or a form without a term `dot(t, w) * ds`.
         """
         self.grid.edge(edge)
         what = f"traction(edge='{edge}')"
@@ -319,7 +328,8 @@ class Scene:
                 "- dot(t, w) * ds to its residual"
             )
         components = inputs.pair(what, value, "components (t_x, t_y)")
-        self.loads.tractions.append(Traction(edge, components))
+        cells_between(self.grid, edge, between)
+        self.loads.tractions.append(Traction(edge, components, between))
 
     def load(self, particles: npt.ArrayLike, force: Sequence[float]) -> None:
         """Load particles of the body, wherever they move: a traction on a surface that is not an edge

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from tawami import _rust, boundary, inputs
 from tawami.attached import Attached
 from tawami.basis import Basis
-from tawami.boundary import Component, Profile
+from tawami.boundary import Component, Interval, Profile
 from tawami.errors import InputError
 from tawami.grid import Edge, Grid
 from tawami.reduction import Reduction
@@ -31,6 +31,7 @@ class Support:
         component: 0 or 1.
         value: Displacement [m]; 1 where a velocity is prescribed.
         velocity: [m/s]; None where a displacement is prescribed.
+        between: Part of the edge [m]; None for all of it.
         carried: Share of the value that later ones grow from.
         applied: Share of the value that is there already.
     """
@@ -39,6 +40,7 @@ class Support:
     component: int
     value: Profile
     velocity: Velocity | None = None
+    between: Interval | None = None
     carried: float = 0.0
     applied: float = 0.0
 
@@ -85,11 +87,16 @@ class Supports:
         self.walls: list[Wall] = []
 
     def fix(
-        self, edge: Edge, component: Component, value: Profile, velocity: Velocity | None
+        self,
+        edge: Edge,
+        component: Component,
+        value: Profile,
+        velocity: Velocity | None,
+        between: Interval | None,
     ) -> None:
         """Prescribe a component along an edge."""
-        self.grid.edge(edge)
-        self._add(Support(edge, boundary.component_index(component), value, velocity))
+        boundary.cells_between(self.grid, edge, between)
+        self._add(Support(edge, boundary.component_index(component), value, velocity, between))
 
     def hold(
         self,
@@ -161,7 +168,7 @@ class Supports:
                     continue
                 edge = boundary.held_edge(
                     self.grid, self.basis, field.active, support.place, support.component,
-                    support.value,
+                    support.value, support.between,
                 )  # fmt: skip
                 held.append(boundary.Held(edge.indices, share * edge.values))
             else:
