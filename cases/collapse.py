@@ -2,9 +2,11 @@
 
 0.2 m x 0.1 m, Drucker-Prager without cohesion; it starts with the stress of a pile at rest between
 walls, sigma_y the overburden, sigma_x half of it, and one wall is taken away. Mixed u-eps_v at finite
-strain beside displacement only.
+strain beside B-bar and displacement only.
 
 python -m cases.collapse [--results results/collapse] [--end 0.8] [--dt 1e-3]
+python -m cases.collapse --aspects           run-out of piles 0.5 to 4 times as high as wide
+python -m cases.collapse --incompressible    nu = 0.4999, alpha = 0.1, to 0.4 s
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import matplotlib
 import matplotlib.pyplot as plt
@@ -27,6 +30,7 @@ from tqdm import tqdm
 
 import tawami
 from cases.figure import save
+from tawami.energy import Energies
 from tawami.environment import header
 from tawami.output import result_folder
 
@@ -35,8 +39,14 @@ Array = npt.NDArray[np.float64]
 LENGTH, HEIGHT = 0.2, 0.1  # of the pile [m]
 RHO, G = 2040.0, 9.81  # [kg/m3], [m/s2]
 E, NU, PHI = 0.84e6, 0.3, 21.9  # [Pa], [-], [degrees]
-FORMS = {"u_epsv_finite": "mixed $u$-$\\varepsilon_v$", "u_finite": "displacement only"}
-COLOURS = {"u_epsv_finite": "tab:red", "u_finite": "tab:gray"}
+FORMS = {
+    "u_epsv_finite": "mixed $u$-$\\varepsilon_v$",
+    "u_bbar_finite": "B-bar",
+    "u_finite": "displacement only",
+}
+COLOURS = {"u_epsv_finite": "tab:red", "u_bbar_finite": "tab:blue", "u_finite": "tab:gray"}
+#: Height over length of the piles whose run-outs are compared.
+ASPECTS = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0)
 
 
 @dataclass
@@ -48,8 +58,8 @@ class Run:
         volume: Volumes of the particles at the start [m2].
         iterations: Newton iterations of each accepted step.
         dt: Size of each accepted step [s].
-        time, runout, kinetic, potential, roughness: Of each recorded time [s, m, J, J, -]; energies
-            per metre depth.
+        ends: Time at its end [s].
+        time, runout, energies, roughness: Of each recorded time [s, m, J/m, -].
         x, mean_stress: Of the particles at the recorded times [m, Pa].
         seconds: Wall time.
     """
@@ -58,21 +68,30 @@ class Run:
     volume: Array
     iterations: list[int] = field(default_factory=list)
     dt: list[float] = field(default_factory=list)
+    ends: list[float] = field(default_factory=list)
     time: list[float] = field(default_factory=list)
     runout: list[float] = field(default_factory=list)
-    kinetic: list[float] = field(default_factory=list)
-    potential: list[float] = field(default_factory=list)
+    energies: list[Energies] = field(default_factory=list)
     roughness: list[float] = field(default_factory=list)
     x: list[Array] = field(default_factory=list)
     mean_stress: list[Array] = field(default_factory=list)
     seconds: float = 0.0
 
 
-def build(form: str, *, h: float = 0.01, nu: float = NU, alpha: float = 0.01) -> tawami.Dynamics:
+def build(
+    form: str,
+    *,
+    h: float = 0.01,
+    nu: float = NU,
+    alpha: float = 0.01,
+    size: tuple[float, float] = (LENGTH, HEIGHT),
+) -> tawami.Dynamics:
     """The pile, its wall gone."""
-    cells = (round(4 * LENGTH / h), round(1.4 * HEIGHT / h))
+    length, height = size
+    # room for a run-out of twice the height
+    cells = (round((2 * length + 4 * height) / h), round(1.4 * height / h))
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=h, cells=cells)
-    body = tawami.box(grid, (0.0, 0.0), (LENGTH, HEIGHT))
+    body = tawami.box(grid, (0.0, 0.0), size)
     rods = tawami.drucker_prager(tawami.linear_elastic(E=E, nu=nu), phi=PHI)
     parameters = {"alpha": alpha, "theta": 0.01} if form == "u_epsv_finite" else {}
     scene = tawami.Scene(grid, body, rods, form=form, density=RHO, **parameters)
@@ -80,7 +99,7 @@ def build(form: str, *, h: float = 0.01, nu: float = NU, alpha: float = 0.01) ->
     scene.fix("left", "x")
     scene.fix("bottom", "x")
     scene.fix("bottom", "y")
-    vertical = -RHO * G * (HEIGHT - scene.particles.x[:, 1])
+    vertical = -RHO * G * (height - scene.particles.x[:, 1])
     horizontal = 0.5 * vertical
     scene.particles.stress[:, :3] = np.column_stack(
         [horizontal, vertical, 0.5 * (horizontal + vertical)]
@@ -95,21 +114,24 @@ def solve(
     dt: float = 1e-3,
     end: float = 0.8,
     every: int = 20,
-    **options: float,
+    **options: Any,
 ) -> Run:
     """The collapse to `end` [s], recorded every so many steps of `dt` [s]."""
     motion = build(form, h=h, **options)
-    scene = motion.scene
-    run, start = Run(form, np.array(scene.particles.volume)), perf_counter()
+    run, start = Run(form, np.array(motion.scene.particles.volume)), perf_counter()
     record(run, motion, h)
     with tqdm(total=end, desc=form, unit="s", disable=not sys.stderr.isatty()) as bar:
-        while end - motion.time > 1e-9:
-            before = motion.time
-            steps = motion.run(min(end, motion.time + every * dt), min(dt, end - motion.time))
-            run.iterations += [step.iterations for step in steps]
-            run.dt += [(motion.time - before) / len(steps)] * len(steps)
+
+        def look(_: tawami.Solution) -> None:
+            bar.update(motion.time - bar.n)
+            if motion.time > len(run.time) * every * dt - 1e-9:
+                record(run, motion, h)
+
+        steps = motion.run(end, dt, each=look)
+        if run.time[-1] < end - 1e-9:
             record(run, motion, h)
-            bar.update(motion.time - before)
+    run.iterations = [step.iterations for step in steps]
+    run.dt, run.ends = [step.size for step in steps], [step.end for step in steps]
     run.seconds = perf_counter() - start
     return run
 
@@ -120,8 +142,7 @@ def record(run: Run, motion: tawami.Dynamics, h: float) -> None:
     stress = motion.scene.particles.stress[:, :3].mean(axis=1)
     run.time.append(motion.time)
     run.runout.append(float(np.quantile(x[:, 0], 0.99)))  # the farthest particle is spray
-    run.kinetic.append(motion.kinetic_energy)
-    run.potential.append(float(G * motion.mass @ x[:, 1]))
+    run.energies.append(motion.energies)
     run.roughness.append(roughness(x, stress, h))
     run.x.append(x)
     run.mean_stress.append(stress)
@@ -147,11 +168,20 @@ def summary(run: Run) -> str:
         f"{run.form:14} to {run.time[-1]:.2f} s in {len(run.dt)} steps: Newton iterations "
         f"{np.mean(run.iterations):.2f} on average, {max(run.iterations)} at most; run-out "
         f"{run.runout[-1]:.4f} m; roughness of the mean stress {np.median(run.roughness[1:]):.3f} "
-        f"(median); {run.seconds:.0f} s"
+        f"(median); {run.seconds:.0f} s\n{'':14} {run.energies[-1]}"
     )
 
 
 # -- figures -----------------------------------------------------------------
+
+#: Parts of the balance of energy that are drawn, with their lines.
+LINES = {"kinetic": "-", "dissipated": "--", "external": ":", "transfer": "-."}
+NAMES = {
+    "kinetic": "kinetic",
+    "dissipated": "dissipated by the law",
+    "external": "released weight",
+    "transfer": "lost in transfers",
+}
 
 
 def film(runs: Sequence[Run], path: Path) -> None:
@@ -181,18 +211,47 @@ def film(runs: Sequence[Run], path: Path) -> None:
     save(figure, path, dpi=150)
 
 
+def surface(x: Array, h: float) -> tuple[Array, Array]:
+    """Profile of the pile: the highest particle in strips of h/2 [m]."""
+    strip = np.floor(x[:, 0] / (h / 2)).astype(int)
+    used = np.unique(strip)
+    return (used + 0.5) * h / 2, np.array([x[strip == s, 1].max() for s in used])
+
+
+def profiles(runs: Sequence[Run], path: Path, h: float) -> None:
+    """Profiles at several times, a panel a form."""
+    figure, panels = plt.subplots(
+        len(runs), 1, figsize=(8, 2.2 * len(runs)), layout="constrained", sharex=True, squeeze=False
+    )
+    for axes, run in zip(panels[:, 0], runs, strict=True):
+        wanted = np.unique(np.searchsorted(run.time, [0.0, 0.1, 0.2, 0.3, 0.4, 0.8]))
+        for k in wanted[wanted < len(run.time)]:
+            shade = plt.cm.viridis(0.9 * run.time[k] / run.time[-1])
+            axes.plot(*surface(run.x[k], h), color=shade, label=f"$t$ = {run.time[k]:.2f} s")
+        axes.set_aspect("equal")
+        axes.set_ylim(0, 1.15 * HEIGHT)
+        axes.set_title(FORMS[run.form], fontsize=9)
+        axes.set_ylabel("$y$ [m]")
+        axes.legend(fontsize=7, ncols=2)
+    panels[-1, 0].set_xlabel("$x$ [m]")
+    save(figure, path)
+
+
 def histories(runs: Sequence[Run], path: Path) -> None:
     """Run-out, energies, roughness and Newton iterations over time."""
     figure, panels = plt.subplots(2, 2, figsize=(11, 7), layout="constrained")
     for run in runs:
         style = {"color": COLOURS[run.form], "label": FORMS[run.form]}
         panels[0, 0].plot(run.time, run.runout, **style)
-        panels[0, 1].plot(run.time, run.kinetic, **style)
-        potential = np.array(run.potential) - run.potential[0]
-        panels[0, 1].plot(run.time, -potential, color=COLOURS[run.form], linestyle="--")
+        for name, line in LINES.items():
+            values = [getattr(energies, name) for energies in run.energies]
+            label = style["label"] if name == "kinetic" else None
+            panels[0, 1].plot(run.time, values, line, color=style["color"], label=label)
         panels[1, 0].plot(run.time[1:], run.roughness[1:], **style)
-        panels[1, 1].plot(np.cumsum(run.dt), run.iterations, ".", markersize=2, **style)
-    labels = ("run-out (99 % of particles) [m]", "energy [J/m] (dashed: released weight)",
+        panels[1, 1].plot(run.ends, run.iterations, ".", markersize=2, **style)
+    for name, line in LINES.items():
+        panels[0, 1].plot([], [], line, color="black", label=NAMES[name])
+    labels = ("run-out (99 % of particles) [m]", "energy [J/m]",
               "roughness of the mean stress [-]", "Newton iterations per step [-]")  # fmt: skip
     for axes, label in zip(panels.ravel(), labels, strict=True):
         axes.set_xlabel("$t$ [s]")
@@ -202,6 +261,71 @@ def histories(runs: Sequence[Run], path: Path) -> None:
     save(figure, path, dpi=150)
 
 
+# -- piles of other shapes, and of an incompressible material ----------------
+
+
+@dataclass(frozen=True)
+class Runout:
+    """Run-out of a pile: height over length, and how far it spreads over its length."""
+
+    aspect: float
+    spread: float
+
+
+def runout(aspect: float, *, cells: int = 10, end: float = 4.0) -> Runout:
+    """The collapse of a pile of 0.1 m times `aspect`, to `end` sqrt(height/g)."""
+    length = 0.1
+    h, height = length / cells, aspect * length
+    time = end * np.sqrt(height / G)
+    run = solve("u_epsv_finite", h=h, dt=1e-3, end=time, every=10**9, size=(length, height))
+    return Runout(aspect, run.runout[-1] / length - 1)
+
+
+def exponents(piles: Sequence[Runout]) -> tuple[float, float]:
+    """Slopes of log spread over log aspect, of the piles up to 1.5 and of those from 1.5."""
+    low, high = (
+        np.array([(p.aspect, p.spread) for p in piles if where(p.aspect)])
+        for where in (lambda a: a <= 1.5, lambda a: a >= 1.5)
+    )
+    slopes = [np.polyfit(*np.log(part).T, 1)[0] for part in (low, high)]
+    return float(slopes[0]), float(slopes[1])
+
+
+def runouts(piles: Sequence[Runout], path: Path) -> None:
+    """Spread over aspect ratio, with the slopes of the experiments."""
+    figure, axes = plt.subplots(figsize=(6, 4.5), layout="constrained")
+    aspect, spread = np.array([(p.aspect, p.spread) for p in piles]).T
+    axes.loglog(aspect, spread, "o-", color=COLOURS["u_epsv_finite"], label=FORMS["u_epsv_finite"])
+    for start, slope, line in ((0, 1.0, "--"), (-1, 2 / 3, ":")):
+        axes.loglog(
+            aspect, spread[start] * (aspect / aspect[start]) ** slope, line, color="black",
+            label=f"slope {slope:.2g}",
+        )  # fmt: skip
+    axes.set_xlabel("height over length of the pile, $a$ [-]")
+    axes.set_ylabel("run-out, $(L_{end} - L_0)/L_0$ [-]")
+    axes.grid(alpha=0.3, which="both")
+    axes.legend()
+    save(figure, path)
+
+
+def compare_aspects(folder: Path) -> None:
+    """Run-outs of piles from low to high."""
+    piles = []
+    for aspect in ASPECTS:
+        piles.append(runout(aspect))
+        print(f"a = {aspect:4.2f}: run-out {piles[-1].spread:.3f} of the length", flush=True)
+    low, high = exponents(piles)
+    print(f"exponents: {low:.2f} up to a = 1.5, {high:.2f} from there on")
+    runouts(piles, folder / "runouts.png")
+    print(f"Results: {folder / 'runouts.png'}")
+
+
+def incompressible(end: float) -> None:
+    """The mixed form near nu = 0.5."""
+    run = solve("u_epsv_finite", nu=0.4999, alpha=0.1, end=end)
+    print(f"nu = 0.4999, alpha = 0.1: {summary(run)}; smallest step {min(run.dt):.2e} s")
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the collapse with each form, draw it, say where."""
     parser = argparse.ArgumentParser(prog="python -m cases.collapse", description=__doc__)
@@ -209,11 +333,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--end", type=float, default=0.8, help="time of the end [s]")
     parser.add_argument("--dt", type=float, default=1e-3, help="size of a step [s]")
     parser.add_argument("--cell", type=float, default=0.01, help="size of a cell [m]")
+    parser.add_argument("--aspects", action="store_true", help="compare piles of other shapes")
+    parser.add_argument("--incompressible", action="store_true", help="nu = 0.4999 to 0.4 s")
     options = parser.parse_args(arguments)
     matplotlib.use("Agg")
     logging.disable(logging.INFO)  # the compilation of forms is talkative
     print(header(), flush=True)
     folder = result_folder(options.results)
+    if options.aspects:
+        return compare_aspects(folder)
+    if options.incompressible:
+        return incompressible(min(options.end, 0.4))
     runs = []
     for form in FORMS:
         try:
@@ -224,8 +354,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 raise
             print(f"{form:14} did not get to the end: {str(error)[:200]} ...", flush=True)
     film(runs, folder / "film.png")
+    profiles(runs, folder / "profiles.png", options.cell)
     histories(runs, folder / "histories.png")
-    print(f"Results: {folder / 'film.png'}, {folder / 'histories.png'}")
+    print(f"Results: film.png, profiles.png and histories.png in {folder}")
 
 
 if __name__ == "__main__":

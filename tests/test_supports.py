@@ -375,7 +375,9 @@ def test_a_part_of_an_edge_is_loaded_and_held():
 @pytest.mark.parametrize("between", [(0.1, 0.5), (0.5, -0.5), (-1.0, 3.0), (0.0, 0.0)])
 def test_parts_of_edges_are_of_whole_cells(random_scene, between):
     scene = random_scene()
-    with pytest.raises(tawami.InputError, match="expected two lines of the grid, in order, every 0.5"):
+    with pytest.raises(
+        tawami.InputError, match="expected two lines of the grid, in order, every 0.5"
+    ):
         scene.fix("bottom", "x", between=between)
     with pytest.raises(tawami.InputError, match="edge='bottom': between"):
         scene.traction("bottom", (1.0, 0.0), between=between)
