@@ -46,7 +46,7 @@ FORMS = {
 }
 COLOURS = {"u_epsv_finite": "tab:red", "u_bbar_finite": "tab:blue", "u_finite": "tab:gray"}
 #: Height over length of the piles whose run-outs are compared.
-ASPECTS = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0)
+ASPECTS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0)
 
 
 @dataclass

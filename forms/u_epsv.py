@@ -6,22 +6,32 @@ laplacian       the paper's; imposes d eps_v/dn = 0 weakly on the border of the 
 residual_based  the same with the whole momentum residual grad p + div s, p = K eps_v: consistent,
                 unsymmetric, small strain, for scenes without body force and inertia
 projection      Dohrmann and Bochev 2004: the part of eps_v that varies within a cell; needs no h^2
+
+`ghost_penalty` ties partly filled cells to their neighbours: jumps of the second normal derivative of
+u, whose first is continuous for splines, and of the first of eps_v, on the sides that they share.
 """
 
-from ufl import Identity, div, dot, grad, sym
+from ufl import Identity, div, dot, grad, inner, sym
 
 fields = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
 kinematics = "mixed"
-parameters = {"alpha": {"default": 0.1, "minimum": 0.0}}
-options = {"stabilisation": ("laplacian", "residual_based", "projection")}
+parameters = {"alpha": {"default": 0.1, "minimum": 0.0}, "k": {"default": 0.01, "minimum": 0.0}}
+options = {
+    "stabilisation": ("laplacian", "residual_based", "projection"),
+    "ghost_penalty": ("off", "on"),
+}
 
 
 def residual(
-    u, eps_v, w, q, sigma, K, mu, t, h, sum_p, cell_mean, dx, dx_c, ds, alpha, stabilisation
-):
+    u, eps_v, w, q, sigma, K, mu, t, h, sum_p, cell_mean, dx, dx_c, ds, dG, facet_mean, jump_n,
+    jump_nn, alpha, k, stabilisation, ghost_penalty,
+):  # fmt: skip
     """R_u = sum_p V_p sigma_p : grad w - int t . w ds;  R_q = sum_p V_p K_p q (div u - eps_v) - S."""
     R_u = sum_p(sigma, grad(w)) - dot(t, w) * ds
     R_q = sum_p(K, q * (div(u) - eps_v))
+    if ghost_penalty == "on":
+        R_u += k * facet_mean(mu) * h**3 * inner(jump_nn(u), jump_nn(w)) * dG
+        R_q -= k * facet_mean(K**2 / mu) * h**3 * jump_n(eps_v) * jump_n(q) * dG
     if stabilisation == "projection":
         c = alpha * cell_mean(K**2 / mu)
         return R_u + R_q - c * q * eps_v * dx + c * q * eps_v * dx_c

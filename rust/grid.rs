@@ -189,6 +189,14 @@ impl Location {
         Self::new(self.grid, cell, xi)
     }
 
+    /// The same with all particles at least `margin` (in cells) away from the sides of their cells:
+    /// where one lies on a side, functions vanish that it alone reaches.
+    #[must_use]
+    pub fn away_from_sides(mut self, margin: f64) -> Self {
+        self.xi.iter_mut().flatten().for_each(|t| *t = t.clamp(margin, 1.0 - margin));
+        self
+    }
+
     /// Particles of the a-th active cell.
     #[must_use]
     pub fn particles_of(&self, a: usize) -> &[u32] {

@@ -17,7 +17,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -200,18 +200,23 @@ def _quiet() -> Iterator[None]:
         logging.disable(before)
 
 
+#: What integrals go over, in the order of FFCx.
+Kind = Literal["cell", "exterior_facet", "interior_facet"]
+KINDS: tuple[Kind, ...] = ("cell", "exterior_facet", "interior_facet")
+
+
 @dataclass(frozen=True)
 class Kernel:
     """A compiled integral over cells or facets, not yet attached to a mesh.
 
     Attributes:
-        facets: Whether it integrates over exterior facets.
+        kind: What it integrates over.
         address: Address of the C function.
         coefficients: Positions, in the form's coefficients, of those it reads, in packed order.
         module: Keeps the C function loaded.
     """
 
-    facets: bool
+    kind: Kind
     address: int
     coefficients: tuple[int, ...]
     module: Any
@@ -225,21 +230,21 @@ COMPILER_FLAGS = (
 )  # fmt: skip
 
 
-def compile_kernel(comm: Any, form: Any, *, facets: bool) -> Kernel:
+def compile_kernel(comm: Any, form: Any, kind: Kind = "cell") -> Kernel:
     """Compile a UFL form with one kind of integral; the result is cached on disk."""
     settings = {"cffi_extra_compile_args": list(COMPILER_FLAGS), "cache_dir": _cache_directory()}
     with _quiet():
         compiled, module, _ = jit.ffcx_jit(comm, form, {}, settings)
-    kind = 1 if facets else 0
+    place = KINDS.index(kind)
     if OLD:
-        integral = compiled.integrals(kind)[0]
+        integral = compiled.integrals(place)[0]
         order = compiled.original_coefficient_position
     else:
-        integral = compiled.form_integrals[compiled.form_integral_offsets[kind]]
+        integral = compiled.form_integrals[compiled.form_integral_offsets[place]]
         order = compiled.original_coefficient_positions
     address = int(module.ffi.cast("uintptr_t", integral.tabulate_tensor_float64))
     used = tuple(order[i] for i in range(compiled.num_coefficients))
-    return Kernel(facets, address, used, module)
+    return Kernel(kind, address, used, module)
 
 
 # -- mesh and spaces ---------------------------------------------------------
@@ -361,4 +366,4 @@ def add_vector(vector: Array, form: Any, kernel: Kernel, constants: Array, packe
 
 
 def _key(kernel: Kernel) -> Any:
-    return _integral.exterior_facet if kernel.facets else _integral.cell
+    return getattr(_integral, kernel.kind)

@@ -65,6 +65,8 @@ class CompiledForm:
         traction: Its integral over loaded edges, if it has one.
         tangent: Derivative of `residual`, one per quadrature rule.
         couplings: What it has besides: products of two integrals of rank 1, cell by cell.
+        ghost: Its integral over sides of partly filled cells, if it has one: of rank 2, the residual
+            being linear there.
         densities: Particle data per rule: each density with its first column.
     """
 
@@ -74,6 +76,7 @@ class CompiledForm:
     traction: Integral | None
     tangent: tuple[Integral, ...]
     couplings: tuple[tuple[Integral, Integral], ...]
+    ghost: Integral | None
     densities: Mapping[Rule, Mapping[Density, int]]
 
     def columns(self, rule: Rule) -> int:
@@ -115,6 +118,26 @@ def _is_linear_in(form: Any, coefficient: Any) -> bool:
     return at_zero.empty() and coefficient not in slope.coefficients()
 
 
+def _ghost(form: Form, symbols: Symbols, sides: Any) -> Any:
+    """The matrix of the terms on sides of cells."""
+    used = set(sides.coefficients())
+    others = {density for density, symbol in symbols.placeholders.items() if symbol in used}
+    matrix = ufl.replace(sides, {symbols.increments: symbols.trial})
+    try:
+        expanded = ufl.algorithms.expand_derivatives(matrix)
+        check_form_arity(expanded, matrix.arguments())
+        linear = len(matrix.arguments()) == 2 and symbols.traction not in used
+    except ArityMismatch:
+        linear = False
+    if not linear or any(density.rule != "mean" for density in others):
+        raise FormError(
+            f"form {form.name}: expected terms with dG linear in the fields and, but for h, parameters "
+            "and facet_mean(...), in nothing else, as "
+            "facet_mean(mu) * h**3 * inner(jump_nn(u), jump_nn(w)) * dG"
+        )
+    return matrix
+
+
 def _by_rule(form: Any) -> list[Any]:
     """One form per quadrature rule. FFCx 0.5 puts several rules into one kernel, but a field that is
     evaluated under the rule with one point is then taken from there under the other rule as well,
@@ -148,23 +171,25 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
             f"form {form.name}: expected edge terms linear in the traction t and in nothing else but "
             "the test functions, as - dot(t, w) * ds; give other loads through scene.traction(...)"
         )
-    if cells is None or len(residual.integrals()) > len(cells.integrals()) + (
-        len(edges.integrals()) if edges is not None else 0
-    ):
+    sides = _of_type(residual, "interior_facet")
+    parts = [part for part in (cells, edges, sides) if part is not None]
+    if cells is None or len(residual.integrals()) > sum(len(part.integrals()) for part in parts):
         raise FormError(
-            f"form {form.name}: expected integrals over particles or cells, and over edges (ds) only"
+            f"form {form.name}: expected integrals over particles or cells, over edges (ds) and over "
+            "sides of partly filled cells (dG) only"
         )
     if symbols.traction in cells.coefficients():
         raise FormError(f"form {form.name}: the traction t belongs into terms with ds, not with dx")
     with _refusals(form):
         tangent, couplings = symbols.tangent(cells), symbols.couplings(cells)
+    ghost = None if sides is None else _ghost(form, symbols, sides)
     densities: dict[Rule, dict[Density, int]] = {rule: {} for rule in (*DEGREE, "mean")}
     width = dict.fromkeys(densities, 0)
     for density in symbols.placeholders:
         densities[density.rule][density] = width[density.rule]
         width[density.rule] += density.size
 
-    def integral(ufl_form: Any, *, facets: bool = False) -> Integral:
+    def integral(ufl_form: Any, kind: _dolfinx.Kind = "cell") -> Integral:
         used = set(ufl_form.coefficients())
         displacement, bilinear = _dolfinx.DISPLACEMENT_DOFS, _dolfinx.BILINEAR_DOFS
         kinds = {
@@ -190,7 +215,7 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
         with _refusals(form):
             # FFCx checks this too, but in newer versions it then leaves its cache locked
             check_form_arity(ufl.algorithms.expand_derivatives(ufl_form), ufl_form.arguments())
-            kernel = _dolfinx.compile_kernel(comm, ufl_form, facets=facets)
+            kernel = _dolfinx.compile_kernel(comm, ufl_form, kind)
         order = ufl_form.coefficients()
         slots = tuple(kinds[order[i]] for i in kernel.coefficients)
         names = {constant: name for name, constant in symbols.constants.items()}
@@ -201,8 +226,9 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
         form=form,
         element=symbols.element,
         residual=tuple(integral(part) for part in _by_rule(cells)),
-        traction=integral(edges, facets=True) if edges is not None else None,
+        traction=integral(edges, "exterior_facet") if edges is not None else None,
         tangent=tuple(integral(part) for part in _by_rule(tangent)),
+        ghost=integral(ghost, "interior_facet") if ghost is not None else None,
         couplings=tuple((integral(left), integral(right)) for left, right in couplings),
         densities=densities,
     )

@@ -63,7 +63,8 @@ class FastField(Field):
         """Internal forces and volume residual on all coefficients, before supports, on every rank."""
         with self.stopwatch("residual"):
             kernels = self._kernels(self.compiled.residual, data)
-            return self._sum(self._assembler.vector(kernels, self._volume, coefficients))
+            forces = self._sum(self._assembler.vector(kernels, self._volume, coefficients))
+        return self._with_ghost(forces, coefficients, data)
 
     def tangent(self, coefficients: Array, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
         """P^T K P as a PETSc matrix; it is overwritten by the next call, and stays the same object
@@ -78,12 +79,12 @@ class FastField(Field):
             self._assembler.matrix(kernels, couplings, self._volume, coefficients, *self._pattern)
             self._petsc["of cells"].assemble()
         if self.grid.comm.size == 1:
-            return self._petsc["of cells"]
+            return self._tangent_with_ghost(self._petsc["of cells"], data, reduction)
         with self.stopwatch("reduction"):
             unassembled, reduced = self._petsc["unassembled"], self._petsc["reduced"]
             unassembled.assemble()
             self._petsc["reduced"] = unassembled.convert("aij", reduced)
-        return self._petsc["reduced"]
+        return self._tangent_with_ghost(self._petsc["reduced"], data, reduction)
 
     def _new_pattern(self, reduction: Reduction) -> None:
         """Pattern and matrix of what this rank's cells add, in the unknowns that they reach; the sum

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
+from petsc4py import PETSc
 
-from tawami import _dolfinx, _rust, ranks
+from tawami import _dolfinx, _rust, ghost, ranks
 from tawami.basis import Basis
 from tawami.compilation import CompiledForm, Integral
 from tawami.density import Rule
@@ -24,6 +25,10 @@ from tawami.reduction import Layout, Reduction
 from tawami.stopwatch import Stopwatch
 
 Array = npt.NDArray[np.float64]
+#: Sum over the particles of a displacement function that round-off of the assembly would drown: that
+#: of a particle 4e-7 of a cell inside its support. It is held at zero, as if the particle were not yet
+#: there; a ghost penalty gives it a stiffness.
+UNRESOLVED = 1e-13
 
 
 class Field:
@@ -65,12 +70,18 @@ class Field:
         #: Whether each cell holds particles, on whichever rank, ny x nx.
         self.active = ranks.any_of(grid.comm, active)
         self.layout = Layout(grid, basis, self._space, self.active)
+        if compiled.ghost is None:
+            once = np.ones(len(volume))
+            sums = _rust.nodal_sums(location, once, once[:, None], basis)
+            self.layout.leave_out(ranks.sum_of(grid.comm, sums)[:, 0] < UNRESOLVED)
         #: Indices of the points of each rule; none for means over cells.
         self._points: dict[Rule, list[tuple[int, int]]] = {
             rule: self._point_indices(rule) for rule in compiled.densities
         }
         self._packed: dict[int, Array] = {}
         self._reduction: Reduction | None = None
+        self._ghost_matrix: sp.csr_matrix | None = None
+        self._ghost_of: Any = None
         self._petsc = Handles(self, grid.comm)
 
     @functools.cached_property
@@ -144,7 +155,45 @@ class Field:
                 packed = self._pack(integral, nodal, data)
             with self.stopwatch("residual"):
                 self._add_vector(vector, self._forms[id(integral)], integral, packed)
-        return self._sum(self.layout.extraction.T @ vector)
+        return self._with_ghost(self._sum(self.layout.extraction.T @ vector), coefficients, data)
+
+    def _ghost(self, data: Mapping[Rule, Array]) -> sp.csr_matrix | None:
+        """The ghost penalty of the form on all coefficients, if it has one."""
+        integral = self.compiled.ghost
+        if integral is not None and self._ghost_matrix is None:
+            with self.stopwatch("set-up"):
+                self._ghost_matrix = ghost.matrix(
+                    self.grid, self.layout, integral, self.active, self._location, self._volume,
+                    data["mean"], self._values,
+                )  # fmt: skip
+        return self._ghost_matrix
+
+    def _with_ghost(self, forces: Array, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
+        matrix = self._ghost(data)
+        return forces if matrix is None else np.asarray(forces + matrix @ coefficients)
+
+    def _tangent_with_ghost(
+        self, matrix: Any, data: Mapping[Rule, Array], reduction: Reduction
+    ) -> Any:
+        """The reduced tangent and S^T G S, G the ghost penalty: one object as long as `matrix` is."""
+        penalty = self._ghost(data)
+        if penalty is None:
+            return matrix
+        with self.stopwatch("reduction"):
+            if self._ghost_of is not matrix:
+                self._petsc.free("ghost", "with ghost")
+                own = reduction.own.stop - reduction.own.start
+                reduced = (reduction.selection.T @ penalty @ reduction.selection)[reduction.own]
+                self._petsc["ghost"] = aij(self.grid.comm, reduced, own)
+                total = self._petsc["with ghost"] = matrix.copy()
+                total.axpy(1.0, self._petsc["ghost"], PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+                self._ghost_of = matrix
+            else:
+                total = self._petsc["with ghost"]
+                total.zeroEntries()
+                for part in (matrix, self._petsc["ghost"]):
+                    total.axpy(1.0, part, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        return total
 
     def _sum(self, of_cells: Any) -> Array:
         """What the cells of all ranks give."""
@@ -216,7 +265,7 @@ class Field:
                 self._petsc["P"], self._petsc["reduced"] = p, matrix.ptap(p)
             else:
                 matrix.ptap(self._petsc["P"], result=self._petsc["reduced"])
-        return self._petsc["reduced"]
+        return self._tangent_with_ghost(self._petsc["reduced"], data, reduction)
 
     def unreduced_tangent(self, coefficients: Array, data: Mapping[Rule, Array]) -> sp.csr_matrix:
         """E^T K E, the tangent of :meth:`residual`, whole on every rank."""

@@ -17,6 +17,9 @@ sum_v(D, f), sum_v(f)     the same with f taken at the vertices of the particle'
                           the weights of the bilinear functions: q eps_v is row-sum lumped
 cell_mean(D)              volume-weighted mean over the particles of each cell
 dx, dx_c, ds              area of the cells with particles (full rule, one point); loaded edges
+dG, facet_mean(D)         sides that partly filled cells share with others, and cell_mean(D) there
+jump_n(f), jump_nn(f)     across these sides, the jump of the first and second normal derivative of a
+                          field or test function: for ghost penalties, linear in the fields
 t, h                      traction [Pa], cell size [m]
 parameters, options       alpha, ...: as declared
 ========================= ========================================================================
@@ -50,8 +53,11 @@ KINEMATICS: Mapping[str, tuple[str, ...]] = {
 }
 #: Names that every form has.
 RESERVED = frozenset(
-    (*COMPONENTS, "K", "mu", "t", "h", "dx", "dx_c", "ds", "sum_p", "sum_c", "sum_v", "cell_mean")
-)
+    (
+        *COMPONENTS, "K", "mu", "t", "h", "dx", "dx_c", "ds", "dG", "sum_p", "sum_c", "sum_v",
+        "cell_mean", "facet_mean", "jump_n", "jump_nn",
+    )
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

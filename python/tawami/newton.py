@@ -224,7 +224,8 @@ class Newton:
 
     def _scale(self, matrix: Any, reduction: Reduction) -> Array:
         """Factors of this rank's unknowns: displacement by 1/sqrt(diagonal); eps_v and p are solved
-        as p/mu, over the square root of mu times the volume of their function (README, The method).
+        as p/mu, over the square root of mu times the volume of their function, or of their diagonal
+        where that is larger (README, The method).
         """
         layout = self.field.layout
         own = reduction.unknowns[reduction.own]
@@ -245,7 +246,10 @@ class Newton:
         volume = np.maximum(sums[:, 0], least)
         mu_i = volume / np.maximum(sums[:, 2], least / self._largest_mu)
         to_field = mu_i * sums[:, 1] / volume if self.kind == "volumetric_strain" else mu_i
-        scale[~of_u] = np.where(to_field > 0, to_field, 1) / np.sqrt(mu_i * volume)
+        to_field = np.where(to_field > 0, to_field, 1)
+        # in a cell with little of the body the stabilisation is larger than that volume
+        size = np.maximum(mu_i * volume, to_field**2 * np.abs(diagonal[~of_u]))
+        scale[~of_u] = to_field / np.sqrt(size)
         return scale
 
     def solve(

@@ -56,6 +56,10 @@ class Layout:
         self.owner = self._of_all(lambda b: self._of_cells.spread(b, grid.rank_of_cell))
         self.size = len(self.active)
 
+    def leave_out(self, functions: Mask) -> None:
+        """Displacement functions that take no part, as those without particles."""
+        self.active[: self.num_displacement] &= ~np.repeat(functions, 2)
+
     def _of_all(self, of_functions: Callable[[Basis], Any]) -> Any:
         """Values for all coefficients from those for the functions of each field."""
         fields = [np.repeat(of_functions(self.basis), 2)]

@@ -38,6 +38,9 @@ Array = npt.NDArray[np.float64]
 FIELDS: dict[str, type[Field]] = {"fast": FastField, "reference": Field}
 #: Times that a step is solved with other states of the walls before it is given up.
 PASSES = 40
+#: Distance, in cells, to which moving particles approach a side of their cell: one that is alone leaves
+#: functions beyond it without strength and mass. It is as well as on the side, to this distance.
+MARGIN = 1e-5
 #: Times after which functions only let go of a wall.
 FREE = 8
 
@@ -169,7 +172,7 @@ class Scene:
                 f"form {self.form.name} has finite strains: expected a law in Rust, a NumpyLaw has "
                 "small ones only"
             )
-        location = self._distribute(whole, grid.rust.locate(whole.x))
+        location = self._distribute(whole, self._locate(whole.x))
         self._compiled = compile_form(grid.comm, self.form, options)
         if self.form.kinematics == "mixed":
             self.particles.add_eps_v()
@@ -574,11 +577,16 @@ class Scene:
             self.particles = self.particles.select(np.flatnonzero(~outside).astype(np.uint32))
         self.attached = self._attach(self._migrated())
 
+    def _locate(self, x: Array) -> _rust.Location:
+        """Cells of particles; those that move are kept off the sides of their cells."""
+        location = self.grid.rust.locate(x)
+        return location.away_from_sides(MARGIN) if self._finite else location
+
     def _migrated(self) -> _rust.Location:
         """Each particle to the rank of its cell."""
         comm = self.grid.comm
         while True:
-            location = self.grid.rust.locate(self.particles.x)
+            location = self._locate(self.particles.x)
             if comm.size == 1:
                 return location
             rank = self.grid.rank_of_cell[location.cell]

@@ -81,6 +81,10 @@ class Symbols:
             "dx": self.measures["particle"],
             "dx_c": self.measures["centre"],
             "ds": ufl.ds(domain=domain, metadata={"quadrature_degree": 4}),
+            "dG": ufl.dS(domain=domain, metadata={"quadrature_degree": 4}),
+            "facet_mean": lambda quantity: ufl.avg(self._cell_mean(quantity)),
+            "jump_n": self._jump_n,
+            "jump_nn": self._jump_nn,
             "sum_p": functools.partial(self._sum, "particle"),
             "sum_c": functools.partial(self._sum, "centre"),
             "sum_v": functools.partial(self._sum, "vertex"),
@@ -191,6 +195,18 @@ class Symbols:
                 f"form {self.form.name}: cell_mean takes constants (K, mu), not '{quantity.name}'"
             )
         return self.density(Density("mean", quantity))[0]
+
+    def _jump_n(self, f: Any) -> Any:
+        """Jump of the normal derivative across a facet."""
+        n = ufl.FacetNormal(self.domain)
+        slope = ufl.dot(ufl.grad(f), n)
+        return slope("+") + slope("-")
+
+    def _jump_nn(self, f: Any) -> Any:
+        """Jump of the second normal derivative across a facet."""
+        n = ufl.FacetNormal(self.domain)
+        bend = ufl.dot(ufl.dot(ufl.grad(ufl.grad(f)), n), n)
+        return bend("+") - bend("-")
 
     def call(self, **other: Any) -> Any:
         """The residual as the form file states it, with some names standing for something else."""

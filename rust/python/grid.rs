@@ -60,6 +60,12 @@ impl PyLocation {
         self.0.len()
     }
 
+    /// The same, away from the sides of the cells by a part of a cell, up to a half.
+    fn away_from_sides(&self, margin: f64) -> PyResult<Self> {
+        require((0.0..=0.5).contains(&margin), "a margin beyond half a cell")?;
+        Ok(Self(Arc::new((*self.0).clone().away_from_sides(margin))))
+    }
+
     /// Where some of the particles are.
     fn select(&self, particles: PyReadonlyArray1<u32>) -> PyResult<Self> {
         let particles = particles.as_slice()?;
