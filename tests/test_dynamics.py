@@ -322,6 +322,61 @@ def test_a_plastic_block_dissipates_what_its_stress_does_on_plastic_strains():
     assert motion.energies.dissipated == pytest.approx(work, rel=1e-9)
 
 
+@pytest.mark.parametrize("basis", ["quadratic_spline", "bilinear"])
+def test_apic_where_nothing_is_spread(basis):
+    """A particle in the corner of the grid, particles on its lines."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(8, 8))
+    x = np.array([[i / 8, j / 8] for i in range(5) for j in range(5)])
+    law = tawami.linear_elastic(E=1e4, nu=0.3)
+    body = tawami.Body(x, np.full(25, 1 / 64))
+    scene = tawami.Scene(grid, body, law, form="u_finite", density=1000.0, basis=basis)
+    motion = tawami.Dynamics(scene, velocity=(0.2, 0.1), transfer="apic")
+    motion.run(0.1, 0.01)
+    assert motion.velocity == pytest.approx(np.tile([0.2, 0.1], (25, 1)), abs=1e-9)
+
+
+def test_gravity_that_is_switched_on_later_loses_no_time():
+    scene = block()
+    motion = tawami.Dynamics(scene)
+    motion.step(0.01)
+    scene.gravity((0, -G))
+    motion.run(0.06, 0.01)
+    assert motion.velocity[:, 1] == pytest.approx(np.full(64, -0.5), abs=1e-9)
+
+
+def test_the_impact_of_a_support_that_sets_off_is_what_it_loses():
+    """An edge that moves at once: 1/2 m (v - v0)^2 of its functions."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(8, 4))
+    body = tawami.box(grid, (0, 0), (1, 0.5))
+    law = tawami.linear_elastic(E=1e6, nu=0.3)
+    scene = tawami.Scene(grid, body, law, form="u", density=1000.0, tolerance=1e-10)
+    scene.fix("left", "x", velocity=0.1)
+    motion = tawami.Dynamics(scene)
+    motion.step(1e-5)
+    t = scene.particles.x[:, 0] / grid.h
+    mass = motion.mass @ np.where(t < 1, (1 - t) ** 2, 0.0)
+    assert motion.energies.impact == pytest.approx(0.5 * mass * 0.1**2, rel=1e-9)
+    assert motion.energies.external == pytest.approx(mass * 0.1**2, rel=0.05)
+
+
+def test_velocities_written_during_a_run_are_taken():
+    scene = block("u")
+    motion = tawami.Dynamics(scene)
+    motion.step(0.01)
+    motion.velocity[:] = (0.3, 0.0)
+    motion.step(0.01)
+    assert motion.linear_momentum == pytest.approx([75.0, 0.0], abs=1e-9)
+
+
+def test_energy_of_particles_that_leave_is_told():
+    scene = block(leaving="remove")
+    motion = tawami.Dynamics(scene, velocity=(10.0, 0.0))
+    motion.run(0.1, 0.01)
+    e = motion.energies
+    assert e.left == pytest.approx(0.5 * 250 * 100 * len(scene.left) / 64, rel=1e-6)
+    assert abs(e.transfer) + abs(e.integration) < 1e-6 * e.kinetic
+
+
 def test_wrong_input_gets_a_sentence(random_scene):
     with pytest.raises(tawami.InputError, match=r"Dynamics needs Scene\(..., density=...\)"):
         tawami.Dynamics(random_scene())
@@ -334,6 +389,8 @@ def test_wrong_input_gets_a_sentence(random_scene):
     ):
         with pytest.raises(tawami.InputError, match=words):
             tawami.Dynamics(scene, **options)
+    with pytest.raises(tawami.InputError, match="damping = 1 s relaxes the velocities of FLIP"):
+        tawami.Dynamics(scene, damping=1.0, transfer="apic")
     with pytest.raises(tawami.InputError, match="damping = 'a': expected a time"):
         tawami.Dynamics(scene, damping="a")
     with pytest.raises(tawami.InputError, match="its lumped masses are not all positive"):

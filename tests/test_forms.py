@@ -298,7 +298,10 @@ def test_a_file_with_a_mistake_is_named(tmp_path):
         ({"alpha": float("nan")}, "alpha = nan"),
         ({"alpha": "much"}, "alpha = 'much': expected a number"),
         ({"stabilisation": "pspg"}, "stabilisation = 'pspg': expected one of 'laplacian'"),
-        ({"gamma": 1}, "form 'u_epsv' has no parameter 'gamma': it has 'alpha', 'stabilisation'"),
+        (
+            {"gamma": 1},
+            "form 'u_epsv' has no parameter 'gamma': it has 'alpha', 'k', 'stabilisation'",
+        ),
     ],
 )
 def test_wrong_parameters(random_scene, given, message):

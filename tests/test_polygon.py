@@ -132,11 +132,11 @@ def shelf(name, width):
     return scene.solve()
 
 
-def test_small_parts_of_cells_cost_condition_and_leave_the_deflection():
+def test_small_parts_of_cells_leave_condition_and_deflection():
     whole = shelf("u_epsv", 0.0)
-    for width, condition in ((1e-2, 4e2), (1e-4, 3e4), (1e-5, 3e5)):
+    for width in (1e-2, 1e-4, 1e-5):
         solution = shelf("u_epsv", width)
-        assert solution.condition == pytest.approx(condition, rel=0.5)
+        assert solution.condition < 200
         change = solution.displacement((8, 2))[1] / whole.displacement((8, 2))[1] - 1
         assert abs(change) < width
         assert np.abs(solution.mean_stress).max() == pytest.approx(0.295, abs=0.003)

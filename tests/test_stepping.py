@@ -135,6 +135,49 @@ def test_reactions_of_edges_and_points_hold_the_weight():
         solution.reaction("floor")
 
 
+def test_an_edge_and_a_point_beside_it_share_what_they_give():
+    """What a point gives reaches functions of the edge too, and is not counted twice."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(8, 4))
+    body = tawami.box(grid, (0, 0), (2, 1))
+    scene = tawami.Scene(grid, body, ELASTIC, form="u")
+    scene.fix("left", "x")
+    scene.hold((0, 0.5), "y")
+    scene.traction("right", (0.0, -2.0))
+    solution = scene.solve()
+    assert solution.reaction("left") == pytest.approx([0.0, 0.0], abs=1e-5)
+    assert solution.reaction((0, 0.5)) == pytest.approx([0.0, 2.0], rel=1e-5)
+
+
+def test_an_edge_does_not_move_the_body_away_from_its_functions():
+    scene = block()
+    scene.fix("top", "y", -0.1)
+    words = "would have moved the body -0.1 m across its edge.*a quarter of a cell, 0.0625 m"
+    with pytest.raises(tawami.InputError, match=words):
+        scene.solve()
+    with pytest.raises(tawami.InputError, match="a quarter of a cell"):
+        tawami.ramp(scene, 0.25)
+    assert scene.particles.displacement.min() < -0.03  # what there was of it
+
+
+def test_a_point_of_the_border_is_held_on_its_way_and_found_by_its_names():
+    """Half a cell further its cell has lost its particles, its functions have not."""
+    scene = block()
+    scene.supports.all.clear()
+    points = [(0.999, 0.1), (0.999, 0.9)]
+    for point in points:
+        scene.hold(point, "x", 0.2)
+    scene.hold((0.5, 0.5), "y")
+    steps = tawami.ramp(scene, 0.1)
+    assert len(steps) == 10
+    assert scene.particles.displacement[:, 0] == pytest.approx(np.full(64, 0.2), abs=1e-8)
+    solution = scene.solve()
+    x, y = scene.supports.all[0].place
+    assert (x, y) == pytest.approx((1.199, 0.1), abs=1e-8)
+    for place in (points[0], (x, y)):
+        assert solution.reaction(place) == pytest.approx([0.0, 0.0], abs=1e-6)
+    scene.release(points[0])
+
+
 def test_wrong_input_gets_a_sentence():
     scene = block()
     with pytest.raises(tawami.InputError, match="size = 2.0: expected a finite number from"):

@@ -40,11 +40,12 @@ def test_point_constraint_by_elimination_is_that_by_multiplier(basis, point, val
     # the same with Lagrange multipliers, by scipy
     n = scene.num_coefficients
     matrix = scene.tangent(np.zeros(n))
-    held = boundary.held_edge(scene.grid, basis, scene.attached.field.active, "left", 0, 1e-3)
+    cells, layout = scene.attached.field.active, scene.attached.layout
+    held = boundary.held_edge(scene.grid, basis, cells, "left", 0, 1e-3)
     rows = [sp.csr_matrix(([1.0], ([0], [k])), shape=(1, n)) for k in held.indices]
     values = list(held.values)
     for place, v in ((point, value), ((0.3, 0.9), -value)):
-        p = boundary.held_point(scene.grid, basis, scene.attached.field.active, place, 1, v)
+        p = boundary.held_point(scene.grid, basis, cells, place, 1, v, layout.active)
         rows.append(sp.csr_matrix((p.weights, (np.zeros(len(p.indices)), p.indices)), shape=(1, n)))
         values.append(v)
     b = sp.vstack(rows)

@@ -159,7 +159,8 @@ def measure(setting: Setting) -> dict[str, Any]:
     comm = MPI.COMM_WORLD
     warnings.simplefilter("ignore", InexactSumWarning)  # of the nonlinear term; the same for all
     start = perf_counter()
-    compile_form(comm, tawami.Form.load("u_epsv"), {"stabilisation": "laplacian"})
+    form = tawami.Form.load("u_epsv")
+    compile_form(comm, form, form.settings({})[1])
     forms = perf_counter() - start
     mpm.build("u_epsv", "paper", 2, alpha=0.1, assembly=setting.path).solve()  # libraries
     options: dict[str, Any] = {"alpha": 0.1, "per_axis": setting.per_axis, "assembly": setting.path}

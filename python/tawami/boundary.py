@@ -168,12 +168,16 @@ def held_point(
     point: Sequence[float],
     component: int,
     value: float,
+    active_functions: npt.NDArray[np.bool_],
 ) -> PointHeld:
     """One displacement component at a point: a constraint on the interpolated value.
 
+    A point at the border of a body that moves may come to lie in a cell without particles: the
+    functions that have some stand for all, as long as they make up most of the value.
+
     Raises:
         InputError: The point is outside the grid.
-        SupportError: The point is in a cell without particles.
+        SupportError: The body does not reach the point.
     """
     where = f"hold(point=({point[0]:g}, {point[1]:g}))"
     location = locate_point(grid, point, where)
@@ -183,17 +187,23 @@ def held_point(
     near = [(i + di, j + dj) for di in _touching(a) for dj in _touching(b)]
     nx, ny = grid.cells
     filled = [(k, m) for k, m in near if 0 <= k < nx and 0 <= m < ny and active[m, k]]
-    if not filled:
-        raise SupportError(
-            f"{where}: the point lies in a cell without particles; move it into the body"
-        )
-    k, m = filled[0]
+    k, m = filled[0] if filled else (i, j)
     wx = values_1d(basis, nx, k, np.clip(a + i - k, 0, 1))
     wy = values_1d(basis, ny, m, np.clip(b + j - m, 0, 1))
     width = _rust.basis_len(basis, grid.cells[0])
     functions = (wx.indices[None, :] + width * wy.indices[:, None]).ravel().astype(np.int64)
     weights = np.outer(wy.data, wx.data).ravel()
+    reached = active_functions[2 * functions]
+    if not filled and weights[reached].sum() < MOST:
+        raise SupportError(
+            f"{where}: the point lies in a cell without particles; move it into the body"
+        )
+    functions, weights = functions[reached], weights[reached] / weights[reached].sum()
     return PointHeld(2 * functions + component, weights, value, where, (point[0], point[1]))
+
+
+#: Least share of the value at a point that functions with particles must make up.
+MOST = 0.9
 
 
 def _touching(t: float) -> tuple[int, ...]:

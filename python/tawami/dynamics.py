@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -69,7 +69,7 @@ class Dynamics:
                 "Dynamics with the basis 'biquadratic': its lumped masses are not all positive; use "
                 "'quadratic_spline'"
             )
-        if not scene.mass.min(initial=np.inf) > 0:
+        if not scene.least_density > 0:
             raise InputError(
                 "Dynamics: a density of 0: expected more than 0 kg/m3 for every material"
             )
@@ -79,6 +79,11 @@ class Dynamics:
         self.beta = (self.gamma + 0.5) ** 2 / 4
         self.scene, self.damping = scene, float(damping)
         self.transfer, self._moves = TRANSFERS[transfer], scene.form.strain == "finite"
+        if damping != np.inf and not (self.transfer.flip and self._moves):
+            raise InputError(
+                f"damping = {damping:g} s relaxes the velocities of FLIP: expected transfer "
+                "'affine_flip' or 'flip' and a form of finite strain; gamma > 0.5 damps too"
+            )
         n = scene.num_particles
         try:
             given = np.broadcast_to(np.asarray(velocity, dtype=float), (n, 2))
@@ -96,6 +101,7 @@ class Dynamics:
         self.time, self.steps = 0.0, 0
         #: v and a of the grid where it stays, functions x 2.
         self._kept: tuple[Array, Array] | None = None
+        self._stored, self._borne = np.array(self.velocity), ()
         self.energies = Energies(kinetic=self.kinetic_energy, elastic=self.elastic_energy)
 
     # -- what the particles carry --------------------------------------------
@@ -147,13 +153,15 @@ class Dynamics:
                     "fix(..., velocity=...) for a motion, or ramp(scene) before Dynamics"
                 )
         zero, end = np.zeros(attached.layout.size), self.time + dt
+        borne = (*scene.loads.signature, *map(id, supports.all), *map(id, supports.walls))
+        sudden, left = borne != self._borne, len(scene.left)
         mass = attached.sums(self.mass, np.ones((len(self.mass), 1)))[:, 0]
         external, before = scene.external(), self._from_particles(mass)
 
         def prescribed(rate: Callable[[Support], float]) -> Array:
             if not any(support.velocity is not None for support in supports.all):
                 return zero
-            return supports.reduction(attached, rate, zero, moving=True).offset
+            return supports.reduction(attached, rate, zero, scene.gap, moving=True).offset
 
         def way(support: Support) -> float:
             return 0.5 * dt * (support.velocity_at(self.time) + support.velocity_at(end))
@@ -166,9 +174,10 @@ class Dynamics:
 
         def problem() -> Problem:
             nonlocal state
-            reduction = supports.reduction(attached, way, zero, moving=True)
+            ways = supports.stay_on_edges(way) if self._moves else {}
+            reduction = supports.reduction(attached, way, zero, scene.gap, moving=True)
             v, a = before
-            if self.steps == 0:
+            if sudden:  # the loads are others than those that gave a
                 a = self._first_acceleration(external, mass, a)
             v = reduction.imposed(v.ravel(), masses, speed).reshape(-1, 2)
             a = reduction.imposed(a.ravel(), masses, change).reshape(-1, 2)
@@ -177,7 +186,7 @@ class Dynamics:
             impulse = masses * (v - before[0]).ravel() / dt
             inertia = Inertia(masses, slope, offset.ravel(), impulse)
             state = _GridState(v, a, reduction, inertia)
-            return Problem(reduction, external, inertia, self._guess(dt * v))
+            return Problem(reduction, external, inertia, self._guess(dt * v), ways)
 
         def also(accepted: Accepted) -> Callable[[float], None]:
             a1 = state.inertia.acceleration(accepted.u.ravel()).reshape(-1, 2)
@@ -186,12 +195,16 @@ class Dynamics:
             a1 = state.reduction.imposed(a1.ravel(), masses, change).reshape(-1, 2)
             carried = self._to_particles(accepted.u, before[0], v1, a1, dt)
             losses = self._losses(mass, (before[0], state.v, v1), accepted, external)
+            given = float(state.inertia.impulse @ state.v.ravel()) * dt
+            losses.external += given
+            losses.impact += given
 
             def store(dissipated: float) -> None:
                 for name, values in carried.items():
                     array = scene.particles.carried(name)
                     array[:] = values.reshape(array.shape)
                 self._kept = None if self._moves else (v1, a1)
+                self._stored, self._borne = np.array(self.velocity), borne
                 self.time, self.steps = end, self.steps + 1
                 self._balance(losses, dissipated)
 
@@ -199,15 +212,19 @@ class Dynamics:
 
         solution = scene.advance(problem, also, end)
         scene.accept(1.0)
+        if len(scene.left) > left:
+            e, kinetic, elastic = self.energies, self.kinetic_energy, self.elastic_energy
+            gone = e.kinetic + e.elastic - kinetic - elastic
+            self.energies = replace(e, kinetic=kinetic, elastic=elastic, left=e.left + gone)
         return solution
 
     def _from_particles(self, mass: Array) -> tuple[Array, Array]:
         """v and a of the grid, functions x 2."""
-        if self._kept is not None:
+        if self._kept is not None and np.array_equal(self._stored, self.velocity):
             return self._kept
-        x, attached = np.array(self.scene.particles.x), self.scene.attached
+        attached = self.scene.attached
         v, a = (
-            _over(to_grid(attached, x, self.mass, values, gradient), mass[:, None])
+            _over(to_grid(attached, self.mass, values, gradient), mass[:, None])
             for values, gradient in (
                 (self.velocity, self.velocity_gradient),
                 (self.acceleration, self._acceleration_gradient),
@@ -241,7 +258,7 @@ class Dynamics:
         self, u: Array, before: Array, v1: Array, a1: Array, dt: float
     ) -> dict[str, Array]:
         """What the particles carry at the end of the step, by name."""
-        attached, x = self.scene.attached, np.array(self.scene.particles.x)
+        attached = self.scene.attached
         velocity = pic = attached.at_particles(v1)
         if self.transfer.flip and self._moves:
             moved = self.velocity + attached.at_particles(v1 - before)
@@ -250,8 +267,8 @@ class Dynamics:
         return {
             "velocity": velocity,
             "acceleration": attached.at_particles(a1),
-            "velocity_gradient": gradient_of(self.transfer, attached, x, v1, f),
-            "acceleration_gradient": gradient_of(self.transfer, attached, x, a1, f),
+            "velocity_gradient": gradient_of(self.transfer, attached, v1, f),
+            "acceleration_gradient": gradient_of(self.transfer, attached, a1, f),
         }
 
     # -- many steps ----------------------------------------------------------
@@ -328,7 +345,7 @@ class Dynamics:
         """What the step adds to the balance on the grid, with the kinetic energy that it ends with."""
         mapped, imposed, end = (0.5 * float(mass @ (v**2).sum(axis=1)) for v in velocities)
         friction = self.scene.supports.friction(accepted.forces)
-        work = external[: accepted.u.size].reshape(-1, 2) + accepted.forces
+        work = external[: accepted.u.size].reshape(-1, 2) + accepted.smooth
         return Energies(
             kinetic=end,
             external=float((work - friction).ravel() @ accepted.u.ravel()),

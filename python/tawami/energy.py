@@ -1,8 +1,9 @@
 """Where the energy of a motion goes, from its start on [J per metre depth].
 
-    kinetic + elastic + dissipated + friction = start + external - transfer - impact - integration
+    kinetic + elastic + dissipated + friction + left = start + external - transfer - impact - integration
 
-all of them measured but the last, which is what the balance leaves: the error of the time integration.
+all of them measured but the last, which is what the balance leaves: the error of the time integration,
+and what the stabilisation of the form stores and takes (1/2 alpha h^2 sum V K^2/mu |grad eps_v|^2).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ class Energies:
         external: Work of loads and of supports that move.
         transfer: Kinetic energy lost on the way from the particles to the grid and back.
         impact: Kinetic energy lost where supports stop the grid.
+        left: Kinetic and elastic energy of the particles that left the grid.
         integration: The rest.
     """
 
@@ -32,6 +34,7 @@ class Energies:
     external: float = 0.0
     transfer: float = 0.0
     impact: float = 0.0
+    left: float = 0.0
     integration: float = 0.0
 
     def __str__(self) -> str:

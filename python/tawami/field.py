@@ -26,8 +26,8 @@ from tawami.stopwatch import Stopwatch
 
 Array = npt.NDArray[np.float64]
 #: Sum over the particles of a displacement function that round-off of the assembly would drown: that
-#: of a particle 4e-7 of a cell inside its support. It is held at zero, as if the particle were not yet
-#: there; a ghost penalty gives it a stiffness.
+#: of a particle 4e-7 of a cell inside its support. It follows its neighbour, as if the particle were
+#: not yet there; a ghost penalty gives it a stiffness.
 UNRESOLVED = 1e-13
 
 
@@ -73,7 +73,7 @@ class Field:
         if compiled.ghost is None:
             once = np.ones(len(volume))
             sums = _rust.nodal_sums(location, once, once[:, None], basis)
-            self.layout.leave_out(ranks.sum_of(grid.comm, sums)[:, 0] < UNRESOLVED)
+            self.layout.tie(ranks.sum_of(grid.comm, sums)[:, 0], UNRESOLVED)
         #: Indices of the points of each rule; none for means over cells.
         self._points: dict[Rule, list[tuple[int, int]]] = {
             rule: self._point_indices(rule) for rule in compiled.densities

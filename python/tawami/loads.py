@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -53,6 +54,11 @@ class Loads:
         self.tractions: list[Traction] = []
         self.forces: list[Forces] = []
 
+    @property
+    def signature(self) -> tuple[Any, ...]:
+        """Another one once the loads are others."""
+        return (*self.gravity, *map(id, self.tractions), *map(id, self.forces))
+
     def add_forces(self, particles: npt.ArrayLike, force: Sequence[float]) -> None:
         """Share a force [N per metre depth] out among particles of the body, a mask or numbers."""
         total = np.array(inputs.point("load(...): force", force))
@@ -65,6 +71,7 @@ class Loads:
                 f"load(particles={particles!r}): expected a mask of the {self.num_particles} "
                 "particles of the body, or their numbers"
             )
+        chosen = np.unique(chosen)
         if chosen.size == 0:
             raise InputError("load(...): no particle was chosen; the force would act on nothing")
         each = np.zeros((self.num_particles, 2))

@@ -193,7 +193,9 @@ class Newton:
         scale = max(self._started, *(float(np.linalg.norm(force[:n])) for force in forces))
         # Forces of a body that supports move rigidly are round-off: it is in equilibrium.
         moved = np.abs(reduction.offset[:n]).max()
-        round_off = 1e-14 * self._stiffest * moved * np.sqrt(n)
+        round_off = 1e-13 * self._stiffest * moved * np.sqrt(n)
+        if not forces[1].any():  # and those of stress that is left of them
+            round_off += 1e-14 * self._stiffest * self.field.grid.h * np.sqrt(n)
         if inertia is not None:  # and those of one that coasts
             round_off += 1e-13 * float(np.linalg.norm(inertia.mass * inertia.offset))
         momentum = float(np.linalg.norm(free[of_u])) / scale if scale > round_off else 0.0

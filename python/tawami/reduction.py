@@ -43,6 +43,7 @@ class Layout:
         owner: The rank that keeps each coefficient's row: one with a cell of its support.
         num_parts: Number of parts of the body that share no displacement function.
         part: Part that each displacement coefficient belongs to, -1 for inactive ones.
+        tied: Displacement coefficients that follow others, with these: pairs.
     """
 
     def __init__(self, grid: Grid, basis: Basis, space: _dolfinx.Space, active: Mask) -> None:
@@ -55,10 +56,29 @@ class Layout:
         self.active = self._of_all(self._of_cells.functions)
         self.owner = self._of_all(lambda b: self._of_cells.spread(b, grid.rank_of_cell))
         self.size = len(self.active)
+        self.tied: Indices = np.empty((0, 2), dtype=np.int64)
 
-    def leave_out(self, functions: Mask) -> None:
-        """Displacement functions that take no part, as those without particles."""
-        self.active[: self.num_displacement] &= ~np.repeat(functions, 2)
+    def tie(self, sums: Array, least: float) -> None:
+        """Let displacement functions with particles in their support, but with a sum over these below
+        `least`, follow the neighbour with the largest sum.
+        """
+        n = self.num_displacement
+        weak = np.flatnonzero(self.active[:n:2] & (sums < least))
+        width, height = (_rust.basis_len(self.basis, cells) for cells in self.grid.cells)
+        tied: list[tuple[int, int]] = []
+        for function in weak:
+            i, j = int(function) % width, int(function) // width
+            near = [
+                p + width * q
+                for q in range(max(j - 1, 0), min(j + 2, height))
+                for p in range(max(i - 1, 0), min(i + 2, width))
+            ]
+            strongest = max(near, key=lambda f: float(sums[f]))
+            if sums[strongest] >= least:
+                tied.append((int(function), strongest))
+        pairs = np.array(tied, dtype=np.int64).reshape(-1, 1, 2)
+        self.tied = (2 * pairs + np.arange(2)[:, None]).reshape(-1, 2)
+        self.active[self.tied[:, 0]] = False
 
     def _of_all(self, of_functions: Callable[[Basis], Any]) -> Any:
         """Values for all coefficients from those for the functions of each field."""
@@ -215,6 +235,14 @@ class Reduction:
         self.selection = sp.csr_matrix((entries, (rows, columns)), shape=shape)
         self.offset = np.where(fixed, total - start, 0.0)
         self.offset[dependent] = values
+        follows = layout.tied[~fixed[layout.tied[:, 0]]]
+        if len(follows):
+            followers, leaders = follows.T
+            swap = sp.csr_matrix(
+                (np.ones(len(follows)), (followers, leaders)), shape=(layout.size,) * 2
+            )
+            self.selection = sp.csr_matrix(self.selection + swap @ self.selection)
+            self.offset[followers] = self.offset[leaders]
 
     @classmethod
     def of_all(cls, layout: Layout) -> Reduction:
@@ -240,7 +268,7 @@ class Reduction:
         n = len(values)
         free = self.unknowns < n
         s, g = self.selection[:n][:, free], offset[:n]
-        if not self.points:
+        if not self.points and not len(self.layout.tied):
             return np.asarray(s @ (values - g)[self.unknowns[free]] + g)
         weighted = s.T @ sp.diags(mass)
         return np.asarray(s @ spsolve((weighted @ s).tocsc(), weighted @ (values - g)) + g)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import copy
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
@@ -41,18 +41,17 @@ PASSES = 40
 #: Distance, in cells, to which moving particles approach a side of their cell: one that is alone leaves
 #: functions beyond it without strength and mass. It is as well as on the side, to this distance.
 MARGIN = 1e-5
-#: Times after which functions only let go of a wall.
-FREE = 8
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One step to solve; see `Newton.solve`."""
+    """One step to solve; see `Newton.solve`, and `Supports.stay_on_edges` for the ways."""
 
     reduction: Reduction
     external: Array
     inertia: Inertia | None = None
     guess: Array | None = None
+    ways: Mapping[int, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -63,13 +62,13 @@ class Accepted:
         step: What Newton found.
         u: Increments of the displacement, functions x 2.
         forces: What supports and walls give, functions x 2 [N per metre depth].
-        dissipated: What the laws dissipate [J per metre depth], on this rank.
+        smooth: The same without their impulse at the beginning of the step.
     """
 
     step: Converged
     u: Array
     forces: Array
-    dissipated: float = 0.0
+    smooth: Array
 
 
 class Scene:
@@ -230,6 +229,11 @@ class Scene:
         if self._densities is None:
             return None
         return np.asarray(self._densities[self.particles.material] * self.particles.volume)
+
+    @property
+    def least_density(self) -> float:
+        """The smallest density of a material [kg/m3]; 0 without any."""
+        return 0.0 if self._densities is None else float(self._densities.min())
 
     # -- supports and loads --------------------------------------------------
 
@@ -405,14 +409,10 @@ class Scene:
 
     # -- steps ---------------------------------------------------------------
 
-    def solve(self, part: float = 1.0) -> Solution:
+    def solve(self) -> Solution:
         """Find equilibrium under the present supports and loads, and store it in the particles.
 
         May be called again after more supports or loads were added.
-
-        Args:
-            part: Share of the loads and prescribed displacements that are new since all of them were
-                solved for; `ramp` takes it from 0 to 1.
 
         Raises:
             SupportError: Supports that leave a rigid motion free or contradict each other.
@@ -421,7 +421,12 @@ class Scene:
             InputError: NaN or infinity in an array of the particles, a particle that would leave the
                 grid, or a support with a velocity.
         """
-        part = inputs.number("part", part, low=0.0, high=1.0)
+        return self.solve_part(1.0)
+
+    def solve_part(self, part: float) -> Solution:
+        """As :meth:`solve`, under this share of the loads and prescribed displacements that are new
+        since all of them were solved for; `ramp` takes it from 0 to 1.
+        """
         for support in self.supports.all:
             if support.velocity is not None:
                 raise InputError(
@@ -440,8 +445,16 @@ class Scene:
             return support.at(part) - (support.applied if self._finite else 0.0)
 
         with self.stopwatch("set-up"):
-            reduction = self.supports.reduction(self.attached, amount, start, moving=False)
-            return Problem(reduction, self.external(part))
+            ways = self.supports.stay_on_edges(amount) if self._finite else {}
+            reduction = self.supports.reduction(
+                self.attached, amount, start, self.gap, moving=False
+            )
+            return Problem(reduction, self.external(part), ways=ways)
+
+    @property
+    def gap(self) -> Array:
+        """Coefficients since the start of the scene where particles do not move, 0 where they do."""
+        return np.zeros_like(self._total) if self._finite else self._total
 
     def carry(self, part: float) -> None:
         """This share of what was new is what the scene bears now."""
@@ -493,11 +506,14 @@ class Scene:
             self.particles.check()
         walls = [copy.deepcopy(wall.state) for wall in self.supports.walls]
         try:
-            step, reduction = self._settled(problem)
+            step, settled = self._settled(problem)
             u = self.split(step.coefficients)[0].reshape(-1, 2)
             moved = self._moved(u, time) if self._finite else None
             n = u.size
-            accepted = Accepted(step, u, step.forces[:n].reshape(-1, 2))
+            forces = step.forces[:n]
+            inertia = settled.inertia
+            smooth = forces if inertia is None else forces - inertia.impulse
+            accepted = Accepted(step, u, forces.reshape(-1, 2), smooth.reshape(-1, 2))
             store = also(accepted) if also is not None else None
             with self.stopwatch("commit"), ranks.together(self.grid.comm):
                 dissipated = self.attached.stage.commit(*self.split(step.coefficients))
@@ -509,26 +525,35 @@ class Scene:
             store(dissipated)
         if moved is None:
             self._total = self._total + step.coefficients
-            return Solution(self, step, reduction, self._total)
-        self.supports.follow(u.ravel())
+            return Solution(self, step, settled.reduction, self._total)
+        self.supports.follow(u, settled.reduction.points)
+        for number, way in settled.ways.items():
+            self.supports.all[number].way = way
         self.particles.move_to(moved)
-        solution = Solution(self, step, reduction, step.coefficients)
+        solution = Solution(self, step, settled.reduction, step.coefficients)
         self._relocate(time)
         return solution
 
-    def _settled(self, problem: Callable[[], Problem]) -> tuple[Converged, Reduction]:
+    def _settled(self, problem: Callable[[], Problem]) -> tuple[Converged, Problem]:
         """A step in which no wall pulls, is passed through, or gives more friction than it has."""
         newton, supports, step = self.attached.newton, self.supports, None
         active = self.attached.layout.active[: self.attached.layout.num_displacement : 2]
         friction = supports.friction if supports.walls else None
-        for attempt in range(PASSES):
+        n = self.attached.layout.num_displacement
+        gap = self.gap[:n].reshape(-1, 2)
+        for wall in supports.walls:
+            wall.begin()
+        for _ in range(PASSES):
             now = problem()
             guess = now.guess if step is None else step.coefficients
-            step = newton.solve(now.reduction, now.external, now.inertia, guess, friction)
-            n = self.attached.layout.num_displacement
+            found = newton.solve(now.reduction, now.external, now.inertia, guess, friction)
+            if step is not None:
+                history, krylov = step.history + found.history[1:], step.krylov + found.krylov
+                found = replace(found, history=history, krylov=krylov)
+            step = found
             forces, u = (part[:n].reshape(-1, 2) for part in (step.forces, step.coefficients))
-            if not supports.adapt(forces, u, active, monotone=attempt > FREE):
-                return step, now.reduction
+            if not supports.adapt(forces, u, gap, active):
+                return step, now
         assert step is not None
         raise ConvergenceError(
             f"contact and friction of the walls did not settle in {PASSES} solves. Nothing was changed "

@@ -55,7 +55,8 @@ class Solution:
         self.history: History = step.history
         self.krylov = tuple(step.krylov)
         self.condition, self.symmetric = step.condition, step.symmetric
-        self._forces, self._reduction = step.forces, reduction
+        self._on_points: list[tuple[tuple[Any, ...], int, float]] = []
+        self._reactions(step.forces, reduction)
         particles, comm = scene.particles, scene.grid.comm
         number = ranks.joined(comm, particles.number)
         order = np.argsort(number)
@@ -84,43 +85,51 @@ class Solution:
 
         Args:
             place: Name of an edge of the grid: the sum over the functions along it, so that what acts
-                at a corner belongs to both its edges; or the point (x, y) of a `hold` [m].
+                at a corner belongs to both its edges; or the point (x, y) of a `hold` [m], as it was
+                given or where it is now. In dynamics it is the force at the end of the step and the
+                impulse at its beginning over its length.
 
         Raises:
             InputError: No such edge, or no point held there.
         """
-        n = len(self.u)
-        held = np.ones(n, dtype=bool)
-        held[self._reduction.unknowns[self._reduction.unknowns < n]] = False
-        forces = np.where(held, self._forces[:n], 0.0).reshape(-1, 2)
         if isinstance(place, str):
             if place not in EDGES:
                 raise InputError(f"reaction('{place}'): expected one of {', '.join(EDGES)}")
             scene = self.scene
             functions = boundary.edge_functions(scene.grid, scene.basis, place)
-            walls = [wall for wall in scene.supports.walls if wall.edge == place]
-            friction = sum((wall.friction_of(forces) for wall in walls), np.zeros_like(forces))
-            return np.asarray((forces + friction)[functions].sum(axis=0))
-        return self._at_point(place)
-
-    def _at_point(self, place: Sequence[float]) -> Array:
-        """Multipliers of the point constraints: what they add up to is out of balance by itself."""
-        points = self._reduction.points
-        mine = [np.allclose(point.place, place) for point in points]
-        if not any(mine):
+            return np.asarray(self._on_edges[functions].sum(axis=0))
+        force, found = np.zeros(2), False
+        for places, component, multiplier in self._on_points:
+            if any(np.allclose(place, known) for known in places):
+                force[component] += multiplier
+                found = True
+        if not found:
             raise InputError(f"reaction({tuple(place)}): no point is held there")
-        involved = np.unique(np.concatenate([point.indices for point in points]))
-        involved = involved[~self._reduction.fixed[involved]]
-        weights = np.zeros((len(involved), len(points)))
-        for k, point in enumerate(points):
-            for index, weight in zip(point.indices, point.weights, strict=True):
-                weights[involved == index, k] = weight
-        multipliers = np.linalg.lstsq(weights, self._forces[involved], rcond=None)[0]
-        force = np.zeros(2)
-        for point, multiplier, at_place in zip(points, multipliers, mine, strict=True):
-            if at_place:
-                force[point.indices[0] % 2] += multiplier
         return force
+
+    def _reactions(self, forces: Array, reduction: Reduction) -> None:
+        """What supports give: of the points by their multipliers, the rest of the edges and walls.
+
+        Args:
+            forces: What is out of balance without them on all coefficients.
+            reduction: What they leave free.
+        """
+        n = len(self.u)
+        scene, points = self.scene, reduction.points
+        rest = forces[:n].copy()
+        if points:
+            weights = np.zeros((n, len(points)))
+            for k, point in enumerate(points):
+                weights[point.indices, k] = point.weights
+            loose = ~reduction.fixed[:n]
+            multipliers = np.linalg.lstsq(weights[loose], rest[loose], rcond=None)[0]
+            rest -= weights @ multipliers
+            supports = [s for s in scene.supports.all if not isinstance(s.place, str)]
+            for point, support, multiplier in zip(points, supports, multipliers, strict=True):
+                places = (support.given, support.place, point.place)
+                self._on_points.append((places, support.component, float(multiplier)))
+        held = np.where(reduction.fixed[:n], rest, 0.0).reshape(-1, 2)
+        self._on_edges = held + scene.supports.friction(forces[:n].reshape(-1, 2))
 
     @property
     def mean_stress(self) -> Array:

@@ -113,7 +113,7 @@ def ramp(
 
     def attempt(part: float, _size: float) -> Solution:
         nonlocal reached
-        solution = scene.solve(part)
+        solution = scene.solve_part(part)
         reached = part
         return solution
 
@@ -143,7 +143,7 @@ def settle(scene: Scene, *, tolerance: float = 1e-10, most: int = 200) -> list[S
             "settle(...) resets the grid: expected a scene with a form of finite strain"
         )
     steps = list[Step]()
-    with scene.tolerance_of(min(tolerance, 0.1 * tolerance)):
+    with scene.tolerance_of(max(0.1 * tolerance, 1e-14)):
         for _ in range(inputs.whole_number("most", most, low=1)):
             solution = scene.solve()
             steps.append(Step(1.0, 0.0, solution.history, solution.krylov))

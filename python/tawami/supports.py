@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
-from tawami import _rust, boundary, inputs
+from tawami import boundary, inputs
 from tawami.attached import Attached
 from tawami.basis import Basis
 from tawami.boundary import Component, Interval, Profile
@@ -28,12 +28,14 @@ class Support:
 
     Attributes:
         place: Name of the edge, or the point (x, y) [m], which moves with the body.
+        given: The same as the driver script gave it.
         component: 0 or 1.
         value: Displacement [m]; 1 where a velocity is prescribed.
         velocity: [m/s]; None where a displacement is prescribed.
         between: Part of the edge [m]; None for all of it.
         carried: Share of the value that later ones grow from.
         applied: Share of the value that is there already.
+        way: How far the body has been moved across an edge [m], where particles move.
     """
 
     place: Edge | tuple[float, float]
@@ -43,6 +45,11 @@ class Support:
     between: Interval | None = None
     carried: float = 0.0
     applied: float = 0.0
+    way: float = 0.0
+    given: Edge | tuple[float, float] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.given = self.place
 
     def at(self, part: float) -> float:
         """Share of the value once `part` of what is new has come."""
@@ -133,7 +140,7 @@ class Supports:
         """Take supports away."""
         at = place if isinstance(place, str) else inputs.point("release(...)", place)
         axis = None if component is None else boundary.component_index(component)
-        gone = [s for s in self.all if s.place == at and axis in (None, s.component)]
+        gone = [s for s in self.all if at in (s.place, s.given) and axis in (None, s.component)]
         walls = [w for w in self.walls if w.edge == at and axis is None]
         if not gone and not walls:
             places = sorted({f"{s.place}" for s in self.all} | {w.edge for w in self.walls})
@@ -148,6 +155,7 @@ class Supports:
         attached: Attached,
         amount: Callable[[Support], float],
         start: Array,
+        gap: Array,
         *,
         moving: bool,
     ) -> Reduction:
@@ -157,14 +165,25 @@ class Supports:
             attached: The particles where they are.
             amount: Factor of each support's value.
             start: Coefficients that are there already, which the amounts include.
-            moving: Inertia holds the body: rigid motions may be free, and supports that have lost it
-                are passed over.
+            gap: Displacement coefficients since the start of the scene where particles do not move,
+                0 where they do: what walls look at.
+            moving: Inertia holds the body: rigid motions may be free, and edges held at rest that have
+                lost it are passed over.
+
+        Raises:
+            SupportError: An edge or point with a prescribed motion, or a point at all, that the body
+                has left.
         """
-        field, held, points = attached.field, [], []
+        field, layout, held, points = attached.field, attached.layout, [], []
         for support in self.all:
             share = amount(support)
             if isinstance(support.place, str):
-                if moving and not len(field.edge_nodes(support.place)):
+                part = boundary.cells_between(self.grid, support.place, support.between)
+                if (
+                    moving
+                    and support.velocity is None
+                    and not part[field.along(support.place)].any()
+                ):
                     continue
                 edge = boundary.held_edge(
                     self.grid, self.basis, field.active, support.place, support.component,
@@ -176,30 +195,59 @@ class Supports:
                 points.append(
                     boundary.held_point(
                         self.grid, self.basis, field.active, support.place, support.component,
-                        share * support.value,
+                        share * support.value, layout.active,
                     )
                 )  # fmt: skip
+        fixed = np.zeros(layout.size, dtype=bool)
+        for edge in held:
+            fixed[edge.indices] = True
         for wall in self.walls:
-            for at_rest in wall.held(attached.layout.active):
-                values = start[at_rest.indices]
-                held.append(boundary.Held(at_rest.indices, values))
-        return Reduction(attached.layout, held, points, start, moving=moving)
+            taken = fixed.copy()
+            for other in self.walls:
+                taken[other.stopped if other is not wall else []] = True
+            held += wall.held(layout.active, taken, start, gap)
+        return Reduction(layout, held, points, start, moving=moving)
 
-    def follow(self, u: Array) -> None:
-        """Points move with the body: u are the increments of the displacement."""
-        for support in self.all:
-            if not isinstance(support.place, str):
-                location = boundary.locate_point(self.grid, support.place, str(support))
-                x, y = support.place + _rust.interpolate(location, self.basis, 2, u)[0]
-                support.place = (float(x), float(y))
+    def stay_on_edges(self, amount: Callable[[Support], float]) -> dict[int, float]:
+        """How far each support will have moved the body across its edge, where particles move; the
+        edge's functions stay where they are and would soon hold nothing.
+
+        Raises:
+            InputError: More than a quarter of a cell.
+        """
+        ways = {}
+        for number, support in enumerate(self.all):
+            if (
+                isinstance(support.place, str)
+                and self.grid.edge(support.place)[0] == support.component
+            ):
+                value = 1.0 if callable(support.value) else support.value
+                ways[number] = support.way + amount(support) * value
+                if abs(ways[number]) > 0.25 * self.grid.h and not callable(support.value):
+                    raise InputError(
+                        f"{support} would have moved the body {ways[number]:.3g} m across its edge of "
+                        "the grid, whose functions stay there: expected at most a quarter of a cell, "
+                        f"{0.25 * self.grid.h:.3g} m. hold(point, ...) moves points of the body further"
+                    )
+        return ways
+
+    def follow(self, u: Array, points: Sequence[boundary.PointHeld]) -> None:
+        """Points move with the body.
+
+        Args:
+            u: Increments of the displacement, functions x 2.
+            points: The constraints of the step, in the order of the supports.
+        """
+        supports = [s for s in self.all if not isinstance(s.place, str)]
+        for support, point in zip(supports, points, strict=True):
+            x, y = point.place + point.weights @ u[point.indices // 2]
+            support.place = (float(x), float(y))
 
     def friction(self, forces: Array) -> Array:
         """Friction of the walls from what supports have to give, functions x 2."""
         return sum((wall.friction_of(forces) for wall in self.walls), np.zeros_like(forces))
 
-    def adapt(
-        self, forces: Array, u: Array, active: npt.NDArray[np.bool_], *, monotone: bool
-    ) -> bool:
+    def adapt(self, forces: Array, u: Array, gap: Array, active: npt.NDArray[np.bool_]) -> bool:
         """Change states of the walls that contradict a solution; whether there were any."""
-        changed = [wall.adapt(forces, u, active, monotone=monotone) for wall in self.walls]
+        changed = [wall.adapt(forces, u, gap, active) for wall in self.walls]
         return any(changed)

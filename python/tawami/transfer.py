@@ -47,45 +47,53 @@ TRANSFERS: dict[str, Transfer] = {
 }
 
 
-def to_grid(attached: Attached, x: Array, mass: Array, values: Array, gradient: Array) -> Array:
+def to_grid(attached: Attached, mass: Array, values: Array, gradient: Array) -> Array:
     """Momentum per component of a particle field and its gradient: functions x 2.
 
     Args:
         attached: The particles where they are.
-        x: Their positions [m].
         mass: Their masses [kg per metre depth].
         values: v_p or a_p, particles x 2.
         gradient: Its gradient, particles x 2 x 2.
     """
-    origin = np.asarray(attached.layout.grid.origin)
-    at_origin = values - np.einsum("pij,pj->pi", gradient, x - origin)
+    points, at = _positions(attached)
+    at_origin = values - np.einsum("pij,pj->pi", gradient, at)
     sums = attached.sums(mass, np.column_stack([at_origin, gradient.reshape(-1, 4)]))
-    points = attached.layout.greville - origin
     return np.asarray(sums[:, :2] + np.einsum("ikl,il->ik", sums[:, 2:].reshape(-1, 2, 2), points))
 
 
-def gradient_of(transfer: Transfer, attached: Attached, x: Array, field: Array, f: Array) -> Array:
+def gradient_of(transfer: Transfer, attached: Attached, field: Array, f: Array) -> Array:
     """C_p of a field of the grid at the end of the step: particles x 2 x 2.
 
     Args:
         transfer: Which.
         attached: The particles where they were.
-        x: Their positions there [m].
         field: v1 or a1, functions x 2.
         f: I + grad u of the step.
     """
     if transfer.gradient == "none":
-        return np.zeros((len(x), 2, 2))
-    gradient = attached.gradients(field)
+        return np.zeros_like(f)
+    gradient = attached.gradients(field).copy()
     if transfer.gradient == "moments":
-        gradient = _moments(attached, x, field) @ np.linalg.inv(_moments(attached, x, None))
+        spread = _moments(attached, None)
+        # at the ends of the grid, and on its lines with bilinear functions, nothing is spread
+        enough = np.linalg.det(spread) > 1e-8 * attached.layout.grid.h**4
+        moments = _moments(attached, field)[enough]
+        gradient[enough] = moments @ np.linalg.inv(spread[enough])
     return np.asarray(gradient @ np.linalg.inv(f))
 
 
-def _moments(attached: Attached, x: Array, field: Array | None) -> Array:
+def _positions(attached: Attached) -> tuple[Array, Array]:
+    """x_i and x_p [m] from the corner of the grid, x_p as the functions have it: away from the sides of
+    cells by what moving particles are kept off them.
+    """
+    points = attached.layout.greville - np.asarray(attached.layout.grid.origin)
+    return points, attached.at_particles(points)
+
+
+def _moments(attached: Attached, field: Array | None) -> Array:
     """sum_i N_i field_i (x_i - x_p)^T; the field is x_i - x_p where none is given."""
-    origin = np.asarray(attached.layout.grid.origin)
-    points, at = attached.layout.greville - origin, x - origin
+    points, at = _positions(attached)
     given = points if field is None else field
     mean = at if field is None else attached.at_particles(field)
     columns = [attached.at_particles(given * points[:, [k]]) for k in range(2)]

@@ -26,6 +26,8 @@ Mask = npt.NDArray[np.bool_]
 
 #: Forces and displacements that count as none, relative to the largest on the wall and to h.
 FORCE, GAP = 1e-6, 1e-12
+#: Times that a function may come back to the wall, or to rest, in one step.
+TURNS = 4
 
 
 @dataclass
@@ -55,6 +57,8 @@ class Wall:
     Attributes:
         functions: Displacement functions along it.
         state: Their state.
+        taken: Whether other supports prescribe their components, functions x 2.
+        turns: How often each came back to the wall or to rest in this step.
     """
 
     grid: Grid
@@ -64,6 +68,8 @@ class Wall:
     separates: bool
     functions: npt.NDArray[np.int64] = field(init=False)
     state: Contact = field(init=False)
+    taken: Mask = field(init=False)
+    turns: npt.NDArray[np.int64] = field(init=False)
 
     def __post_init__(self) -> None:
         self.functions = edge_functions(self.grid, self.basis, self.edge)
@@ -71,6 +77,12 @@ class Wall:
         # without friction nothing sticks; the sign does not matter then
         slip = np.full(n, 1 if self.friction == 0 else 0, dtype=np.int8)
         self.state = Contact(np.ones(n, dtype=bool), slip)
+        self.taken = np.zeros((n, 2), dtype=bool)
+        self.begin()
+
+    def begin(self) -> None:
+        """A new step."""
+        self.turns = np.zeros(len(self.functions), dtype=np.int64)
 
     @property
     def _axes(self) -> tuple[int, int, int]:
@@ -78,52 +90,71 @@ class Wall:
         axis, end = self.grid.edge(self.edge)
         return axis, 1 - axis, -1 if end else 1
 
-    def held(self, active: Mask) -> list[Held]:
-        """What the wall prescribes in the present states; `active`: coefficients with particles."""
+    @property
+    def stopped(self) -> npt.NDArray[np.int64]:
+        """Coefficients that it stops from passing through."""
+        across, _, _ = self._axes
+        return 2 * self.functions[self.state.touching] + across
+
+    def held(self, active: Mask, fixed: Mask, start: Array, gap: Array) -> list[Held]:
+        """What the wall prescribes in the present states.
+
+        Args:
+            active: Whether each displacement coefficient has particles.
+            fixed: Whether other supports prescribe it; then the wall does not.
+            start: Coefficients that are there already, which the values include.
+            gap: Displacement coefficients since the body touched the wall.
+        """
         across, along, _ = self._axes
-        supports = []
-        touching = self.state.touching
+        self.taken = fixed[2 * self.functions[:, None] + np.arange(2)]
+        touching, supports = self.state.touching, []
         for axis, mask in ((across, touching), (along, touching & (self.state.slip == 0))):
-            indices = 2 * self.functions[mask] + axis
+            indices = 2 * self.functions[mask & ~self.taken[:, axis]] + axis
             indices = indices[active[indices]]
-            supports.append(Held(indices, np.zeros(len(indices))))
+            values = start[indices] - (gap[indices] if axis == across else 0.0)
+            supports.append(Held(indices, values))
         return supports
 
     def friction_of(self, forces: Array) -> Array:
         """Friction on the body (functions x 2), from what the wall has to give to hold it."""
         across, along, inward = self._axes
         friction = np.zeros_like(forces)
-        sliding = self.functions[self.state.touching & (self.state.slip != 0)]
-        push = np.maximum(inward * forces[sliding, across], 0.0)
-        direction = self.state.slip[self.state.touching & (self.state.slip != 0)]
-        friction[sliding, along] = self.friction * push * direction if self.friction else 0.0
+        sliding = self.state.touching & (self.state.slip != 0) & ~self.taken[:, along]
+        f = self.functions[sliding]
+        push = np.maximum(inward * forces[f, across], 0.0)
+        friction[f, along] = self.friction * push * self.state.slip[sliding] if self.friction else 0
         return friction
 
-    def adapt(self, forces: Array, u: Array, active: Mask, *, monotone: bool) -> bool:
+    def adapt(self, forces: Array, u: Array, gap: Array, active: Mask) -> bool:
         """Change the states that contradict a solution; whether there were any.
+
+        A function that comes back to the wall, or to rest, too often in one step goes round in
+        circles and is let go.
 
         Args:
             forces: Reactions that supports and walls give, functions x 2.
             u: Displacement increments, functions x 2.
+            gap: Displacement before them since the body touched the wall.
             active: Whether each function has particles.
-            monotone: Functions only let go: what came back would go round in circles.
         """
         across, along, inward = self._axes
-        here, f = active[self.functions], self.functions
+        f, state, nowhere = self.functions, self.state, GAP * self.grid.h
+        here, loose = active[f], ~self.taken
         push, moved = inward * forces[f, across], u[f, along]
-        none, nowhere = FORCE * np.abs(forces[f]).max(initial=0.0), GAP * self.grid.h
-        leaves = here & self.state.touching & self.separates & (push < -none)
-        meets = here & ~self.state.touching & (inward * u[f, across] < -nowhere)
+        none = FORCE * np.abs(forces[f]).max(initial=0.0)
+        below = inward * (gap + u)[f, across] < -nowhere
+        free = here & loose[:, across]
+        leaves = free & state.touching & self.separates & (push < -none)
+        meets = free & ~state.touching & below & (self.turns < TURNS)
         slides, sticks = np.zeros_like(here), np.zeros_like(here)
         if self.friction > 0:
-            held = here & self.state.touching & ~leaves
+            held = here & state.touching & ~leaves & loose[:, along]
             bound = self.friction * np.maximum(push, 0.0) if np.isfinite(self.friction) else np.inf
-            slides = held & (self.state.slip == 0) & (np.abs(forces[f, along]) > bound + none)
-            sticks = held & (self.state.slip != 0) & (self.state.slip * moved > nowhere)
-        if monotone:
-            meets, sticks = np.zeros_like(here), np.zeros_like(here)
-        self.state.touching = (self.state.touching & ~leaves) | meets
-        self.state.slip[slides] = np.sign(forces[f, along][slides]).astype(np.int8)
+            slides = held & (state.slip == 0) & (np.abs(forces[f, along]) > bound + none)
+            sticks = held & (state.slip * moved > nowhere) & (self.turns < TURNS)
+        self.turns += meets | sticks
+        state.touching = (state.touching & ~leaves) | meets
+        state.slip[slides] = np.sign(forces[f, along][slides]).astype(np.int8)
         if self.friction > 0:
-            self.state.slip[sticks | meets] = 0
+            state.slip[sticks | meets] = 0
         return bool((leaves | meets | slides | sticks).any())
