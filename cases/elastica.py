@@ -291,68 +291,83 @@ def _stress_error(run: Run, start: Array, L: float) -> float:
 
 
 def shapes(runs: Sequence[Run], path: Path) -> None:
-    """The bent beams, coloured by mean stress, beside the elastica; a row a form, a column a load."""
+    """The bent beams, coloured by mean stress, beside the elastica; a column a form, a row a load."""
     figure_, panels = plt.subplots(
-        len(runs) // len(LOADS), len(LOADS), figsize=(11, 8.5), layout="constrained",
-        width_ratios=(1.65, 1), squeeze=False,
+        len(LOADS), len(FORMS), figsize=(14, 8), layout="constrained", sharex="row", sharey="row",
+        height_ratios=(1, 1.9),
     )  # fmt: skip
-    for k, run in enumerate(sorted(runs, key=lambda r: (list(FORMS).index(r.form), r.load))):
-        axes = panels.ravel()[k]
+    for run in runs:
+        row, column = LOADS.index(run.load), list(FORMS).index(run.form)
+        axes = panels[row, column]
         L = (run.slender - 0.5 / run.n) * D
-        x, y = L * curve(run.load, np.linspace(0, 1, 200))[:2]
-        root = curve(run.load, np.array([0.0]))[3, 0] / L
-        limit = (1 + run.nu) / 3 * E / (1 - run.nu**2) * root * D / 2 / 1e3
+        # of the fibres at the root of the stiffest
+        limit = mean_stress(run.load, 0.499, L, np.array([[0.0, D / 2]]))[0] / 1e3
         shown = axes.scatter(
             *run.at.T, c=run.mean_stress / 1e3, s=2, cmap="coolwarm", vmin=-limit, vmax=limit
         )
-        axes.plot(x, y, "k", linewidth=0.8, label="elastica")
+        axes.plot(*L * curve(run.load, np.linspace(0, 1, 200))[:2], "k", label="elastica")
         axes.set_aspect("equal")
         axes.set_title(
-            f"{FORMS[run.form]}, $\\nu$ = {run.nu}, $PL^2/\\bar{{E}}I$ = {run.load:g}", fontsize=9
+            f"{FORMS[run.form]}, $\\nu$ = {run.nu}, $PL^2/\\bar{{E}}I$ = {run.load:g}", fontsize=10
         )
         axes.set_xlabel("$x$ [m]")
         axes.set_ylabel("$y$ [m]")
         axes.legend(loc="lower left", fontsize=8)
-        figure_.colorbar(shown, ax=axes, label="mean stress [kPa], tension positive")
+        if column == len(FORMS) - 1:
+            figure_.colorbar(shown, ax=panels[row], label="mean stress [kPa], tension positive")
     figure.save(figure_, path)
 
 
 def errors(cells: Sequence[Run], steps: Sequence[Run], path: Path) -> None:
     """Error of the tip and of the mean stress over cells, and of the tip over steps, for each load."""
-    figure_, panels = plt.subplots(3, len(LOADS), figsize=(11, 11), layout="constrained")
-    markers = {0.3: "o", 0.49: "s", 0.499: "^"}
-    for (top, middle, bottom), load in zip(panels.T, LOADS, strict=True):
-        for form, nu in dict.fromkeys((run.form, run.nu) for run in cells):
-            chosen = [r for r in cells if (r.form, r.nu, r.load) == (form, nu, load)]
-            style = {"color": COLOURS[form], "marker": markers[nu],
-                     "label": f"{FORMS[form]}, $\\nu$ = {nu}"}  # fmt: skip
-            top.loglog([r.n for r in chosen], [r.error for r in chosen], **style)
-            middle.loglog([r.n for r in chosen], [r.stress_error for r in chosen], **style)
-        n = np.array([2, 4, 8])
-        expected = [r.expected for r in chosen]
-        top.loglog(n, expected, "k--", label="of the particles' second moment")
-        for drag, colour in ((1e-3, "tab:orange"), (1e-2, "tab:red"), (1e-1, "tab:purple")):
-            chosen = sorted(
-                (r for r in steps if (r.drag, r.load) == (drag, load)), key=lambda r: r.steps
-            )
-            bottom.loglog(
-                [r.accepted for r in chosen], [r.error for r in chosen], color=colour, marker="o",
-                label=f"drag = {drag:g} $\\mu$",
-            )  # fmt: skip
-        top.set_title(f"$PL^2/\\bar{{E}}I$ = {load:g}")
-        top.set_ylabel("tip's distance from the elastica's / $L$ [%]")
-        middle.set_ylabel("rms error of the mean stress [%]")
-        bottom.set_ylabel("tip's distance from the elastica's / $L$ [%]")
-        for axes in (top, middle):
-            axes.set_xlabel("cells over the depth [-]")
-            axes.set_xticks(n, [str(k) for k in n])
-        bottom.set_xlabel("steps, each with the grid reset [-] (mixed, $\\nu$ = 0.3, 4 cells)")
-        bottom.set_xticks([10, 20, 40, 80, 160], ["10", "20", "40", "80", "160"])
-        for axes in (top, middle, bottom):
-            axes.minorticks_off()
-            axes.grid(alpha=0.3)
-            axes.legend(fontsize=7)
+    figure_, panels = plt.subplots(3, len(LOADS), figsize=(12, 10.5), layout="constrained")
+    for column, load in zip(panels.T, LOADS, strict=True):
+        _over_cells(column[:2], [run for run in cells if run.load == load])
+        _over_steps(column[2], [run for run in steps if run.load == load])
+        column[0].set_title(f"$PL^2/\\bar{{E}}I$ = {load:g}")
+    ticks = (0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)
+    for axes in panels.ravel():
+        low, high = axes.get_ylim()
+        shown = [tick for tick in ticks if low < tick < high]
+        axes.minorticks_off()
+        axes.set_yticks(shown, [f"{tick:g}" for tick in shown])
+        axes.grid(alpha=0.3)
+    figure_.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside right upper", fontsize=8)
+    panels[2, 1].legend(fontsize=8, loc="upper left")
     figure.save(figure_, path)
+
+
+def _over_cells(panels: Sequence[plt.Axes], runs: Sequence[Run]) -> None:
+    """Error of the tip, and of the mean stress, a line a form and Poisson's ratio."""
+    markers = {0.3: "o", 0.49: "s", 0.499: "^"}
+    for form, nu in dict.fromkeys((run.form, run.nu) for run in runs):
+        chosen = [run for run in runs if (run.form, run.nu) == (form, nu)]
+        n = [run.n for run in chosen]
+        style = {"color": COLOURS[form], "marker": markers[nu],
+                 "label": f"{FORMS[form]}, $\\nu$ = {nu}"}  # fmt: skip
+        panels[0].loglog(n, [run.error for run in chosen], **style)
+        panels[1].loglog(n, [run.stress_error for run in chosen], **style)
+    expected = [run.expected for run in chosen]
+    panels[0].loglog(n, expected, "k--", label="of the particles' second moment")
+    panels[0].set_ylabel("distance of the tips / $L$ [%]")
+    panels[1].set_ylabel("rms error of the mean stress [%]")
+    for axes in panels:
+        axes.set_xlabel("cells over the depth [-]")
+        axes.set_xticks(n, [str(k) for k in n])
+
+
+def _over_steps(axes: plt.Axes, runs: Sequence[Run]) -> None:
+    """Error of the tip, a line a drag."""
+    for drag, colour in ((1e-3, "tab:orange"), (1e-2, "tab:red"), (1e-1, "tab:purple")):
+        chosen = sorted((run for run in runs if run.drag == drag), key=lambda run: run.steps)
+        accepted = [run.accepted for run in chosen]
+        axes.loglog(
+            accepted, [run.error for run in chosen], color=colour, marker="o",
+            label=f"drag = {drag:g} $\\mu$",
+        )  # fmt: skip
+    axes.set_xlabel("steps, the grid reset after each [-] (mixed, $\\nu$ = 0.3, 4 cells)")
+    axes.set_ylabel("distance of the tips / $L$ [%]")
+    axes.set_xticks(accepted, [str(k) for k in accepted])
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

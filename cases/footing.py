@@ -14,8 +14,12 @@ exact for both laws: in plane strain they flow at the same shear s_u once elasti
 Flow keeps the volume. A method that cannot follow it locks: its force grows without an end.
 
 The footing is a part of the top edge, moved down in steps that adapt. Splines spread it: all functions
-on its cells are held, and the one beyond its edge reaches half a cell into the ground beside it.
-Points held (`scene.hold`) at the centres of its cells leave that one free; both are compared.
+on its cells are held, n + 2 where it has n cells, and the last one moves the ground beside it by up to
+half as much. The footing acts wider than it is, by a share of h, and Q comes down to Prandtl's linearly.
+
+Points held (`scene.hold`) do the same if there are as many as functions, at both ends and at the
+centres of the cells; more points hold the same twice. The centres alone leave the last function free:
+the edge of the footing stays behind, and Q comes up from below.
 
 python -m cases.footing [--results results/footing]
 """
@@ -51,7 +55,7 @@ S_U, RIGIDITY = 1.0e3, 667.0  # undrained strength [Pa], mu/s_u [-]
 SETTLEMENT = 12.0  # of the footing at the end, times s_u b/mu
 PRANDTL = 2 + np.pi  # Q / (s_u B)
 Law = Literal["von_mises", "tresca"]
-Footing = Literal["edge", "centres", "lines", "greville", "quarters"]
+Footing = Literal["edge", "centres", "lines", "greville"]
 #: What differs from u_epsv, von Mises, nu = 0.499, splines, the footing as a part of the edge.
 STUDY: dict[str, list[dict[str, Any]]] = {
     "cells": [{"form": form, "n": n} for form in ("u_epsv", "u_bbar", "u") for n in (2, 4, 8)]
@@ -66,7 +70,7 @@ STUDY: dict[str, list[dict[str, Any]]] = {
     "bilinear": [{"form": form, "basis": "bilinear", "n": n}
                  for form in ("u_epsv", "u_bbar", "u") for n in (4, 8)],
     "footing": [{"footing": footing, "n": n}
-                for footing in ("centres", "greville", "lines", "quarters") for n in (4, 8)],
+                for footing in ("centres", "lines", "greville") for n in (4, 8)],
     "alpha": [{"alpha": alpha, "n": 4} for alpha in (0.01, 0.5)],
     "particles": [{"per_axis": 3, "n": 4}],
 }  # fmt: skip
@@ -150,8 +154,7 @@ def held_points(footing: Footing, n: int) -> Array:
         "edge": np.empty(0),
         "centres": centres,
         "lines": np.arange(n + 1) * h,
-        "greville": np.concatenate([[0.0], centres]),
-        "quarters": (np.arange(2 * n) + 0.5) * h / 2,
+        "greville": np.concatenate([[0.0], centres, [B_HALF]]),
     }
     return positions[footing]
 
