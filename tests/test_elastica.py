@@ -18,7 +18,7 @@ def test_the_tip_is_where_the_tables_have_it(load, x, y):
     """The third is linear: y = -load/3, x = -load^2/15."""
     assert elastica.tip(load) == pytest.approx([x, y], abs=5e-5)
     end = elastica.curve(load, np.array([1.0]))[:, 0]
-    assert end[:2] == pytest.approx(elastica.tip(load) + [1, 0], abs=1e-8)
+    assert end[:2] == pytest.approx(elastica.tip(load) + np.array([1, 0]), abs=1e-8)
     assert end[2] == pytest.approx(elastica.tip_angle(load), abs=1e-8)
     assert end[3] == pytest.approx(0.0, abs=1e-8)
 
@@ -55,7 +55,7 @@ def test_without_drag_a_static_beam_stops_where_particles_enter_empty_cells():
 
 
 def test_the_drag_is_a_term_of_its_own():
-    """At rest it adds nothing, at drag = 0 never; in a simple shear d u_x/dy = g it is drag g a volume."""
+    """Nothing at rest, or with drag = 0; known in a simple shear."""
     grid = grid_of((2, 2))
     body = tawami.box(grid, grid.origin, grid.upper)
     law = tawami.linear_elastic(E=1.0, nu=0.3)
