@@ -1,0 +1,74 @@
+"""The elastica, and a strip bent to it across many cells."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import grid_of
+
+import tawami
+from cases import elastica
+
+
+@pytest.mark.parametrize(
+    ("load", "x", "y"),
+    [(1.0, -0.0564, -0.3017), (10.0, -0.5550, -0.8106), (0.01, -6.7e-6, -0.01 / 3)],
+)
+def test_the_tip_is_where_the_tables_have_it(load, x, y):
+    """The third is linear: y = -load/3, x = -load^2/15."""
+    assert elastica.tip(load) == pytest.approx([x, y], abs=5e-5)
+    end = elastica.curve(load, np.array([1.0]))[:, 0]
+    assert end[:2] == pytest.approx(elastica.tip(load) + np.array([1, 0]), abs=1e-8)
+    assert end[2] == pytest.approx(elastica.tip_angle(load), abs=1e-8)
+    assert end[3] == pytest.approx(0.0, abs=1e-8)
+
+
+@pytest.fixture(scope="module")
+def far():
+    return elastica.solve(10.0)
+
+
+def test_a_strip_bent_far_is_within_two_percent_at_four_cells(far):
+    assert far.accepted == 20
+    assert far.iterations < 5
+    assert far.crossed > 100
+    assert far.error < 2.0
+    assert elastica.solve(1.0).error < 0.8
+
+
+def test_near_incompressible_the_mean_stress_tells_who_locks():
+    mixed, displacement = (
+        elastica.solve(1.0, form, 0.499, steps=10) for form in ("u_epsv_finite", "u_finite")
+    )
+    assert mixed.error < 0.8
+    assert mixed.stress_error < 3.0
+    assert displacement.stress_error > 5 * mixed.stress_error
+
+
+def test_the_error_grows_with_the_number_of_grids(far):
+    assert elastica.solve(10.0, steps=60).error > 1.2 * far.error
+
+
+def test_without_drag_a_static_beam_stops_where_particles_enter_empty_cells():
+    run = elastica.solve(10.0, n=2, drag=0.0)
+    assert "of the load, with the smallest step" in run.stopped
+
+
+def test_the_drag_is_a_term_of_its_own():
+    """Nothing at rest, or with drag = 0; known in a simple shear."""
+    grid = grid_of((2, 2))
+    body = tawami.box(grid, grid.origin, grid.upper)
+    law = tawami.linear_elastic(E=1.0, nu=0.3)
+    shipped = tawami.Scene(grid, body, law, form="u_finite")
+    dragged = [
+        tawami.Scene(grid, body, law, form=elastica.with_drag("u_finite"), drag=drag)
+        for drag in (0.0, 3.0)
+    ]
+    greville = np.array([0.0, 0.25, 0.75, 1.0])
+    y = np.repeat(greville, 4)
+    c = np.column_stack([0.1 * y, 0 * y]).ravel()
+    own = shipped.residual(c)
+    assert dragged[0].residual(c) == pytest.approx(own, abs=1e-14)
+    assert dragged[1].residual(0 * c) == pytest.approx(0 * c, abs=1e-14)
+    # tested with its own motion: 2 drag e : e over the area of 1 m2, as sym(grad u) : grad w has half
+    assert (dragged[1].residual(c) - own) @ c == pytest.approx(3.0 * 0.1**2 / 2)

@@ -1,0 +1,60 @@
+"""The footing on clay, small: a plateau from above for the mixed form, locking without it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cases import footing
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return {form: footing.solve(form, n=2) for form in ("u_epsv", "u_bbar", "u")}
+
+
+def test_the_mixed_form_comes_to_a_plateau_above_prandtl(runs):
+    for form in ("u_epsv", "u_bbar"):
+        assert runs[form].growth < 0.1
+        assert (
+            25 < runs[form].error < 40
+        )  # a footing wider by part of a cell, of which there are two
+    finer = footing.solve(n=4)
+    assert finer.stopped == ""
+    assert finer.growth < 0.1
+    # linear in the size of the cells: twice as fine, half the error
+    assert finer.error == pytest.approx(runs["u_epsv"].error / 2, rel=0.1)
+
+
+def test_displacement_alone_locks(runs):
+    assert runs["u"].growth > 1.0
+    assert runs["u"].error > 3 * runs["u_epsv"].error
+    bilinear = footing.solve("u", n=2, basis="bilinear")
+    assert bilinear.error > 1000
+    assert bilinear.growth > 25
+
+
+def test_tresca_and_another_compressibility_have_the_plateau_of_von_mises(runs):
+    tresca = footing.solve(n=2, law="tresca")
+    incompressible = footing.solve(n=2, nu=0.4999)
+    assert tresca.last == pytest.approx(runs["u_epsv"].last, rel=0.02)
+    assert incompressible.last == pytest.approx(runs["u_epsv"].last, rel=1e-3)
+    assert np.diff(tresca.q).min() > -1e-3
+
+
+def test_as_many_points_as_functions_are_the_part_of_the_edge(runs):
+    points = footing.solve(n=2, footing="greville")
+    assert points.q == pytest.approx(runs["u_epsv"].q, rel=1e-6)
+    assert points.uneven < 1e-10
+    centres = footing.solve(n=2, footing="centres", step=0.1)
+    assert centres.uneven > 0.5
+    assert centres.last < footing.PRANDTL
+
+
+def test_elastic_at_first():
+    """Half the settlement of a step, half the force: nothing has yielded yet."""
+    run = footing.build(
+        footing.Run("u_epsv", "von_mises", "quadratic_spline", "edge", 2, 0.499, 0.1, 2)
+    )
+    forces = [run.solve(part).reaction("top")[1] for part in (0.005, 0.01)]
+    assert forces[1] == pytest.approx(2 * forces[0], rel=1e-6)
