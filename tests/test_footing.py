@@ -56,5 +56,5 @@ def test_elastic_at_first():
     run = footing.build(
         footing.Run("u_epsv", "von_mises", "quadratic_spline", "edge", 2, 0.499, 0.1, 2)
     )
-    forces = [run.solve(part).reaction("top")[1] for part in (0.005, 0.01)]
+    forces = [run.solve_part(part).reaction("top")[1] for part in (0.005, 0.01)]
     assert forces[1] == pytest.approx(2 * forces[0], rel=1e-6)
