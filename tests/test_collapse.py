@@ -62,3 +62,12 @@ def test_roughness_tells_a_chequerboard_from_a_plane():
     assert collapse.roughness(x, 3.0 + x @ [1.0, -2.0], 1.0) < 1e-12
     board = (-1.0) ** (2 * x).sum(axis=1)
     assert collapse.roughness(x, board, 1.0) > 0.5
+
+
+def test_a_higher_pile_runs_out_farther():
+    """Coarsely: nearly in proportion to its height over its length while that is small."""
+    piles = [collapse.runout(a, 8, end=3.0) for a in (0.5, 1.0)]
+    slope = np.log(piles[1].spread / piles[0].spread) / np.log(2)
+    assert 0.8 < slope < 1.8
+    low, high = collapse.exponents([collapse.Runout(a, 2 * a**0.9) for a in (0.5, 1.5, 4.0)])
+    assert (low, high) == pytest.approx((0.9, 0.9))
