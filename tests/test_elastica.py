@@ -49,9 +49,12 @@ def test_the_error_grows_with_the_number_of_grids(far):
     assert elastica.solve(10.0, steps=60).error > 1.2 * far.error
 
 
-def test_without_drag_a_static_beam_stops_where_particles_enter_empty_cells():
+def test_without_a_cure_a_static_beam_stops_where_particles_enter_empty_cells():
     run = elastica.solve(10.0, n=2, drag=0.0)
     assert "of the load, with the smallest step" in run.stopped
+    cured = elastica.solve(10.0, n=2, drag=0.0, ghost=1e-2)
+    assert cured.stopped == ""
+    assert cured.error < elastica.solve(10.0, n=2).error < 4.0
 
 
 def test_the_drag_is_a_term_of_its_own():
