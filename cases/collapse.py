@@ -45,8 +45,9 @@ FORMS = {
     "u_finite": "displacement only",
 }
 COLOURS = {"u_epsv_finite": "tab:red", "u_bbar_finite": "tab:blue", "u_finite": "tab:gray"}
-#: Height over length of the piles whose run-outs are compared.
-ASPECTS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0)
+#: Height over length of the piles whose run-outs are compared, and cells along their length: about as
+#: many particles in each.
+ASPECTS = {0.5: 28, 1.0: 20, 1.5: 16, 2.0: 14, 3.0: 12, 4.0: 10}
 
 
 @dataclass
@@ -212,10 +213,10 @@ def film(runs: Sequence[Run], path: Path) -> None:
 
 
 def surface(x: Array, h: float) -> tuple[Array, Array]:
-    """Profile of the pile: the highest particle in strips of h/2 [m]."""
-    strip = np.floor(x[:, 0] / (h / 2)).astype(int)
+    """Profile of the pile: the highest particle in strips of h [m]."""
+    strip = np.floor(x[:, 0] / h).astype(int)
     used = np.unique(strip)
-    return (used + 0.5) * h / 2, np.array([x[strip == s, 1].max() for s in used])
+    return (used + 0.5) * h, np.array([x[strip == s, 1].max() for s in used])
 
 
 def profiles(runs: Sequence[Run], path: Path, h: float) -> None:
@@ -272,7 +273,7 @@ class Runout:
     spread: float
 
 
-def runout(aspect: float, *, cells: int = 10, end: float = 4.0) -> Runout:
+def runout(aspect: float, cells: int, *, end: float = 4.0) -> Runout:
     """The collapse of a pile of 0.1 m times `aspect`, to `end` sqrt(height/g)."""
     length = 0.1
     h, height = length / cells, aspect * length
@@ -311,8 +312,8 @@ def runouts(piles: Sequence[Runout], path: Path) -> None:
 def compare_aspects(folder: Path) -> None:
     """Run-outs of piles from low to high."""
     piles = []
-    for aspect in ASPECTS:
-        piles.append(runout(aspect))
+    for aspect, cells in ASPECTS.items():
+        piles.append(runout(aspect, cells))
         print(f"a = {aspect:4.2f}: run-out {piles[-1].spread:.3f} of the length", flush=True)
     low, high = exponents(piles)
     print(f"exponents: {low:.2f} up to a = 1.5, {high:.2f} from there on")

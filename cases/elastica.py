@@ -22,13 +22,8 @@ What keeps the beam from being an elastica, as shares of the tip's deflection:
 
 The load grows in steps; after each the particles have moved and the grid is reset. Without inertia
 that is singular as soon as the beam leaves the lines of the grid: the first particle in a cell brings
-functions that no other particle holds. Two cures are compared. The ghost penalty of the mixed form;
-and, with any form, a term more than the shipped one,
-
-    + int over the cells with particles of  drag sym(grad u) : grad w,    drag = 1e-2 mu,
-
-which resists the increments u of a step, and is forgotten with the grid. Each reset costs some
-accuracy: more steps are not better.
+functions that no other particle holds. The ghost penalty of the shipped forms, k = 0.01, ties these to
+the others. Each reset costs some accuracy: more steps are not better.
 
 python -m cases.elastica [--results results/elastica]
 """
@@ -37,8 +32,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import functools
-import inspect
 import logging
 import sys
 from collections.abc import Sequence
@@ -55,12 +48,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import ellipeinc, ellipkinc
 from tqdm import tqdm
-from ufl import grad, inner, sym
 
 import tawami
 from cases import figure, table
 from tawami.environment import header
-from tawami.formulation import Form
 from tawami.output import result_folder
 
 Array = npt.NDArray[np.float64]
@@ -73,8 +64,7 @@ FORMS = {
     "u_bbar_finite": "B-bar",
 }
 COLOURS = {"u_epsv_finite": "tab:red", "u_finite": "tab:gray", "u_bbar_finite": "tab:blue"}
-#: What differs from u_epsv_finite, nu = 0.3, 4 cells, 2 x 2 particles, 20 steps, drag = 1e-2 mu,
-#: alpha = 0.01, no ghost penalty.
+#: What differs from u_epsv_finite, nu = 0.3, 4 cells, 2 x 2 particles, 20 steps, k = 1e-2.
 STUDY: dict[str, list[dict[str, Any]]] = {
     "cells": [
         {"form": form, "nu": nu, "n": n}
@@ -83,16 +73,11 @@ STUDY: dict[str, list[dict[str, Any]]] = {
         for n in (2, 4, 8)
     ],
     "bbar": [{"form": "u_bbar_finite", "n": n} for n in (2, 4, 8)],
-    "steps": [
-        {"steps": steps, "drag": drag} for drag in (1e-3, 1e-2, 1e-1) for steps in (10, 40, 80, 160)
-    ],
-    "drag": [{"drag": drag} for drag in (0.0, 1e-4, 1e-3, 1e-1)],
+    "steps": [{"steps": steps, "k": k} for k in (1e-3, 1e-2, 1e-1) for steps in (10, 40, 80, 160)],
+    "k": [{"k": k} for k in (0.0, 1e-4, 1e-3, 1e-1)],
     "particles": [{"per_axis": 3}, {"per_axis": 4}],
     "slender": [{"slender": 40}],
     "alpha": [{"alpha": 0.1}],
-    "ghost": [{"drag": 0.0, "ghost": k} for k in (1e-3, 1e-2, 1e-1)]
-    + [{"drag": 0.0, "ghost": 1e-2, "steps": steps} for steps in (10, 40, 80, 160)]
-    + [{"drag": 0.0, "ghost": 1e-2, "n": n} for n in (2, 8)],
 }
 
 
@@ -152,8 +137,7 @@ class Run:
         form, nu, n, per_axis, alpha, slender: Weak form, Poisson's ratio, cells over the depth,
             particles per cell and axis, stabilisation, length over depth.
         steps: Asked for, in equal shares of the load.
-        drag: Over mu.
-        ghost: k of the ghost penalty, with the mixed form; 0 is off.
+        k: Factor of the ghost penalty; 0 is without.
         accepted: Steps it took.
         iterations: Newton's, mean over the steps.
         x, y: Displacement of the tip over L.
@@ -172,8 +156,7 @@ class Run:
     n: int
     per_axis: int
     steps: int
-    drag: float
-    ghost: float
+    k: float
     alpha: float
     slender: int
     accepted: int = 0
@@ -191,35 +174,9 @@ class Run:
 
 
 COLUMNS = (
-    "load", "form", "nu", "n", "per_axis", "steps", "drag", "ghost", "alpha", "slender", "accepted",
+    "load", "form", "nu", "n", "per_axis", "steps", "k", "alpha", "slender", "accepted",
     "iterations", "x", "y", "error", "expected", "stress_error", "crossed", "seconds",
 )  # fmt: skip
-
-
-@functools.cache
-def with_drag(name: str) -> Form:
-    """A shipped form and the term that resists the increments; its parameter is drag [Pa]."""
-    shipped = Form.load(name)
-    wanted = inspect.signature(shipped.residual).parameters
-
-    def residual(**names: Any) -> Any:
-        u, w, drag, dx = (names[name] for name in ("u", "w", "drag", "dx"))
-        own = shipped.residual(**{name: names[name] for name in wanted})
-        return own + drag * inner(sym(grad(u)), grad(w)) * dx
-
-    # the arguments of a residual are picked by their names
-    residual.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-        [
-            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY)
-            for name in dict.fromkeys((*wanted, "u", "w", "drag", "dx"))
-        ]
-    )
-    return dataclasses.replace(
-        shipped,
-        residual=residual,
-        parameters={**shipped.parameters, "drag": {"default": 0.0, "minimum": 0.0}},
-        name=f"{name} with drag",
-    )
 
 
 def build(run: Run) -> tuple[tawami.Scene, npt.NDArray[np.bool_], float]:
@@ -233,12 +190,10 @@ def build(run: Run) -> tuple[tawami.Scene, npt.NDArray[np.bool_], float]:
     )  # fmt: skip
     body = tawami.box(grid, (0.0, -D / 2), (length, D / 2), per_axis=run.per_axis)
     material = tawami.linear_elastic(E=E, nu=run.nu)
-    parameters: dict[str, Any] = {"drag": run.drag * material.shear_modulus}
+    options: dict[str, Any] = {"ghost_penalty": "on", "k": run.k} if run.k else {}
     if run.form == "u_epsv_finite":
-        parameters["alpha"] = run.alpha
-    if run.ghost:
-        parameters |= {"ghost_penalty": "on", "k": run.ghost}
-    scene = tawami.Scene(grid, body, material, form=with_drag(run.form), **parameters)
+        options["alpha"] = run.alpha
+    scene = tawami.Scene(grid, body, material, form=run.form, **options)
     scene.fix("left", "x")
     scene.fix("left", "y")
     loaded = body.x[:, 0] > length - h
@@ -255,14 +210,13 @@ def solve(
     n: int = 4,
     per_axis: int = 2,
     steps: int = 20,
-    drag: float = 1e-2,
-    ghost: float = 0.0,
+    k: float = 1e-2,
     alpha: float = 0.01,
     slender: int = SLENDER,
 ) -> Run:
     """Bring the load up, compare the tip and the mean stress with the elastica's."""
     begin = perf_counter()
-    run = Run(load, form, nu, n, per_axis, steps, drag, ghost, alpha, slender)
+    run = Run(load, form, nu, n, per_axis, steps, k, alpha, slender)
     scene, loaded, L = build(run)
     start = np.array(scene.particles.x)
     try:
@@ -365,25 +319,21 @@ def _over_cells(panels: Sequence[plt.Axes], runs: Sequence[Run]) -> None:
     panels[1].set_ylabel("rms error of the mean stress [%]")
     for axes in panels:
         axes.set_xlabel("cells over the depth [-]")
-        axes.set_xticks(n, [str(k) for k in n])
+        axes.set_xticks(n, [str(cells) for cells in n])
 
 
 def _over_steps(axes: plt.Axes, runs: Sequence[Run]) -> None:
-    """Error of the tip, a line a drag and one with the ghost penalty."""
-    cures = {
-        (1e-3, 0.0): ("tab:orange", "drag = 0.001 $\\mu$"),
-        (1e-2, 0.0): ("tab:red", "drag = 0.01 $\\mu$"),
-        (1e-1, 0.0): ("tab:purple", "drag = 0.1 $\\mu$"),
-        (0.0, 1e-2): ("tab:green", "ghost penalty, $k$ = 0.01"),
-    }
-    for cure, (colour, label) in cures.items():
-        chosen = [run for run in runs if (run.drag, run.ghost) == cure]
-        chosen.sort(key=lambda run: run.steps)
+    """Error of the tip, a line a factor of the ghost penalty."""
+    for k, colour in ((1e-3, "tab:orange"), (1e-2, "tab:red"), (1e-1, "tab:purple")):
+        chosen = sorted((run for run in runs if run.k == k), key=lambda run: run.steps)
         accepted = [run.accepted for run in chosen]
-        axes.loglog(accepted, [run.error for run in chosen], color=colour, marker="o", label=label)
+        axes.loglog(
+            accepted, [run.error for run in chosen], color=colour, marker="o",
+            label=f"ghost penalty, $k$ = {k:g}",
+        )  # fmt: skip
     axes.set_xlabel("steps, the grid reset after each [-] (mixed, $\\nu$ = 0.3, 4 cells)")
     axes.set_ylabel("distance of the tips / $L$ [%]")
-    axes.set_xticks(accepted, [str(k) for k in accepted])
+    axes.set_xticks(accepted, [str(count) for count in accepted])
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -410,8 +360,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     (folder / "table.csv").write_text(table.as_csv(rows, COLUMNS))
     cells = [run for run in (*runs["cells"], *runs["bbar"]) if not run.stopped]
     standard = [run for run in cells if (run.form, run.nu, run.n) == ("u_epsv_finite", 0.3, 4)]
-    steps = [*runs["steps"], *runs["drag"], *runs["ghost"], *standard]
-    steps = [run for run in steps if not run.stopped and run.n == 4]
+    steps = [run for run in (*runs["steps"], *runs["k"], *standard) if not run.stopped]
     bent = [run for run in cells if run.n == 4 and (run.nu == 0.499 or run.form == "u_bbar_finite")]
     shapes(bent, folder / "shapes.png")
     errors(cells, steps, folder / "errors.png")

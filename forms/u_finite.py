@@ -1,12 +1,20 @@
-"""Displacement only at finite strain, updated Lagrangian. It locks near nu = 0.5."""
+"""Displacement only at finite strain, updated Lagrangian. It locks near nu = 0.5.
 
-from ufl import dot, grad
+`ghost_penalty` as in `u_epsv`.
+"""
+
+from ufl import dot, grad, inner
 
 fields = {"u": ("displacement", "w")}
 kinematics = "displacement"
 strain = "finite"
+parameters = {"k": {"default": 0.01, "minimum": 0.0}}
+options = {"ghost_penalty": ("off", "on")}
 
 
-def residual(w, P, t, sum_p, ds):
+def residual(u, w, P, mu, t, h, sum_p, ds, dG, facet_mean, jump_nn, k, ghost_penalty):
     """R_u(w) = sum_p V0_p (tau_p f^-T) : grad w - int t . w ds, P = tau f^-T."""
-    return sum_p(P, grad(w)) - dot(t, w) * ds
+    R_u = sum_p(P, grad(w)) - dot(t, w) * ds
+    if ghost_penalty == "on":
+        R_u += k * facet_mean(mu) * h**3 * inner(jump_nn(u), jump_nn(w)) * dG
+    return R_u

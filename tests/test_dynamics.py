@@ -384,7 +384,7 @@ def test_wrong_input_gets_a_sentence(random_scene):
     for options, words in (
         ({"transfer": "mpm"}, "transfer = 'mpm': expected one of affine_flip, flip"),
         ({"damping": 0.0}, "damping = 0.0: expected a time in s"),
-        ({"gamma": 0.2}, "gamma = 0.2: expected a finite number from 0.5 to 1"),
+        ({"gamma": 0.2}, "gamma = 0.2: expected a finite number of at least 0.5 and at most 1"),
         ({"velocity": np.zeros((3, 2))}, r"velocity has shape \(3, 2\): expected two numbers"),
     ):
         with pytest.raises(tawami.InputError, match=words):

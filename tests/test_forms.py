@@ -294,7 +294,7 @@ def test_a_file_with_a_mistake_is_named(tmp_path):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"alpha": -0.1}, "alpha = -0.1: expected a finite number from 0"),
+        ({"alpha": -0.1}, "alpha = -0.1: expected a finite number of at least 0"),
         ({"alpha": float("nan")}, "alpha = nan"),
         ({"alpha": "much"}, "alpha = 'much': expected a number"),
         ({"stabilisation": "pspg"}, "stabilisation = 'pspg': expected one of 'laplacian'"),

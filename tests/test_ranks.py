@@ -21,7 +21,7 @@ def start(number: int, *arguments: str, **variables: str) -> subprocess.Complete
     command, environment = mpirun(number, [sys.executable, *arguments])
     environment |= {"PYTHONPATH": f"{ROOT}:{ROOT / 'tests'}", "OMP_NUM_THREADS": "1"} | variables
     return subprocess.run(
-        command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False, timeout=60
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False, timeout=200
     )
 
 

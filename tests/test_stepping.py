@@ -180,7 +180,7 @@ def test_a_point_of_the_border_is_held_on_its_way_and_found_by_its_names():
 
 def test_wrong_input_gets_a_sentence():
     scene = block()
-    with pytest.raises(tawami.InputError, match="size = 2.0: expected a finite number from"):
+    with pytest.raises(tawami.InputError, match="size = 2.0: expected a finite number above 0"):
         tawami.ramp(scene, 2.0)
     scene.fix("right", "x", velocity=1.0)
     with pytest.raises(tawami.InputError, match=r"fix\(edge='right'\) has a velocity, and solve"):

@@ -128,7 +128,9 @@ def test_wrong_walls_get_a_sentence():
     scene = block(friction=0.1)
     with pytest.raises(tawami.InputError, match="there is one already"):
         scene.wall("bottom")
-    with pytest.raises(tawami.InputError, match="friction = -1: expected a finite number from 0"):
+    with pytest.raises(
+        tawami.InputError, match="friction = -1: expected a finite number of at least 0"
+    ):
         scene.wall("top", -1)
     with pytest.raises(tawami.InputError, match="edge 'floor': expected 'left'"):
         scene.wall("floor")

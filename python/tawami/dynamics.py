@@ -9,7 +9,6 @@ move and v and a stay on the grid.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 
@@ -141,7 +140,7 @@ class Dynamics:
             ConvergenceError, SingularError: As `Scene.solve`.
             InputError: dt, or what is not finite, or a particle that would leave the grid.
         """
-        dt = inputs.number("dt", dt, low=sys.float_info.min)
+        dt = inputs.number("dt", dt, low=inputs.LEAST)
         scene, attached = self.scene, self.scene.attached
         with ranks.together(scene.grid.comm):
             scene.particles.check()
@@ -297,7 +296,7 @@ class Dynamics:
                 is in the particles.
             InputError: dt <= 0, or a step longer than the time that is left.
         """
-        dt = inputs.number("dt", dt, low=sys.float_info.min)
+        dt = inputs.number("dt", dt, low=inputs.LEAST)
         left = inputs.number("end", end) - self.time
         if dt > left * (1 + 1e-9):
             raise InputError(

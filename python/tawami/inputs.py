@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from numbers import Integral, Real
 from typing import Any
@@ -13,6 +14,8 @@ import numpy.typing as npt
 from tawami.errors import InputError
 
 Array = npt.NDArray[np.float64]
+#: The least number above 0.
+LEAST = sys.float_info.min
 
 
 def number(name: str, value: Any, *, low: float = -math.inf, high: float = math.inf) -> float:
@@ -24,7 +27,10 @@ def number(name: str, value: Any, *, low: float = -math.inf, high: float = math.
     if not isinstance(value, Real):
         raise InputError(f"{name} = {value!r}: expected a number")
     if not (math.isfinite(value) and low <= float(value) <= high):
-        within = "" if math.isinf(low) and math.isinf(high) else f" from {low:g} to {high:g}"
+        least = "above 0" if low == LEAST else f"of at least {low:g}"
+        within = f" {least}" if math.isinf(high) else f" {least} and at most {high:g}"
+        if math.isinf(low):
+            within = "" if math.isinf(high) else f" of at most {high:g}"
         raise InputError(f"{name} = {value!r}: expected a finite number{within}")
     return float(value)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -15,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from tawami import _rust, inputs, ranks
+from tawami import _rust, inputs, placement, ranks
 from tawami.attached import Attached
 from tawami.basis import BASES, Basis
 from tawami.body import Body
@@ -38,9 +37,6 @@ Array = npt.NDArray[np.float64]
 FIELDS: dict[str, type[Field]] = {"fast": FastField, "reference": Field}
 #: Times that a step is solved with other states of the walls before it is given up.
 PASSES = 40
-#: Distance, in cells, to which moving particles approach a side of their cell: one that is alone leaves
-#: functions beyond it without strength and mass. It is as well as on the side, to this distance.
-MARGIN = 1e-5
 
 
 @dataclass(frozen=True)
@@ -171,7 +167,8 @@ class Scene:
                 f"form {self.form.name} has finite strains: expected a law in Rust, a NumpyLaw has "
                 "small ones only"
             )
-        location = self._distribute(whole, self._locate(whole.x))
+        self.num_particles = len(whole)
+        self.particles, location = placement.distributed(grid, whole, moving=self._finite)
         self._compiled = compile_form(grid.comm, self.form, options)
         if self.form.kinematics == "mixed":
             self.particles.add_eps_v()
@@ -199,23 +196,6 @@ class Scene:
             tolerance=tolerance, max_iterations=max_iterations,
         )  # fmt: skip
         return Attached(location, field, stage, newton)
-
-    def _distribute(self, body: _rust.Particles, location: _rust.Location) -> _rust.Location:
-        """Keep the particles in this rank's cells."""
-        self.num_particles, self.particles = len(body), body
-        if self.grid.comm.size == 1:
-            return location
-        parts = (body.x, body.volume, body.material)
-        digest = hashlib.sha1(b"".join(part.tobytes() for part in parts)).digest()
-        if len(set(self.grid.comm.allgather(digest))) > 1:
-            raise InputError(
-                "the body is not the same on all ranks: expected the same positions, volumes and "
-                "materials on each. Give random numbers a seed, or make it on one rank and bcast it"
-            )
-        here = self.grid.rank_of_cell[location.cell] == self.grid.comm.rank
-        mine = np.flatnonzero(here).astype(np.uint32)
-        self.particles = body.select(mine)
-        return location.select(mine)
 
     @property
     def constants(self) -> dict[str, Array]:
@@ -508,7 +488,11 @@ class Scene:
         try:
             step, settled = self._settled(problem)
             u = self.split(step.coefficients)[0].reshape(-1, 2)
-            moved = self._moved(u, time) if self._finite else None
+            moved = None
+            if self._finite:
+                moved = np.asarray(self.particles.x + self.attached.at_particles(u))
+                stop = self._leaving == "stop"
+                placement.check_staying(self.grid, self.particles, moved, time, stop=stop)
             n = u.size
             forces = step.forces[:n]
             inertia = settled.inertia
@@ -531,7 +515,10 @@ class Scene:
             self.supports.all[number].way = way
         self.particles.move_to(moved)
         solution = Solution(self, step, settled.reduction, step.coefficients)
-        self._relocate(time)
+        self.particles, gone = placement.removed(self.grid, self.particles)
+        self.left += [(number, x, time) for number, x in gone]
+        self.particles, location = placement.migrated(self.grid, self.particles)
+        self.attached = self._attach(location)
         return solution
 
     def _settled(self, problem: Callable[[], Problem]) -> tuple[Converged, Problem]:
@@ -560,66 +547,6 @@ class Scene:
             "in the particles. Take a smaller step",
             step.history,
         )
-
-    def _moved(self, u: Array, time: float) -> Array:
-        """Positions at the end of the step."""
-        moved = np.asarray(self.particles.x + self.attached.at_particles(u))
-        outside = self._outside(moved)
-        with ranks.together(self.grid.comm):
-            if outside.any() and self._leaving == "stop":
-                p = np.flatnonzero(outside)[0]
-                when = "" if np.isnan(time) else f" at {time:g} s"
-                raise InputError(
-                    f"particle {self.particles.number[p]} would leave the grid{when}, at "
-                    f"({moved[p, 0]:g}, {moved[p, 1]:g}) m, and {outside.sum() - 1} others with it: "
-                    "expected a grid that holds the motion, or Scene(..., leaving='remove'). Nothing "
-                    "was changed"
-                )
-        staying = ranks.sum_of(self.grid.comm, np.array([np.sum(~outside)]))
-        if not staying[0]:
-            raise InputError("the last particle would leave the grid: nothing is left to compute")
-        return moved
-
-    def _outside(self, x: Array) -> npt.NDArray[np.bool_]:
-        margin = 1e-9 * self.grid.h  # as Rust takes it
-        inside = (x >= np.subtract(self.grid.origin, margin)) & (
-            x <= np.add(self.grid.upper, margin)
-        )
-        return np.asarray(~inside.all(axis=1))
-
-    def _relocate(self, time: float) -> None:
-        """Remove the particles that left, send those to their rank that belong to another, and attach
-        the others where they are.
-        """
-        outside = self._outside(self.particles.x)
-        gone = [
-            (int(self.particles.number[p]), (float(self.particles.x[p, 0]),
-                                             float(self.particles.x[p, 1])), time)
-            for p in np.flatnonzero(outside)
-        ]  # fmt: skip
-        self.left += [particle for part in self.grid.comm.allgather(gone) for particle in part]
-        if outside.any():
-            self.particles = self.particles.select(np.flatnonzero(~outside).astype(np.uint32))
-        self.attached = self._attach(self._migrated())
-
-    def _locate(self, x: Array) -> _rust.Location:
-        """Cells of particles; those that move are kept off the sides of their cells."""
-        location = self.grid.rust.locate(x)
-        return location.away_from_sides(MARGIN) if self._finite else location
-
-    def _migrated(self) -> _rust.Location:
-        """Each particle to the rank of its cell."""
-        comm = self.grid.comm
-        while True:
-            location = self._locate(self.particles.x)
-            if comm.size == 1:
-                return location
-            rank = self.grid.rank_of_cell[location.cell]
-            if not ranks.any_of(comm, np.array([(rank != comm.rank).any()]))[0]:
-                return location
-            rows = ranks.exchanged(comm, self.particles.rows(), rank)
-            particles = self.particles.of_rows(rows)
-            self.particles = particles.select(np.argsort(particles.number).astype(np.uint32))
 
 
 def _densities(density: float | Sequence[float], materials: int) -> Array:

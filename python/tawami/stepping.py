@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -106,7 +105,7 @@ def ramp(
             last equilibrium that was found.
         InputError: A size out of its range, or as `Scene.solve`.
     """
-    size = inputs.number("size", size, low=sys.float_info.min, high=1.0)
+    size = inputs.number("size", size, low=inputs.LEAST, high=1.0)
     least = size / 1024 if smallest is None else inputs.number("smallest", smallest, low=0.0)
 
     reached = 0.0
