@@ -16,13 +16,14 @@ What keeps the beam from being an elastica, as shares of the tip's deflection:
 
     shear           (D/L)^2 / (2 (1 - nu) kappa), kappa = 5/(6 - nu)          0.2 %
     extension       up to P/(Ebar D L) = (D/L)^2/12 times 1 or 10               0.02 %, 0.2 %
-    fibres          up to 11 % of strain at the root where P L^2/(Ebar I) = 10; of second order
+    fibres          up to 11 % of strain at the root where P L^2/(Ebar I) = 10; of second order in
+                    the deflection, of first in the mean stress
     particles       N of them over the depth have the second moment I (1 - 1/N^2): 1.6 % where N = 8
 
 The load grows in steps; after each the particles have moved and the grid is reset. Without inertia
 that is singular as soon as the beam leaves the lines of the grid: the first particle in a cell brings
 functions that no other particle holds. The ghost penalty of the shipped forms, k = 0.01, ties these to
-the others.
+the others. Each reset costs some accuracy: more steps are not better.
 
 python -m cases.elastica [--results results/elastica]
 """

@@ -253,7 +253,7 @@ def curves(runs: dict[str, list[Run]], path: Path) -> None:
         axes.set_xlabel("settlement $w \\mu / (s_u b)$ [-]")
         axes.set_ylabel("$Q / (s_u B)$ [-]")
         axes.grid(alpha=0.3)
-        axes.legend(fontsize=7, loc="lower right")
+        axes.legend(fontsize=7, loc="lower right", ncols=2)
     figure.save(figure_, path)
 
 
