@@ -36,7 +36,6 @@ from mpi4py import MPI
 from tqdm import tqdm
 
 import tawami
-from cases.energy import elastic
 from cases.figure import save
 from tawami.environment import header
 from tawami.output import result_folder
@@ -172,14 +171,14 @@ def solve(
     scene, begin, dt = motion.scene, perf_counter(), TURN / steps
     radii = np.linalg.norm(np.array(scene.particles.x), axis=1)
     run = Run(kind, radii, steps)
-    record(run, motion, dt, nu)
+    record(run, motion, dt)
     run.x.append(np.array(scene.particles.x))
     with tqdm(total=turns, desc=kind.name, unit="turn", disable=not sys.stderr.isatty()) as bar:
         for _ in range(turns):
             total = np.zeros(len(radii))
             for _ in range(steps):
                 motion.step(dt)
-                record(run, motion, dt, nu)
+                record(run, motion, dt)
                 total += scene.particles.stress[:, :3].mean(axis=1)
             run.steady.append(total / steps)
             run.x.append(np.array(scene.particles.x))
@@ -188,20 +187,19 @@ def solve(
     return run
 
 
-def record(run: Run, motion: tawami.Dynamics, dt: float, nu: float) -> None:
+def record(run: Run, motion: tawami.Dynamics, dt: float) -> None:
     """What is recorded of every step."""
     scene, v, a = motion.scene, motion.velocity, motion.acceleration
     x = np.array(scene.particles.x)
     spin = OMEGA * motion.mass @ run.radii**2
     moment = motion.mass @ (v[:, 0] * a[:, 1] - v[:, 1] * a[:, 0])
-    moduli = E / (3 * (1 - 2 * nu)), E / (2 * (1 + nu))
     speed = motion.mass @ np.linalg.norm(v, axis=1)
     outer = np.isclose(run.radii, run.radii.max())
     r = np.linalg.norm(x[outer] - motion.mass @ x / motion.mass.sum(), axis=1)
     run.turns.append(motion.time / TURN)
     run.angular.append(motion.angular_momentum() / spin)
     run.kept.append((motion.angular_momentum() + dt**2 / 4 * moment) / spin)
-    run.energy.append((motion.kinetic_energy + elastic(scene, *moduli)) / (0.5 * OMEGA * spin))
+    run.energy.append((motion.kinetic_energy + motion.elastic_energy) / (0.5 * OMEGA * spin))
     run.linear.append(float(np.abs(motion.linear_momentum).max() / speed))
     run.roundness.append(float((r.max() - r.min()) / R))
 

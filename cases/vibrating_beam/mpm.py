@@ -19,8 +19,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 import tawami
-from cases.energy import elastic
-from cases.vibrating_beam.beam import AMPLITUDE, RHO, D, E, L, first_bending, lame, mode
+from cases.vibrating_beam.beam import AMPLITUDE, RHO, D, E, L, first_bending, mode
 from tawami.transfer import TransferName
 
 Array = npt.NDArray[np.float64]
@@ -121,7 +120,7 @@ def solve(
     begin = perf_counter()
     motion = build(nu, form, transfer, n=n, per_axis=per_axis, alpha=alpha)
     scene, run = motion.scene, Run(nu, form, transfer, n, per_axis, steps, alpha)
-    moduli, dt = lame(nu), 2 * np.pi / first_bending(nu) / steps
+    dt = 2 * np.pi / first_bending(nu) / steps
     start, cell = np.array(scene.particles.x), cells_of(scene)
     crossed = np.zeros(len(start), dtype=bool)
     weight = motion.mass * mode(nu, start[:, 0])[0]
@@ -132,7 +131,7 @@ def solve(
         run.time.append(motion.time)
         run.deflection.append(float(weight @ (np.array(scene.particles.x) - start)[:, 1]))
         run.kinetic.append(motion.kinetic_energy)
-        run.elastic.append(elastic(scene, *moduli))
+        run.elastic.append(motion.elastic_energy)
         crossed |= (cells_of(scene) != cell).any(axis=1)
         before, now = run.deflection[-2:]
         if before * now < 0:
