@@ -25,7 +25,7 @@ from tawami.errors import TawamiError
 from tawami.petsc import clean_up, stay
 
 #: Seconds that each rank leaves to those before it to say what is wrong, and the longest wait.
-COURTESY, LONGEST = 0.3, 3.0
+COURTESY, LONGEST = 1.0, 4.0
 
 
 def sum_of(comm: Any, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
