@@ -21,6 +21,7 @@ from tawami import _dolfinx
 from tawami.density import DEGREE, Density, Rule
 from tawami.errors import FormError, MissingDependencyError
 from tawami.formulation import Form
+from tawami.numerics import TangentRule
 from tawami.symbols import PLACEHOLDERS, Symbols
 
 
@@ -31,12 +32,19 @@ class Slot:
     Attributes:
         source: 'fields' (the increments), 'traction', or the rule of particle densities.
         width: Entries per cell.
-        columns: Columns of the rule's particle data (densities only).
+        columns: Columns of the particle data (densities only).
     """
 
     source: Literal["fields", "traction"] | Rule
     width: int
     columns: tuple[int, ...] = ()
+
+    @property
+    def data(self) -> Rule:
+        """The rule whose particle data these are (densities only)."""
+        assert self.source != "fields"
+        assert self.source != "traction"
+        return "particle" if self.source == "reduced" else self.source
 
 
 @dataclass(frozen=True)
@@ -151,7 +159,21 @@ def _by_rule(form: Any) -> list[Any]:
     return [ufl.Form(rules[rule]) for rule in sorted(rules, reverse=True)]
 
 
-def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
+def _reduced(tangent: Any) -> Any:
+    """A tangent with the smaller rule in place of the full one."""
+    full, reduced = (DEGREE[rule] for rule in ("particle", "reduced"))
+    parts = []
+    for part in tangent.integrals():
+        metadata = part.metadata()
+        if metadata["quadrature_degree"] == full:
+            part = part.reconstruct(metadata={**metadata, "quadrature_degree": reduced})
+        parts.append(part)
+    return ufl.Form(parts)
+
+
+def _compile(
+    comm: Any, form: Form, options: Mapping[str, str], tangent_rule: TangentRule
+) -> CompiledForm:
     symbols = Symbols(form, options)
     residual = symbols.residual()
     cells, edges = _of_type(residual, "cell"), _of_type(residual, "exterior_facet")
@@ -182,6 +204,9 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
         raise FormError(f"form {form.name}: the traction t belongs into terms with ds, not with dx")
     with _refusals(form):
         tangent, couplings = symbols.tangent(cells), symbols.couplings(cells)
+    at_particles: Rule = "particle"
+    if tangent_rule == "reduced":
+        tangent, at_particles = _reduced(tangent), "reduced"
     ghost = None if sides is None else _ghost(form, symbols, sides)
     densities: dict[Rule, dict[Density, int]] = {rule: {} for rule in (*DEGREE, "mean")}
     width = dict.fromkeys(densities, 0)
@@ -189,7 +214,9 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
         densities[density.rule][density] = width[density.rule]
         width[density.rule] += density.size
 
-    def integral(ufl_form: Any, kind: _dolfinx.Kind = "cell") -> Integral:
+    def integral(
+        ufl_form: Any, kind: _dolfinx.Kind = "cell", at_particles: Rule = "particle"
+    ) -> Integral:
         used = set(ufl_form.coefficients())
         displacement, bilinear = _dolfinx.DISPLACEMENT_DOFS, _dolfinx.BILINEAR_DOFS
         kinds = {
@@ -202,14 +229,15 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
             size = sum(density.size for density in mine)
             if size == 0:
                 continue
-            together = ufl.Coefficient(symbols.space(rule, size), count=2 + len(kinds))
+            points = at_particles if rule == "particle" else rule
+            together = ufl.Coefficient(symbols.space(points, size), count=2 + len(kinds))
             columns: list[int] = []
             for density, symbol in mine.items():
                 first, start = len(columns), densities[rule][density]
                 exchange[symbol] = ufl.as_vector([together[first + k] for k in range(density.size)])
                 columns += range(start, start + density.size)
             kinds[together] = Slot(
-                rule, max(len(_dolfinx.rule_points(rule)), 1) * size, tuple(columns)
+                points, max(len(_dolfinx.rule_points(points)), 1) * size, tuple(columns)
             )
         ufl_form = ufl.replace(ufl_form, exchange)
         with _refusals(form):
@@ -227,28 +255,31 @@ def _compile(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
         element=symbols.element,
         residual=tuple(integral(part) for part in _by_rule(cells)),
         traction=integral(edges, "exterior_facet") if edges is not None else None,
-        tangent=tuple(integral(part) for part in _by_rule(tangent)),
+        tangent=tuple(integral(part, at_particles=at_particles) for part in _by_rule(tangent)),
         ghost=integral(ghost, "interior_facet") if ghost is not None else None,
         couplings=tuple((integral(left), integral(right)) for left, right in couplings),
         densities=densities,
     )
 
 
-_compiled: dict[tuple[Form, tuple[tuple[str, str], ...]], CompiledForm] = {}
+_compiled: dict[tuple[Form, TangentRule, tuple[tuple[str, str], ...]], CompiledForm] = {}
 
 
-def compile_form(comm: Any, form: Form, options: Mapping[str, str]) -> CompiledForm:
+def compile_form(
+    comm: Any, form: Form, options: Mapping[str, str], tangent_rule: TangentRule = "full"
+) -> CompiledForm:
     """Compile a form with its options; the result is kept for the process and on disk.
 
     Args:
         comm: Communicator; a collective call.
         form: The form.
         options: One value for each of the form's options.
+        tangent_rule: Points of the sums over particles in the tangent: 'full', or 'reduced'.
 
     Raises:
         FormError: An unknown name, a forgotten test function, or what UFL and FFCx refuse.
     """
-    key = (form, tuple(sorted(options.items())))
+    key = (form, tangent_rule, tuple(sorted(options.items())))
     if key not in _compiled:
-        _compiled[key] = _compile(comm, form, options)
+        _compiled[key] = _compile(comm, form, options, tangent_rule)
     return _compiled[key]

@@ -14,15 +14,16 @@ import numpy as np
 
 from tawami.errors import FormError
 
-#: Points that densities are given at: the full rule, the cell's centre, its vertices; or one mean per
-#: cell.
-Rule = Literal["particle", "centre", "vertex", "mean"]
+#: Points that densities are given at: the full rule, a smaller one for tangents, the cell's centre, its
+#: vertices; or one mean per cell.
+Rule = Literal["particle", "reduced", "centre", "vertex", "mean"]
 Part = Literal["value", "strain", "gradient", "volume"]
 
-#: Quadrature degree of each rule: 5 x 5 points make the tangent of quadratic splines exact.
-DEGREE: Mapping[Rule, int] = {"particle": 8, "centre": 1, "vertex": 1}
+#: Quadrature degree of each rule: 5 x 5 points make the tangent of quadratic splines exact, the 3 x 3 of
+#: the reduced rule do not (they are exact up to degree 2 along each axis).
+DEGREE: Mapping[Rule, int] = {"particle": 8, "reduced": 4, "centre": 1, "vertex": 1}
 #: Family of each rule: the points of Gauss-Lobatto-Legendre's smallest are the vertices.
-FAMILY: Mapping[Rule, str] = {"particle": "default", "centre": "default", "vertex": "GLL"}
+FAMILY: Mapping[Rule, str] = {**dict.fromkeys(DEGREE, "default"), "vertex": "GLL"}
 #: Components of the quantities that the material law gives, at small and at finite strain.
 LAW: Mapping[str, Mapping[str, int]] = {
     "small": {"sigma": 3, "s": 3, "sigma_m": 1},

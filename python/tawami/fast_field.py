@@ -52,7 +52,7 @@ class FastField(Field):
                 else:
                     assert slot.source != "traction"  # refused in integrals over cells
                     points, columns = self._points[slot.source], list(slot.columns)
-                    slots.append((data[slot.source], points, slot.source == "vertex", columns))
+                    slots.append((data[slot.data], points, slot.source == "vertex", columns))
             constants = self._constants(integral).tolist()
             kernels.append(
                 (integral.kernel.address, integral.rank, integral.width, slots, constants)

@@ -70,7 +70,7 @@ class Field:
         #: Whether each cell holds particles, on whichever rank, ny x nx.
         self.active = ranks.any_of(grid.comm, active)
         self.layout = Layout(grid, basis, self._space, self.active)
-        if compiled.ghost is None:
+        if compiled.ghost is None and basis != "biquadratic":  # these have zeros within a cell too
             once = np.ones(len(volume))
             sums = _rust.nodal_sums(location, once, once[:, None], basis)
             self.layout.tie(ranks.sum_of(grid.comm, sums)[:, 0], UNRESOLVED)
@@ -121,7 +121,7 @@ class Field:
                 assert slot.source != "traction"  # refused in integrals over cells
                 rule = slot.source
                 _rust.densities(
-                    self._location, self._volume, data[rule], self._points[rule],
+                    self._location, self._volume, data[slot.data], self._points[rule],
                     rule == "vertex", self._rows, list(slot.columns), offset, packed,
                 )  # fmt: skip
             offset += slot.width

@@ -24,15 +24,16 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from tawami.errors import SingularError
+from tawami.krylov import SINGULAR, Blocks
 from tawami.petsc import Handles
 from tawami.stopwatch import Stopwatch
 
 Array = npt.NDArray[np.float64]
 
-#: A scaled system beyond this condition number has no digit left to trust.
-SINGULAR = 1e14
 #: Iterations of FGMRES that are worth less than a factorisation, and the most there may be.
 PAYS, LIMIT = 8, 15
+#: Percent of memory more than MUMPS foresees, for delayed pivots; a singular matrix delays many.
+ROOM = (50, 1000)
 #: Random vectors; the factors are read once for all right-hand sides, so they cost little.
 PROBES = 3
 
@@ -43,6 +44,7 @@ class LinearSolver:
     Args:
         comm: Communicator.
         stopwatch: Where the time goes.
+        always: Whether every tangent is factorised.
 
     Attributes:
         symmetric: Whether the tangent last factorised is symmetric (probed by one product with a
@@ -53,8 +55,8 @@ class LinearSolver:
         iterations: FGMRES iterations of the last solve; 0 where the tangent was factorised.
     """
 
-    def __init__(self, comm: Any, stopwatch: Stopwatch) -> None:
-        self._stopwatch = stopwatch
+    def __init__(self, comm: Any, stopwatch: Stopwatch, *, always: bool = False) -> None:
+        self._stopwatch, self._always = stopwatch, always
         self._handles = Handles(self, comm)
         self._matrix: Any = None
         self._scale = np.empty(0)
@@ -72,7 +74,12 @@ class LinearSolver:
         return not self.condition < SINGULAR
 
     def solve(
-        self, matrix: Any, scale: Callable[[], Array], right: Array, tolerance: float
+        self,
+        matrix: Any,
+        scale: Callable[[], Array],
+        right: Array,
+        tolerance: float,
+        _blocks: Callable[[], Blocks],
     ) -> Array:
         """Solution of `K x = r`; of `S K S y = S r`, `x = S y`, in fact.
 
@@ -86,7 +93,7 @@ class LinearSolver:
             SingularError: The factorisation ran out of memory or failed for another reason than a
                 singular matrix. Whether it is singular is for the caller to ask.
         """
-        if self._matrix is matrix and self.iterations <= PAYS:
+        if not self._always and self._matrix is matrix and self.iterations <= PAYS:
             self._multiply(matrix, self._scale)
             solution = self._iterate(right, tolerance)
             if solution is not None:
@@ -150,6 +157,19 @@ class LinearSolver:
 
     def _factorise(self, matrix: Any) -> bool:
         """False if a pivot was zero."""
+        for room in ROOM:
+            code, detail = self._mumps(matrix, room)
+            if code != -9:
+                break
+        if code < 0 and code not in (-10, -6):
+            raise SingularError(
+                f"MUMPS could not factorise the tangent (INFOG(1) = {code}, INFOG(2) = {detail}): see "
+                "the MUMPS users' guide; -9 and -13 mean that memory is short"
+            )
+        return code >= 0
+
+    def _mumps(self, matrix: Any, room: int) -> tuple[int, int]:
+        """Factorise with so many percent of memory more than foreseen; what MUMPS says of it."""
         self._handles.free("factor", "pc", "ksp")
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)
         ksp = self._handles["ksp"] = PETSc.KSP().create(matrix.comm)
@@ -162,17 +182,10 @@ class LinearSolver:
         pc.setFactorSetUpSolverType()
         factor = self._handles["factor"] = pc.getFactorMatrix()
         factor.setMumpsIcntl(7, 0)  # AMD: the cheapest first factorisation
-        factor.setMumpsIcntl(14, 50)  # room for delayed pivots
+        factor.setMumpsIcntl(14, room)
         ksp.setUp()
         pc.setReusePreconditioner(True)
-        code = factor.getMumpsInfog(1)
-        if code < 0 and code not in (-10, -6):
-            raise SingularError(
-                f"MUMPS could not factorise the tangent (INFOG(1) = {code}, INFOG(2) = "
-                f"{factor.getMumpsInfog(2)}): see the MUMPS users' guide; -9 and -13 mean "
-                "that memory is short"
-            )
-        return bool(code >= 0)
+        return int(factor.getMumpsInfog(1)), int(factor.getMumpsInfog(2))
 
     def _solve_all(self, right: Array) -> Array:
         """Solutions for several right-hand sides, each a row."""

@@ -23,7 +23,9 @@ from tawami.compilation import CompiledForm
 from tawami.density import Density, LawQuantity, ParticleScalar, Rule
 from tawami.errors import ConvergenceError, InputError, SingularError
 from tawami.field import Field
+from tawami.krylov import Blocks, KrylovSolver
 from tawami.linear import LinearSolver
+from tawami.numerics import Numerics
 from tawami.numpy_law import NumpyStage
 from tawami.petsc import clean_up
 from tawami.reduction import Reduction
@@ -103,8 +105,7 @@ class Newton:
         location: Where they are.
         constants: K and mu of each particle [Pa].
         stopwatch: Where the time goes.
-        tolerance: Both measures must fall below it.
-        max_iterations: Linear solves before giving up.
+        numerics: How it is solved.
     """
 
     def __init__(
@@ -116,14 +117,12 @@ class Newton:
         location: _rust.Location,
         constants: Mapping[str, Array],
         stopwatch: Stopwatch,
-        *,
-        tolerance: float,
-        max_iterations: int,
+        numerics: Numerics,
     ) -> None:
         self.field, self.compiled, self.stage = field, compiled, stage
         self.particles, self.location, self.constants = particles, location, constants
         self.stopwatch = stopwatch
-        self.tolerance, self.max_iterations = tolerance, max_iterations
+        self.numerics = numerics
         self.data = {
             rule: np.zeros((len(particles), compiled.columns(rule))) for rule in compiled.densities
         }
@@ -137,7 +136,12 @@ class Newton:
         self.kind = volumetric[0][0] if volumetric else None
         self._p_ref = self._started = 0.0
         self._comm = field.grid.comm
-        self._linear = LinearSolver(self._comm, stopwatch)
+        self._linear: LinearSolver | KrylovSolver
+        if numerics.linear_solver == "iterative":
+            self._linear = KrylovSolver(self._comm, stopwatch)
+        else:
+            always = numerics.factorise == "always"
+            self._linear = LinearSolver(self._comm, stopwatch, always=always)
         softer = np.minimum(constants["K"], 1e4 * constants["mu"])
         #: Largest moduli of the body [Pa].
         self._stiffest, self._largest_mu = (
@@ -311,23 +315,34 @@ class Newton:
                 history.append(self._measures(forces, rest, coefficients, reduction, inertia))
             if not np.isfinite(_worst(history[-1])):
                 self._fail(history, "an infinite or undefined number came up")
-            if _worst(history[-1]) < self.tolerance:
+            if _worst(history[-1]) < self.numerics.tolerance:
                 return Converged(
                     coefficients, held, history, krylov, linear.condition, linear.symmetric
                 )
-            if len(history) > self.max_iterations:
+            if len(history) > self.numerics.max_iterations:
                 self._fail(history, "Take a smaller load, or check material and supports")
             matrix = self.field.tangent(coefficients, self.data, reduction)
             if inertia is not None:
                 self._add_mass(matrix, inertia, reduction)
             right = -(reduction.selection.T @ rest)
             scale = functools.partial(self._scale, matrix, reduction)
-            change = linear.solve(matrix, scale, right[reduction.own], self._forcing(history))
+            blocks = functools.partial(self._blocks, reduction)
+            forcing = self._forcing(history)
+            change = linear.solve(matrix, scale, right[reduction.own], forcing, blocks)
             krylov.append(linear.iterations)
             if linear.singular:
                 self._report_singular(reduction)
             unknowns += ranks.joined(self._comm, change)
             self.stopwatch.lap()
+
+    def _blocks(self, reduction: Reduction) -> Blocks:
+        """What this rank's unknowns are; the rigid motions by the Greville points of their functions."""
+        own = reduction.unknowns[reduction.own]
+        of_u = own < self.field.layout.num_displacement
+        function, along_y = np.divmod(own[of_u], 2)
+        x, y = (self.field.layout.greville[function] - self.field.grid.origin).T
+        rigid = [1.0 - along_y, along_y, np.where(along_y == 1, x, -y)]
+        return Blocks(of_u, np.column_stack(rigid))
 
     def _add_mass(self, matrix: Any, inertia: Inertia, reduction: Reduction) -> None:
         """S^T M S, M the lumped mass, to the reduced tangent: a diagonal but for point constraints."""
@@ -346,7 +361,7 @@ class Newton:
         """
         now = _worst(history[-1])
         rate = now / _worst(history[-2]) if len(history) > 1 else 1.0
-        return float(np.clip(0.1 * rate**2, min(0.1 * self.tolerance / now, 1e-3), 1e-3))
+        return float(np.clip(0.1 * rate**2, min(0.1 * self.numerics.tolerance / now, 1e-3), 1e-3))
 
     def _fail(self, history: History, advice: str) -> None:
         rows = "; ".join(
@@ -355,8 +370,8 @@ class Newton:
         )
         so_far = f"measures of momentum and volume by iteration: {rows}. " if history else ""
         raise ConvergenceError(
-            f"Newton did not converge in {max(len(history) - 1, 0)} iterations to {self.tolerance:g}; "
-            f"{so_far}Nothing was changed in the particles. {advice}",
+            f"Newton did not converge in {max(len(history) - 1, 0)} iterations to "
+            f"{self.numerics.tolerance:g}; {so_far}Nothing was changed in the particles. {advice}",
             history,
         )
 

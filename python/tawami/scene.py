@@ -27,6 +27,7 @@ from tawami.formulation import Form
 from tawami.grid import Edge, Grid
 from tawami.loads import Loads, Traction
 from tawami.newton import Converged, Inertia, Newton
+from tawami.numerics import Assembly, Factorise, Numerics, SolverName, TangentRule
 from tawami.numpy_law import NumpyLaw, NumpyStage
 from tawami.reduction import Reduction
 from tawami.solution import Solution
@@ -83,10 +84,8 @@ class Scene:
         form: Weak form: the name of a shipped one ('u_epsv', 'u_p', 'u_bbar', 'u'), the path of a
             file, a module, or a `Form`.
         basis: Basis of the displacement: 'quadratic_spline', 'bilinear' or 'biquadratic'.
-        tolerance: Newton stops when both measures of `tawami.newton` are below it.
-        max_iterations: Newton iterations before the step is given up.
-        assembly: 'fast', kernels called from Rust, or 'reference', dolfinx and P^T K P: the same
-            numbers to round-off.
+        tolerance, max_iterations, assembly, tangent_rule, factorise, linear_solver: How a step is
+            solved; see `tawami.numerics.Numerics`.
         density: Mass density at the start [kg/m3], one for all materials or one each; gravity needs it.
         leaving: What to do with particles that leave the grid: 'stop' with an error before they do, or
             'remove' them; `left` says which and where.
@@ -120,7 +119,10 @@ class Scene:
         basis: Basis = "quadratic_spline",
         tolerance: float = 1e-6,
         max_iterations: int = 20,
-        assembly: Literal["fast", "reference"] = "fast",
+        assembly: Assembly = "fast",
+        tangent_rule: TangentRule = "full",
+        factorise: Factorise = "when_it_pays",
+        linear_solver: SolverName = "direct",
         density: float | Sequence[float] | None = None,
         leaving: Literal["stop", "remove"] = "stop",
         **parameters: Any,
@@ -129,15 +131,14 @@ class Scene:
             raise InputError(f"basis '{basis}': expected one of {', '.join(map(repr, BASES))}")
         if leaving not in ("stop", "remove"):
             raise InputError(f"leaving = {leaving!r}: expected 'stop' or 'remove'")
-        if assembly not in FIELDS:
-            raise InputError(f"assembly = {assembly!r}: expected 'fast' or 'reference'")
         if not isinstance(grid, Grid) or not isinstance(body, Body):
             raise InputError(
                 f"Scene({type(grid).__name__}, {type(body).__name__}, ...): expected a tawami.Grid and "
                 "a tawami.Body"
             )
-        tolerance = inputs.number("tolerance", tolerance, low=1e-14, high=0.1)
-        max_iterations = inputs.whole_number("max_iterations", max_iterations, low=1)
+        self._numerics = Numerics(
+            tolerance, max_iterations, assembly, tangent_rule, factorise, linear_solver
+        )
         self.grid, self.basis = grid, basis
         self.form = Form.load(form)
         values, options = self.form.settings(parameters)
@@ -159,7 +160,6 @@ class Scene:
         whole.add_history(materials)
         self._materials, self._law, self._values = materials, law, values
         self._moduli = np.array([(m.bulk_modulus, m.shear_modulus) for m in materials])
-        self._side, self._limits = FIELDS[assembly], (tolerance, max_iterations)
         self._densities = None if density is None else _densities(density, len(materials))
         self._finite = self.form.strain == "finite"
         if self._finite and law is not None:
@@ -169,7 +169,7 @@ class Scene:
             )
         self.num_particles = len(whole)
         self.particles, location = placement.distributed(grid, whole, moving=self._finite)
-        self._compiled = compile_form(grid.comm, self.form, options)
+        self._compiled = compile_form(grid.comm, self.form, options, tangent_rule)
         if self.form.kinematics == "mixed":
             self.particles.add_eps_v()
         self.stopwatch = Stopwatch()
@@ -180,9 +180,8 @@ class Scene:
 
     def _attach(self, location: _rust.Location) -> Attached:
         """Field side, laws and Newton's method for the particles in these places."""
-        tolerance, max_iterations = self._limits
         with self.stopwatch("set-up"):
-            field = self._side(
+            field = FIELDS[self._numerics.assembly](
                 self.grid, self._compiled, self.basis, location, self.particles.volume,
                 self._values, self.stopwatch,
             )  # fmt: skip
@@ -193,7 +192,7 @@ class Scene:
         stage = rust if law is None else NumpyStage(rust, self.particles, law)
         newton = Newton(
             field, self._compiled, stage, self.particles, location, self.constants, self.stopwatch,
-            tolerance=tolerance, max_iterations=max_iterations,
+            self._numerics,
         )  # fmt: skip
         return Attached(location, field, stage, newton)
 
@@ -458,14 +457,12 @@ class Scene:
     @contextmanager
     def tolerance_of(self, tolerance: float) -> Iterator[None]:
         """Newton's tolerance within a block."""
-        before = self._limits
+        before = self._numerics
         try:
-            self._limits = (tolerance, before[1])
-            self.attached.newton.tolerance = tolerance
+            self._numerics = self.attached.newton.numerics = replace(before, tolerance=tolerance)
             yield
         finally:
-            self._limits = before
-            self.attached.newton.tolerance = before[0]
+            self._numerics = self.attached.newton.numerics = before
 
     def advance(
         self,

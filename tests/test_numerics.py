@@ -1,0 +1,101 @@
+"""How a step is solved may change how long it takes, not what comes out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import tawami
+from cases.cantilever import mpm
+
+
+def pushed(**options) -> tawami.Scene:
+    """A block that yields: several Newton iterations."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(6, 4))
+    body = tawami.box(grid, (0.0, 0.0), (1.0, 1.0))
+    clay = tawami.von_mises(tawami.linear_elastic(E=1e7, nu=0.49), yield_stress=1e5, hardening=1e5)
+    scene = tawami.Scene(grid, body, clay, form="u_epsv", alpha=0.1, **options)
+    scene.fix("bottom", "x")
+    scene.fix("bottom", "y")
+    scene.fix("left", "x")
+    scene.fix("top", "y", lambda x, y: -0.02 * x)
+    return scene
+
+
+@pytest.mark.parametrize("form", ["u", "u_bbar", "u_epsv", "u_p"])
+def test_the_iterative_solver_finds_what_the_direct_one_finds(form):
+    direct, iterative = (
+        mpm.build(form, "paper", 8, linear_solver=name, tolerance=1e-10).solve()
+        for name in ("direct", "iterative")
+    )
+    assert np.allclose(iterative.u, direct.u, rtol=0, atol=1e-7 * np.abs(direct.u).max())
+    assert min(iterative.krylov) > 0
+    assert direct.condition / 3 < iterative.condition < 3 * direct.condition
+
+
+def test_fgmres_iterations_of_the_mixed_form_depend_neither_on_nu_nor_on_the_grid():
+    def most(n: int, nu: float) -> int:
+        rubber = tawami.linear_elastic(E=3e6, nu=nu)
+        scene = mpm.build("u_epsv", "exact", n, material=rubber, linear_solver="iterative")
+        return max(scene.solve().krylov)
+
+    assert max(most(n, nu) for n in (8, 32) for nu in (0.3, 0.4999, 0.4999999)) < 60
+
+
+@pytest.mark.parametrize("assembly", ["fast", "reference"])
+def test_a_reduced_tangent_takes_more_iterations_to_the_same_place(assembly):
+    full, reduced = (
+        pushed(tangent_rule=rule, assembly=assembly, tolerance=1e-10).solve()
+        for rule in ("full", "reduced")
+    )
+    assert np.allclose(reduced.u, full.u, rtol=0, atol=1e-7 * np.abs(full.u).max())
+    assert reduced.iterations > full.iterations
+
+
+def test_both_assemblies_have_the_same_reduced_tangent():
+    full, fast, reference = (
+        mpm.build("u_epsv", "exact", 4, tangent_rule=rule, assembly=assembly)
+        for rule, assembly in (("full", "fast"), ("reduced", "fast"), ("reduced", "reference"))
+    )
+    zero, n = np.zeros(full.num_coefficients), full.attached.layout.num_displacement
+    exact, one, other = (scene.tangent(zero).toarray() for scene in (full, fast, reference))
+    assert np.allclose(one, other, rtol=0, atol=1e-12 * np.abs(exact).max())
+    exact, one = exact[:n, :n], one[:n, :n]
+    assert np.abs(one - exact).max() > 1e-3 * np.abs(exact).max()
+
+
+def test_a_factorisation_for_every_iteration():
+    seldom, always = (pushed(factorise=when).solve() for when in ("when_it_pays", "always"))
+    assert always.krylov == (0,) * always.iterations
+    assert max(seldom.krylov) > 0
+    assert np.allclose(always.u, seldom.u, rtol=0, atol=1e-6 * np.abs(seldom.u).max())
+
+
+def test_what_fgmres_cannot_solve_is_said():
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.5, cells=(4, 2))
+    body = tawami.box(grid, (0.0, 0.0), (2.0, 1.0), per_axis=1)
+    scene = tawami.Scene(
+        grid, body, tawami.linear_elastic(E=1e6, nu=0.3), form="u", basis="biquadratic",
+        linear_solver="iterative",
+    )  # fmt: skip
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    scene.traction("right", (0.0, -1.0))
+    with pytest.raises(tawami.SingularError, match="linear_solver='direct' says where"):
+        scene.solve()
+    assert not scene.particles.stress.any()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"linear_solver": "cg"}, "linear_solver = 'cg': expected 'direct' or 'iterative'"),
+        ({"factorise": "never"}, "factorise = 'never': expected 'when_it_pays' or 'always'"),
+        ({"tangent_rule": 3}, "tangent_rule = 3: expected 'full' or 'reduced'"),
+        ({"tolerance": 0.5}, "tolerance = 0.5: expected a finite number"),
+    ],
+)
+def test_other_settings_are_refused(options, message):
+    with pytest.raises(tawami.InputError, match=message):
+        pushed(**options)
