@@ -33,6 +33,7 @@ from cases.figure import save
 from tawami.energy import Energies
 from tawami.environment import header
 from tawami.output import result_folder
+from tawami.transfer import TransferName
 
 Array = npt.NDArray[np.float64]
 
@@ -84,18 +85,20 @@ def build(
     *,
     h: float = 0.01,
     nu: float = NU,
-    alpha: float = 0.01,
+    per_axis: int = 2,
     size: tuple[float, float] = (LENGTH, HEIGHT),
+    transfer: TransferName = "affine_flip",
+    **options: Any,
 ) -> tawami.Dynamics:
-    """The pile, its wall gone."""
+    """The pile, its wall gone; alpha = 0.01 where the form has it, other options go to `Scene`."""
     length, height = size
     # room for a run-out of twice the height
     cells = (round((2 * length + 4 * height) / h), round(1.4 * height / h))
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=h, cells=cells)
-    body = tawami.box(grid, (0.0, 0.0), size)
+    body = tawami.box(grid, (0.0, 0.0), size, per_axis=per_axis)
     rods = tawami.drucker_prager(tawami.linear_elastic(E=E, nu=nu), phi=PHI)
-    parameters = {"alpha": alpha, "theta": 0.01} if form == "u_epsv_finite" else {}
-    scene = tawami.Scene(grid, body, rods, form=form, density=RHO, **parameters)
+    parameters = {"alpha": 0.01} if form == "u_epsv_finite" else {}
+    scene = tawami.Scene(grid, body, rods, form=form, density=RHO, **(parameters | options))
     scene.gravity((0.0, -G))
     scene.fix("left", "x")
     scene.fix("bottom", "x")
@@ -105,7 +108,7 @@ def build(
     scene.particles.stress[:, :3] = np.column_stack(
         [horizontal, vertical, 0.5 * (horizontal + vertical)]
     )
-    return tawami.Dynamics(scene)
+    return tawami.Dynamics(scene, transfer=transfer)
 
 
 def solve(

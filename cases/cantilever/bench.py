@@ -11,7 +11,6 @@ import argparse
 import csv
 import json
 import logging
-import resource
 import subprocess
 import sys
 import warnings
@@ -31,7 +30,7 @@ import tawami
 from cases.cantilever import mpm
 from cases.cantilever.beam import NU, D, E, L, P
 from tawami.compilation import compile_form
-from tawami.environment import header
+from tawami.environment import header, peak_memory
 from tawami.output import result_folder, whole_file
 from tawami.ranks import mpirun
 from tawami.symbols import InexactSumWarning
@@ -184,7 +183,7 @@ def measure(setting: Setting) -> dict[str, Any]:
         "step_s": sum(watch.seconds.get(stage, 0.0) for stage in STAGES),
         "cpu_outside_s": comm.allreduce(outside),
         "cpu_s": comm.allreduce(cpu),
-        "peak_MB": comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024),
+        "peak_MB": comm.allreduce(peak_memory()),
         "copy_GB_s": copy_bandwidth(setting.threads),
         "law_GB_s": law_bytes(scene) * len(solution.history) / watch.seconds["law"] / 1e9,
     }

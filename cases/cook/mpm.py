@@ -43,10 +43,15 @@ def body_of(grid: tawami.Grid, kind: str) -> tawami.Body:
 
 def build(method: str, nu: float, h: float, body: str = "even") -> tawami.Scene:
     """The membrane as a scene on squares of side h, which divides 4."""
+    return scene_of(nu, h, body, **METHODS[method])
+
+
+def scene_of(nu: float, h: float, body: str, **options: object) -> tawami.Scene:
+    """The same with any form and options of `Scene`."""
     cells = (round(LENGTH / h), round(HEIGHT / h))
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=h, cells=cells)
     material = tawami.linear_elastic(E=E, nu=nu)
-    scene = tawami.Scene(grid, body_of(grid, body), material, **METHODS[method])
+    scene = tawami.Scene(grid, body_of(grid, body), material, **options)
     scene.fix("left", "x", between=CLAMPED)
     scene.fix("left", "y", between=CLAMPED)
     scene.traction("right", (0.0, SHEAR), between=LOADED)

@@ -27,6 +27,7 @@ from tawami.ranks import run
 from tawami.scene import Scene
 from tawami.solution import Solution
 from tawami.stepping import ramp, settle
+from tawami.study import Series, Study, recommend
 
 __all__ = [
     "Body",
@@ -41,8 +42,10 @@ __all__ = [
     "NumpyLaw",
     "OutputError",
     "Scene",
+    "Series",
     "SingularError",
     "Solution",
+    "Study",
     "SupportError",
     "TawamiError",
     "box",
@@ -52,6 +55,7 @@ __all__ = [
     "neo_hookean",
     "polygon",
     "ramp",
+    "recommend",
     "run",
     "settle",
     "von_mises",

@@ -23,6 +23,7 @@ from tawami.errors import FormError, MissingDependencyError
 from tawami.formulation import Form
 from tawami.numerics import TangentRule
 from tawami.symbols import PLACEHOLDERS, Symbols
+from tawami.tally import tally
 
 
 @dataclass(frozen=True)
@@ -281,5 +282,6 @@ def compile_form(
     """
     key = (form, tangent_rule, tuple(sorted(options.items())))
     if key not in _compiled:
-        _compiled[key] = _compile(comm, form, options, tangent_rule)
+        with tally.compiling():
+            _compiled[key] = _compile(comm, form, options, tangent_rule)
     return _compiled[key]

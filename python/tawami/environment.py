@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import resource
 from importlib.metadata import version
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from tawami import _dolfinx
 
 #: What this process has loaded (Linux).
 MAPS = Path("/proc/self/maps")
+#: What Linux says of this process.
+STATUS = Path("/proc/self/status")
 
 
 def blas() -> tuple[str, bool]:
@@ -35,6 +38,19 @@ def blas() -> tuple[str, bool]:
         if any(name in path.name for name in ("openblas", "blis", "mkl")):
             return path.name, False
     return "unknown", False
+
+
+def peak_memory() -> float:
+    """Most memory that this process has held [MB].
+
+    Linux' own figure: that of `getrusage` begins with what the parent held when it started the process.
+    """
+    try:
+        lines = STATUS.read_text().splitlines()
+        (line,) = (line for line in lines if line.startswith("VmHWM:"))
+        return int(line.split()[1]) / 1024
+    except (OSError, ValueError):
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def header() -> str:

@@ -30,6 +30,7 @@ from tawami.numpy_law import NumpyStage
 from tawami.petsc import clean_up
 from tawami.reduction import Reduction
 from tawami.stopwatch import Stopwatch
+from tawami.tally import tally
 
 Array = npt.NDArray[np.float64]
 History = list[tuple[float, float | None]]
@@ -316,6 +317,7 @@ class Newton:
             if not np.isfinite(_worst(history[-1])):
                 self._fail(history, "an infinite or undefined number came up")
             if _worst(history[-1]) < self.numerics.tolerance:
+                tally.steps += 1
                 return Converged(
                     coefficients, held, history, krylov, linear.condition, linear.symmetric
                 )
@@ -330,6 +332,8 @@ class Newton:
             forcing = self._forcing(history)
             change = linear.solve(matrix, scale, right[reduction.own], forcing, blocks)
             krylov.append(linear.iterations)
+            tally.newton_iterations += 1
+            tally.unknowns = max(tally.unknowns, reduction.size)
             if linear.singular:
                 self._report_singular(reduction)
             unknowns += ranks.joined(self._comm, change)

@@ -1,0 +1,51 @@
+"""The studies, one after the other; what has been run is not run again.
+
+python -m cases.trade [cantilever] [cook] [collapse] [self_weight] [--sample N] [--results results/trade]
+python -m cases.trade --words          what the shipped results say, without running anything
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+import tawami
+from cases.trade import cantilever, collapse, cook, self_weight
+from tawami.environment import header
+from tawami.study import Table
+
+STUDIES = {s.name: s for s in (cantilever.STUDY, cook.STUDY, collapse.STUDY, self_weight.STUDY)}
+#: Results that come with the repository.
+SHIPPED = Path(__file__).parent
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run studies and say what they say."""
+    parser = argparse.ArgumentParser(prog="python -m cases.trade", description=__doc__)
+    parser.add_argument("studies", nargs="*", help=f"among {', '.join(STUDIES)}; all by default")
+    parser.add_argument("--results", default="results/trade", help="folder for the results")
+    parser.add_argument("--sample", type=int, help="run so many settings, drawn at random")
+    parser.add_argument("--words", action="store_true", help="of the shipped results, run nothing")
+    options = parser.parse_args(arguments)
+    names = options.studies or list(STUDIES)
+    for name in names:
+        if name not in STUDIES:
+            parser.error(f"study {name}: expected one of {', '.join(STUDIES)}")
+    print(header(), flush=True)
+    for name in names:
+        if options.words:
+            table = Table.read(SHIPPED / f"{name}.csv")
+        else:
+            study = STUDIES[name]
+            study.path = Path(options.results) / name
+            table = study.run(sample=options.sample)
+            print(f"\nResults: {study.path}/{name}.csv, {name}.png")
+        for quantity in table.quantities:
+            print(f"\n{table.in_words(quantity)}")
+        for row in table.failed:
+            print(f"failed: {row}")
+
+
+if __name__ == "__main__":
+    tawami.run(main, "trade")

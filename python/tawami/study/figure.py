@@ -1,0 +1,113 @@
+"""The picture of a study: error over cost, both logarithmic, the front, its knees by number."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tawami.errors import MissingDependencyError
+from tawami.output import whole_file
+from tawami.study.table import Row, Table, text_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+LABELS = {
+    "wall_s": "wall time [s]",
+    "cpu_s": "processor time [s]",
+    "peak_MB": "peak memory [MB]",
+    "newton_iterations": "Newton iterations [-]",
+    "steps": "steps [-]",
+    "unknowns": "unknowns [-]",
+}
+MARKERS = "os^Dvp*X"
+
+
+def picture(
+    table: Table,
+    path: str | Path,
+    *,
+    colour: str | None = None,
+    cost: str = "wall_s",
+    quantities: Sequence[str] | None = None,
+    title: str | None = None,
+) -> None:
+    """Draw a study: a panel a quantity, a marker a series, the fronts as lines.
+
+    Args:
+        table: What was found.
+        path: PNG to write.
+        colour: Knob whose values have colours.
+        cost: Along the abscissa: 'wall_s', 'cpu_s', 'peak_MB', ...
+        quantities: What is drawn; all with errors by default.
+        title: Above the panels; the name of the study by default.
+
+    Raises:
+        MissingDependencyError: matplotlib is not installed.
+        OutputError: The file cannot be written.
+    """
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise MissingDependencyError(
+            "pictures of studies need matplotlib: pip install matplotlib"
+        ) from error
+    quantities = list(quantities or table.quantities)
+    figure = Figure(figsize=(7.5 * len(quantities), 7.5), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(1, len(quantities), squeeze=False)[0]
+    values = list(
+        dict.fromkeys(row.knobs.get(colour or "", "") for row in table.of(table.series[0]))
+    )
+    colours = {value: f"C{k % 10}" for k, value in enumerate(values)}
+    for axes, quantity in zip(panels, quantities, strict=True):
+        _panel(axes, table, quantity, cost, colour, colours)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=9)
+    figure.suptitle(title or table.name)
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=150, format="png")
+
+
+def _panel(
+    axes: Axes, table: Table, quantity: str, cost: str, colour: str | None, colours: dict[Any, str]
+) -> None:
+    least = min((r.errors[quantity] for r in table.of() if r.errors[quantity] > 0), default=1e-16)
+
+    def place(rows: Sequence[Row]) -> tuple[list[float], list[float]]:
+        """Of runs; one without any error stands where the smallest is."""
+        return [r.costs[cost] for r in rows], [max(r.errors[quantity], least) for r in rows]
+
+    own = table.series[0]
+    for number, label in enumerate(table.series):
+        marker = MARKERS[number % len(MARKERS)]
+        if label == own and colour is not None:
+            for value, shade in colours.items():
+                mine = [row for row in table.of(label) if row.knobs.get(colour, "") == value]
+                axes.plot(*place(mine), marker, color=shade, markersize=5, alpha=0.7,
+                          label=f"{label}: {colour} {value}" if value != "" else label)  # fmt: skip
+        else:
+            axes.plot(*place(table.of(label)), marker, color="black", markersize=5, fillstyle="none",
+                      label=label)  # fmt: skip
+        dash = "-" if label == own else "--"
+        front = table.front(quantity, cost=cost, series=label)
+        axes.step(*place(front), dash, where="post", color="black", linewidth=1,
+                  label=f"front, {label}")  # fmt: skip
+    knees = table.knees(quantity, cost=cost, series=own)
+    best = table.knee(quantity, cost=cost, series=own)
+    lines = []
+    for number, row in enumerate(knees, start=1):
+        ((x,), (y,)) = place([row])
+        axes.annotate(str(number), (x, y), textcoords="offset points", xytext=(-9, -13),
+                      fontsize=10, fontweight="bold")  # fmt: skip
+        axes.plot([x], [y], "o", markersize=11, fillstyle="none", color="tab:red",
+                  markeredgewidth=2.2 if row is best else 1.0,
+                  label="corners of the front" if number == 1 else None)  # fmt: skip
+        lines.append(f"{number}{' (knee)' if row is best else ''}: {text_of(row.knobs)}")
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlabel(LABELS[cost] + "\n\n" + "\n".join(lines), fontsize=9, loc="left")
+    axes.set_ylabel(f"error of {quantity} [-]")
+    axes.grid(alpha=0.3, which="both")
