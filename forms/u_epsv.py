@@ -15,7 +15,7 @@ from ufl import Identity, div, dot, grad, inner, sym
 
 fields = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
 kinematics = "mixed"
-parameters = {"alpha": {"default": 0.1, "minimum": 0.0}, "k": {"default": 0.01, "minimum": 0.0}}
+parameters = {"alpha": {"default": 0.01, "minimum": 0.0}, "k": {"default": 0.01, "minimum": 0.0}}
 options = {
     "stabilisation": ("laplacian", "residual_based", "projection"),
     "ghost_penalty": ("off", "on"),
