@@ -52,7 +52,7 @@ class Result:
     iterations: tuple[int, ...]
 
 
-def solve(form: str, *, h: float = 1.0, increments: int = 20) -> Result:
+def build(form: str, *, h: float = 1.0) -> tawami.Scene:
     """The column at a cell size [m]; with two cells abreast, instead of one, B-bar bulges sideways."""
     cells = round(H / h)
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=h, cells=(1, cells))
@@ -62,11 +62,16 @@ def solve(form: str, *, h: float = 1.0, increments: int = 20) -> Result:
     scene.fix("left", "x")
     scene.fix("right", "x")
     scene.fix("bottom", "y")
-    iterations = []
+    return scene
+
+
+def solve(form: str, *, h: float = 1.0, increments: int = 20) -> Result:
+    """The column under its weight."""
+    scene, iterations = build(form, h=h), []
+    start = np.array(scene.particles.x[:, 1])
     for k in range(1, increments + 1):
         scene.gravity((0.0, -G * k / increments))
         iterations.append(scene.solve().iterations)
-    start = body.x[:, 1]
     end = np.array(scene.particles.x[:, 1])
     # the top is half a (deformed) particle above the highest one
     top = start.max()
@@ -82,6 +87,9 @@ def solve(form: str, *, h: float = 1.0, increments: int = 20) -> Result:
 
 def main() -> None:
     """Print height and stress beside the closed form."""
+    scene = build("u_epsv_finite")
+    scene.gravity((0.0, -G))
+    print(scene.header())
     print(f"closed form: {final_height():.5f} m")
     for form in FORMS:
         r = solve(form)
