@@ -140,7 +140,8 @@ def _unknowns(scene: Scene) -> str:
     fields = ", ".join(
         f"{n} of {name}" for name, n in zip(scene.form.fields, numbers, strict=False)
     )
-    return f"{_free(scene)} of {sum(numbers)} ({fields}), the supports taking the rest"
+    taken = sum(numbers) - _free(scene)
+    return f"{sum(numbers) - taken}: {fields}, less {taken} that supports take"
 
 
 def _free(scene: Scene) -> int:
