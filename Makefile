@@ -1,6 +1,7 @@
 # make cantilever   set up what is missing, run the study of the cantilever
 # make test         set up what is missing, pass every test
 # make bench        speed and memory, stage by stage
+# make trade        what accuracy costs: every knob of four cases; goes on where it was
 # make lint, make format, make clean
 #
 # Set-up needs Debian 12, 13 or sid (root or sudo for the packages that are missing) and Rust.
@@ -18,7 +19,7 @@ export OMP_NUM_THREADS ?= 1
 export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 
-.PHONY: cantilever test bench lint format setup clean
+.PHONY: cantilever test bench trade lint format setup clean
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 
@@ -31,6 +32,9 @@ test: setup
 
 bench: setup
 	$(PYTHON) -m cases.cantilever.bench
+
+trade: setup
+	$(PYTHON) -m cases.trade
 
 lint: setup $(STAMPS)/lint
 	cargo fmt --check

@@ -348,6 +348,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         return compare_aspects(folder)
     if options.incompressible:
         return incompressible(min(options.end, 0.4))
+    print(build("u_epsv_finite", h=options.cell).header(), flush=True)
     runs = []
     for form in FORMS:
         try:

@@ -99,6 +99,9 @@ def errors(scene: tawami.Scene) -> tuple[float, float]:
 
 def main() -> None:
     """Print height and stress beside the closed form."""
+    scene = build("u_epsv_finite")
+    scene.gravity((0.0, -G))
+    print(scene.header())
     print(f"closed form: {final_height():.5f} m")
     for form in FORMS:
         r = solve(form)

@@ -205,6 +205,15 @@ pub struct Stage<'a> {
     pub increments: Increments<'a>,
 }
 
+/// What a particle keeps of an accepted step: far less than its answer, of which all are held at once.
+struct Kept {
+    stress: Stress,
+    volume: f64,
+    u: [f64; 2],
+    history: [f64; MAX_HISTORY],
+    dissipated: f64,
+}
+
 /// What a particle answers to the increments.
 struct Answer {
     /// Change of the volume that its law got.
@@ -331,20 +340,22 @@ impl Stage<'_> {
     /// [`Error::Inverted`]; then nothing has changed.
     pub fn commit(&self, particles: &mut Particles) -> Result<f64> {
         let of = |p: usize| {
-            let mut answer = self.respond(particles, p).ok_or(p)?;
+            let answer = self.respond(particles, p)?;
+            let Answer { mut stress, volume, history, dissipated, .. } = answer;
             if self.kinematics == Kinematics::Deviatoric {
-                answer.stress.mean += self.increments.volumetric_at(self.location, p);
+                stress.mean += self.increments.volumetric_at(self.location, p);
             }
             let u = self.increments.u.value(self.location.cell[p] as usize, self.location.xi[p]);
-            Ok((answer, u))
+            Some(Kept { stress, volume, u, history, dissipated })
         };
-        let new: std::result::Result<Vec<_>, usize> =
-            (0..particles.len()).into_par_iter().map(of).collect();
-        let new = new.map_err(|p| Error::Inverted { index: particles.number[p] as usize })?;
+        let new: Vec<Option<Kept>> = (0..particles.len()).into_par_iter().map(of).collect();
+        if let Some(p) = new.iter().position(Option::is_none) {
+            return Err(Error::Inverted { index: particles.number[p] as usize });
+        }
         let mut dissipated = 0.0;
-        for (p, (answer, u)) in new.into_iter().enumerate() {
-            let Answer { stress, volume, history, .. } = answer;
-            dissipated += particles.volume[p] * answer.dissipated;
+        for (p, kept) in new.into_iter().flatten().enumerate() {
+            let Kept { stress, volume, u, history, .. } = kept;
+            dissipated += particles.volume[p] * kept.dissipated;
             for (i, unit) in UNIT.iter().enumerate() {
                 particles.stress[[p, i]] = stress.deviator[i] + stress.mean * unit;
             }

@@ -197,12 +197,40 @@ impl Particles {
         names.iter().map(place).collect()
     }
 
-    /// Bytes that one particle takes.
+    /// The arrays that there are: name, and bytes that one particle takes in it.
+    #[must_use]
+    pub fn arrays(&self) -> Vec<(&str, usize)> {
+        const DOUBLE: usize = size_of::<f64>();
+        const NUMBER: usize = size_of::<u32>();
+        // a new array does not compile before it is named here
+        let Self {
+            x,
+            volume: _,
+            material: _,
+            number: _,
+            stress,
+            displacement,
+            eps_v,
+            history,
+            carried,
+        } = self;
+        let mut arrays = vec![
+            ("x", DOUBLE * x.ncols()),
+            ("volume", DOUBLE),
+            ("material", NUMBER),
+            ("number", NUMBER),
+            ("stress", DOUBLE * stress.ncols()),
+            ("displacement", DOUBLE * displacement.ncols()),
+        ];
+        arrays.extend(eps_v.as_ref().map(|_| ("eps_v", DOUBLE)));
+        arrays.extend(history.iter().map(|(name, _)| (*name, DOUBLE)));
+        arrays.extend(carried.iter().map(|(name, a)| (name.as_str(), DOUBLE * a.ncols())));
+        arrays
+    }
+
+    /// Bytes that one particle takes in all of them.
     #[must_use]
     pub fn bytes_per_particle(&self) -> usize {
-        let doubles =
-            2 + 1 + COMPONENTS + 2 + usize::from(self.eps_v.is_some()) + self.history.len();
-        let carried: usize = self.carried.iter().map(|(_, a)| a.ncols()).sum();
-        8 * (doubles + carried) + 4 + 4
+        self.arrays().iter().map(|(_, bytes)| bytes).sum()
     }
 }

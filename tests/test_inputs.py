@@ -294,7 +294,11 @@ def test_only_the_arrays_that_a_scene_needs_exist():
     for form in ("u", "u_epsv"):
         scene = tawami.Scene(grid, body_of(grid), tawami.linear_elastic(**ELASTIC), form=form)
         bytes_of[form] = scene.particles.bytes_per_particle
-        assert (scene.particles.eps_v is None) == (form == "u")
+        if form == "u":
+            with pytest.raises(tawami.InputError, match=r"no volumetric strain.*form='u_epsv'"):
+                _ = scene.particles.eps_v
+        else:
+            assert scene.particles.eps_v.shape == scene.particles.volume.shape
         assert scene._compiled.traction is not None
     assert bytes_of == {"u": 80, "u_epsv": 88}
 

@@ -199,6 +199,15 @@ tawami.run(main, "driver")
     assert np.ptp(stress) > 0
 
 
+def test_the_header_is_that_of_the_whole_body():
+    code = SCENE + "tell(scene(density=1.0).header())"
+    alone, four = (start(number, "-c", code) for number in (1, 4))
+    assert four.returncode == 0, four.stderr
+    header = alone.stdout[alone.stdout.index("grid  ") :]
+    assert "particles     128, 88 bytes each" in header
+    assert four.stdout.count(header.replace("1 rank\n", "4 ranks\n")) == 4
+
+
 FEW = (
     SCENE.replace("h=0.25, cells=(8, 4)", "h=1.0, cells=(2, 1)")
     + """

@@ -24,6 +24,8 @@ def test_the_driver_script_runs(tmp_path):
     run = subprocess.run(
         [sys.executable, script.name], cwd=tmp_path, capture_output=True, text=True, check=True
     )
+    (header,) = re.findall(r"```text\n(.*?)```", TEXT, flags=re.DOTALL)
+    assert set(header.splitlines()) <= set(run.stdout.splitlines())
     deflection = float(run.stdout.split()[-1])
     row, _ = mpm.solve("u_epsv", "clamped", 16, 0.1)
     assert np.isclose(deflection, row.deflection_m, rtol=1e-9)

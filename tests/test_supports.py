@@ -57,6 +57,19 @@ def test_point_constraint_by_elimination_is_that_by_multiplier(basis, point, val
     assert solution.displacement(point)[1] == pytest.approx(value, abs=1e-15)
 
 
+def test_a_number_is_its_own_projection(basis):
+    grid = grid_of((6, 4))
+    active = np.ones(grid.cells[::-1], dtype=bool)
+    active[:, 3] = False  # no particles there
+    for between in (None, (-0.5, 1.5)):
+        number, function = (
+            boundary.held_edge(grid, basis, active, "top", 1, value, between)
+            for value in (-0.7, lambda x, y: -0.7 + 0 * x)
+        )
+        np.testing.assert_array_equal(number.indices, function.indices)
+        assert number.values == pytest.approx(function.values, rel=1e-13)
+
+
 def test_profiles_are_projected_in_l2_and_reproduced_where_the_basis_can(basis):
     scene = beam(basis=basis)
     linear = boundary.held_edge(

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-import shapely
 
 from tawami import _dolfinx, _rust
 from tawami.errors import InputError
 from tawami.grid import Grid
 from tawami.inputs import array, point, whole_number
+
+if TYPE_CHECKING:
+    import shapely
 
 Array = npt.NDArray[np.float64]
 #: Degree of the rule on the triangles of a cut cell: grad w : C : grad u of quadratic splines.
@@ -108,6 +110,8 @@ def polygon(grid: Grid, vertices: npt.ArrayLike, *, per_axis: int = 2, gauss: bo
         InputError: Fewer than three vertices, all on a line, sides that cross or touch, or a vertex
             outside the grid.
     """
+    import shapely  # here and below: a scene without polygons does without it
+
     points, weights = _along_an_axis(per_axis, gauss)
     shape = _in_cells(grid, vertices)
     lower, upper = np.floor(shape.bounds[:2]), np.ceil(shape.bounds[2:])
@@ -132,6 +136,8 @@ def _along_an_axis(number: int, gauss: bool) -> tuple[Array, Array]:
 
 def _in_cells(grid: Grid, vertices: npt.ArrayLike) -> shapely.Polygon:
     """The polygon in cells from the origin; round-off must not leave slivers beyond a line."""
+    import shapely
+
     corners = array("vertices", vertices, 2)
     if len(corners) < 3 or corners.shape[1] != 2:
         raise InputError(
@@ -164,6 +170,8 @@ def _in_cells(grid: Grid, vertices: npt.ArrayLike) -> shapely.Polygon:
 
 def _in_triangles(parts: Any) -> tuple[Array, Array]:
     """Positions and volumes of particles that integrate over parts of cells."""
+    import shapely
+
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(parts))
     area = shapely.area(triangles)
     triangles, area = triangles[area > ROUND_OFF], area[area > ROUND_OFF]

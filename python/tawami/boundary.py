@@ -121,10 +121,13 @@ def held_edge(
     prescribed = evaluate(value, x, y, f"fix(edge='{edge}')")
     values = values_1d(basis, n, cell, t)
     used = np.unique(values.indices)
+    indices = 2 * edge_functions(grid, basis, edge)[used] + component
+    if not callable(value) and np.ndim(value) == 0:
+        return Held(indices, np.full(len(used), prescribed[0]))  # the functions add up to 1
     values = values[:, used]
     weighted = sp.diags(np.tile(weights, len(touched))) @ values
     coefficients = spsolve((weighted.T @ values).tocsc(), weighted.T @ prescribed)
-    return Held(2 * edge_functions(grid, basis, edge)[used] + component, coefficients)
+    return Held(indices, coefficients)
 
 
 def cells_between(grid: Grid, edge: Edge, between: Interval | None) -> npt.NDArray[np.bool_]:

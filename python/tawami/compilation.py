@@ -7,7 +7,8 @@ once per process and on disk.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import functools
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -19,7 +20,7 @@ from ufl.algorithms.check_arities import ArityMismatch, check_form_arity
 
 from tawami import _dolfinx
 from tawami.density import DEGREE, Density, Rule
-from tawami.errors import FormError, MissingDependencyError
+from tawami.errors import FormError, InputError, MissingDependencyError
 from tawami.formulation import Form
 from tawami.numerics import TangentRule
 from tawami.symbols import PLACEHOLDERS, Symbols
@@ -71,22 +72,30 @@ class CompiledForm:
         form: What it was compiled from.
         element: Element of all fields on the mesh: biquadratic displacement, bilinear others.
         residual: Its integrals over cells, one per quadrature rule.
-        traction: Its integral over loaded edges, if it has one.
+        edges: Compiles its integral over loaded edges, if it has one: not before there is a load.
         tangent: Derivative of `residual`, one per quadrature rule.
         couplings: What it has besides: products of two integrals of rank 1, cell by cell.
         ghost: Its integral over sides of partly filled cells, if it has one: of rank 2, the residual
             being linear there.
         densities: Particle data per rule: each density with its first column.
+        used: Those of the form's parameters that its residual names with these options.
     """
 
     form: Form
     element: Any
     residual: tuple[Integral, ...]
-    traction: Integral | None
+    edges: Callable[[], Integral] | None
     tangent: tuple[Integral, ...]
     couplings: tuple[tuple[Integral, Integral], ...]
     ghost: Integral | None
     densities: Mapping[Rule, Mapping[Density, int]]
+    used: frozenset[str]
+
+    @functools.cached_property
+    def traction(self) -> Integral | None:
+        """The integral over loaded edges, if the form has one; a call for all ranks."""
+        with tally.compiling():
+            return None if self.edges is None else self.edges()
 
     def columns(self, rule: Rule) -> int:
         """Number of columns of the particle data of a rule."""
@@ -255,12 +264,19 @@ def _compile(
         form=form,
         element=symbols.element,
         residual=tuple(integral(part) for part in _by_rule(cells)),
-        traction=integral(edges, "exterior_facet") if edges is not None else None,
+        edges=None if edges is None else lambda: integral(edges, "exterior_facet"),
         tangent=tuple(integral(part, at_particles=at_particles) for part in _by_rule(tangent)),
         ghost=integral(ghost, "interior_facet") if ghost is not None else None,
         couplings=tuple((integral(left), integral(right)) for left, right in couplings),
         densities=densities,
+        used=_named(symbols, residual),
     )
+
+
+def _named(symbols: Symbols, residual: Any) -> frozenset[str]:
+    """Parameters that a residual names."""
+    used = set(residual.constants())
+    return frozenset(name for name in symbols.form.parameters if symbols.constants[name] in used)
 
 
 _compiled: dict[tuple[Form, TangentRule, tuple[tuple[str, str], ...]], CompiledForm] = {}
@@ -285,3 +301,30 @@ def compile_form(
         with tally.compiling():
             _compiled[key] = _compile(comm, form, options, tangent_rule)
     return _compiled[key]
+
+
+def check_used(
+    compiled: CompiledForm, options: Mapping[str, str], given: Mapping[str, Any]
+) -> None:
+    """Whether a form with its options uses all parameters that it was given.
+
+    Raises:
+        InputError: One has no effect; the message names the option with which it has.
+    """
+    form = compiled.form
+    for name in [n for n in given if n in form.parameters and n not in compiled.used]:
+        switches = [
+            f"{option}='{choice}'"
+            for option, choices in form.options.items()
+            for choice in choices
+            if _uses(form, {**options, option: choice}, name)
+        ]
+        raise InputError(
+            f"{name} = {given[name]!r}: form {form.name} does not use it with its present options: "
+            f"expected {' or '.join(switches) or f'no {name}'}"
+        )
+
+
+def _uses(form: Form, options: Mapping[str, str], name: str) -> bool:
+    symbols = Symbols(form, options)
+    return name in _named(symbols, symbols.residual())

@@ -15,7 +15,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import numpy.typing as npt
 
-from tawami import inputs, ranks
+from tawami import contents, inputs, ranks
 from tawami.energy import Energies
 from tawami.errors import InputError
 from tawami.newton import Inertia
@@ -59,7 +59,7 @@ class Dynamics:
         damping: float = np.inf,
         gamma: float = 0.5,
     ) -> None:
-        if scene.mass is None:
+        if not scene.has_density:
             raise InputError("Dynamics needs Scene(..., density=...) [kg/m3]")
         if transfer not in TRANSFERS:
             raise InputError(f"transfer = {transfer!r}: expected one of {', '.join(TRANSFERS)}")
@@ -98,9 +98,9 @@ class Dynamics:
             scene.particles.carried(name)[:] = 0.0
         self.velocity[:] = given[scene.particles.number]
         self.time, self.steps = 0.0, 0
-        #: v and a of the grid where it stays, functions x 2.
-        self._kept: tuple[Array, Array] | None = None
-        self._stored, self._borne = np.array(self.velocity), ()
+        #: v and a of the grid where it stays (functions x 2), and the velocities that it gave particles.
+        self._kept: tuple[Array, Array, Array] | None = None
+        self._borne: tuple[object, ...] = ()
         self.energies = Energies(kinetic=self.kinetic_energy, elastic=self.elastic_energy)
 
     # -- what the particles carry --------------------------------------------
@@ -127,9 +127,11 @@ class Dynamics:
     @property
     def mass(self) -> Array:
         """m_p [kg per metre depth]."""
-        mass = self.scene.mass
-        assert mass is not None
-        return mass
+        return self.scene.mass
+
+    def header(self) -> str:
+        """As `Scene.header`, with the motion."""
+        return contents.header(self.scene, self)
 
     # -- one step ------------------------------------------------------------
 
@@ -202,8 +204,9 @@ class Dynamics:
                 for name, values in carried.items():
                     array = scene.particles.carried(name)
                     array[:] = values.reshape(array.shape)
-                self._kept = None if self._moves else (v1, a1)
-                self._stored, self._borne = np.array(self.velocity), borne
+                if not self._moves:
+                    self._kept = v1, a1, np.array(self.velocity)
+                self._borne = borne
                 self.time, self.steps = end, self.steps + 1
                 self._balance(losses, dissipated)
 
@@ -219,8 +222,8 @@ class Dynamics:
 
     def _from_particles(self, mass: Array) -> tuple[Array, Array]:
         """v and a of the grid, functions x 2."""
-        if self._kept is not None and np.array_equal(self._stored, self.velocity):
-            return self._kept
+        if self._kept is not None and np.array_equal(self._kept[2], self.velocity):
+            return self._kept[:2]
         attached = self.scene.attached
         v, a = (
             _over(to_grid(attached, self.mass, values, gradient), mass[:, None])

@@ -9,6 +9,10 @@ class FormError(TawamiError):
     """A weak form that cannot be used as it stands."""
 
 
+class NotModelledError(InputError, AttributeError):
+    """An attribute that this scene does not model; the message names the switch that does."""
+
+
 class SupportError(TawamiError):
     """Supports that leave a rigid motion free, contradict each other, or miss the body."""
 
@@ -46,6 +50,7 @@ __all__ = [
     "FormError",
     "InputError",
     "MissingDependencyError",
+    "NotModelledError",
     "OutputError",
     "SingularError",
     "SupportError",

@@ -6,7 +6,7 @@ there already stays.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -79,24 +79,28 @@ class Loads:
         self.forces.append(Forces(each))
 
     def external(
-        self, attached: Attached, particles: _rust.Particles, mass: Array | None, part: float
+        self,
+        attached: Attached,
+        particles: _rust.Particles,
+        mass: Callable[[], Array],
+        part: float,
     ) -> Array:
         """External forces on all coefficients.
 
         Args:
             attached: The particles where they are.
             particles: The particles of this rank.
-            mass: Their masses [kg per metre depth]; None where there is no density.
+            mass: Gives their masses [kg per metre depth]; called where there is gravity only.
             part: Share of the loads that are new.
         """
-        on_particles = np.zeros((len(particles), 2))
         gravity = self._gravity_at(part)
-        if mass is not None:
-            on_particles += mass[:, None] * gravity
-        for forces in self.forces:
-            on_particles += _share(forces, part) * forces.force[particles.number]
         external = np.zeros(attached.layout.size)
         if self.forces or gravity.any():
+            on_particles = np.zeros((len(particles), 2))
+            if gravity.any():
+                on_particles += mass()[:, None] * gravity
+            for forces in self.forces:
+                on_particles += _share(forces, part) * forces.force[particles.number]
             sums = attached.sums(np.ones(len(particles)), on_particles)
             external[: sums.size] = sums.ravel()
         for traction in self.tractions:

@@ -172,6 +172,12 @@ class Newton:
                     "'u_p', or nu < 0.5"
                 )
 
+    @property
+    def bytes_per_particle(self) -> int:
+        """What the particle data and the constants take."""
+        arrays = [*self.data.values(), *self.constants.values()]
+        return sum(array.itemsize * int(np.prod(array.shape[1:])) for array in arrays)
+
     def internal(self, coefficients: Array) -> Array:
         """Internal forces and volume residual on all coefficients, at given increments."""
         with self.stopwatch("law"):

@@ -75,7 +75,7 @@ def write_particles(path: str | Path, solution: Solution) -> None:
         "mean stress [Pa]": solution.mean_stress,
         "volume [m2 per m]": solution.volume,
     }
-    if solution.eps_v is not None:
+    if solution.scene.form.kinematics == "mixed":
         data["eps_v [-]"] = solution.eps_v
     mesh = meshio.Mesh(_with_z(solution.x), [("vertex", np.arange(n)[:, None])], point_data=data)
     _write(path, mesh, solution.scene.grid.comm)
@@ -103,7 +103,7 @@ def write_grid(path: str | Path, solution: Solution) -> None:
     data: dict[str, Array] = {
         "displacement [m]": _with_z(vertex @ solution.u.reshape(-1, 2)),
     }
-    if solution.volumetric is not None:
+    if len(scene.form.fields) > 1:
         name, unit = (
             list(scene.form.fields.items())[1][0],
             "-" if scene.form.kinematics == "mixed" else "Pa",

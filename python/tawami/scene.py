@@ -14,12 +14,12 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from tawami import _rust, inputs, placement, ranks
+from tawami import _rust, contents, inputs, placement, ranks
 from tawami.attached import Attached
 from tawami.basis import BASES, Basis
 from tawami.body import Body
 from tawami.boundary import Component, Interval, Profile, cells_between
-from tawami.compilation import compile_form
+from tawami.compilation import check_used, compile_form
 from tawami.errors import ConvergenceError, InputError
 from tawami.fast_field import FastField
 from tawami.field import Field
@@ -68,7 +68,7 @@ class Accepted:
     smooth: Array
 
 
-class Scene:
+class Scene(contents.Elsewhere):
     """Particles on a grid with a weak form, supports and loads.
 
     By itself it is static; `ramp` brings its loads up in steps, `Dynamics` sets it in motion. With a
@@ -96,15 +96,16 @@ class Scene:
             they are. Where particles change rank or leave the grid this is another object after a
             step. Their arrays are views of the storage, not copies: `x` [m], `material` and
             `number`, which cannot be written, `volume` [m2], `stress` [Pa] (xx, yy, zz, xy; tension
-            positive), `displacement` [m], and `eps_v` with forms that have that field (None
-            otherwise).
+            positive), `displacement` [m], and `eps_v` with forms that have that field.
         num_particles: Number of particles of the body, on all ranks.
         left: Number, position [m] and time [s] (NaN in a static scene) of the particles that left.
         supports, loads: As fix(...), gravity(...) and their like have made them.
+        parameters, options: Of the form, as they are used.
+        numerics: How a step is solved.
 
     Raises:
         InputError: Particles outside the grid, a body without particles, NaN, an incompressible
-            material with a form that cannot take it, an unknown parameter.
+            material with a form that cannot take it, a parameter that is unknown or without effect.
         FormError: A form that cannot be used as it stands.
     """
 
@@ -136,7 +137,7 @@ class Scene:
                 f"Scene({type(grid).__name__}, {type(body).__name__}, ...): expected a tawami.Grid and "
                 "a tawami.Body"
             )
-        self._numerics = Numerics(
+        self.numerics = Numerics(
             tolerance, max_iterations, assembly, tangent_rule, factorise, linear_solver
         )
         self.grid, self.basis = grid, basis
@@ -170,6 +171,9 @@ class Scene:
         self.num_particles = len(whole)
         self.particles, location = placement.distributed(grid, whole, moving=self._finite)
         self._compiled = compile_form(grid.comm, self.form, options, tangent_rule)
+        check_used(self._compiled, options, parameters)
+        self.options = options
+        self.parameters = {name: values[name] for name in values if name in self._compiled.used}
         if self.form.kinematics == "mixed":
             self.particles.add_eps_v()
         self.stopwatch = Stopwatch()
@@ -181,7 +185,7 @@ class Scene:
     def _attach(self, location: _rust.Location) -> Attached:
         """Field side, laws and Newton's method for the particles in these places."""
         with self.stopwatch("set-up"):
-            field = FIELDS[self._numerics.assembly](
+            field = FIELDS[self.numerics.assembly](
                 self.grid, self._compiled, self.basis, location, self.particles.volume,
                 self._values, self.stopwatch,
             )  # fmt: skip
@@ -192,9 +196,17 @@ class Scene:
         stage = rust if law is None else NumpyStage(rust, self.particles, law)
         newton = Newton(
             field, self._compiled, stage, self.particles, location, self.constants, self.stopwatch,
-            self._numerics,
+            self.numerics,
         )  # fmt: skip
         return Attached(location, field, stage, newton)
+
+    @property
+    def laws(self) -> list[str]:
+        """Names of the laws, each with its history variables."""
+        if self._law is not None:
+            return ["NumpyLaw"]
+        histories = [(m.name, ", ".join(m.history_names)) for m in self._materials]
+        return [f"{name} ({history})" if history else name for name, history in histories]
 
     @property
     def constants(self) -> dict[str, Array]:
@@ -203,11 +215,20 @@ class Scene:
         return {"K": of_particle[:, 0].copy(), "mu": of_particle[:, 1].copy()}
 
     @property
-    def mass(self) -> Array | None:
-        """Mass of each particle [kg per metre depth]; None without a density."""
+    def mass(self) -> Array:
+        """Mass of each particle [kg per metre depth].
+
+        Raises:
+            InputError: No density.
+        """
         if self._densities is None:
-            return None
+            raise InputError("mass needs Scene(..., density=...) [kg/m3]")
         return np.asarray(self._densities[self.particles.material] * self.particles.volume)
+
+    @property
+    def has_density(self) -> bool:
+        """Whether the scene has a density."""
+        return self._densities is not None
 
     @property
     def least_density(self) -> float:
@@ -345,6 +366,17 @@ class Scene:
 
     # -- what it is made of --------------------------------------------------
 
+    def header(self) -> str:
+        """What the scene models and what it does not, with the switches that would add it: lines for
+        the start of a run, with the arrays of the particles, their bytes, and the unknowns.
+
+        A call for all ranks.
+
+        Raises:
+            SupportError: A point is held that no particle is near.
+        """
+        return contents.header(self)
+
     def split(self, coefficients: Array) -> tuple[Array, Array | None]:
         """Coefficients of the displacement and of the bilinear field (None if there is none)."""
         return self.attached.field.layout.split(coefficients)
@@ -452,17 +484,17 @@ class Scene:
 
     def external(self, part: float = 1.0) -> Array:
         """External forces on all coefficients [N per metre depth]."""
-        return self.loads.external(self.attached, self.particles, self.mass, part)
+        return self.loads.external(self.attached, self.particles, lambda: self.mass, part)
 
     @contextmanager
     def tolerance_of(self, tolerance: float) -> Iterator[None]:
         """Newton's tolerance within a block."""
-        before = self._numerics
+        before = self.numerics
         try:
-            self._numerics = self.attached.newton.numerics = replace(before, tolerance=tolerance)
+            self.numerics = self.attached.newton.numerics = replace(before, tolerance=tolerance)
             yield
         finally:
-            self._numerics = self.attached.newton.numerics = before
+            self.numerics = self.attached.newton.numerics = before
 
     def advance(
         self,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from tawami import _rust, boundary, ranks
+from tawami import _rust, boundary, contents, ranks
 from tawami.errors import InputError
 from tawami.grid import EDGES
 from tawami.newton import Converged, History
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 
-class Solution:
+class Solution(contents.Elsewhere):
     """Equilibrium of a scene, or the end of a step. On several ranks all of it is on every rank, and
     arrays of particles are in the order of their numbers.
 
@@ -28,7 +28,6 @@ class Solution:
         scene: What was solved.
         u: Coefficients of the displacement [m], two per function, x fastest: since the start, and of
             the last step where strains are finite.
-        volumetric: Coefficients of eps_v, or of p [Pa]; None with forms that have neither.
         unknowns: Number of reduced unknowns.
         iterations: Newton iterations of the last step.
         history: (momentum, volume) measures of every residual of the last step.
@@ -39,7 +38,6 @@ class Solution:
         volume: Their volumes [m2] at the start.
         stress: Their stress [Pa] (xx, yy, zz, xy), as it was when this was solved.
         displacement_of_particles: Their displacement [m] since the start.
-        eps_v: Their volumetric strain; None with forms that do not have it.
         condition: Estimate of the condition number of the tangent last factorised, scaled: its
             Frobenius norm over the square root of its size, times that of its inverse as random
             vectors show it.
@@ -50,7 +48,7 @@ class Solution:
         self, scene: Scene, step: Converged, reduction: Reduction, coefficients: Array
     ) -> None:
         self.scene = scene
-        self.u, self.volumetric = scene.split(coefficients)
+        self.u, self._volumetric = scene.split(coefficients)
         self.unknowns, self.iterations = reduction.size, step.iterations
         self.history: History = step.history
         self.krylov = tuple(step.krylov)
@@ -68,7 +66,35 @@ class Solution:
         self.x, self.volume = whole(particles.x), whole(particles.volume)
         self.stress = whole(particles.stress)
         self.displacement_of_particles = whole(particles.displacement)
-        self.eps_v = None if particles.eps_v is None else whole(particles.eps_v)
+        mixed = scene.form.kinematics == "mixed"
+        self._eps_v = whole(particles.eps_v) if mixed else None
+
+    @property
+    def volumetric(self) -> Array:
+        """Coefficients of eps_v, or of p [Pa].
+
+        Raises:
+            InputError: The form has neither.
+        """
+        return self._of_form("volumetric", self._volumetric, ("mixed", "deviatoric"))
+
+    @property
+    def eps_v(self) -> Array:
+        """Volumetric strain of the particles.
+
+        Raises:
+            InputError: The form does not have that field.
+        """
+        return self._of_form("eps_v", self._eps_v, ("mixed",))
+
+    def _of_form(self, name: str, values: Array | None, kinematics: tuple[str, ...]) -> Array:
+        if values is None:
+            form = self.scene.form
+            raise InputError(
+                f"{name}: form {form.name} does not have it: expected a form with the kinematics "
+                f"{' or '.join(map(repr, kinematics))}, as form='{contents.MIXED[form.strain]}'"
+            )
+        return values
 
     def displacement(self, point: Sequence[float]) -> Array:
         """Displacement (u_x, u_y) [m] of the grid at a point.
@@ -90,11 +116,17 @@ class Solution:
                 impulse at its beginning over its length.
 
         Raises:
-            InputError: No such edge, or no point held there.
+            InputError: No such edge or nothing that supports it, or no point held there.
         """
         if isinstance(place, str):
             if place not in EDGES:
                 raise InputError(f"reaction('{place}'): expected one of {', '.join(EDGES)}")
+            if place not in self._edges:
+                raise InputError(
+                    f"reaction('{place}'): nothing supports that edge: expected one of "
+                    f"{', '.join(sorted(self._edges)) or 'none'}, or fix('{place}', ...) or "
+                    f"wall('{place}') before"
+                )
             scene = self.scene
             functions = boundary.edge_functions(scene.grid, scene.basis, place)
             return np.asarray(self._on_edges[functions].sum(axis=0))
@@ -116,6 +148,8 @@ class Solution:
         """
         n = len(self.u)
         scene, points = self.scene, reduction.points
+        self._edges = {s.place for s in scene.supports.all if isinstance(s.place, str)}
+        self._edges |= {wall.edge for wall in scene.supports.walls}
         rest = forces[:n].copy()
         if points:
             weights = np.zeros((n, len(points)))

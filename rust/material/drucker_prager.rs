@@ -43,6 +43,10 @@ impl DruckerPrager {
 }
 
 impl Material for DruckerPrager {
+    fn name(&self) -> &'static str {
+        "drucker_prager"
+    }
+
     fn shear_modulus(&self) -> f64 {
         self.elastic.shear_modulus()
     }

@@ -73,6 +73,10 @@ impl LinearElastic {
 }
 
 impl Material for LinearElastic {
+    fn name(&self) -> &'static str {
+        "linear_elastic"
+    }
+
     fn shear_modulus(&self) -> f64 {
         self.mu
     }

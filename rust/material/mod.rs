@@ -80,6 +80,9 @@ impl From<&Tangent> for Moduli {
 
 /// A material law.
 pub trait Material: Send + Sync {
+    /// What driver scripts call it.
+    fn name(&self) -> &'static str;
+
     /// Shear modulus mu [Pa] of the elastic part.
     fn shear_modulus(&self) -> f64;
 

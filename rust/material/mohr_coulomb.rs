@@ -128,6 +128,10 @@ impl MohrCoulomb {
 }
 
 impl Material for MohrCoulomb {
+    fn name(&self) -> &'static str {
+        "mohr_coulomb"
+    }
+
     fn shear_modulus(&self) -> f64 {
         self.elastic.shear_modulus()
     }

@@ -53,6 +53,10 @@ fn shift(x: &[f64; 3]) -> f64 {
 }
 
 impl Material for NeoHookean {
+    fn name(&self) -> &'static str {
+        "neo_hookean"
+    }
+
     fn shear_modulus(&self) -> f64 {
         self.elastic.shear_modulus()
     }

@@ -36,6 +36,10 @@ impl VonMises {
 }
 
 impl Material for VonMises {
+    fn name(&self) -> &'static str {
+        "von_mises"
+    }
+
     fn shear_modulus(&self) -> f64 {
         self.elastic.shear_modulus()
     }

@@ -78,7 +78,15 @@ impl PyParticles {
     fn carried<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let object = slf.borrow();
         let Some((_, array)) = object.0.carried.iter().find(|(known, _)| known == name) else {
-            return Err(InputError::new_err(format!("no array '{name}': is this a static scene?")));
+            let known: Vec<_> = object.0.carried.iter().map(|(known, _)| known.as_str()).collect();
+            return Err(InputError::new_err(if known.is_empty() {
+                format!(
+                    "no array '{name}': a scene by itself is static; Dynamics(scene, velocity=...) \
+                     gives its particles velocities and accelerations"
+                )
+            } else {
+                format!("no array '{name}': expected one of {known:?}")
+            }));
         };
         // SAFETY: as in `view`; never reallocated once it is there.
         Ok(unsafe { PyArray::borrow_from_array(array, slf.clone().into_any()) })
@@ -108,9 +116,14 @@ impl PyParticles {
         let object = slf.borrow();
         let Some((_, array)) = object.0.history.iter().find(|(known, _)| *known == name) else {
             let known: Vec<_> = object.0.history.iter().map(|(name, _)| *name).collect();
-            return Err(InputError::new_err(format!(
-                "history '{name}': the laws of this scene have {known:?}"
-            )));
+            return Err(InputError::new_err(if known.is_empty() {
+                format!(
+                    "history '{name}': the laws of this scene have none: expected a plastic law, as \
+                     von_mises(...), drucker_prager(...) or mohr_coulomb(...)"
+                )
+            } else {
+                format!("history '{name}': the laws of this scene have {known:?}")
+            }));
         };
         // SAFETY: as in `view`; never reallocated once a scene is made.
         Ok(unsafe { PyArray::borrow_from_array(array, slf.clone().into_any()) })
@@ -118,6 +131,12 @@ impl PyParticles {
 
     fn add_eps_v(&mut self) {
         self.0.add_eps_v();
+    }
+
+    /// Name of each array, and bytes that one particle takes in it.
+    #[getter]
+    fn arrays(&self) -> Vec<(&str, usize)> {
+        self.0.arrays()
     }
 
     #[getter]
@@ -160,11 +179,17 @@ impl PyParticles {
     }
 
     #[getter]
-    fn eps_v<'py>(slf: &Bound<'py, Self>) -> Option<Bound<'py, PyArray1<f64>>> {
+    fn eps_v<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let object = slf.borrow();
-        let array = object.0.eps_v.as_ref()?;
+        let Some(array) = object.0.eps_v.as_ref() else {
+            return Err(InputError::new_err(
+                "eps_v: the form of this scene has no volumetric strain: expected one with the \
+                 kinematics 'mixed', as Scene(..., form='u_epsv') or, at finite strain, \
+                 form='u_epsv_finite'",
+            ));
+        };
         // SAFETY: as in `view`; never reallocated.
-        Some(unsafe { PyArray::borrow_from_array(array, slf.clone().into_any()) })
+        Ok(unsafe { PyArray::borrow_from_array(array, slf.clone().into_any()) })
     }
 }
 
@@ -225,6 +250,18 @@ impl PyMaterial {
     #[staticmethod]
     fn neo_hookean(k: f64, mu: f64) -> PyResult<Self> {
         Ok(Self(Arc::new(NeoHookean::new(LinearElastic::from_k_mu(k, mu)?))))
+    }
+
+    /// What the law is called.
+    #[getter]
+    fn name(&self) -> &'static str {
+        self.0.name()
+    }
+
+    /// Names of its history variables.
+    #[getter]
+    fn history_names(&self) -> Vec<&'static str> {
+        self.0.history().to_vec()
     }
 
     /// Whether the law exists at finite strain only.
