@@ -245,7 +245,8 @@ def test_another_array_of_a_motion_is_named():
 def test_a_parameter_without_effect_is_refused():
     with pytest.raises(tawami.InputError, match=r"k = 0.1: form .* expected ghost_penalty='on'"):
         scene_of(form="u_epsv", k=0.1)
-    assert scene_of(form="u_epsv", k=0.1, ghost_penalty="on").parameters == {"alpha": 0.1, "k": 0.1}
+    scene = scene_of(form="u_epsv", alpha=0.2, k=0.1, ghost_penalty="on")
+    assert scene.parameters == {"alpha": 0.2, "k": 0.1}
     idle = tawami.Form({"u": ("displacement", "w")}, "displacement", _residual,
                        parameters={"beta": {"default": 1.0}})  # fmt: skip
     assert scene_of(form=idle).parameters == {}

@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import meshio
 import numpy as np
 import numpy.typing as npt
 
@@ -77,8 +76,8 @@ def write_particles(path: str | Path, solution: Solution) -> None:
     }
     if solution.scene.form.kinematics == "mixed":
         data["eps_v [-]"] = solution.eps_v
-    mesh = meshio.Mesh(_with_z(solution.x), [("vertex", np.arange(n)[:, None])], point_data=data)
-    _write(path, mesh, solution.scene.grid.comm)
+    cells = [("vertex", np.arange(n)[:, None])]
+    _write(path, solution.scene.grid.comm, solution.x, cells, data)
 
 
 def write_grid(path: str | Path, solution: Solution) -> None:
@@ -109,20 +108,25 @@ def write_grid(path: str | Path, solution: Solution) -> None:
             "-" if scene.form.kinematics == "mixed" else "Pa",
         )
         data[f"{name} [{unit}]"] = np.asarray(solution.volumetric)
-    mesh = meshio.Mesh(
-        _with_z(points),
-        [("quad", squares)],
-        point_data=data,
-        cell_data={"particles [-]": [scene.particles_per_cell.astype(float)]},
-    )
-    _write(path, mesh, grid.comm)
+    count = {"particles [-]": [scene.particles_per_cell.astype(float)]}
+    _write(path, grid.comm, points, [("quad", squares)], data, count)
 
 
 def _with_z(values: npt.ArrayLike) -> Array:
     return np.pad(np.asarray(values, dtype=float), ((0, 0), (0, 1)))
 
 
-def _write(path: str | Path, mesh: meshio.Mesh, comm: Any) -> None:
+def _write(
+    path: str | Path,
+    comm: Any,
+    points: Array,
+    cells: list[tuple[str, npt.NDArray[Any]]],
+    point_data: dict[str, Array],
+    cell_data: dict[str, list[Array]] | None = None,
+) -> None:
+    import meshio  # here: a scene without output does without it
+
+    mesh = meshio.Mesh(_with_z(points), cells, point_data=point_data, cell_data=cell_data)
     if Path(path).suffix != ".vtu":
         raise OutputError(f"'{path}': expected a file name ending in .vtu")
     with ranks.together(comm):
