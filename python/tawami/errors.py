@@ -13,6 +13,14 @@ class SupportError(TawamiError):
     """Supports that leave a rigid motion free, contradict each other, or miss the body."""
 
 
+class InstabilityWarning(UserWarning):
+    """An option of a form that is not stable for this body."""
+
+
+class LockingWarning(UserWarning):
+    """A form without a field for the volume, where that makes its mean stress useless."""
+
+
 class SingularError(TawamiError):
     """A tangent that cannot be solved; the message names the cells."""
 
@@ -45,6 +53,8 @@ __all__ = [
     "ConvergenceError",
     "FormError",
     "InputError",
+    "InstabilityWarning",
+    "LockingWarning",
     "MissingDependencyError",
     "OutputError",
     "SingularError",

@@ -18,7 +18,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from mpi4py import MPI
 
-from tawami import _rust, ranks
+from tawami import _rust, ranks, singularity
 from tawami.compilation import CompiledForm
 from tawami.density import Density, LawQuantity, ParticleScalar, Rule
 from tawami.errors import ConvergenceError, InputError, SingularError
@@ -316,7 +316,8 @@ class Newton:
                     coefficients, held, history, krylov, linear.condition, linear.symmetric
                 )
             if len(history) > self.max_iterations:
-                self._fail(history, "Take a smaller load, or check material and supports")
+                advice = self._lost() or "Take a smaller load, or check material and supports"
+                self._fail(history, advice)
             matrix = self.field.tangent(coefficients, self.data, reduction)
             if inertia is not None:
                 self._add_mass(matrix, inertia, reduction)
@@ -361,39 +362,16 @@ class Newton:
         )
 
     def _report_singular(self, reduction: Reduction) -> None:
-        layout, grid = self.field.layout, self.field.grid
-        condition, weak = self._linear.condition, self._linear.weak
+        weak = self._linear.weak
         self._linear.forget()
-        own = np.argsort(-np.abs(weak))[:20]
-        entries = ranks.joined(self._comm, np.abs(weak[own]))
-        unknowns = ranks.joined(self._comm, reduction.own.start + own)
-        counts = np.bincount(self.location.cell, minlength=grid.cells[0] * grid.cells[1])
-        counts = ranks.sum_of(self._comm, counts)
-        weakest: list[str] = []
-        for unknown in unknowns[np.argsort(-entries, kind="stable")][:20]:
-            cells = layout.cells_of(reduction.unknowns[unknown])
-            number = counts[cells @ [1, grid.cells[0]]]
-            i, j = cells[number.argmin()]
-            text = f"({i}, {j}) with {number.min()} particles"
-            if text not in weakest:
-                weakest.append(text)
-        ratio = float((self.constants["K"] / self.constants["mu"]).max(initial=0.0))
-        stiff = self._comm.allreduce(ratio, op=MPI.MAX)
-        if stiff > 1e9 and self.compiled.form.kinematics in ("displacement", "cell"):
-            advice = (
-                f"K/mu is {stiff:.1e}: without a field for the volume no digit is left at that; use "
-                "form 'u_epsv' or 'u_p'"
-            )
-        else:
-            advice = (
-                "the particles do not stiffen every function of the grid. Use more particles per "
-                "cell, the basis 'quadratic_spline', or alpha > 0"
-            )
-        size = "infinite" if np.isinf(condition) else f"about {condition:.1e}"
+        cells = singularity.weakest(self.field, self.location, reduction, weak)
         raise SingularError(
-            f"the tangent is singular (condition number of the scaled matrix: {size}; from its "
-            f"factorisation and random vectors). The displacement basis is '{layout.basis}'; weakest "
-            f"at the cells (i, j): {', '.join(weakest[:4])}. Likely cause: {advice}"
+            singularity.sentence(self.field.layout.basis, self._linear.condition, cells, self._lost())
+        )
+
+    def _lost(self) -> str:
+        return singularity.lost_digits(
+            self._comm, self.constants["K"] / self.constants["mu"], self.compiled.form.kinematics
         )
 
 
