@@ -23,7 +23,7 @@ Outcome = Literal["survived", "warned", "refused", "WRONG"]
 Measured = float | tuple[float, str]
 
 #: What may be said of an answer beforehand.
-WARNINGS = (tawami.LockingWarning, tawami.InstabilityWarning)
+WARNINGS = (tawami.LockingWarning, tawami.InstabilityWarning, tawami.QuadratureWarning)
 
 COLUMNS = ("subject", "setting", "outcome", "error", "bound", "says")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,6 +65,7 @@ def point(name: str, one_minus_2nu: float, alpha: float | None) -> Point:
 
 def points(short: bool) -> list[Point]:
     """All of the map, or its corners."""
+    warnings.simplefilter("ignore", tawami.LockingWarning)  # the map shows it
     step = 3 if short else 1
     found = []
     for name, (form, _) in FORMS.items():
@@ -107,8 +109,9 @@ def _panel(axes: Any, mine: Sequence[Point], attribute: str, limits: tuple[float
         axes.add_patch(box)
     for i, j in np.argwhere(~np.isnan(values)):
         dark = values[i, j] < np.sqrt(limits[0] * limits[1])
-        text, colour = f"{values[i, j]:.0e}".replace("e-0", "e-").replace("e+0", "e"), "wk"[not dark]
-        axes.text(j, i, text, ha="center", va="center", fontsize=6, color=colour)
+        digit, power = f"{values[i, j]:.0e}".split("e")
+        style = {"ha": "center", "va": "center", "fontsize": 6, "color": "w" if dark else "k"}
+        axes.text(j, i, f"{digit}e{int(power)}", **style)
     axes.set_yticks(range(len(rows)), [f"{c:g}" if c else r"0 ($\nu = 0.5$)" for c in rows], fontsize=7)
     labels = ["-" if a is None else f"{a:g}" for a in columns]
     axes.set_xticks(range(len(columns)), labels, fontsize=7)

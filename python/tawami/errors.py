@@ -21,6 +21,10 @@ class LockingWarning(UserWarning):
     """A form without a field for the volume, where that makes its mean stress useless."""
 
 
+class QuadratureWarning(UserWarning):
+    """Particles that do not integrate over the cells that they fill."""
+
+
 class SingularError(TawamiError):
     """A tangent that cannot be solved; the message names the cells."""
 
@@ -57,6 +61,7 @@ __all__ = [
     "LockingWarning",
     "MissingDependencyError",
     "OutputError",
+    "QuadratureWarning",
     "SingularError",
     "SupportError",
     "TawamiError",

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from tawami import _rust, inputs, placement, ranks
+from tawami import _rust, inputs, placement, quadrature, ranks
 from tawami.attached import Attached
 from tawami.basis import BASES, Basis
 from tawami.body import Body
@@ -115,6 +115,7 @@ class Scene:
     Warns:
         LockingWarning: A form without a field for the volume, and a material nearly incompressible.
         InstabilityWarning: When solving: cells filled in part, and an option that needs whole ones.
+        QuadratureWarning: When first solving: particles that do not integrate over the cells they fill.
     """
 
     def __init__(
@@ -187,6 +188,7 @@ class Scene:
         self.attached = self._attach(location)
         self.supports, self.loads = Supports(grid, basis), Loads(grid, self.num_particles)
         self._total = np.zeros(self.num_coefficients)
+        self._looked_at = False
 
     def _warn_of_locking(self, particles: _rust.Particles) -> None:
         bulk, mu = self._moduli[particles.material].T
@@ -436,6 +438,9 @@ class Scene:
                     f"{support} has a velocity, and solve() knows no time: expected a value, or "
                     "Dynamics(scene)"
                 )
+        if not self._looked_at:
+            quadrature.warn(self.attached, self.particles.volume)
+            self._looked_at = True
         solution = self.advance(lambda: self.problem(part))
         self.carry(part)
         return solution
