@@ -5,9 +5,9 @@ solutions, the difference of their weak forms, tested with e, is
 
     2 mu |dev eps(e_u)|^2 + |e_p|^2 / K + alpha h^2/mu |grad e_p|^2 = -alpha h^2/mu (grad p, grad e_p)
 
-whence |2 mu dev eps(e_u)| <= h sqrt(alpha/2) |grad p| for any alpha, however large. The same holds of the
-projection with |p - p_c| for h |grad p|, p_c the mean of p over a cell: h^2/12 |grad p|^2 is its square
-for a bilinear p but for terms of higher order in h.
+whence |2 mu dev eps(e_u)| <= h sqrt(alpha/2) |grad p| for any alpha, however large. The same holds of
+the projection with |p - p_c| for h |grad p|, p_c the mean of p over a cell: h^2/12 |grad p|^2 is its
+square for a bilinear p but for terms of higher order in h.
 """
 
 from __future__ import annotations

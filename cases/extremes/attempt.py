@@ -106,7 +106,8 @@ def untouched(scene: tawami.Scene) -> Iterator[None]:
         yield
     except tawami.TawamiError as refusal:
         for name, values in _arrays(scene).items():
-            if not np.array_equal(values, before[name], equal_nan=True):
+            old = before[name]
+            if values is not None and not np.array_equal(values, old, equal_nan=True):
                 raise RuntimeError(f"{name} of the particles changed: {refusal}") from refusal
         raise
 

@@ -150,8 +150,8 @@ def stabilised(
 
 
 def bare(body: str, basis: str, cells: tuple[int, ...]) -> tuple[float, str]:
-    """alpha = 0. Biquadratic: how far it falls below the constant of Taylor and Hood. The others are known
-    to be unstable: their constant on the finest grid over that of alpha = 0.01.
+    """alpha = 0. Biquadratic: how far it falls below the constant of Taylor and Hood. The others are
+    known to be unstable: their constant on the finest grid over that of alpha = 0.01.
     """
     values = constants(body, basis, "laplacian", 0.0, cells)
     words = in_words(values, cells)

@@ -47,7 +47,7 @@ def edges() -> Array:
 def in_cells(of_cell: Callable[[int], Array]) -> tawami.Body:
     """A body of such particles in all cells."""
     nx, ny = CELLS
-    x = [(of_cell(c) + [c % nx, c // nx]) * H for c in range(nx * ny)]
+    x = [(of_cell(c) + np.array([c % nx, c // nx])) * H for c in range(nx * ny)]
     volume = [np.full(len(part), H * H / len(part)) for part in x]
     return tawami.Body(np.concatenate(x), np.concatenate(volume))
 
@@ -103,9 +103,10 @@ def tension(body: tawami.Body, form: str, basis: str) -> float:
 
 
 def midpoint(body: tawami.Body, form: str, basis: str) -> float:
-    """Bound in tension: how much too small the midpoint rule with k points along an axis makes the integral
-    of the last function at a border, (1 - s)^2 of splines (1/(4 k^2)), (1 - s)(1 - 2 s) of biquadratic
-    (1/k^2); bilinear ones it has exactly. B-bar misses 0.22 and 0.42 whatever the rule (README, Limits).
+    """Bound in tension: how much too small the midpoint rule with k points along an axis makes the
+    integral of the last function at a border, (1 - s)^2 of splines (1/(4 k^2)), (1 - s)(1 - 2 s) of
+    biquadratic ones (1/k^2); bilinear ones it has exactly. B-bar misses 0.22 and 0.42 by any rule
+    (`tests/test_patch.py`).
     """
     k = np.sqrt(len(body.x) / (CELLS[0] * CELLS[1]))
     of_rule = {"quadratic_spline": 1 / (4 * k**2), "biquadratic": 1 / k**2, "bilinear": 1e-9}

@@ -67,7 +67,7 @@ def box(
         ends = (np.array([lower[axis], upper[axis]]) - grid.origin[axis]) / grid.h
         first, last = np.rint(ends).astype(int)
         if (
-            not np.allclose(ends, [first, last], atol=ON_LINE)
+            np.abs(ends - [first, last]).max() > ON_LINE
             or first < 0
             or last > grid.cells[axis]
         ):

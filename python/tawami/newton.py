@@ -198,7 +198,10 @@ class Newton:
             round_off += 1e-14 * self._stiffest * self.field.grid.h * np.sqrt(n)
         if inertia is not None:  # and those of one that coasts
             round_off += 1e-13 * float(np.linalg.norm(inertia.mass * inertia.offset))
-        momentum = float(np.linalg.norm(free[of_u])) / scale if scale > round_off else 0.0
+        at_rest = scale <= round_off and (
+            inertia is not None or self._moves_rigidly(coefficients[:n], moved)
+        )
+        momentum = 0.0 if at_rest or scale == 0 else float(np.linalg.norm(free[of_u])) / scale
         volume = None
         if self.kind is not None:
             weight, strains = self._volume_scale(coefficients)
@@ -207,6 +210,19 @@ class Newton:
         # all ranks take the same way, to the bit
         measures: tuple[float, float | None] = self._comm.bcast((momentum, volume))
         return measures
+
+    def _moves_rigidly(self, u: Array, moved: float) -> bool:
+        """Whether strains are round-off of what supports move: their forces may still be those of a soft
+        part, drowned in the round-off of a stiff one.
+        """
+        grid, basis = self.field.grid, self.field.layout.basis
+        g = np.asarray(_rust.gradients(self.location, basis, np.ascontiguousarray(u)))
+        g = g.reshape(-1, 2, 2)
+        strain = g + g.transpose(0, 2, 1)
+        if self.compiled.form.strain == "finite":
+            strain = strain + g.transpose(0, 2, 1) @ g
+        largest = self._comm.allreduce(float(np.abs(strain).max(initial=0.0)), op=MPI.MAX)
+        return bool(moved == 0 or largest <= 1e-10 * moved / grid.h)
 
     def _nodal_sums(self, columns: Array) -> Array:
         """Volume-weighted sums over all particles on the bilinear functions."""
@@ -235,10 +251,10 @@ class Newton:
         vector = matrix.getDiagonal()
         diagonal = vector.array.copy()
         vector.destroy()
-        scale = np.ones(len(own))
-        # A zero diagonal (a function that no particle strains) is left for the solver to report.
-        positive = of_u & (diagonal > 0)
-        scale[positive] = 1 / np.sqrt(diagonal[positive])
+        # A softening law makes negative diagonals. A zero one (a function that no particle strains) is
+        # left for the solver to report, in a scale that does not know units.
+        size = np.abs(np.where(of_u, diagonal, 0.0))
+        scale = 1 / np.sqrt(np.where(size > 0, size, self._largest_mu))
         if self.kind is None:
             return scale
         bulk, mu = self.constants["K"], self.constants["mu"]
@@ -326,7 +342,7 @@ class Newton:
             change = linear.solve(matrix, scale, right[reduction.own], self._forcing(history))
             krylov.append(linear.iterations)
             if linear.singular:
-                self._report_singular(reduction)
+                self._report_singular(reduction, began=len(history) == 1)
             unknowns += ranks.joined(self._comm, change)
             self.stopwatch.lap()
 
@@ -361,18 +377,21 @@ class Newton:
             history,
         )
 
-    def _report_singular(self, reduction: Reduction) -> None:
-        weak = self._linear.weak
+    def _report_singular(self, reduction: Reduction, *, began: bool) -> None:
+        weak, advice = self._linear.weak, self._lost()
+        if not advice and not began:
+            advice = singularity.BEYOND
         self._linear.forget()
         cells = singularity.weakest(self.field, self.location, reduction, weak)
         raise SingularError(
-            singularity.sentence(self.field.layout.basis, self._linear.condition, cells, self._lost())
+            singularity.sentence(self.field.layout.basis, self._linear.condition, cells, advice)
         )
 
     def _lost(self) -> str:
+        kinematics, comm = self.compiled.form.kinematics, self._comm
         return singularity.lost_digits(
-            self._comm, self.constants["K"] / self.constants["mu"], self.compiled.form.kinematics
-        )
+            comm, self.constants["K"] / self.constants["mu"], kinematics
+        ) or singularity.contrast(comm, self.constants["mu"])
 
 
 def _worst(measures: tuple[float, float | None]) -> float:

@@ -15,6 +15,13 @@ from tawami.reduction import Reduction
 Array = npt.NDArray[np.float64]
 #: K/mu at which forms without a field for the volume have no digit left.
 NO_DIGITS = 1e9
+#: Largest over least shear modulus from which round-off of the stiff may reach Newton's tolerance.
+FEW_DIGITS = 1e8
+#: Advice where the tangent was regular when the step began.
+BEYOND = (
+    "the load, for the tangent was regular when the step began: it is more than the material can bear, or "
+    "than one step can. Nothing was changed in the particles. Take a smaller load, or ramp(...)"
+)
 
 
 def weakest(
@@ -59,6 +66,23 @@ def lost_digits(comm: Any, ratio: Array, kinematics: str) -> str:
     return (
         f"K/mu is {stiff:.1e}: without a field for the volume no digit is left at that; use form "
         "'u_epsv' or 'u_p'"
+    )
+
+
+def contrast(comm: Any, mu: Array) -> str:
+    """What to do where the materials are too different; nothing elsewhere.
+
+    Args:
+        comm: Communicator.
+        mu: Shear modulus of this rank's particles [Pa].
+    """
+    largest = comm.allreduce(float(mu.max(initial=0.0)), op=MPI.MAX)
+    least = comm.allreduce(float(mu.min(initial=np.inf)), op=MPI.MIN)
+    if largest < FEW_DIGITS * least:
+        return ""
+    return (
+        f"shear moduli differ by a factor of {largest / least:.1e}, and round-off of the stiff material "
+        "is as large as the forces of the soft one; make the stiff one softer, or hold it by supports"
     )
 
 
