@@ -194,9 +194,7 @@ def test_particles_anywhere_let_go_of_a_stress(name, basis):
     grid = grid_of()
     x = grid.origin + grid.h * np.array(grid.cells) * np.random.default_rng(3).random((150, 2))
     law = tawami.linear_elastic(E=E, nu=NU)
-    scene = tawami.Scene(
-        grid, tawami.Body(x, np.full(150, 0.02)), law, basis=basis, **FORMS[name]
-    )
+    scene = tawami.Scene(grid, tawami.Body(x, np.full(150, 0.02)), law, basis=basis, **FORMS[name])
     div = np.trace(GRADIENT)
     stress = K * div + 2 * MU * (np.array([GRADIENT[0, 0], GRADIENT[1, 1], 0]) - div / 3)
     stress = np.append(stress, MU * (GRADIENT[0, 1] + GRADIENT[1, 0]))

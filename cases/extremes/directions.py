@@ -97,7 +97,7 @@ def attempts(short: bool) -> Iterator[Attempt]:
                     lambda f=form, b=basis, t=turns: difference(f, b, t, 0.0),
                 )
     for form in ("u", "u_epsv", "u_epsv_finite"):
-        for away in AWAY[1::3] if short else AWAY:
+        for away in AWAY[::3] if short else AWAY:
             yield attempted(
                 SUBJECT,
                 f"{form}: {away:g} cells from (0, 0)",

@@ -125,7 +125,9 @@ SUBJECT = "inf-sup"
 TAYLOR_HOOD = 0.43
 
 
-def constants(body: str, basis: str, name: str, alpha: float, cells: tuple[int, ...]) -> list[float]:
+def constants(
+    body: str, basis: str, name: str, alpha: float, cells: tuple[int, ...]
+) -> list[float]:
     """On finer and finer grids."""
     return [blocks(body, n, basis, name).constant(alpha) for n in cells]
 

@@ -35,13 +35,11 @@ def linear(form: str, factor: float) -> float:
         scene.traction("right", (0.0, -(f - 1) * beam.P / beam.D))
         solution = scene.solve()
         answers.append((solution.stress / f, solution.displacement_of_particles / f))
-    return max(
-        float(np.abs(b - a).max() / np.abs(a).max()) for a, b in zip(*answers, strict=True)
-    )
+    return max(float(np.abs(b - a).max() / np.abs(a).max()) for a, b in zip(*answers, strict=True))
 
 
 def plastic(law: tawami.Material, factor: float) -> float:
-    """A cantilever that yields: it must be refused, with nothing changed, and be as before afterwards."""
+    """A cantilever that yields: it must be refused, with nothing changed."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(8, 4))
     scene = tawami.Scene(grid, tawami.box(grid, grid.origin, grid.upper), law)
     scene.fix("left", "x")
@@ -131,11 +129,11 @@ def inside_out() -> float:
 def attempts(short: bool) -> Iterator[Attempt]:
     """Each law and form.
 
-    Perfectly plastic: the wall shears off at a mean traction of c at most, by the upper bound theorem of
-    limit analysis; that is 50 times the load. A linear body: round-off times a condition number of 1e6. Hencky's bar by a ramp: a moved body is
-    integrated over cells that it cuts anywhere, which costs a spinning disc 0.11 of its mean stress
-    (README, Motion) and B-bar 0.22 in plain tension (`tests/test_patch.py`). Beyond M/e nothing may be
-    borne, but for as much.
+    Perfectly plastic: the wall shears off at a mean traction of c at most, by the upper bound theorem
+    of limit analysis; that is 50 times the load. A linear body: round-off times a condition number of
+    1e6. Hencky's bar by a ramp: a moved body is integrated over cells that it cuts anywhere, which
+    costs a spinning disc 0.11 of its mean stress (README, Motion) and B-bar 0.22 in plain tension
+    (`tests/test_patch.py`). Beyond M/e nothing may be borne, but for as much.
     """
     for form in FORMS[::2] if short else FORMS:
         yield attempted(SUBJECT, f"elastic, {form}: 1e3", 1e-9, lambda f=form: linear(f, 1e3))
@@ -149,8 +147,6 @@ def attempts(short: bool) -> Iterator[Attempt]:
             setting = f"Hencky's bar, {form}, ramp to {load:g} M/e"
             yield attempted(SUBJECT, setting, bound, lambda f=form, c=load: ramped(f, c * M / e))
         setting = f"Hencky's bar, {form}, 10 M"
-        yield attempted(
-            SUBJECT, f"{setting} by a ramp", bound, lambda f=form: by_ramp(f, 1e3)
-        )
+        yield attempted(SUBJECT, f"{setting} by a ramp", bound, lambda f=form: by_ramp(f, 1e3))
         yield attempted(SUBJECT, f"{setting} at once", None, lambda f=form: at_once(f, 1e3))
     yield attempted(SUBJECT, "Hencky's bar, pressed by 10 M at once", None, inside_out)

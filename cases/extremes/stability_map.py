@@ -112,7 +112,9 @@ def _panel(axes: Any, mine: Sequence[Point], attribute: str, limits: tuple[float
         digit, power = f"{values[i, j]:.0e}".split("e")
         style = {"ha": "center", "va": "center", "fontsize": 6, "color": "w" if dark else "k"}
         axes.text(j, i, f"{digit}e{int(power)}", **style)
-    axes.set_yticks(range(len(rows)), [f"{c:g}" if c else r"0 ($\nu = 0.5$)" for c in rows], fontsize=7)
+    axes.set_yticks(
+        range(len(rows)), [f"{c:g}" if c else r"0 ($\nu = 0.5$)" for c in rows], fontsize=7
+    )
     labels = ["-" if a is None else f"{a:g}" for a in columns]
     axes.set_xticks(range(len(columns)), labels, fontsize=7)
     axes.set_xlabel(r"$\alpha$ [-]" if columns[0] is not None else r"no $\alpha$")

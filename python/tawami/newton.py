@@ -254,7 +254,7 @@ class Newton:
         # A softening law makes negative diagonals. A zero one (a function that no particle strains) is
         # left for the solver to report, in a scale that does not know units.
         size = np.abs(np.where(of_u, diagonal, 0.0))
-        scale = 1 / np.sqrt(np.where(size > 0, size, self._largest_mu))
+        scale: Array = 1 / np.sqrt(np.where(size > 0, size, self._largest_mu))
         if self.kind is None:
             return scale
         bulk, mu = self.constants["K"], self.constants["mu"]

@@ -81,5 +81,8 @@ def _fault(area: Array, first: Array, second: Array) -> tuple[tuple[int, int], s
             continue
         place, most = worst(np.where(both, jump, 0.0))
         if most > UNLIKE:
-            return place, f"and its neighbour have their particles in places that differ by {most:.2g} h"
+            return (
+                place,
+                f"and its neighbour have their particles in places that differ by {most:.2g} h",
+            )
     return None

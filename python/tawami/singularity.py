@@ -19,8 +19,8 @@ NO_DIGITS = 1e9
 FEW_DIGITS = 1e8
 #: Advice where the tangent was regular when the step began.
 BEYOND = (
-    "the load, for the tangent was regular when the step began: it is more than the material can bear, or "
-    "than one step can. Nothing was changed in the particles. Take a smaller load, or ramp(...)"
+    "the load, for the tangent was regular when the step began: it is more than the material can bear, "
+    "or than one step can. Nothing was changed in the particles. Take a smaller load, or ramp(...)"
 )
 
 
