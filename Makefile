@@ -1,5 +1,6 @@
 # make cantilever   set up what is missing, run the study of the cantilever
 # make test         set up what is missing, pass every test
+# make extremes     try the method at its extremes, say what survives and what is refused
 # make bench        speed and memory, stage by stage
 # make trade        what accuracy costs: every knob of four cases; goes on where it was
 # make lint, make format, make clean
@@ -19,7 +20,7 @@ export OMP_NUM_THREADS ?= 1
 export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 
-.PHONY: cantilever test bench trade lint format setup clean
+.PHONY: cantilever test extremes bench trade lint format setup clean
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 
@@ -29,6 +30,9 @@ cantilever: setup
 test: setup
 	cargo test --locked --quiet
 	$(PYTHON) -m pytest --quiet
+
+extremes: setup
+	$(PYTHON) -m cases.extremes
 
 bench: setup
 	$(PYTHON) -m cases.cantilever.bench

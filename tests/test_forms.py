@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 import textwrap
+import warnings
 from itertools import pairwise
 
 import numpy as np
@@ -326,3 +327,43 @@ def test_arithmetic_of_particle_constants():
     np.testing.assert_allclose(expression.evaluate(values), expected)
     assert a * b == a * b
     assert a * b != a / b
+
+
+def test_the_residual_based_stabilisation_has_an_alpha_that_is_too_large():
+    grid = grid_of()
+    body, law = tawami.box(grid, grid.origin, grid.upper), tawami.linear_elastic(E=1.0, nu=0.3)
+    options = {"form": "u_epsv", "stabilisation": "residual_based"}
+    message = "alpha = 0.3 with 'residual_based': expected at most 0.14, .* use a smaller alpha"
+    with pytest.raises(tawami.InputError, match=message):
+        tawami.Scene(grid, body, law, alpha=0.3, **options)
+    with pytest.raises(tawami.InputError, match="alpha = 'much': expected a number"):
+        tawami.Scene(grid, body, law, alpha="much", **options)
+    tawami.Scene(grid, body, law, alpha=0.14, **options)
+    tawami.Scene(grid, body, law, alpha=0.3)
+
+
+@pytest.mark.parametrize(("form", "nu", "locks"), [
+    ("u", 0.4999, True), ("u_finite", 0.4999, True), ("u", 0.48, False), ("u_bbar", 0.4999, False)
+])  # fmt: skip
+def test_a_form_that_locks_says_so(form, nu, locks):
+    grid = grid_of()
+    body, law = tawami.box(grid, grid.origin, grid.upper), tawami.linear_elastic(E=1.0, nu=nu)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        tawami.Scene(grid, body, law, form=form)
+    said = [str(w.message) for w in caught if w.category is tawami.LockingWarning]
+    assert len(said) == locks
+    assert all("K/mu = 5e+03 at particle 0: it locks" in message for message in said)
+
+
+@pytest.mark.parametrize("form", ["u", "u_bbar"])
+@pytest.mark.parametrize("one_minus_2nu", [1e-10, 1e-14])
+def test_a_stiffness_beyond_all_digits_names_k_over_mu(form, one_minus_2nu):
+    grid = grid_of()
+    law = tawami.linear_elastic(E=1.0, one_minus_2nu=one_minus_2nu)
+    scene = tawami.Scene(grid, tawami.box(grid, grid.origin, grid.upper), law, form=form)
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    scene.traction("right", (0.0, -1e-4))
+    with pytest.raises(tawami.TawamiError, match=r"K/mu is 1.0e\+1[04]: .* use form 'u_epsv'"):
+        scene.solve()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+import warnings
+
 import numpy as np
 import pytest
 from conftest import FORMS, grid_of, linear_field
@@ -181,3 +184,51 @@ def test_results_do_not_depend_on_units_or_place(name):
         # without a field for the volume the condition number is that of K/mu
         accuracy = 1e-8 if options["form"] in ("u", "u_bbar") else 1e-9
         assert solve(*arguments) == pytest.approx(reference, rel=accuracy)
+
+
+@pytest.mark.parametrize("name", ["u", "u_epsv"])
+def test_particles_anywhere_let_go_of_a_stress(name, basis):
+    """A body under -C : eps whose border moves by eps x is free of stress, whatever its quadrature. For
+    biquadratic functions, some of which are negative at most particles, too.
+    """
+    grid = grid_of()
+    x = grid.origin + grid.h * np.array(grid.cells) * np.random.default_rng(3).random((150, 2))
+    law = tawami.linear_elastic(E=E, nu=NU)
+    scene = tawami.Scene(grid, tawami.Body(x, np.full(150, 0.02)), law, basis=basis, **FORMS[name])
+    div = np.trace(GRADIENT)
+    stress = K * div + 2 * MU * (np.array([GRADIENT[0, 0], GRADIENT[1, 1], 0]) - div / 3)
+    stress = np.append(stress, MU * (GRADIENT[0, 1] + GRADIENT[1, 0]))
+    scene.particles.stress[:] = -stress
+    for edge in ("left", "right", "bottom", "top"):
+        for k, component in enumerate("xy"):
+            scene.fix(edge, component, lambda x, y, k=k: GRADIENT[k, 0] * x + GRADIENT[k, 1] * y)
+    scene.solve()
+    assert np.abs(scene.particles.stress).max() < 1e-9 * np.abs(stress).max()
+    assert np.abs(scene.particles.displacement - x @ GRADIENT.T).max() < 1e-11
+
+
+CORNER = 0.1 * np.array([[0.2, 0.2], [0.8, 0.2], [0.2, 0.8], [0.8, 0.8]])
+
+
+@pytest.mark.parametrize(("of_cell", "message"), [
+    (lambda r: CORNER, "on one side, their centroid 0.45 h off the centre"),
+    (lambda r: 0.5 + 9 * (CORNER - 0.05), None),
+    (lambda r: 0.75 + 5 * (CORNER - 0.05), None),  # a lattice that is moved by a quarter of a cell
+    (lambda r: 0.5 + 15 * (CORNER - 0.05), r"at its border, 0.45 h \(rms\)"),
+    (lambda r: 0.5 + 5 * (CORNER - 0.05) + 0.15 * r.choice([-1, 1], 2), "its neighbour .* by 0.3 h"),
+    (lambda r: np.vstack([0.5 + 5 * (CORNER - 0.05)] * 2), "holds 2 times its area"),
+])  # fmt: skip
+def test_particles_that_integrate_badly_get_a_warning(of_cell, message):
+    grid, random = grid_of(), np.random.default_rng(0)
+    x = np.vstack([of_cell(random) + np.array([i, j]) for i in range(4) for j in range(3)])
+    body = tawami.Body(grid.origin + grid.h * x, np.full(len(x), grid.h**2 / 4))
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=E, nu=NU))
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        scene.solve()
+        scene.solve()
+    said = [str(w.message) for w in caught if w.category is tawami.QuadratureWarning]
+    assert len(said) == (message is not None)
+    assert all(re.search(message, text) for text in said)

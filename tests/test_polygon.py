@@ -97,6 +97,7 @@ def test_sides_on_lines_of_the_grid_but_for_round_off_make_a_box(gauss):
     assert made.volume[order] == pytest.approx(box.volume[order_of_box])
 
 
+@pytest.mark.filterwarnings("ignore:'residual_based':tawami.InstabilityWarning")
 @pytest.mark.parametrize("name", FORMS)
 def test_patch_test_of_a_slanted_bar(name):
     """Pulled along its slanted, free sides: one stress, to round-off. But for B-bar: div w at the
@@ -145,7 +146,8 @@ def test_small_parts_of_cells_leave_condition_and_deflection():
 def test_what_small_parts_of_cells_do_to_others():
     """README, Limits."""
     assert shelf("u_bbar", 1e-2).condition == pytest.approx(2e8, rel=0.5)
-    assert np.abs(shelf("u_epsv_residual_based", 1e-2).mean_stress).max() > 1.9
+    with pytest.warns(tawami.InstabilityWarning, match=r"cell \(0, 4\) holds 0.01 of its area"):
+        assert np.abs(shelf("u_epsv_residual_based", 1e-2).mean_stress).max() > 1.9
     assert np.abs(shelf("u_epsv", 1e-2).mean_stress).max() < 0.3
     with pytest.raises(tawami.SingularError):
         shelf("u_bbar", 2e-6)

@@ -30,12 +30,18 @@ E = 3.0e6  # Young's modulus [Pa]
 NU = 0.4999  # Poisson's ratio
 I = D**3 / 12  # noqa: E741 - second moment of area [m4 per metre depth], named as in the paper
 
-E_BAR, NU_BAR = E / (1 - NU**2), NU / (1 - NU)  # plane strain
 K, MU = E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU))
 LAMBDA = K - 2 * MU / 3
 
-#: Eq. (3) [m]; the paper prints E where E_bar is meant.
-V_THEORY = P / (6 * E_BAR * I) * ((4 + 5 * NU_BAR) * D**2 * L / 4 + 2 * L**3)
+
+def deflection(nu: float) -> float:
+    """Eq. (3) [m]; the paper prints E where E_bar is meant."""
+    e_bar, nu_bar = E / (1 - nu**2), nu / (1 - nu)
+    return P / (6 * e_bar * I) * ((4 + 5 * nu_bar) * D**2 * L / 4 + 2 * L**3)
+
+
+#: For the nu of the paper [m].
+V_THEORY = deflection(NU)
 
 #: Where the deflections of the clamped beam converge to [m]; by refinement, no closed form.
 V_CLAMPED = 0.009684
@@ -67,9 +73,10 @@ class Row:
         return 100 * (self.deflection_m - V_THEORY) / V_THEORY
 
 
-def root_displacement_x(y: Any) -> Any:
+def root_displacement_x(y: Any, nu: float = NU) -> Any:
     """u_x [m] on the root of the closed form."""
-    return (2 + NU_BAR) * P * y * (y**2 - D**2 / 4) / (6 * E_BAR * I)
+    e_bar, nu_bar = E / (1 - nu**2), nu / (1 - nu)
+    return (2 + nu_bar) * P * y * (y**2 - D**2 / 4) / (6 * e_bar * I)
 
 
 def shear(y: Any) -> Any:
@@ -77,9 +84,9 @@ def shear(y: Any) -> Any:
     return 1.5 * P / D * (1 - 4 * y**2 / D**2)
 
 
-def mean_stress(x: Any, y: Any) -> Any:
+def mean_stress(x: Any, y: Any, nu: float = NU) -> Any:
     """(1 + nu)/3 sigma_xx [Pa], sigma_xx = P (L - x) y / I."""
-    return (1 + NU) / 3 * P * (L - x) * y / I
+    return (1 + nu) / 3 * P * (L - x) * y / I
 
 
 def point_support_growth() -> float:

@@ -4,6 +4,7 @@ next.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,12 +12,15 @@ import numpy.typing as npt
 
 from tawami import _rust, ranks
 from tawami.basis import Basis
+from tawami.errors import InstabilityWarning
 from tawami.field import Field
 from tawami.newton import Newton
 from tawami.numpy_law import NumpyStage
 from tawami.reduction import Layout
 
 Array = npt.NDArray[np.float64]
+#: Part of a cell that is as good as all of it, to forms that need whole cells.
+WHOLE = 0.5
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,23 @@ class Attached:
         """
         sums = _rust.nodal_sums(self.location, weight, data, basis or self.layout.basis)
         return ranks.sum_of(self.layout.grid.comm, sums)
+
+    def warn_of_parts(self, volume: Array, option: str) -> None:
+        """Warn of cells that the body fills in part, for an option of the form that needs whole ones."""
+        grid = self.layout.grid
+        areas = np.bincount(self.location.cell, volume, minlength=grid.cells[0] * grid.cells[1])
+        areas = ranks.sum_of(grid.comm, areas)
+        parts = np.where(areas > 0, areas / grid.h**2, 1.0)
+        c = int(parts.argmin())
+        if parts[c] < WHOLE and not grid.comm.rank:
+            i, j = c % grid.cells[0], c // grid.cells[0]
+            warnings.warn(
+                f"'{option}' is not stable in cells that the body fills in part: cell ({i}, {j}) holds "
+                f"{parts[c]:.2g} of its area, expected at least {WHOLE:g}; use another option of the "
+                "form, or a grid whose lines follow the body",
+                InstabilityWarning,
+                stacklevel=2,
+            )
 
     def at_particles(self, values: Array) -> Array:
         """A displacement field (functions x 2) at this rank's particles, particles x 2."""

@@ -68,11 +68,7 @@ def box(
     for axis in range(2):
         ends = (np.array([lower[axis], upper[axis]]) - grid.origin[axis]) / grid.h
         first, last = np.rint(ends).astype(int)
-        if (
-            not np.allclose(ends, [first, last], atol=ON_LINE)
-            or first < 0
-            or last > grid.cells[axis]
-        ):
+        if np.abs(ends - [first, last]).max() > ON_LINE or first < 0 or last > grid.cells[axis]:
             raise InputError(
                 f"box: its {'xy'[axis]} range [{lower[axis]:g}, {upper[axis]:g}] m must lie on "
                 f"lines of the grid (every {grid.h:g} m from {grid.origin[axis]:g} to "

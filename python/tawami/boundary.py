@@ -130,6 +130,10 @@ def held_edge(
     return Held(indices, coefficients)
 
 
+#: A position this near to a line of the grid [cells] lies on it.
+ON_LINE = 1e-6
+
+
 def cells_between(grid: Grid, edge: Edge, between: Interval | None) -> npt.NDArray[np.bool_]:
     """Which cells along an edge lie in a part of it.
 
@@ -145,7 +149,7 @@ def cells_between(grid: Grid, edge: Edge, between: Interval | None) -> npt.NDArr
         np.array([inputs.number("between", end) for end in (a, b)]) - grid.origin[axis]
     ) / grid.h
     first, last = np.rint(ends).astype(int)
-    if not np.allclose(ends, [first, last], atol=1e-6) or not 0 <= first < last <= n:
+    if np.abs(ends - [first, last]).max() > ON_LINE or not 0 <= first < last <= n:
         raise InputError(
             f"edge='{edge}': between = {between}: expected two lines of the grid, in order, every "
             f"{grid.h:g} m from {grid.origin[axis]:g} to {grid.upper[axis]:g} m"

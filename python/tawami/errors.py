@@ -17,6 +17,18 @@ class SupportError(TawamiError):
     """Supports that leave a rigid motion free, contradict each other, or miss the body."""
 
 
+class InstabilityWarning(UserWarning):
+    """An option of a form that is not stable for this body."""
+
+
+class LockingWarning(UserWarning):
+    """A form without a field for the volume, where that makes its mean stress useless."""
+
+
+class QuadratureWarning(UserWarning):
+    """Particles that do not integrate over the cells that they fill."""
+
+
 class SingularError(TawamiError):
     """A tangent that cannot be solved; the message names the cells."""
 
@@ -49,9 +61,12 @@ __all__ = [
     "ConvergenceError",
     "FormError",
     "InputError",
+    "InstabilityWarning",
+    "LockingWarning",
     "MissingDependencyError",
     "NotModelledError",
     "OutputError",
+    "QuadratureWarning",
     "SingularError",
     "SupportError",
     "TawamiError",

@@ -25,8 +25,9 @@ from tawami.reduction import Layout, Reduction
 from tawami.stopwatch import Stopwatch
 
 Array = npt.NDArray[np.float64]
-#: Sum over the particles of a displacement function that round-off of the assembly would drown: that
-#: of a particle 4e-7 of a cell inside its support. It follows its neighbour, as if the particle were
+#: Sum over the particles of a spline that round-off of the assembly would drown: that of a particle 4e-7
+#: of a cell inside its support. (The gradient of a Lagrange function does not vanish with it, and
+#: biquadratic ones have negative sums as well.) It follows its neighbour, as if the particle were
 #: not yet there; a ghost penalty gives it a stiffness.
 UNRESOLVED = 1e-13
 
@@ -70,7 +71,7 @@ class Field:
         #: Whether each cell holds particles, on whichever rank, ny x nx.
         self.active = ranks.any_of(grid.comm, active)
         self.layout = Layout(grid, basis, self._space, self.active)
-        if compiled.ghost is None and basis != "biquadratic":  # these have zeros within a cell too
+        if compiled.ghost is None and basis == "quadratic_spline":
             once = np.ones(len(volume))
             sums = _rust.nodal_sums(location, once, once[:, None], basis)
             self.layout.tie(ranks.sum_of(grid.comm, sums)[:, 0], UNRESOLVED)

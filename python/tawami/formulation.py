@@ -1,7 +1,7 @@
 """The contract of a weak form: what a file in `forms/` declares.
 
-A form declares `fields`, `kinematics`, optionally `parameters`, `options` and `strain`, and a
-function `residual` whose arguments are picked by their names:
+A form declares `fields`, `kinematics`, optionally `parameters`, `options`, `strain` and `whole_cells`,
+and a function `residual` whose arguments are picked by their names:
 
 ========================= ========================================================================
 the fields, the tests     u, w, eps_v, q, ... as declared in `fields`
@@ -36,6 +36,7 @@ import importlib.util
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from numbers import Real
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -71,9 +72,10 @@ class Form:
             law receives.
         residual: Function that returns the residual as a UFL form.
         parameters: Numbers that may change without compiling again: name -> {"default": ...,
-            "minimum": ..., "maximum": ...}, the limits optional.
+            "minimum": ..., "maximum": ...}, the limits optional; a maximum may be {option: maximum}.
         options: Choices that make a different form: name -> the possible values, default first.
         strain: 'small', or 'finite': logarithmic elastic strains, the grid reset after each step.
+        whole_cells: Those of the options that need cells which the body fills.
         name: What messages call it.
 
     Raises:
@@ -83,9 +85,10 @@ class Form:
     fields: Mapping[str, tuple[str, str]]
     kinematics: str
     residual: Callable[..., Any]
-    parameters: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     options: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     strain: str = "small"
+    whole_cells: tuple[str, ...] = ()
     name: str = "of the driver script"
 
     def __post_init__(self) -> None:
@@ -162,9 +165,7 @@ class Form:
         options = {name: choices[0] for name, choices in self.options.items()}
         for name, value in given.items():
             if name in parameters:
-                limits = self.parameters[name]
-                low, high = limits.get("minimum", -math.inf), limits.get("maximum", math.inf)
-                parameters[name] = number(name, value, low=low, high=high)
+                parameters[name] = value
             elif name in options:
                 if value not in self.options[name]:
                     raise InputError(
@@ -175,7 +176,21 @@ class Form:
                 known = [*parameters, *options]
                 has = f"it has {listed(known)}" if known else "it has none"
                 raise InputError(f"form {self.name} has no parameter '{name}': {has}")
-        return parameters, options
+        return {n: self._limited(n, v, options) for n, v in parameters.items()}, options
+
+    def _limited(self, name: str, value: Any, options: Mapping[str, str]) -> float:
+        """The value of a parameter, within its limits."""
+        limits = self.parameters[name]
+        high = limits.get("maximum", math.inf)
+        if isinstance(high, Mapping):
+            chosen = [option for option in options.values() if option in high]
+            if chosen and isinstance(value, Real) and value > high[chosen[0]]:
+                raise InputError(
+                    f"{name} = {value:g} with '{chosen[0]}': expected at most {high[chosen[0]]:g}, "
+                    f"beyond which form {self.name} is not stable; use a smaller {name}"
+                )
+            high = math.inf
+        return number(name, value, low=limits.get("minimum", -math.inf), high=high)
 
 
 def shipped() -> list[str]:
@@ -210,6 +225,7 @@ def _from_module(module: ModuleType, _residual: Any, name: str | None = None) ->
         parameters=getattr(module, "parameters", {}),
         options=getattr(module, "options", {}),
         strain=getattr(module, "strain", "small"),
+        whole_cells=getattr(module, "whole_cells", ()),
         name=name,
     )
 

@@ -17,6 +17,8 @@ from tawami.inputs import number, pair, point, whole_number
 Array = npt.NDArray[np.float64]
 Edge = Literal["left", "right", "bottom", "top"]
 EDGES: tuple[Edge, ...] = ("left", "right", "bottom", "top")
+#: Cells from (0, 0) to the origin of a grid from which on positions are off by more than 1e-7 cells.
+FAR = 1e9
 
 
 class Grid:
@@ -45,6 +47,11 @@ class Grid:
         self.h = number("h", h)
         self.cells = _cells(cells)
         self.rust = _rust.Grid(self.origin, self.h, self.cells)
+        if max(map(abs, self.origin)) > FAR * self.h:
+            raise InputError(
+                f"origin = {self.origin}: expected at most {FAR:g} cells of {self.h:g} m from (0, 0): "
+                "farther away positions have too few digits; move body and grid nearer"
+            )
         self._rectangle: _dolfinx.Rectangle | None = None
         self._spaces: dict[int, _dolfinx.Space] = {}
 

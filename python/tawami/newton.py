@@ -18,7 +18,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from mpi4py import MPI
 
-from tawami import _rust, ranks
+from tawami import _rust, ranks, singularity
 from tawami.compilation import CompiledForm
 from tawami.density import Density, LawQuantity, ParticleScalar, Rule
 from tawami.errors import ConvergenceError, InputError, SingularError
@@ -209,7 +209,10 @@ class Newton:
             round_off += 1e-14 * self._stiffest * self.field.grid.h * np.sqrt(n)
         if inertia is not None:  # and those of one that coasts
             round_off += 1e-13 * float(np.linalg.norm(inertia.mass * inertia.offset))
-        momentum = float(np.linalg.norm(free[of_u])) / scale if scale > round_off else 0.0
+        at_rest = scale <= round_off and (
+            inertia is not None or self._moves_rigidly(coefficients[:n], moved)
+        )
+        momentum = 0.0 if at_rest or scale == 0 else float(np.linalg.norm(free[of_u])) / scale
         volume = None
         if self.kind is not None:
             weight, strains = self._volume_scale(coefficients)
@@ -218,6 +221,19 @@ class Newton:
         # all ranks take the same way, to the bit
         measures: tuple[float, float | None] = self._comm.bcast((momentum, volume))
         return measures
+
+    def _moves_rigidly(self, u: Array, moved: float) -> bool:
+        """Whether strains are round-off of what supports move: their forces may still be those of a soft
+        part, drowned in the round-off of a stiff one.
+        """
+        grid, basis = self.field.grid, self.field.layout.basis
+        g = np.asarray(_rust.gradients(self.location, basis, np.ascontiguousarray(u)))
+        g = g.reshape(-1, 2, 2)
+        strain = g + g.transpose(0, 2, 1)
+        if self.compiled.form.strain == "finite":
+            strain = strain + g.transpose(0, 2, 1) @ g
+        largest = self._comm.allreduce(float(np.abs(strain).max(initial=0.0)), op=MPI.MAX)
+        return bool(moved == 0 or largest <= 1e-10 * moved / grid.h)
 
     def _nodal_sums(self, columns: Array) -> Array:
         """Volume-weighted sums over all particles on the bilinear functions."""
@@ -246,10 +262,10 @@ class Newton:
         vector = matrix.getDiagonal()
         diagonal = vector.array.copy()
         vector.destroy()
-        scale = np.ones(len(own))
-        # A zero diagonal (a function that no particle strains) is left for the solver to report.
-        positive = of_u & (diagonal > 0)
-        scale[positive] = 1 / np.sqrt(diagonal[positive])
+        # A softening law makes negative diagonals. A zero one (a function that no particle strains) is
+        # left for the solver to report, in a scale that does not know units.
+        size = np.abs(np.where(of_u, diagonal, 0.0))
+        scale: Array = 1 / np.sqrt(np.where(size > 0, size, self._largest_mu))
         if self.kind is None:
             return scale
         bulk, mu = self.constants["K"], self.constants["mu"]
@@ -328,7 +344,8 @@ class Newton:
                     coefficients, held, history, krylov, linear.condition, linear.symmetric
                 )
             if len(history) > self.numerics.max_iterations:
-                self._fail(history, "Take a smaller load, or check material and supports")
+                advice = self._lost() or "Take a smaller load, or check material and supports"
+                self._fail(history, advice)
             matrix = self.field.tangent(coefficients, self.data, reduction)
             if inertia is not None:
                 self._add_mass(matrix, inertia, reduction)
@@ -341,7 +358,7 @@ class Newton:
             tally.newton_iterations += 1
             tally.unknowns = max(tally.unknowns, reduction.size)
             if linear.singular:
-                self._report_singular(reduction)
+                self._report_singular(reduction, began=len(history) == 1)
             unknowns += ranks.joined(self._comm, change)
             self.stopwatch.lap()
 
@@ -385,41 +402,21 @@ class Newton:
             history,
         )
 
-    def _report_singular(self, reduction: Reduction) -> None:
-        layout, grid = self.field.layout, self.field.grid
-        condition, weak = self._linear.condition, self._linear.weak
+    def _report_singular(self, reduction: Reduction, *, began: bool) -> None:
+        weak, advice = self._linear.weak, self._lost()
+        if not advice and not began:
+            advice = singularity.BEYOND
         self._linear.forget()
-        own = np.argsort(-np.abs(weak))[:20]
-        entries = ranks.joined(self._comm, np.abs(weak[own]))
-        unknowns = ranks.joined(self._comm, reduction.own.start + own)
-        counts = np.bincount(self.location.cell, minlength=grid.cells[0] * grid.cells[1])
-        counts = ranks.sum_of(self._comm, counts)
-        weakest: list[str] = []
-        for unknown in unknowns[np.argsort(-entries, kind="stable")][:20]:
-            cells = layout.cells_of(reduction.unknowns[unknown])
-            number = counts[cells @ [1, grid.cells[0]]]
-            i, j = cells[number.argmin()]
-            text = f"({i}, {j}) with {number.min()} particles"
-            if text not in weakest:
-                weakest.append(text)
-        ratio = float((self.constants["K"] / self.constants["mu"]).max(initial=0.0))
-        stiff = self._comm.allreduce(ratio, op=MPI.MAX)
-        if stiff > 1e9 and self.compiled.form.kinematics in ("displacement", "cell"):
-            advice = (
-                f"K/mu is {stiff:.1e}: without a field for the volume no digit is left at that; use "
-                "form 'u_epsv' or 'u_p'"
-            )
-        else:
-            advice = (
-                "the particles do not stiffen every function of the grid. Use more particles per "
-                "cell, the basis 'quadratic_spline', or alpha > 0"
-            )
-        size = "infinite" if np.isinf(condition) else f"about {condition:.1e}"
+        cells = singularity.weakest(self.field, self.location, reduction, weak)
         raise SingularError(
-            f"the tangent is singular (condition number of the scaled matrix: {size}; from its "
-            f"factorisation and random vectors). The displacement basis is '{layout.basis}'; weakest "
-            f"at the cells (i, j): {', '.join(weakest[:4])}. Likely cause: {advice}"
+            singularity.sentence(self.field.layout.basis, self._linear.condition, cells, advice)
         )
+
+    def _lost(self) -> str:
+        kinematics, comm = self.compiled.form.kinematics, self._comm
+        return singularity.lost_digits(
+            comm, self.constants["K"] / self.constants["mu"], kinematics
+        ) or singularity.contrast(comm, self.constants["mu"])
 
 
 def _worst(measures: tuple[float, float | None]) -> float:

@@ -132,7 +132,8 @@ class Solution(contents.Elsewhere):
             return np.asarray(self._on_edges[functions].sum(axis=0))
         force, found = np.zeros(2), False
         for places, component, multiplier in self._on_points:
-            if any(np.allclose(place, known) for known in places):
+            near = 1e-8 * self.scene.grid.h
+            if any(np.abs(np.subtract(place, known)).max() <= near for known in places):
                 force[component] += multiplier
                 found = True
         if not found:

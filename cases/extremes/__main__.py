@@ -1,0 +1,109 @@
+"""Everything that was tried, what happened, and where it ends.
+
+python -m cases.extremes [--short] [--only SUBJECT ...] [--results results/extremes]
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from collections.abc import Iterator, Sequence
+from importlib import import_module
+from pathlib import Path
+from time import perf_counter
+
+import matplotlib
+
+import tawami
+from cases import table
+from cases.extremes import attempt, stability_map
+from cases.extremes.attempt import Attempt
+from tawami.environment import header
+from tawami.output import result_folder, whole_file
+
+#: Modules of this package, each with `attempts(short)`.
+SUBJECTS = (
+    "poisson",
+    "alpha",
+    "inf_sup",
+    "particles",
+    "slivers",
+    "contrast",
+    "scales",
+    "directions",
+    "overload",
+    "not_finite",
+)
+
+
+def tried(name: str, short: bool) -> Iterator[Attempt]:
+    """The attempts of a subject; one that breaks off keeps those before, and is wrong."""
+    try:
+        yield from import_module(f"cases.extremes.{name}").attempts(short)
+    except Exception as error:
+        says = f"the subject broke off: {type(error).__name__}: {error}"
+        yield Attempt(name, "-", "WRONG", None, None, says)
+
+
+def as_line(row: Attempt) -> str:
+    """A row of the table as it is printed."""
+    numbers = " ".join("-".rjust(9) if n is None else f"{n:9.2e}" for n in (row.error, row.bound))
+    says = row.says if len(row.says) <= 100 else row.says[:97] + "..."
+    return f"{row.subject:17s} {row.setting:58s} {row.outcome:8s} {numbers}  {says}".rstrip()
+
+
+def ends(rows: Sequence[Attempt]) -> Iterator[str]:
+    """Where each subject ends: its last survival and its first refusal, in the order of trying."""
+    for subject in dict.fromkeys(row.subject for row in rows):
+        mine = [row for row in rows if row.subject == subject]
+        parts = [f"{len(mine)} tried"]
+        for outcome, which in (("survived", -1), ("warned", 0), ("refused", 0), ("WRONG", 0)):
+            found = [row for row in mine if row.outcome == outcome]
+            if found:
+                place = "last" if which else "first"
+                parts.append(f"{len(found)} {outcome}, {place}: {found[which].setting}")
+        yield f"{subject}: {'; '.join(parts)}"
+
+
+def study(subjects: Sequence[str], short: bool, file: Path) -> list[Attempt]:
+    """Try all of it, print it as it goes, and keep it in a file after every subject."""
+    rows: list[Attempt] = []
+    for name in subjects:
+        start = perf_counter()
+        for row in tried(name, short):
+            rows.append(row)
+            print(as_line(row), flush=True)
+        print(f"-- {name}: {perf_counter() - start:.1f} s\n", flush=True)
+        with whole_file(file) as part:
+            part.write_text(table.as_csv(rows, attempt.COLUMNS))
+    return rows
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Table, where it ends, map; exit code 1 if anything is wrong."""
+    parser = argparse.ArgumentParser(prog="python -m cases.extremes", description=__doc__)
+    parser.add_argument("--results", default="results/extremes", help="folder for the results")
+    parser.add_argument("--short", action="store_true", help="what the tests run")
+    parser.add_argument("--only", nargs="+", choices=(*SUBJECTS, "map"), help="some subjects")
+    options = parser.parse_args(arguments)
+    matplotlib.use("Agg")
+    logging.disable(logging.INFO)  # the compilation of forms is talkative
+    print(header(), flush=True)
+    folder = result_folder(options.results)
+    chosen = options.only or (*SUBJECTS, "map")
+    rows = study([name for name in chosen if name != "map"], options.short, folder / "extremes.csv")
+    print("\n".join(ends(rows)))
+    wrong = [row for row in rows if row.wrong]
+    for row in wrong:
+        print(f"WRONG: {row.subject}, {row.setting}: {row.error}, {row.says}")
+    print(f"Results: {folder / 'extremes.csv'}")
+    if "map" in chosen:
+        stability_map.draw(stability_map.points(options.short), folder / "map.png")
+        print(f"Map: {folder / 'map.png'}")
+    if wrong:
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    tawami.run(main, "extremes")

@@ -1,0 +1,92 @@
+"""Two materials, one up to 10^13 times as stiff: in series and in parallel, beside the closed forms.
+
+A bar with Gauss points, plane strain, stretched along x between smooth sides. In series (left half soft)
+both halves bear one stress. In parallel (lower half soft, Lame's lambda the same, so that the stress
+across is too) both have one strain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from mpi4py import MPI
+
+import tawami
+from cases.extremes.attempt import Attempt, attempted
+
+SUBJECT = "stiffness contrast"
+NX, NY, H = 8, 4, 0.25
+LENGTH = NX * H
+MU, LAMBDA, STRETCH = 1e6, 1.5e6, 1e-3  # [Pa], [Pa], mean strain [-]; nu = 0.3 for the soft one
+FORMS: dict[str, dict[str, Any]] = {
+    "u": {"form": "u"},
+    "u_bbar": {"form": "u_bbar"},
+    "u_epsv": {"form": "u_epsv"},
+    "u_epsv, alpha = 0": {"form": "u_epsv", "alpha": 0.0},
+    "u_p": {"form": "u_p"},
+}
+BASES = ("quadratic_spline", "bilinear", "biquadratic")
+CONTRASTS = (1e1, 1e3, 1e5, 1e7, 1e9, 1e11, 1e13)
+
+
+def scene_of(
+    form: str, basis: Any, arrangement: str, contrast: float
+) -> tuple[tawami.Scene, float]:
+    """The bar, stretched, and the force of the closed form [N per metre depth]."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=H, cells=(NX, NY))
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=3, gauss=True)
+    series = arrangement == "series"
+    laws = [
+        tawami.linear_elastic(K=LAMBDA * (c if series else 1.0) + 2 / 3 * MU * c, mu=MU * c)
+        for c in (1.0, contrast)
+    ]
+    axis = 0 if series else 1
+    stiff = (body.x[:, axis] > grid.upper[axis] / 2).astype(int)
+    scene = tawami.Scene(grid, body, laws, material_of=stiff, basis=basis, **FORMS[form])
+    scene.fix("left", "x")
+    scene.fix("bottom", "y")
+    scene.fix("top", "y")
+    scene.fix("right", "x", STRETCH * LENGTH)
+    soft = LAMBDA + 2 * MU
+    if series:
+        return scene, NY * H * STRETCH * 2 * soft / (1 + 1 / contrast)
+    return scene, NY * H / 2 * STRETCH * (soft + LAMBDA + 2 * MU * contrast)
+
+
+def force_error(form: str, basis: str, arrangement: str, contrast: float) -> tuple[float, str]:
+    """Relative error of the force."""
+    scene, exact = scene_of(form, basis, arrangement, contrast)
+    solution = scene.solve()
+    return abs(solution.reaction("right")[0] / exact - 1), f"condition {solution.condition:.0e}"
+
+
+def representable(form: str, basis: str, arrangement: str) -> bool:
+    """Whether the fields can take the jump that the closed form has at the interface: of the strain in
+    series, where p does not jump; of p in parallel, where strains do not, and which B-bar with quadratic
+    functions does not balance (`tests/test_patch.py`).
+    """
+    if arrangement == "parallel":
+        return form != "u_p" and (form != "u_bbar" or basis == "bilinear")
+    return basis != "quadratic_spline" and form in ("u", "u_bbar", "u_p")
+
+
+def attempts(short: bool) -> Iterator[Attempt]:
+    """Each form and basis at each contrast.
+
+    What can represent the closed form has to give it, to 1e-5: Newton's tolerance of 1e-6 and what a
+    force loses of it by a sum over the end. The others smear a jump over a cell: by as much as a cell is
+    of the soft half (or of the height) their force may be off.
+    """
+    for arrangement in ("series", "parallel"):
+        for basis in BASES[:2] if short else BASES:
+            for form in list(FORMS)[::2] if short else FORMS:
+                exact = representable(form, basis, arrangement)
+                smeared = 2 / NX if arrangement == "series" else 2 / NY
+                for contrast in CONTRASTS[::3] if short else CONTRASTS:
+                    yield attempted(
+                        SUBJECT,
+                        f"{arrangement}, {form}, {basis}: {contrast:g}",
+                        1e-5 if exact else smeared,
+                        lambda f=form, b=basis, a=arrangement, c=contrast: force_error(f, b, a, c),
+                    )

@@ -1,0 +1,173 @@
+"""NaN or infinity in any array of the particles between two steps, and in what a script passes.
+
+Refused with a sentence that names array and particle, before anything is solved; mended, the scene goes
+on as if nothing had happened. Positions, numbers and materials cannot be written at all.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+import tawami
+from cases.extremes.attempt import Attempt, attempted
+
+SUBJECT = "NaN and infinity"
+PARTICLE = 3
+VALUES = (float("nan"), float("inf"), -float("inf"))
+READ_ONLY = ("x", "material", "number")
+STATIC = ("volume", "stress", "displacement", "eps_v")
+HISTORY = ("plastic_strain", "dilatancy")
+CARRIED = ("velocity", "acceleration", "velocity_gradient", "acceleration_gradient")
+
+
+def scene_of(form: str = "u_epsv", **options: Any) -> tawami.Scene:
+    """A strip of Drucker-Prager material that yields a little under its weight."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(8, 4))
+    body = tawami.box(grid, grid.origin, grid.upper)
+    law = tawami.drucker_prager(tawami.linear_elastic(E=1e6, nu=0.3), phi=30.0, c=1e3, psi=5.0)
+    scene = tawami.Scene(grid, body, law, form=form, density=1e3, **options)
+    for component in "xy":
+        scene.fix("left", component)  # type: ignore[arg-type]
+    scene.gravity((0.0, -0.2))
+    return scene
+
+
+def array_of(scene: tawami.Scene, name: str) -> npt.NDArray[np.float64]:
+    """An array of the particles by its name."""
+    if name in HISTORY:
+        return scene.particles.history(name)
+    if name in CARRIED:
+        return scene.particles.carried(name)
+    return getattr(scene.particles, name)  # type: ignore[no-any-return]
+
+
+def static() -> tuple[tawami.Scene, Callable[[], object]]:
+    """A scene after a step, and the next one."""
+    scene = scene_of()
+    scene.solve()
+    scene.gravity((0.02, -0.22))
+    return scene, scene.solve
+
+
+def moving() -> tuple[tawami.Scene, Callable[[], object]]:
+    """The same in motion at finite strain."""
+    scene = scene_of("u_epsv_finite")
+    motion = tawami.Dynamics(scene, velocity=(0.1, 0.0))
+    motion.step(1e-3)
+    return scene, lambda: motion.step(1e-3)
+
+
+def spoiled(
+    make: Callable[[], tuple[tawami.Scene, Callable[[], object]]], name: str, value: float
+) -> float:
+    """A value written into an array; the sentence has to name it."""
+    scene, step = make()
+    array_of(scene, name)[PARTICLE] = value
+    try:
+        step()
+    except tawami.InputError as error:
+        sentence = rf"^{name}: \d+ entries are not finite; .* at particle {PARTICLE}\b"
+        if not re.search(sentence, str(error)):
+            raise RuntimeError(
+                f"it does not name {name} and particle {PARTICLE}: {error}"
+            ) from error
+        raise
+    return 0.0
+
+
+def mended(
+    make: Callable[[], tuple[tawami.Scene, Callable[[], object]]], name: str, value: float
+) -> float:
+    """Largest difference of any array from that of a scene that was never spoiled."""
+    whole, go_on = make()
+    scene, step = make()
+    array = array_of(scene, name)
+    before = array[PARTICLE].copy()
+    array[PARTICLE] = value
+    try:
+        step()
+    except tawami.InputError:
+        array[PARTICLE] = before
+    step()
+    go_on()
+    names = [*READ_ONLY, *STATIC, *HISTORY]
+    return max(float(np.abs(array_of(scene, n) - array_of(whole, n)).max()) for n in names)
+
+
+def passed(value: float) -> dict[str, Callable[[], object]]:
+    """The same value in what a driver script passes."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(8, 4))
+    body, law = tawami.box(grid, (0, 0), (2, 1)), tawami.linear_elastic(E=1.0, nu=0.3)
+    bad = np.array(body.volume)
+    bad[PARTICLE] = value
+    far = np.array(body.x)
+    far[PARTICLE, 1] = value
+
+    def solved(call: Callable[[tawami.Scene], None]) -> Callable[[], object]:
+        def run() -> object:
+            scene = scene_of()
+            call(scene)
+            return scene.solve()
+
+        return run
+
+    return {
+        "Body(volume)": lambda: tawami.Scene(grid, tawami.Body(body.x, bad), law),
+        "Body(x)": lambda: tawami.Scene(grid, tawami.Body(far, body.volume), law),
+        "density": lambda: tawami.Scene(grid, body, law, density=value),
+        "alpha": lambda: tawami.Scene(grid, body, law, alpha=value),
+        "E": lambda: tawami.linear_elastic(E=value, nu=0.3),
+        "Grid(h)": lambda: tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=value, cells=(1, 1)),
+        "traction": solved(lambda scene: scene.traction("right", (value, 0.0))),
+        "traction as a function": solved(
+            lambda scene: scene.traction("left", (0.0, lambda x, y: value * y))
+        ),
+        "gravity": solved(lambda scene: scene.gravity((0.0, value))),
+        "load": solved(lambda scene: scene.load([0, 1], (value, 0.0))),
+        "fix": solved(lambda scene: scene.fix("right", "x", value)),
+        "hold": solved(lambda scene: scene.hold((1.0, 0.5), "x", value)),
+        "ramp": lambda: tawami.ramp(scene_of("u_epsv_finite"), value),
+        "dt": lambda: tawami.Dynamics(scene_of("u_epsv_finite")).step(value),
+        "velocity": lambda: tawami.Dynamics(scene_of("u_epsv_finite"), velocity=(value, 0.0)).step(
+            1e-3
+        ),
+    }
+
+
+def attempts(short: bool) -> Iterator[Attempt]:
+    """Each array and value; a mended scene is the same to the bit."""
+    for value in VALUES[:1] if short else VALUES:
+        for name in READ_ONLY:
+            yield attempted(
+                SUBJECT,
+                f"{value} in {name}",
+                None,
+                lambda n=name, v=value: spoiled(static, n, v),
+                refusals=(ValueError,),  # NumPy's: assignment destination is read-only
+            )
+        for name in (*STATIC, *HISTORY):
+            yield attempted(
+                SUBJECT, f"{value} in {name}", None, lambda n=name, v=value: spoiled(static, n, v)
+            )
+        for name in (*STATIC, *HISTORY, *CARRIED):
+            setting = f"{value} in {name}, in motion"
+            yield attempted(SUBJECT, setting, None, lambda n=name, v=value: spoiled(moving, n, v))
+        for name, run in passed(value).items():
+            yield attempted(SUBJECT, f"{value} as {name}", None, lambda r=run: _answered(r))
+    for make, names in ((static, (*STATIC, *HISTORY)), (moving, CARRIED)):
+        for name in names:
+            setting = f"{name} mended, {make.__name__}"
+            yield attempted(
+                SUBJECT, setting, 0.0, lambda m=make, n=name: mended(m, n, float("nan"))
+            )
+
+
+def _answered(run: Callable[[], object]) -> float:
+    run()
+    return 0.0

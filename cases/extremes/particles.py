@@ -1,0 +1,134 @@
+"""Particles in any number and any place: a patch test that no quadrature spoils.
+
+The body carries the stress -C : eps at the start, and its border is displaced by u = eps x: then no
+stress is left anywhere, and internal forces vanish for every arrangement of particles. Whether a loaded
+body is also right is a matter of how well the particles integrate: plain tension.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+import tawami
+from cases.extremes.attempt import Attempt, attempted
+
+Array = npt.NDArray[np.float64]
+SUBJECT = "particles per cell"
+CELLS, H = (4, 3), 0.5
+E, NU, PULL = 3e6, 0.45, 1e3  # [Pa], [-], [Pa]
+K, MU = E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU))
+GRADIENT = np.array([[2e-3, -1e-3], [4e-4, -1.5e-3]])
+FORMS: dict[str, dict[str, Any]] = {
+    "u": {"form": "u"},
+    "u_bbar": {"form": "u_bbar"},
+    "u_epsv": {"form": "u_epsv"},
+    "u_epsv, alpha = 0": {"form": "u_epsv", "alpha": 0.0},
+    "u_p": {"form": "u_p"},
+}
+BASES = ("quadratic_spline", "bilinear", "biquadratic")
+
+
+def even(per_axis: int) -> Array:
+    """Positions in a cell, evenly."""
+    t = (np.arange(per_axis) + 0.5) / per_axis
+    return np.column_stack([np.tile(t, per_axis), np.repeat(t, per_axis)])
+
+
+def edges() -> Array:
+    """On corners and the middles of edges; neighbours have theirs at the same places."""
+    return np.array([(a, b) for a in (0, 0.5, 1) for b in (0, 0.5, 1) if (a, b) != (0.5, 0.5)])
+
+
+def in_cells(of_cell: Callable[[int], Array]) -> tawami.Body:
+    """A body of such particles in all cells."""
+    nx, ny = CELLS
+    x = [(of_cell(c) + np.array([c % nx, c // nx])) * H for c in range(nx * ny)]
+    volume = [np.full(len(part), H * H / len(part)) for part in x]
+    return tawami.Body(np.concatenate(x), np.concatenate(volume))
+
+
+def arrangements() -> dict[str, tawami.Body]:
+    """Bodies of the same rectangle."""
+    random = np.random.default_rng(0)
+    bodies = {f"{k * k} in each cell": in_cells(lambda c, k=k: even(k)) for k in range(1, 9)}  # type: ignore[misc]
+    bodies["9 within 1/10 of a corner"] = in_cells(lambda c: 0.1 * even(3))
+    bodies["9 within 1/1000 of a corner"] = in_cells(lambda c: 1e-3 * even(3))
+    bodies["64 within 1/10 of a corner"] = in_cells(lambda c: 0.1 * even(8))
+    bodies["on corners and edges of cells"] = in_cells(lambda c: edges())
+    bodies["on corners of cells"] = in_cells(lambda c: edges()[[0, 2, 5, 7]])
+    bodies["one in each cell, at random"] = in_cells(lambda c: random.random((1, 2)))
+    bodies["4 in each cell, at random"] = in_cells(lambda c: random.random((4, 2)))
+    bodies["9 in each cell, at random"] = in_cells(lambda c: random.random((9, 2)))
+    return bodies
+
+
+def scene_of(body: tawami.Body, form: str, basis: Any) -> tawami.Scene:
+    """The rectangle, without supports."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=H, cells=CELLS)
+    law = tawami.linear_elastic(E=E, nu=NU)
+    return tawami.Scene(grid, body, law, basis=basis, **FORMS[form])
+
+
+def patch(body: tawami.Body, form: str, basis: str) -> tuple[float, str]:
+    """Stress that is left, and error of the displacement, relative; what else there is to say."""
+    scene = scene_of(body, form, basis)
+    div = np.trace(GRADIENT)
+    strain = np.array([GRADIENT[0, 0], GRADIENT[1, 1], 0.0]) - div / 3
+    stress = np.append(K * div + 2 * MU * strain, MU * (GRADIENT[0, 1] + GRADIENT[1, 0]))
+    scene.particles.stress[:] = -stress
+    for edge in ("left", "right", "bottom", "top"):
+        for k, c in enumerate("xy"):
+            scene.fix(edge, c, lambda x, y, k=k: GRADIENT[k, 0] * x + GRADIENT[k, 1] * y)  # type: ignore[arg-type,misc]
+    solution = scene.solve()
+    exact = body.x @ GRADIENT.T
+    displaced = np.abs(scene.particles.displacement - exact).max() / np.abs(exact).max()
+    left = np.abs(scene.particles.stress).max() / np.abs(stress).max()
+    return float(max(displaced, left)), f"condition {solution.condition:.0e}"
+
+
+def tension(body: tawami.Body, form: str, basis: str) -> float:
+    """L2 error of the stress in plain tension."""
+    scene = scene_of(body, form, basis)
+    scene.fix("left", "x")
+    scene.fix("bottom", "y")
+    scene.traction("right", (PULL, 0.0))
+    scene.solve()
+    exact = PULL * np.tile([1, 0, NU, 0], (len(body.x), 1))
+    return float(np.linalg.norm(scene.particles.stress - exact) / np.linalg.norm(exact))
+
+
+def midpoint(body: tawami.Body, form: str, basis: str) -> float:
+    """Bound in tension: how much too small the midpoint rule with k points along an axis makes the
+    integral of the last function at a border, (1 - s)^2 of splines (1/(4 k^2)), (1 - s)(1 - 2 s) of
+    biquadratic ones (1/k^2); bilinear ones it has exactly. B-bar misses 0.22 and 0.42 by any rule
+    (`tests/test_patch.py`).
+    """
+    k = np.sqrt(len(body.x) / (CELLS[0] * CELLS[1]))
+    of_rule = {"quadratic_spline": 1 / (4 * k**2), "biquadratic": 1 / k**2, "bilinear": 1e-9}
+    misses = {"quadratic_spline": 0.22, "biquadratic": 0.42, "bilinear": 0.0}
+    return float(of_rule[basis] + (misses[basis] if form == "u_bbar" else 0.0))
+
+
+def attempts(short: bool) -> Iterator[Attempt]:
+    """Each arrangement, basis and form.
+
+    The patch test's bound is Newton's tolerance; most are at round-off.
+    """
+    for name, body in list(arrangements().items())[:: 4 if short else 1]:
+        for basis in BASES:
+            for form in list(FORMS)[:: 2 if short else 1]:
+                setting = f"{name}: {form}, {basis}"
+                yield attempted(
+                    SUBJECT, setting, 1e-6, lambda o=body, f=form, b=basis: patch(o, f, b)
+                )
+                yield attempted(
+                    SUBJECT,
+                    f"{setting}: tension",
+                    midpoint(body, form, basis),
+                    lambda o=body, f=form, b=basis: tension(o, f, b),
+                )
