@@ -149,6 +149,8 @@ def test_a_run_that_takes_too_long_is_ended(tmp_path):
     (row,) = study.run(limit=2.0, quiet=True).rows
     assert "limit of 2 s" in row.failure
     assert time.perf_counter() - start < 20
+    study.run(limit=1.0, quiet=True)  # tried again, unlike one that refuses
+    assert len((tmp_path / "runs.jsonl").read_text().splitlines()) == 2
 
 
 def test_memory_and_threads_are_those_of_the_run(tmp_path):

@@ -94,7 +94,8 @@ def measured(name: str, knobs: Mapping[str, Any], limit: float) -> dict[str, Any
         limit: Wall time after which it is ended [s].
 
     Returns:
-        values, wall_s, cpu_s, peak_MB, newton_iterations, steps, unknowns; or failure, a sentence.
+        values, wall_s, cpu_s, peak_MB, newton_iterations, steps, unknowns; or failure, a sentence, with
+        `cut` where the process did not come to its end.
     """
     own, environment = mpirun(1, [])[1], dict(os.environ)
     own = {key: value for key, value in own.items() if key in environment} | {MARK: "1"}
@@ -112,10 +113,10 @@ def measured(name: str, knobs: Mapping[str, Any], limit: float) -> dict[str, Any
                 timeout=limit, check=False,
             )  # fmt: skip
         except subprocess.TimeoutExpired:
-            return {"failure": f"took longer than the limit of {limit:g} s"}
+            return {"failure": f"took longer than the limit of {limit:g} s", "cut": True}
         if not result.exists():
             last = (ended.stderr.strip().splitlines() or ["it said nothing"])[-1]
-            return {"failure": f"ended with code {ended.returncode}: {last}"}
+            return {"failure": f"ended with code {ended.returncode}: {last}", "cut": True}
         found_values: dict[str, Any] = json.loads(result.read_text())
         return found_values
 

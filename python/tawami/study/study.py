@@ -179,7 +179,8 @@ class Study:
     ) -> Table:
         """Run what has not been run, one process each, one after the other.
 
-        What is there already is not run again, unless the function, tawami or the machine has changed.
+        What is there already is not run again, unless the function, tawami or the machine has changed, or
+        its process was ended before it was done.
 
         Args:
             sample: Number of settings drawn at random, instead of all.
@@ -206,7 +207,8 @@ class Study:
             )
         folder, runs = result_folder(self.path), self._runs()
         work = self._work(sample, seed)
-        work = [job for job in work if (job[0].label, _key(job[1]), job[2]) not in runs]
+        done = {key for key, run in runs.items() if "cut" not in run}
+        work = [job for job in work if (job[0].label, _key(job[1]), job[2]) not in done]
         start = perf_counter()
         for number, (series, setting, fingerprint) in enumerate(work):
             outcome = process.measured(process.name_of(series.run), setting, limit)
