@@ -179,8 +179,8 @@ class Study:
     ) -> Table:
         """Run what has not been run, one process each, one after the other.
 
-        What is there already is not run again, unless the function, tawami or the machine has changed, or
-        its process was ended before it was done.
+        What is there already is not run again, unless the function, tawami or the machine has changed,
+        or its process was ended before it was done.
 
         Args:
             sample: Number of settings drawn at random, instead of all.
