@@ -27,6 +27,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import matplotlib
 import matplotlib.pyplot as plt
@@ -141,17 +142,24 @@ def rings(number: int) -> tawami.Body:
 
 
 def build(
-    kind: Kind, *, n: int = 6, per_axis: int = 3, nu: float = NU, alpha: float = 0.01
+    kind: Kind,
+    *,
+    n: int = 6,
+    per_axis: int = 3,
+    nu: float = NU,
+    alpha: float = 0.01,
+    **options: Any,
 ) -> tawami.Dynamics:
-    """The disc on n cells over the radius, with so many rings in each."""
+    """The disc on n cells over the radius, so many rings in each; other options go to `Scene`."""
     h = R / n
     # the centre of the disc is no point of symmetry of the grid
     origin = (-(n + 2 + 0.013) * h, -(n + 2 + 0.007) * h)
     grid = tawami.Grid(MPI.COMM_WORLD, origin=origin, h=h, cells=(2 * n + 5, 2 * n + 5))
     body = rings(n * per_axis)
     material = tawami.linear_elastic(E=E, nu=nu)
-    parameters = {"alpha": alpha} if kind.form == "u_epsv_finite" else {}
-    scene = tawami.Scene(grid, body, material, form=kind.form, density=RHO, **parameters)
+    if kind.form == "u_epsv_finite":
+        options["alpha"] = alpha
+    scene = tawami.Scene(grid, body, material, form=kind.form, density=RHO, **options)
     spin = OMEGA * np.array([[0.0, -1.0], [1.0, 0.0]])
     motion = tawami.Dynamics(scene, velocity=body.x @ spin.T, transfer=kind.transfer)
     motion.velocity_gradient[:] = spin
@@ -164,7 +172,7 @@ def solve(
     turns: int = 10,
     steps: int = 150,
     nu: float = NU,
-    **options: float,
+    **options: Any,
 ) -> Run:
     """So many turns of so many steps each."""
     motion = build(kind, nu=nu, **options)

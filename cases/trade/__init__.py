@@ -1,5 +1,5 @@
-"""What accuracy costs: every knob of four cases, measured against closed forms and finest runs.
+"""What accuracy costs: the knobs of five cases, measured against closed forms and finest runs.
 
-python -m cases.trade [cantilever] [cook] [collapse] [self_weight]    runs what has not been run
-python -m cases.trade --words                                         says what the shipped results say
+python -m cases.trade [NAME ...]      of cantilever, cook, collapse, self_weight, spinning_disc
+python -m cases.trade --words         says what the shipped results say
 """

@@ -1,6 +1,6 @@
 """The studies, one after the other; what has been run is not run again.
 
-python -m cases.trade [cantilever] [cook] [collapse] [self_weight] [--sample N] [--results results/trade]
+python -m cases.trade [NAME ...] [--sample N] [--results results/trade]
 python -m cases.trade --words          what the shipped results say, without running anything
 """
 
@@ -11,11 +11,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import tawami
-from cases.trade import cantilever, collapse, cook, self_weight
+from cases.trade import cantilever, collapse, cook, self_weight, spinning_disc
 from tawami.environment import header
 from tawami.study import Table
 
-STUDIES = {s.name: s for s in (cantilever.STUDY, cook.STUDY, collapse.STUDY, self_weight.STUDY)}
+CASES = (cantilever, cook, collapse, self_weight, spinning_disc)
+STUDIES = {case.STUDY.name: case.STUDY for case in CASES}
 #: Results that come with the repository.
 SHIPPED = Path(__file__).parent
 
