@@ -21,6 +21,10 @@ class LockingWarning(UserWarning):
     """A form without a field for the volume, where that makes its mean stress useless."""
 
 
+class ParameterWarning(UserWarning):
+    """A parameter of a form beyond its usual range, where answers are far off."""
+
+
 class QuadratureWarning(UserWarning):
     """Particles that do not integrate over the cells that they fill."""
 
@@ -61,6 +65,7 @@ __all__ = [
     "LockingWarning",
     "MissingDependencyError",
     "OutputError",
+    "ParameterWarning",
     "QuadratureWarning",
     "SingularError",
     "SupportError",
