@@ -17,7 +17,7 @@ from ufl import Identity, div, dot, grad, inner, sym
 fields = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
 kinematics = "mixed"
 parameters = {
-    "alpha": {"default": 0.01, "minimum": 0.0, "maximum": {"residual_based": 0.14}},
+    "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0, "maximum": {"residual_based": 0.14}},
     "k": {"default": 0.01, "minimum": 0.0},
 }
 options = {

@@ -12,7 +12,7 @@ fields = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
 kinematics = "mixed"
 strain = "finite"
 parameters = {
-    "alpha": {"default": 0.01, "minimum": 0.0},
+    "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0},
     "theta": {"default": 0.01, "minimum": 0.0, "maximum": 1.0},
     "k": {"default": 0.01, "minimum": 0.0},
 }

@@ -8,7 +8,7 @@ from ufl import div, dot, grad
 
 fields = {"u": ("displacement", "w"), "p": ("pressure", "q")}
 kinematics = "deviatoric"
-parameters = {"alpha": {"default": 0.01, "minimum": 0.0}}
+parameters = {"alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0}}
 
 
 def residual(u, p, w, q, sigma, K, mu, t, h, sum_p, ds, alpha):

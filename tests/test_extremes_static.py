@@ -44,7 +44,7 @@ def test_nothing_wrong_is_delivered_as_right(subject):
     ("poisson", r"^u_bbar: 1 - 2 nu = 0.0001"),
     ("poisson", r"^u_epsv.*: 1 - 2 nu = 1e-(10|04)"),
     ("poisson", r"^u_p: "),
-    ("alpha", r"laplacian: alpha = "),
+    ("alpha", r"laplacian: alpha = 0.0001"),
     ("alpha", r"residual_based: alpha = 0.0001"),
     ("inf_sup", r""),
     ("particles", r"^(25|64) in each cell: u.*, quadratic_spline"),
@@ -89,6 +89,9 @@ def test_what_is_said_beforehand():
     for row in outcomes("poisson", "^u: 1 - 2 nu = 0.0001").values():
         assert row.outcome == "warned"
         assert "K/mu = 1e+04 at particle 0: it locks" in row.says
+    for row in outcomes("alpha", "^u_epsv, laplacian: alpha = 1000$").values():
+        assert row.outcome == "warned"
+        assert "alpha = 1000: expected at most 1" in row.says
     crowded = outcomes("particles", "within 1/10 of a corner: .*tension")
     assert {row.outcome for row in crowded.values()} == {"warned"}
     assert all("has its particles on one side" in row.says for row in crowded.values())

@@ -342,6 +342,15 @@ def test_the_residual_based_stabilisation_has_an_alpha_that_is_too_large():
     tawami.Scene(grid, body, law, alpha=0.3)
 
 
+@pytest.mark.parametrize("form", ["u_epsv", "u_p", "u_epsv_finite"])
+def test_an_unusual_alpha_gets_a_warning(form):
+    grid = grid_of()
+    body, law = tawami.box(grid, grid.origin, grid.upper), tawami.linear_elastic(E=1.0, nu=0.3)
+    tawami.Scene(grid, body, law, form=form, alpha=1.0)
+    with pytest.warns(tawami.ParameterWarning, match="alpha = 2: expected at most 1, beyond which"):
+        tawami.Scene(grid, body, law, form=form, alpha=2.0)
+
+
 @pytest.mark.parametrize(("form", "nu", "locks"), [
     ("u", 0.4999, True), ("u_finite", 0.4999, True), ("u", 0.48, False), ("u_bbar", 0.4999, False)
 ])  # fmt: skip

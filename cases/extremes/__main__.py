@@ -54,16 +54,30 @@ def as_line(row: Attempt) -> str:
 
 
 def ends(rows: Sequence[Attempt]) -> Iterator[str]:
-    """Where each subject ends: its last survival and its first refusal, in the order of trying."""
+    """Where each subject ends: its last survival and its first refusal, in the order of trying; then the
+    same for each series of settings, 'series: value', that does not survive as a whole.
+    """
     for subject in dict.fromkeys(row.subject for row in rows):
         mine = [row for row in rows if row.subject == subject]
-        parts = [f"{len(mine)} tried"]
-        for outcome, which in (("survived", -1), ("warned", 0), ("refused", 0), ("WRONG", 0)):
-            found = [row for row in mine if row.outcome == outcome]
-            if found:
-                place = "last" if which else "first"
-                parts.append(f"{len(found)} {outcome}, {place}: {found[which].setting}")
-        yield f"{subject}: {'; '.join(parts)}"
+        yield f"{subject}: {len(mine)} tried; {_where(mine)}"
+        series = [row.setting.rpartition(":")[0] for row in mine]
+        for name in dict.fromkeys(series):
+            part = [row for row, of in zip(mine, series, strict=True) if of == name]
+            if name and len(part) > 2 and {row.outcome for row in part} != {"survived"}:
+                yield f"    {name}: {_where(part, name)}"
+
+
+def _where(rows: Sequence[Attempt], series: str = "") -> str:
+    parts = []
+    for outcome, which, word in (
+        ("survived", -1, "last"), ("warned", 0, "first"), ("refused", 0, "first"), ("WRONG", 0, "first"),
+    ):  # fmt: skip
+        found = [row for row in rows if row.outcome == outcome]
+        if found:
+            place = found[which].setting
+            place = place.removeprefix(f"{series}: ") if series else place
+            parts.append(f"{len(found)} {outcome}, {word}: {place}")
+    return "; ".join(parts)
 
 
 def study(subjects: Sequence[str], short: bool, file: Path) -> list[Attempt]:

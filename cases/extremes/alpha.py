@@ -68,6 +68,8 @@ def bound_of(form: str, alpha: float, stabilisation: str) -> float:
     if stabilisation == "residual_based":
         return 2 * without
     part = 1 / 12 if stabilisation == "projection" else 1.0
+    # what is worse than the estimate at alpha = 1 is useless, whatever theory allows it
+    alpha = min(alpha, 1.0)
     # 5 % for the gradient of the discrete p, which stands for that of the closed form
     return without + 1.05 * sqrt(part * alpha / 2) / N * gradient_over_size()
 

@@ -23,7 +23,12 @@ Outcome = Literal["survived", "warned", "refused", "WRONG"]
 Measured = float | tuple[float, str]
 
 #: What may be said of an answer beforehand.
-WARNINGS = (tawami.LockingWarning, tawami.InstabilityWarning, tawami.QuadratureWarning)
+WARNINGS = (
+    tawami.InstabilityWarning,
+    tawami.LockingWarning,
+    tawami.ParameterWarning,
+    tawami.QuadratureWarning,
+)
 
 COLUMNS = ("subject", "setting", "outcome", "error", "bound", "says")
 

@@ -59,7 +59,7 @@ def solved(form: str, basis: Any, turns: int = 0, away: float = 0.0) -> list[Arr
         basis=basis, density=1e3, **FORMS[form],
     )  # fmt: skip
     for component in "xy":
-        scene.fix(edge("bottom", turns), component)  # type: ignore[arg-type]
+        scene.fix(edge("bottom", turns), component)
     # on the part of the top that the body reaches
     part = np.array([[2 / 3 * side, side], [side, side]])
     along = 1 if edge("top", turns) in ("left", "right") else 0

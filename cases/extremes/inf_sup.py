@@ -92,8 +92,8 @@ def scene_of(
     scene = tawami.Scene(grid, square, law, form="u_epsv", basis=basis, **options)
     edges = ("left", "bottom", "right", "top") if body == "filled" else ("left", "bottom")
     for edge in edges:
-        scene.fix(edge, "x")  # type: ignore[arg-type]
-        scene.fix(edge, "y")  # type: ignore[arg-type]
+        scene.fix(edge, "x")
+        scene.fix(edge, "y")
     return scene
 
 

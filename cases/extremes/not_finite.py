@@ -33,7 +33,7 @@ def scene_of(form: str = "u_epsv", **options: Any) -> tawami.Scene:
     law = tawami.drucker_prager(tawami.linear_elastic(E=1e6, nu=0.3), phi=30.0, c=1e3, psi=5.0)
     scene = tawami.Scene(grid, body, law, form=form, density=1e3, **options)
     for component in "xy":
-        scene.fix("left", component)  # type: ignore[arg-type]
+        scene.fix("left", component)
     scene.gravity((0.0, -0.2))
     return scene
 
@@ -44,7 +44,7 @@ def array_of(scene: tawami.Scene, name: str) -> npt.NDArray[np.float64]:
         return scene.particles.history(name)
     if name in CARRIED:
         return scene.particles.carried(name)
-    return getattr(scene.particles, name)  # type: ignore[no-any-return]
+    return getattr(scene.particles, name)
 
 
 def static() -> tuple[tawami.Scene, Callable[[], object]]:

@@ -55,7 +55,7 @@ def in_cells(of_cell: Callable[[int], Array]) -> tawami.Body:
 def arrangements() -> dict[str, tawami.Body]:
     """Bodies of the same rectangle."""
     random = np.random.default_rng(0)
-    bodies = {f"{k * k} in each cell": in_cells(lambda c, k=k: even(k)) for k in range(1, 9)}  # type: ignore[misc]
+    bodies = {f"{k * k} in each cell": in_cells(lambda c, k=k: even(k)) for k in range(1, 9)}
     bodies["9 within 1/10 of a corner"] = in_cells(lambda c: 0.1 * even(3))
     bodies["9 within 1/1000 of a corner"] = in_cells(lambda c: 1e-3 * even(3))
     bodies["64 within 1/10 of a corner"] = in_cells(lambda c: 0.1 * even(8))
@@ -83,7 +83,7 @@ def patch(body: tawami.Body, form: str, basis: str) -> tuple[float, str]:
     scene.particles.stress[:] = -stress
     for edge in ("left", "right", "bottom", "top"):
         for k, c in enumerate("xy"):
-            scene.fix(edge, c, lambda x, y, k=k: GRADIENT[k, 0] * x + GRADIENT[k, 1] * y)  # type: ignore[arg-type,misc]
+            scene.fix(edge, c, lambda x, y, k=k: GRADIENT[k, 0] * x + GRADIENT[k, 1] * y)
     solution = scene.solve()
     exact = body.x @ GRADIENT.T
     displaced = np.abs(scene.particles.displacement - exact).max() / np.abs(exact).max()

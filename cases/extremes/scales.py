@@ -108,8 +108,7 @@ def difference(run: Callable[[Units], list[Array]], units: Units) -> float:
 def attempts(short: bool) -> Iterator[Attempt]:
     """Each problem in each setting; 1e-9 is the demand, round-off times the condition number is less."""
     runs: dict[str, Callable[[Units], list[Array]]] = {
-        f"beam, {form}": lambda units, form=form: beam(units, form)  # type: ignore[misc]
-        for form in ELASTIC
+        f"beam, {form}": lambda units, form=form: beam(units, form) for form in ELASTIC
     }
     runs |= {"Drucker-Prager": pressed, "dynamic step": dropped}
     for name, run in runs.items():

@@ -65,7 +65,13 @@ def point(name: str, one_minus_2nu: float, alpha: float | None) -> Point:
 
 def points(short: bool) -> list[Point]:
     """All of the map, or its corners."""
-    warnings.simplefilter("ignore", tawami.LockingWarning)  # the map shows it
+    with warnings.catch_warnings():  # the map shows what they say
+        warnings.simplefilter("ignore", tawami.LockingWarning)
+        warnings.simplefilter("ignore", tawami.ParameterWarning)
+        return _points(short)
+
+
+def _points(short: bool) -> list[Point]:
     step = 3 if short else 1
     found = []
     for name, (form, _) in FORMS.items():

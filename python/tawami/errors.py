@@ -25,6 +25,10 @@ class LockingWarning(UserWarning):
     """A form without a field for the volume, where that makes its mean stress useless."""
 
 
+class ParameterWarning(UserWarning):
+    """A parameter of a form beyond its usual range, where answers are far off."""
+
+
 class QuadratureWarning(UserWarning):
     """Particles that do not integrate over the cells that they fill."""
 
@@ -66,6 +70,7 @@ __all__ = [
     "MissingDependencyError",
     "NotModelledError",
     "OutputError",
+    "ParameterWarning",
     "QuadratureWarning",
     "SingularError",
     "SupportError",

@@ -72,7 +72,8 @@ class Form:
             law receives.
         residual: Function that returns the residual as a UFL form.
         parameters: Numbers that may change without compiling again: name -> {"default": ...,
-            "minimum": ..., "maximum": ...}, the limits optional; a maximum may be {option: maximum}.
+            "minimum": ..., "maximum": ..., "usual": ...}, the limits optional; a maximum may be
+            {option: maximum}; beyond what is usual a scene warns.
         options: Choices that make a different form: name -> the possible values, default first.
         strain: 'small', or 'finite': logarithmic elastic strains, the grid reset after each step.
         whole_cells: Those of the options that need cells which the body fills.
@@ -177,6 +178,15 @@ class Form:
                 has = f"it has {listed(known)}" if known else "it has none"
                 raise InputError(f"form {self.name} has no parameter '{name}': {has}")
         return {n: self._limited(n, v, options) for n, v in parameters.items()}, options
+
+    def unusual(self, parameters: Mapping[str, float]) -> list[str]:
+        """What to say of parameters beyond their usual range."""
+        return [
+            f"{name} = {value:g}: expected at most {self.parameters[name]['usual']:g}, beyond which the "
+            f"answers of form {self.name} are far off; use a smaller {name}"
+            for name, value in parameters.items()
+            if value > self.parameters[name].get("usual", math.inf)
+        ]
 
     def _limited(self, name: str, value: Any, options: Mapping[str, str]) -> float:
         """The value of a parameter, within its limits."""

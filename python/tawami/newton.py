@@ -209,9 +209,9 @@ class Newton:
             round_off += 1e-14 * self._stiffest * self.field.grid.h * np.sqrt(n)
         if inertia is not None:  # and those of one that coasts
             round_off += 1e-13 * float(np.linalg.norm(inertia.mass * inertia.offset))
-        at_rest = scale <= round_off and (
-            inertia is not None or self._moves_rigidly(coefficients[:n], moved)
-        )
+        at_rest: bool = self._comm.bcast(scale <= round_off)  # all ranks take the same way
+        if at_rest and inertia is None:
+            at_rest = self._moves_rigidly(coefficients[:n], moved)
         momentum = 0.0 if at_rest or scale == 0 else float(np.linalg.norm(free[of_u])) / scale
         volume = None
         if self.kind is not None:

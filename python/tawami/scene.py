@@ -21,7 +21,7 @@ from tawami.basis import BASES, Basis
 from tawami.body import Body
 from tawami.boundary import Component, Interval, Profile, cells_between
 from tawami.compilation import check_used, compile_form
-from tawami.errors import ConvergenceError, InputError, LockingWarning
+from tawami.errors import ConvergenceError, InputError, LockingWarning, ParameterWarning
 from tawami.fast_field import FastField
 from tawami.field import Field
 from tawami.formulation import Form
@@ -115,6 +115,7 @@ class Scene(contents.Elsewhere):
     Warns:
         LockingWarning: A form without a field for the volume, and a material nearly incompressible.
         InstabilityWarning: When solving: cells filled in part, and an option that needs whole ones.
+        ParameterWarning: A parameter of the form beyond its usual range.
         QuadratureWarning: When first solving: particles that do not integrate over the cells they fill.
     """
 
@@ -152,6 +153,8 @@ class Scene(contents.Elsewhere):
         self.grid, self.basis = grid, basis
         self.form = Form.load(form)
         values, options = self.form.settings(parameters)
+        for sentence in [] if grid.comm.rank else self.form.unusual(values):
+            warnings.warn(sentence, ParameterWarning, stacklevel=2)
         self._whole_cells = [o for o in options.values() if o in self.form.whole_cells]
         law = None
         if isinstance(material, NumpyLaw):
