@@ -18,7 +18,7 @@ import numpy.typing as npt
 from tawami import inputs, ranks
 from tawami.energy import Energies
 from tawami.errors import InputError
-from tawami.newton import Inertia
+from tawami.inertia import Inertia
 from tawami.reduction import Reduction
 from tawami.scene import Accepted, Problem, Scene
 from tawami.solution import Solution
@@ -181,14 +181,15 @@ class Dynamics:
             v = reduction.imposed(v.ravel(), masses, speed).reshape(-1, 2)
             a = reduction.imposed(a.ravel(), masses, change).reshape(-1, 2)
             slope = 1 / (self.beta * dt**2)
-            offset = slope * (dt * v + dt**2 * (0.5 - self.beta) * a)
+            back = (0.5 / self.beta - 1) * a.ravel()
             impulse = masses * (v - before[0]).ravel() / dt
-            inertia = Inertia(masses, slope, offset.ravel(), impulse)
+            inertia = Inertia(masses, slope, dt * v.ravel(), back, impulse)
             state = _GridState(v, a, reduction, inertia)
-            return Problem(reduction, external, inertia, self._guess(dt * v), ways)
+            return Problem(reduction, external, inertia, self._guess(inertia.course), ways)
 
         def also(accepted: Accepted) -> Callable[[float], None]:
-            a1 = state.inertia.acceleration(accepted.u.ravel()).reshape(-1, 2)
+            assert accepted.acceleration is not None
+            a1 = accepted.acceleration
             v1 = state.v + dt * ((1 - self.gamma) * state.a + self.gamma * a1)
             v1 = state.reduction.imposed(v1.ravel(), masses, speed1).reshape(-1, 2)
             a1 = state.reduction.imposed(a1.ravel(), masses, change).reshape(-1, 2)

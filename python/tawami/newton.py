@@ -23,6 +23,7 @@ from tawami.compilation import CompiledForm
 from tawami.density import Density, LawQuantity, ParticleScalar, Rule
 from tawami.errors import ConvergenceError, InputError, SingularError
 from tawami.field import Field
+from tawami.inertia import Inertia
 from tawami.linear import LinearSolver
 from tawami.numpy_law import NumpyStage
 from tawami.petsc import clean_up
@@ -37,40 +38,12 @@ STRAIN_FLOOR = 1e-7
 
 
 @dataclass(frozen=True)
-class Inertia:
-    """Forces `m_i a_i` of the lumped mass, `a = slope u - offset` in the increments u of the step.
-
-    Attributes:
-        mass: Of each displacement coefficient [kg per metre depth].
-        slope: [1/s2]
-        offset: [m/s2]
-        impulse: Of the supports at the beginning of the step, over its length: what changed the
-            velocities that came from the particles into those they prescribe [N per metre depth].
-    """
-
-    mass: Array
-    slope: float
-    offset: Array
-    impulse: Array
-
-    def acceleration(self, u: Array) -> Array:
-        """At the end of the step, of each displacement coefficient [m/s2]."""
-        return np.asarray(self.slope * u - self.offset)
-
-    def force(self, coefficients: Array) -> Array:
-        """On all coefficients."""
-        n = len(self.mass)
-        forces = np.zeros(len(coefficients))
-        forces[:n] = self.mass * self.acceleration(coefficients[:n])
-        return forces
-
-
-@dataclass(frozen=True)
 class Converged:
     """A converged step.
 
     Attributes:
         coefficients: Increments of all fields.
+        acceleration: At the end of a dynamic step, of each displacement coefficient [m/s2].
         forces: What supports and walls give on all coefficients [N per metre depth].
         history: (momentum, volume) measures of every residual, the first before any solve.
         krylov: FGMRES iterations of every solve; 0 where the tangent was factorised.
@@ -80,6 +53,7 @@ class Converged:
     """
 
     coefficients: Array
+    acceleration: Array | None
     forces: Array
     history: History
     krylov: list[int]
@@ -191,13 +165,12 @@ class Newton:
         free = reduction.selection.T @ out_of_balance
         of_u = reduction.unknowns < n
         scale = max(self._started, *(float(np.linalg.norm(force[:n])) for force in forces))
-        # Forces of a body that supports move rigidly are round-off: it is in equilibrium.
-        moved = np.abs(reduction.offset[:n]).max()
-        round_off = 1e-13 * self._stiffest * moved * np.sqrt(n)
-        if not forces[1].any():  # and those of stress that is left of them
-            round_off += 1e-14 * self._stiffest * self.field.grid.h * np.sqrt(n)
-        if inertia is not None:  # and those of one that coasts
-            round_off += 1e-13 * float(np.linalg.norm(inertia.mass * inertia.offset))
+        round_off = 0.0
+        if not forces[1].any():
+            # Forces of a body that supports move rigidly, or that coasts, are round-off, and so are
+            # those of stress that is left of them. A load is none, however small.
+            way = 10 * np.abs(coefficients[:n]).max() + self.field.grid.h
+            round_off = 1e-14 * self._stiffest * way * np.sqrt(n)
         momentum = float(np.linalg.norm(free[of_u])) / scale if scale > round_off else 0.0
         volume = None
         if self.kind is not None:
@@ -285,19 +258,24 @@ class Newton:
         if inertia is None and squares[0] > 0:  # a body that is unloaded ends without forces
             start = self.internal(np.zeros(len(external)))[: self.field.layout.num_displacement]
             self._started = float(np.linalg.norm(start))
-        unknowns = np.zeros(reduction.size) if guess is None else guess[reduction.unknowns]
+        coefficients, off = _begin(reduction, guess, inertia)
+        acceleration = None
         linear, history = self._linear, History()
         krylov: list[int] = []
         while True:
-            coefficients = reduction.selection @ unknowns + reduction.offset
             try:
                 internal = self.internal(coefficients)
             except _rust.InvertedError as error:
-                self._fail(history, f"Then {error}")
+                if guess is None:
+                    self._fail(history, f"Then {error}")
+                guess = None  # once more from nothing
+                coefficients, off = _begin(reduction, guess, inertia)
+                continue
             forces: tuple[Array, ...] = (internal, external)
             rest = internal - external
-            if inertia is not None:
-                forces += (inertia.force(coefficients),)
+            if inertia is not None and off is not None:
+                acceleration = inertia.acceleration(off)
+                forces += (inertia.force(acceleration, len(rest)),)
                 rest += forces[-1]
             held = rest
             if inertia is not None:
@@ -313,8 +291,9 @@ class Newton:
                 self._fail(history, "an infinite or undefined number came up")
             if _worst(history[-1]) < self.tolerance:
                 return Converged(
-                    coefficients, held, history, krylov, linear.condition, linear.symmetric
-                )
+                    coefficients, acceleration, held, history, krylov, linear.condition,
+                    linear.symmetric,
+                )  # fmt: skip
             if len(history) > self.max_iterations:
                 self._fail(history, "Take a smaller load, or check material and supports")
             matrix = self.field.tangent(coefficients, self.data, reduction)
@@ -322,11 +301,14 @@ class Newton:
                 self._add_mass(matrix, inertia, reduction)
             right = -(reduction.selection.T @ rest)
             scale = functools.partial(self._scale, matrix, reduction)
-            change = linear.solve(matrix, scale, right[reduction.own], self._forcing(history))
+            found = linear.solve(matrix, scale, right[reduction.own], self._forcing(history))
             krylov.append(linear.iterations)
             if linear.singular:
                 self._report_singular(reduction)
-            unknowns += ranks.joined(self._comm, change)
+            change = reduction.selection @ ranks.joined(self._comm, found)
+            coefficients = coefficients + change
+            if off is not None:
+                off = off + change[: len(off)]
             self.stopwatch.lap()
 
     def _add_mass(self, matrix: Any, inertia: Inertia, reduction: Reduction) -> None:
@@ -395,6 +377,15 @@ class Newton:
             f"factorisation and random vectors). The displacement basis is '{layout.basis}'; weakest "
             f"at the cells (i, j): {', '.join(weakest[:4])}. Likely cause: {advice}"
         )
+
+
+def _begin(
+    reduction: Reduction, guess: Array | None, inertia: Inertia | None
+) -> tuple[Array, Array | None]:
+    """The first iterate: increments of all fields, and what is kept of them apart (`Inertia`)."""
+    unknowns = np.zeros(reduction.size) if guess is None else guess[reduction.unknowns]
+    coefficients = reduction.selection @ unknowns + reduction.offset
+    return coefficients, None if inertia is None else inertia.off_course(coefficients)
 
 
 def _worst(measures: tuple[float, float | None]) -> float:
