@@ -1,0 +1,1 @@
+"""What the method bears: each subject a module, each attempt a row; `make extremes`."""
