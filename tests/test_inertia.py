@@ -50,3 +50,21 @@ def test_gravity_on_a_body_that_flies_fast(dt):
     motion = tawami.Dynamics(scene, velocity=(1000.0, 0.0))
     motion.step(dt)
     assert motion.acceleration == pytest.approx(np.tile([0.0, -10.0], (64, 1)), abs=1e-6)
+
+
+@pytest.mark.parametrize("dt", [1e-300, 1e-101, 1e101, 1e300])
+def test_a_step_whose_square_is_no_number(dt):
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(-1, -1), h=0.125, cells=(16, 16))
+    body = tawami.box(grid, (-0.25, -0.25), (0.25, 0.25))
+    law = tawami.linear_elastic(E=1e5, nu=0.3)
+    scene = tawami.Scene(grid, body, law, form="u_epsv_finite", density=1000.0)
+    motion = tawami.Dynamics(scene)
+    for act in (lambda: motion.step(dt), lambda: motion.run(1e301, dt)):
+        with pytest.raises(tawami.InputError, match="of at least 1e-100 and at most 1e.100"):
+            act()
+    motion.velocity[:] = (1.0, 2.0)
+    velocity = np.zeros((64, 2))
+    velocity[5, 1] = np.inf
+    with pytest.raises(tawami.InputError, match=r"velocity of particle 5 is \(0, inf\) m/s"):
+        tawami.Dynamics(scene, velocity=velocity)
+    assert (motion.velocity == (1.0, 2.0)).all()

@@ -27,6 +27,8 @@ from tawami.supports import Support
 from tawami.transfer import TRANSFERS, TransferName, gradient_of, to_grid
 
 Array = npt.NDArray[np.float64]
+#: Steps [s] whose squares, and what is divided by these, are numbers.
+SHORTEST, LONGEST = 1e-100, 1e100
 
 
 class Dynamics:
@@ -90,6 +92,12 @@ class Dynamics:
             raise InputError(
                 f"velocity has shape {np.shape(velocity)}: expected two numbers, or {n} x 2"
             ) from None
+        if not np.isfinite(given).all():
+            p = np.flatnonzero(~np.isfinite(given).all(axis=1))[0]
+            raise InputError(
+                f"velocity of particle {p} is ({given[p, 0]:g}, {given[p, 1]:g}) m/s: expected finite "
+                "numbers"
+            )
         for name, width in (
             ("velocity", 2), ("acceleration", 2),
             ("velocity_gradient", 4), ("acceleration_gradient", 4),
@@ -140,7 +148,7 @@ class Dynamics:
             ConvergenceError, SingularError: As `Scene.solve`.
             InputError: dt, or what is not finite, or a particle that would leave the grid.
         """
-        dt = inputs.number("dt", dt, low=inputs.LEAST)
+        dt = inputs.number("dt", dt, low=SHORTEST, high=LONGEST)
         scene, attached = self.scene, self.scene.attached
         with ranks.together(scene.grid.comm):
             scene.particles.check()
@@ -297,7 +305,7 @@ class Dynamics:
                 is in the particles.
             InputError: dt <= 0, or a step longer than the time that is left.
         """
-        dt = inputs.number("dt", dt, low=inputs.LEAST)
+        dt = inputs.number("dt", dt, low=SHORTEST, high=LONGEST)
         left = inputs.number("end", end) - self.time
         if dt > left * (1 + 1e-9):
             raise InputError(
