@@ -7,6 +7,7 @@ everything else as it was, to the bit; mended, the run must go on as if nothing 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 
@@ -16,17 +17,17 @@ from cases.extremes.attempt import Attempt, attempted
 
 SUBJECT = "NaN and infinity"
 DT, PARTICLE = 0.004, 37
+ELASTIC = tawami.linear_elastic(E=block.E, nu=0.3)
 LAWS = {
-    "linear_elastic": lambda elastic: elastic,
-    "von_mises": lambda elastic: tawami.von_mises(elastic, yield_stress=1e3),
-    "mohr_coulomb": lambda elastic: tawami.mohr_coulomb(elastic, phi=30.0, c=1e3, psi=5.0),
+    "linear_elastic": ELASTIC,
+    "von_mises": tawami.von_mises(ELASTIC, yield_stress=1e3),
+    "mohr_coulomb": tawami.mohr_coulomb(ELASTIC, phi=30.0, c=1e3, psi=5.0),
 }
 
 
 def running(law: str) -> tawami.Dynamics:
     """The block, spinning and plastic here and there, after three steps."""
-    made = LAWS[law](tawami.linear_elastic(E=block.E, nu=0.3))
-    motion = block.spinning(block.scene(law=made), 4.0)
+    motion = block.spinning(block.scene(law=LAWS[law]), 4.0)
     for _ in range(3):
         motion.step(DT)
     return motion
@@ -70,6 +71,14 @@ def refused(motion: tawami.Dynamics, act: Callable[[], object], words: list[str]
     return np.inf
 
 
+def corrupted(law: str, name: str, value: float) -> float:
+    """The refusal of the step after the value was put into an array."""
+    motion = running(law)
+    put(motion, name, value)
+    words = [f"{name}:", f"particle {PARTICLE}"]
+    return refused(motion, lambda: motion.step(DT), words)
+
+
 def mended(law: str, name: str, value: float) -> float:
     """Difference to an undisturbed run after the array was mended; to the bit where it is 0."""
     motion, other = running(law), running(law)
@@ -96,19 +105,25 @@ def of_the_step(what: str, value: float) -> float:
     if what == "traction":  # of a body that fills its grid
         motion = tawami.Dynamics(block.scene("u", cells=(4, 4)))
     scene = motion.scene
+
+    def pull() -> None:
+        scene.traction("top", (0.0, value))
+        motion.step(DT)
+
+    def move() -> None:
+        scene.fix("left", "x", velocity=lambda t: value)
+        motion.step(DT)
+
     acts: dict[str, tuple[Callable[[], object], str]] = {
         "dt": (lambda: motion.step(value), "dt"),
         "dt of a run": (lambda: motion.run(1.0, value), "dt"),
         "end": (lambda: motion.run(value, DT), "end"),
         "gravity": (lambda: scene.gravity((0.0, value)), "gravity"),
         "load": (lambda: scene.load([3], (value, 0.0)), "load"),
-        "traction": (lambda: (scene.traction("top", (0.0, value)), motion.step(DT)), "traction"),
-        "velocity of a support": (
-            lambda: (scene.fix("left", "x", velocity=lambda t: value), motion.step(DT)),
-            "velocity",
-        ),
+        "traction": (pull, "traction"),
+        "velocity of a support": (move, "velocity"),
         "velocity at the start": (
-            lambda: tawami.Dynamics(scene, velocity=(value, 0.0)).step(DT), "velocity",
+            lambda: tawami.Dynamics(scene, velocity=(value, 0.0)), "velocity",
         ),
     }  # fmt: skip
     act, word = acts[what]
@@ -124,28 +139,24 @@ def attempts(short: bool) -> Iterator[Attempt]:
         seen |= set(names)
         for name in names:
             for text, value in list(values.items())[: 1 if short else None]:
-                def run(law: str = law, name: str = name, value: float = value) -> float:
-                    motion = running(law)
-                    put(motion, name, value)
-                    words = [f"{name}:", f"particle {PARTICLE}"]
-                    return refused(motion, lambda: motion.step(DT), words)
-
-                yield attempted(SUBJECT, f"{text} in {name}", 0.0, run)
+                yield attempted(
+                    SUBJECT, f"{text} in {name}", 0.0, partial(corrupted, law, name, value)
+                )
             yield attempted(
                 SUBJECT, f"NaN in {name}, mended", 0.0,
-                lambda law=law, name=name: mended(law, name, np.nan),
+                partial(mended, law, name, np.nan),
             )  # fmt: skip
     numbers = values | {"0": 0.0, "-1": -1.0}
     for text, value in numbers.items():
         for what in ("dt", "dt of a run"):
             yield attempted(
                 SUBJECT, f"{text} as {what}", 0.0,
-                lambda what=what, value=value: of_the_step(what, value),
+                partial(of_the_step, what, value),
             )  # fmt: skip
     for text, value in values.items():
         for what in ("end", "gravity", "load", "traction", "velocity of a support",
                      "velocity at the start"):  # fmt: skip
             yield attempted(
                 SUBJECT, f"{text} as {what}", 0.0,
-                lambda what=what, value=value: of_the_step(what, value),
+                partial(of_the_step, what, value),
             )  # fmt: skip

@@ -10,6 +10,7 @@ so that at a high contrast it is a weight on a spring, or a heavy bar with a tip
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -102,21 +103,23 @@ def attempts(short: bool) -> Iterator[Attempt]:
         for rho in every:
             yield attempted(
                 SUBJECT, f"{form}, free fall, {rho:g} kg/m3", TOLERANCE,
-                lambda form=form, rho=rho: fall(form, (rho, rho)),
+                partial(fall, form, (rho, rho)),
             )  # fmt: skip
-        for low, high in ((1.0, 1e9), (1e9, 1.0)) if short else ((1e-9, 1e9), (1.0, 1e9), (1e9, 1.0)):
+        for low, high in (
+            ((1.0, 1e9), (1e9, 1.0)) if short else ((1e-9, 1e9), (1.0, 1e9), (1e9, 1.0))
+        ):
             yield attempted(
                 SUBJECT, f"{form}, free fall, {low:g} below {high:g} kg/m3", TOLERANCE,
-                lambda form=form, low=low, high=high: fall(form, (low, high)),
+                partial(fall, form, (low, high)),
             )  # fmt: skip
         for rho in every:
             yield attempted(
                 SUBJECT, f"{form}, bar of {rho:g} kg/m3", BOUND,
-                lambda form=form, rho=rho: vibration(form, rho, rho),
+                partial(vibration, form, rho, rho),
             )  # fmt: skip
         for contrast in (1e9,) if short else (1e1, 1e3, 1e6, 1e9, 1e12):
             for held, free in ((1.0, contrast), (contrast, 1.0)):
                 yield attempted(
                     SUBJECT, f"{form}, bar of {held:g} and {free:g} kg/m3", BOUND,
-                    lambda form=form, held=held, free=free: vibration(form, held, free),
+                    partial(vibration, form, held, free),
                 )  # fmt: skip

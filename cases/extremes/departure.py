@@ -6,6 +6,7 @@ Reference: x + v t of each particle says which have left, when and where.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 from mpi4py import MPI
@@ -18,8 +19,8 @@ SIDE, STEPS = 2.0, 10  # of the grid [m]
 
 
 def cloud(speed: float, leaving: str) -> tawami.Dynamics:
-    """200 particles anywhere, two or more cells apart in velocity: all fly outwards, so softly bound that
-    they do not feel each other; speed [cells a step of 1 s].
+    """200 particles anywhere that fly apart, so heavy that they do not feel each other; the fastest by
+    `speed` cells in a step of 1 s.
     """
     h = SIDE / 16
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(-SIDE / 2, -SIDE / 2), h=h, cells=(16, 16))
@@ -28,9 +29,14 @@ def cloud(speed: float, leaving: str) -> tawami.Dynamics:
     body = tawami.Body(x, np.full(200, 1e-3))
     law = tawami.linear_elastic(E=1.0, nu=0.3)
     scene = tawami.Scene(
-        grid, body, law, form="u_finite", density=1e25, leaving=leaving  # type: ignore[arg-type]
+        grid,
+        body,
+        law,
+        form="u_finite",
+        density=1e25,
+        leaving=leaving,  # type: ignore[arg-type]
     )
-    # one field for all, so that the grid has it as they do: x' = rate x
+    # linear in x, so that the grid has it as they do
     rate = speed * h / (0.3 * SIDE)
     motion = tawami.Dynamics(scene, velocity=rate * x)
     motion.velocity_gradient[:] = rate * np.eye(2)
@@ -93,5 +99,5 @@ def attempts(short: bool) -> Iterator[Attempt]:
         for what, run in (("remove", removed), ("stop", stopped)):
             yield attempted(
                 SUBJECT, f"{speed:g} cells a step, {what}", 0.0,
-                lambda run=run, speed=speed: run(speed),
+                partial(run, speed),
             )  # fmt: skip

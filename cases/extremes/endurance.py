@@ -9,6 +9,8 @@ from __future__ import annotations
 import ctypes
 import gc
 from collections.abc import Iterator
+from functools import partial
+from typing import Any
 
 import tawami
 from cases.extremes import block
@@ -41,7 +43,7 @@ def in_use() -> int:
     return int(now.uordblks + now.hblkhd)
 
 
-def growth(form: str, first: int, steps: int, **options: str) -> float:
+def growth(form: str, first: int, steps: int, **options: Any) -> float:
     """Bytes a step that are in use after `steps` steps and were not after the `first`."""
     motion = block.spinning(block.scene(form, **options), 2.0)
     start = 0
@@ -72,12 +74,12 @@ def attempts(short: bool) -> Iterator[Attempt]:
     for form in ("u_epsv_finite",) if short else ("u_epsv_finite", "u_bbar_finite"):
         yield attempted(
             SUBJECT, f"{form}, bytes a step, {steps} steps after {first}", BOUND,
-            lambda form=form: growth(form, first, steps),
+            partial(growth, form, first, steps),
         )  # fmt: skip
     if not short:
         yield attempted(
             SUBJECT, "reference assembly, bytes a step, 300 steps after 200", BOUND,
-            lambda: growth("u_epsv_finite", 200, 300, assembly="reference"),
+            partial(growth, "u_epsv_finite", 200, 300, assembly="reference"),
         )  # fmt: skip
     number = 20 if short else 50
-    yield attempted(SUBJECT, f"bytes a scene, {number} scenes", BOUND, lambda: scenes(number))
+    yield attempted(SUBJECT, f"bytes a scene, {number} scenes", BOUND, partial(scenes, number))

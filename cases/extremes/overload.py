@@ -7,8 +7,10 @@ ramp ends with its sentence at the share that is borne, and the scene is in equi
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
+from mpi4py import MPI
 
 import tawami
 from cases.extremes import block
@@ -22,8 +24,8 @@ BOUND = 1e-9
 
 
 def pushed(form: str, factor: float) -> float:
-    """The momentum after a tenth of the period, pulled by a dead load on its right column, and its angular
-    momentum; errors as shares of F t.
+    """Pulled by a dead load on its right column for a tenth of the period: error of the momentum, over
+    F t.
     """
     scene = block.scene(form, cells=(64, 32), leaving="stop")
     x = np.array(scene.particles.x)
@@ -45,8 +47,7 @@ def pushed(form: str, factor: float) -> float:
 
 def ramped(form: str, factor: float) -> float:
     """The block on its left edge, pulled at its right column, in 10 shares: error of the reaction."""
-    grid = block.scene(form).grid
-    grid = tawami.Grid(grid.comm, origin=(0, 0), h=block.H, cells=(12, 4))
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=block.H, cells=(12, 4))
     body = tawami.box(grid, (0, 0), (block.SIDE, block.SIDE))
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=block.E, nu=0.3), form=form)
     scene.fix("left", "x")
@@ -62,7 +63,9 @@ def ramped(form: str, factor: float) -> float:
         return float(abs(reactions[-1] / (factor * FORCE) + share))
 
     try:
-        tawami.ramp(scene, 0.1, each=lambda solution: reactions.append(solution.reaction("left")[0]))
+        tawami.ramp(
+            scene, 0.1, each=lambda solution: reactions.append(solution.reaction("left")[0])
+        )
     except tawami.TawamiError:
         if not wrong() < 1e-5:
             raise AssertionError(f"refused, and the reaction is {wrong():.1e} off") from None
@@ -76,10 +79,10 @@ def attempts(short: bool) -> Iterator[Attempt]:
         for factor in (1.0, 1e3) if short else (1e-6, 1.0, 10.0, 100.0, 1e3, 1e6):
             yield attempted(
                 SUBJECT, f"{form}, dynamic, {factor:g} times", BOUND,
-                lambda form=form, factor=factor: pushed(form, factor),
+                partial(pushed, form, factor),
             )  # fmt: skip
             # Newton's tolerance
             yield attempted(
                 SUBJECT, f"{form}, ramp, {factor:g} times", 1e-5,
-                lambda form=form, factor=factor: ramped(form, factor),
+                partial(ramped, form, factor),
             )  # fmt: skip

@@ -8,6 +8,7 @@ takes up to twice (omega dt)^2/4 = 1.2 % of sum m x x v (`cases.spinning_disc` s
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -20,8 +21,8 @@ SUBJECT = "rotation and flight"
 Array = npt.NDArray[np.float64]
 STEPS = 40  # a turn
 SPIN = float(np.sqrt(1e-3 * block.E / block.RHO) / (block.SIDE / 2))  # [rad/s]
-#: Of the angular momentum: the rule's 1.2 %, and 1e-4 of the transfer a turn (README: 8e-5 in ten turns of
-#: a disc of 6 cells over its radius; this block has four over its side).
+#: Of the angular momentum: the rule's 1.2 %, and what the transfer takes a turn (README: 8e-5 in ten turns
+#: of a disc of 12 cells over its diameter; this block has four over its side).
 MOMENTUM, TRANSFER = 0.012, 1e-4
 #: Of the energy: forms with eps_v load particles, turn by turn, in ways that no function of the grid
 #: sees; the stress of that grows like the turns, its energy like their square: 2 % in 100.
@@ -65,7 +66,7 @@ def shape_error(before: Array, now: Array) -> float:
 
 
 def flying(form: str, step: float) -> float:
-    """Error of the way over 60 cells, and largest stress over E, of a block in free flight; step [cells]."""
+    """Free flight over 60 cells, `step` of them in a step: errors of way and velocity, stress over E."""
     scene = block.scene(form, cells=(128, 12), shift=(-58.3, 0.21))
     velocity = np.array([1.0, 0.02])
     motion = tawami.Dynamics(scene, velocity=velocity)
@@ -86,12 +87,12 @@ def attempts(short: bool) -> Iterator[Attempt]:
         for turns in (1, 3) if short else (1, 10, 100) if form == "u_epsv_finite" else (1, 30):
             yield attempted(
                 SUBJECT, f"{form}, {turns} turns", 1.0,
-                lambda form=form, turns=turns: spinning(form, turns),
+                partial(spinning, form, turns),
             )  # fmt: skip
     for form in block.FINITE[:1] if short else block.FINITE:
         for step in (0.31, 7.3) if short else (0.31, 1.0, 7.3, 30.0):
             # round-off of the places, of the size of the grid
             yield attempted(
                 SUBJECT, f"{form}, flies 60 cells by {step:g} a step", 1e-12,
-                lambda form=form, step=step: flying(form, step),
+                partial(flying, form, step),
             )  # fmt: skip

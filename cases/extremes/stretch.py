@@ -4,14 +4,15 @@ Two ways, for edges of the grid stay where they are and move a body by a quarter
 
 coasting  A block flies apart, or together, with the velocity (A - I) X, so heavy that its stress does
           not hold it: F = I + t (A - I), the same everywhere. The stress is the closed form of F.
-hanging   A column between smooth sides, held at its foot, under its weight, up or down. The weight of what
-          is above, w (1 - Y), is tau(stretch)/stretch there. Hencky's law bears at most (K + 4/3 mu)/e,
-          at a stretch of e: more has no equilibrium.
+hanging   A column between smooth sides, held at its foot, under its weight, up or down. The weight of
+          what is above, w (1 - Y), is tau(stretch)/stretch there. Hencky's law bears at most
+          (K + 4/3 mu)/e, at a stretch of e: more has no equilibrium.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -31,8 +32,8 @@ LAWS = {"Hencky": tawami.linear_elastic, "neo-Hookean": tawami.neo_hookean}
 CELLS, PER_AXIS = 16, 4
 #: Of `coasting`: moving particles are kept 1e-5 of a cell off its sides.
 COASTING = 1e-5
-#: Of `hanging`: the rms error of two particles a cell in tension is 1.3 and 2 % where a body ends (README,
-#: Limits), and stretched twice as long it has two; B-bar misses the patch test, by up to 22 %.
+#: Of `hanging`: the rms error of two particles a cell in tension is 1.3 and 2 % where a body ends
+#: (README, Limits), and stretched twice as long it has two; B-bar misses the patch test by up to 22 %.
 HANGING = {"u_epsv_finite": 0.05, "u_finite": 0.05, "u_bbar_finite": 0.22}
 
 
@@ -46,15 +47,15 @@ def stress(law: str, K: float, mu: float, stretches: Array) -> Array:
     return np.asarray(mu * (b - b.mean()) + K * np.log(J))
 
 
-def coasting(form: str, law: str, nu: float, stretches: tuple[float, float], steps: int = 40) -> float:
+def coasting(
+    form: str, law: str, nu: float, stretches: tuple[float, float], steps: int = 40
+) -> float:
     """Largest error of the elastic strain (mean stress over K, deviator over 2 mu) and of place."""
     made = LAWS[law](E=1.0, nu=nu)
     n = 2 * int(np.ceil(2 * max(1.0, *stretches))) + 4
     # E t^2/(rho L^2) = 1e-20: the stress does nothing to the motion, even through functions that hold
     # little mass (the mean of B-bar is tested at the centre of a cell, wherever its particles are)
-    scene = block.scene(
-        form, law=made, cells=(n, n), density=1e20 / block.SIDE**2, tolerance=1e-10
-    )
+    scene = block.scene(form, law=made, cells=(n, n), density=1e20 / block.SIDE**2, tolerance=1e-10)
     begin, rate = np.array(scene.particles.x), np.diag(stretches) - np.eye(2)
     motion = tawami.Dynamics(scene, velocity=begin @ rate)
     motion.velocity_gradient[:] = rate
@@ -80,7 +81,9 @@ def hanging(form: str, law: str, nu: float, most: float) -> float:
     weight = nominal(most)  # of the whole column, upwards
     y, stretch = (np.arange(1000) + 0.5) / 1000, np.empty(1000)
     for k, share in enumerate(weight * (1 - y)):
-        stretch[k] = brentq(lambda a, share=share: nominal(a) - share, min(most, 1.0), max(most, 1.0))
+        stretch[k] = brentq(
+            lambda a, share=share: nominal(a) - share, min(most, 1.0), max(most, 1.0)
+        )
     height = float(stretch.mean())
     scene = column(made, form, height, weight)
     tawami.ramp(scene, 0.05)
@@ -130,18 +133,14 @@ def attempts(short: bool) -> Iterator[Attempt]:
                 for name, stretches in shapes.items():
                     yield attempted(
                         SUBJECT, f"{form}, {law}, nu = {nu:g}, {name}, coasting", COASTING,
-                        lambda form=form, law=law, nu=nu, stretches=stretches: coasting(
-                            form, law, nu, stretches
-                        ),
+                        partial(coasting, form, law, nu, stretches),
                     )  # fmt: skip
                 for stretch in (2.0,) if short else (2.0, 0.5, 0.1):
                     yield attempted(
                         SUBJECT, f"{form}, {law}, nu = {nu:g}, to {stretch:g}, hanging", HANGING[form],
-                        lambda form=form, law=law, nu=nu, stretch=stretch: hanging(
-                            form, law, nu, stretch
-                        ),
+                        partial(hanging, form, law, nu, stretch),
                     )  # fmt: skip
         yield attempted(
             SUBJECT, f"{form}, Hencky, 1.1 times its greatest load", 0.0,
-            lambda form=form: without_equilibrium(form),
+            partial(without_equilibrium, form),
         )  # fmt: skip

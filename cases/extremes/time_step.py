@@ -8,6 +8,7 @@ elongation rho g L^2/(2 E).
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -96,11 +97,11 @@ def attempts(short: bool) -> Iterator[Attempt]:
         for ratio in ratios:
             yield attempted(
                 SUBJECT, f"{form}, dt = {ratio:g} T", BOUND,
-                lambda form=form, ratio=ratio: oscillation(form, ratio),
+                partial(oscillation, form, ratio),
             )  # fmt: skip
         for ratio in (10.0, 1e3) if short else (1.0, 10.0, 100.0, 1e3):
             # the sum over the particles for the integral: second order in their distance
             yield attempted(
                 SUBJECT, f"{form}, dt = {ratio:g} T, damped to rest", 2e-3,
-                lambda form=form, ratio=ratio: rest(form, ratio),
+                partial(rest, form, ratio),
             )  # fmt: skip
