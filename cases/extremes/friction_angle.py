@@ -25,8 +25,8 @@ Array = npt.NDArray[np.float64]
 LAWS = {"Drucker-Prager": tawami.drucker_prager, "Mohr-Coulomb": tawami.mohr_coulomb}
 P = 1.0e-3 * block.E  # pressure [Pa]
 G = 10.0
-#: Of states beyond the yield surface: the return is exact but for round-off. Of energy from nowhere: with
-#: two particles a cell, what grid and particles make of the work of the weight differs.
+#: Of states beyond the yield surface: the return is exact but for round-off. Of energy from nowhere:
+#: what grid and particles make of the work of the weight differs.
 YIELD, NOWHERE = 1e-9, 0.02
 
 

@@ -23,8 +23,8 @@ NU = 0.3
 LAW = tawami.linear_elastic(E=block.E, nu=NU)
 #: Speed of pressure waves [m/s].
 WAVES = float(np.sqrt((LAW.bulk_modulus + 4 / 3 * LAW.shear_modulus) / block.RHO))
-#: Of the momentum: a reaction is the force at the end of a step, and their sum is of first order in dt, 96
-#: steps for six ways of the wave through the block. Energy and friction have no such excuse.
+#: Of the momentum: a reaction is the force at the end of a step, and their sum is of first order in dt,
+#: 96 steps for six ways of the wave through the block. Energy and friction have no such excuse.
 BALANCE, EXACT = 0.05, 1e-6
 
 

@@ -21,8 +21,8 @@ SUBJECT = "rotation and flight"
 Array = npt.NDArray[np.float64]
 STEPS = 40  # a turn
 SPIN = float(np.sqrt(1e-3 * block.E / block.RHO) / (block.SIDE / 2))  # [rad/s]
-#: Of the angular momentum: the rule's 1.2 %, and what the transfer takes a turn (README: 8e-5 in ten turns
-#: of a disc of 12 cells over its diameter; this block has four over its side).
+#: Of the angular momentum: the rule's 1.2 %, and what the transfer takes a turn (README: 8e-5 in ten
+#: turns of a disc of 12 cells over its diameter; this block has four over its side).
 MOMENTUM, TRANSFER = 0.012, 1e-4
 #: Of the energy: forms with eps_v load particles, turn by turn, in ways that no function of the grid
 #: sees; the stress of that grows like the turns, its energy like their square: 2 % in 100.
