@@ -16,9 +16,9 @@ from cases.extremes import (
     endurance,
     friction_angle,
     impact,
-    overload,
     rotation,
     stretch,
+    sudden_load,
     time_step,
 )
 from cases.extremes.attempt import attempted
@@ -34,7 +34,7 @@ REFUSED: dict[Any, dict[str, str]] = {
     rotation: {},
     friction_angle: {" 0 degrees": "c = 0: expected a positive cohesion where phi = 0"},
     impact: {"10 of the waves": "Newton did not converge .* smallest step|would leave the grid"},
-    overload: {
+    sudden_load: {
         "dynamic, 1000 times": "particle 7 would leave the grid at 0.0125 s",
         "ramp, 1000 times": "inside out .* at 0.00[67].* of the load, with the smallest step of",
     },
@@ -79,7 +79,9 @@ def test_extremes(subject):
 
 
 def test_what_is_wrong_is_told():
-    """A result beyond its bound, one that is no number, an error without a sentence."""
+    """A result beyond its bound, one that is no number, one where none was due, an error that is no
+    sentence.
+    """
 
     def fails():
         raise ZeroDivisionError("division by zero")
@@ -87,4 +89,5 @@ def test_what_is_wrong_is_told():
     assert attempted("", "", 1.0, lambda: 1.0).outcome == "survived"
     assert attempted("", "", 1.0, lambda: 1.1).outcome == "WRONG"
     assert attempted("", "", 1.0, lambda: float("nan")).outcome == "WRONG"
+    assert attempted("", "", None, lambda: 0.0).outcome == "WRONG"
     assert attempted("", "", 1.0, fails).says == "ZeroDivisionError: division by zero"

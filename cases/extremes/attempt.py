@@ -1,14 +1,22 @@
-"""One attempt at an extreme: what was tried and what happened. It survives with an error below a bound
-that was stated beforehand, or it is refused with a sentence; all else is wrong.
+"""One thing that was tried: it survives with an error below its bound, or is refused with a sentence.
+
+Anything else is WRONG: an answer worse than its bound, an answer where a refusal was due, an error that
+is no sentence. A bound comes from outside the code (a closed form, another method, an invariant); the
+comment beside it says from where.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 import tawami
+
+#: An error, or an error and what there is to say about it.
+Measured = float | tuple[float, str]
+Outcome = Literal["survived", "refused", "WRONG"]
 
 
 @dataclass(frozen=True)
@@ -16,39 +24,50 @@ class Attempt:
     """What was tried and what happened.
 
     Attributes:
-        subject: What is taken to its extreme.
-        setting: How far.
-        outcome: 'WRONG' is a result beyond its bound, or an error without a sentence.
-        error: Distance from a reference outside the method; None without a result.
-        bound: The largest error that is right.
-        says: The sentence of a refusal, or what is wrong.
+        subject: What it belongs to.
+        setting: What was tried.
+        outcome: 'survived' with its error below its bound, 'refused', or 'WRONG'.
+        error: Against an independent reference; None where there is no answer.
+        bound: Of the error; None where a refusal was due.
+        says: The sentence of a refusal, or a remark.
     """
 
     subject: str
     setting: str
-    outcome: Literal["survived", "refused", "WRONG"]
+    outcome: Outcome
     error: float | None
     bound: float | None
-    says: str = ""
+    says: str
+
+    @property
+    def wrong(self) -> bool:
+        """Whether it must not stay so."""
+        return self.outcome == "WRONG"
 
 
-def attempted(subject: str, setting: str, bound: float, run: Callable[[], float]) -> Attempt:
-    """Try something.
+def attempted(
+    subject: str, setting: str, bound: float | None, run: Callable[[], Measured]
+) -> Attempt:
+    """Try it.
 
     Args:
-        subject: What is taken to its extreme.
-        setting: How far.
-        bound: The largest error that is right.
-        run: Gives the error, or is refused.
+        subject: What it belongs to.
+        setting: What is tried.
+        bound: Of the error; None if it has to be refused.
+        run: Gives the error, with a remark if there is one.
     """
+    error, says = None, ""
+    outcome: Outcome = "WRONG"
     try:
-        error = float(run())
+        measured = run()
     except tawami.TawamiError as refusal:
-        says = " ".join([str(refusal), *getattr(refusal, "__notes__", [])])
-        return Attempt(subject, setting, "refused", None, bound, says)
+        outcome, says = "refused", " ".join([str(refusal), *getattr(refusal, "__notes__", [])])
     except Exception as exception:
         says = f"{type(exception).__name__}: {exception}"
-        return Attempt(subject, setting, "WRONG", None, bound, says)
-    if error <= bound:  # false for NaN
-        return Attempt(subject, setting, "survived", error, bound)
-    return Attempt(subject, setting, "WRONG", error, bound, f"{error:.3g} instead of {bound:.3g}")
+    else:
+        error, says = measured if isinstance(measured, tuple) else (measured, "")
+        if bound is None:
+            says = "an answer, where a refusal was due"
+        elif math.isfinite(error) and error <= bound:
+            outcome = "survived"
+    return Attempt(subject, setting, outcome, error, bound, " ".join(says.split()))

@@ -51,7 +51,7 @@ def put(motion: tawami.Dynamics, name: str, value: float) -> None:
 
 
 def refused(motion: tawami.Dynamics, act: Callable[[], object], words: list[str]) -> float:
-    """The refusal of an act on a run; an error without bound where there is none.
+    """The refusal of an act on a run; infinity where there is none.
 
     Raises:
         TawamiError: As it must.
@@ -140,7 +140,7 @@ def attempts(short: bool) -> Iterator[Attempt]:
         for name in names:
             for text, value in list(values.items())[: 1 if short else None]:
                 yield attempted(
-                    SUBJECT, f"{text} in {name}", 0.0, partial(corrupted, law, name, value)
+                    SUBJECT, f"{text} in {name}", None, partial(corrupted, law, name, value)
                 )
             yield attempted(
                 SUBJECT, f"NaN in {name}, mended", 0.0,
@@ -150,13 +150,13 @@ def attempts(short: bool) -> Iterator[Attempt]:
     for text, value in numbers.items():
         for what in ("dt", "dt of a run"):
             yield attempted(
-                SUBJECT, f"{text} as {what}", 0.0,
+                SUBJECT, f"{text} as {what}", None,
                 partial(of_the_step, what, value),
             )  # fmt: skip
     for text, value in values.items():
         for what in ("end", "gravity", "load", "traction", "velocity of a support",
                      "velocity at the start"):  # fmt: skip
             yield attempted(
-                SUBJECT, f"{text} as {what}", 0.0,
+                SUBJECT, f"{text} as {what}", None,
                 partial(of_the_step, what, value),
             )  # fmt: skip

@@ -14,7 +14,7 @@ from mpi4py import MPI
 import tawami
 from cases.extremes.attempt import Attempt, attempted
 
-SUBJECT = "flung out of the grid"
+SUBJECT = "departure"
 SIDE, STEPS = 2.0, 10  # of the grid [m]
 
 

@@ -20,7 +20,7 @@ import tawami
 from cases.extremes import block
 from cases.extremes.attempt import Attempt, attempted
 
-SUBJECT = "friction angle, c = 0"
+SUBJECT = "friction angle"
 Array = npt.NDArray[np.float64]
 LAWS = {"Drucker-Prager": tawami.drucker_prager, "Mohr-Coulomb": tawami.mohr_coulomb}
 P = 1.0e-3 * block.E  # pressure [Pa]

@@ -17,7 +17,7 @@ from mpi4py import MPI
 import tawami
 from cases.extremes.attempt import Attempt, attempted
 
-SUBJECT = "step over natural period"
+SUBJECT = "time step"
 L, E, RHO = 1.0, 1.0e6, 1000.0  # [m], [Pa], [kg/m3]
 OMEGA = np.pi / 2 * np.sqrt(E / RHO) / L  # [rad/s]
 PERIOD = 2 * np.pi / OMEGA  # [s]
