@@ -24,9 +24,9 @@ SPIN = float(np.sqrt(1e-3 * block.E / block.RHO) / (block.SIDE / 2))  # [rad/s]
 #: Of the angular momentum: the rule's 1.2 %, and what the transfer takes a turn (README: 8e-5 in ten
 #: turns of a disc of 12 cells over its diameter; this block has four over its side).
 MOMENTUM, TRANSFER = 0.012, 1e-4
-#: Of the energy, which should not grow at all. Forms with eps_v load particles, turn by turn, in ways that
-#: no function of the grid sees; the stress of that grows like the turns, its energy like their square. It
-#: is a limit of the method (README, Limits), and what is asked is that it gets no worse: 10 % in 100.
+#: Of the energy, which should not grow at all. Forms with eps_v load particles, turn by turn, in ways
+#: that no function of the grid sees; the stress of that grows like the turns, its energy like their
+#: square. A limit of the method (README, Limits); what is asked is that it gets no worse: 10 % in 100.
 ENERGY, UNSEEN = 1e-3, 1e-5
 #: Of the shape, over half the side: 2e-4 a turn at first, half of it later, of particles between the
 #: functions of four cells.
@@ -60,8 +60,8 @@ def spinning(form: str, turns: int) -> Measured:
     ))  # fmt: skip
     kinetic, elastic = motion.kinetic_energy / energy, motion.elastic_energy / energy
     return worst, (
-        f"angular momentum {momentum:.1e}, shape {shape:.1e}, highest energy {highest / energy - 1:+.1e}, "
-        f"kinetic {kinetic:.3f} and elastic {elastic:.4f} at the end"
+        f"angular momentum {momentum:.1e}, shape {shape:.1e}, highest energy "
+        f"{highest / energy - 1:+.1e}, kinetic {kinetic:.3f} and elastic {elastic:.4f} at the end"
     )
 
 

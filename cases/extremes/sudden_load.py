@@ -19,7 +19,7 @@ from cases.extremes.attempt import Attempt, attempted
 SUBJECT = "sudden load"
 PERIOD = 4 * block.SIDE / np.sqrt(block.E / block.RHO)  # of a bar as long as the block [s]
 FORCE = 0.05 * block.E * block.SIDE  # that strains the block by some 5 % [N per metre depth]
-#: Of the momentum: what Newton's tolerance, 1e-6 of the forces, leaves in a sum over a hundred functions.
+#: Of the momentum: what Newton's tolerance, 1e-6 of the forces, leaves in a sum over 100 functions.
 BOUND = 1e-5
 
 
