@@ -34,6 +34,16 @@ SUBJECTS = (
     "directions",
     "overload",
     "not_finite",
+    "density",
+    "time_step",
+    "stretch",
+    "rotation",
+    "friction_angle",
+    "impact",
+    "sudden_load",
+    "corruption",
+    "departure",
+    "endurance",
 )
 
 

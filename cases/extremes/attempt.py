@@ -111,15 +111,15 @@ def untouched(scene: tawami.Scene) -> Iterator[None]:
         yield
     except tawami.TawamiError as refusal:
         for name, values in _arrays(scene).items():
-            old = before[name]
-            if values is not None and not np.array_equal(values, old, equal_nan=True):
+            if not np.array_equal(values, before[name], equal_nan=True):
                 raise RuntimeError(f"{name} of the particles changed: {refusal}") from refusal
         raise
 
 
 def _arrays(scene: tawami.Scene) -> dict[str, Any]:
     particles = scene.particles
-    names = ("x", "volume", "stress", "displacement", "eps_v")
-    arrays = {name: getattr(particles, name) for name in names}
-    arrays |= {name: particles.history(name) for name in particles.history_names}
-    return {name: None if a is None else np.array(a) for name, a in arrays.items()}
+    names = ["x", "volume", "stress", "displacement"]
+    if scene.form.kinematics == "mixed":
+        names.append("eps_v")
+    arrays = {name: np.array(getattr(particles, name)) for name in names}
+    return arrays | {name: np.array(particles.history(name)) for name in particles.history_names}

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from tawami import contents, inputs, ranks
 from tawami.energy import Energies
 from tawami.errors import InputError
-from tawami.newton import Inertia
+from tawami.inertia import Inertia
 from tawami.reduction import Reduction
 from tawami.scene import Accepted, Problem, Scene
 from tawami.solution import Solution
@@ -27,6 +27,8 @@ from tawami.supports import Support
 from tawami.transfer import TRANSFERS, TransferName, gradient_of, to_grid
 
 Array = npt.NDArray[np.float64]
+#: Steps [s] whose squares, and what is divided by these, are numbers.
+SHORTEST, LONGEST = 1e-100, 1e100
 
 
 class Dynamics:
@@ -90,6 +92,12 @@ class Dynamics:
             raise InputError(
                 f"velocity has shape {np.shape(velocity)}: expected two numbers, or {n} x 2"
             ) from None
+        if not np.isfinite(given).all():
+            p = np.flatnonzero(~np.isfinite(given).all(axis=1))[0]
+            raise InputError(
+                f"velocity of particle {p} is ({given[p, 0]:g}, {given[p, 1]:g}) m/s: expected finite "
+                "numbers"
+            )
         for name, width in (
             ("velocity", 2), ("acceleration", 2),
             ("velocity_gradient", 4), ("acceleration_gradient", 4),
@@ -142,7 +150,7 @@ class Dynamics:
             ConvergenceError, SingularError: As `Scene.solve`.
             InputError: dt, or what is not finite, or a particle that would leave the grid.
         """
-        dt = inputs.number("dt", dt, low=inputs.LEAST)
+        dt = inputs.number("dt", dt, low=SHORTEST, high=LONGEST)
         scene, attached = self.scene, self.scene.attached
         with ranks.together(scene.grid.comm):
             scene.particles.check()
@@ -183,14 +191,15 @@ class Dynamics:
             v = reduction.imposed(v.ravel(), masses, speed).reshape(-1, 2)
             a = reduction.imposed(a.ravel(), masses, change).reshape(-1, 2)
             slope = 1 / (self.beta * dt**2)
-            offset = slope * (dt * v + dt**2 * (0.5 - self.beta) * a)
+            back = (0.5 / self.beta - 1) * a.ravel()
             impulse = masses * (v - before[0]).ravel() / dt
-            inertia = Inertia(masses, slope, offset.ravel(), impulse)
+            inertia = Inertia(masses, slope, dt * v.ravel(), back, impulse)
             state = _GridState(v, a, reduction, inertia)
-            return Problem(reduction, external, inertia, self._guess(dt * v), ways)
+            return Problem(reduction, external, inertia, self._guess(inertia.course), ways)
 
         def also(accepted: Accepted) -> Callable[[float], None]:
-            a1 = state.inertia.acceleration(accepted.u.ravel()).reshape(-1, 2)
+            assert accepted.acceleration is not None
+            a1 = accepted.acceleration
             v1 = state.v + dt * ((1 - self.gamma) * state.a + self.gamma * a1)
             v1 = state.reduction.imposed(v1.ravel(), masses, speed1).reshape(-1, 2)
             a1 = state.reduction.imposed(a1.ravel(), masses, change).reshape(-1, 2)
@@ -299,7 +308,7 @@ class Dynamics:
                 is in the particles.
             InputError: dt <= 0, or a step longer than the time that is left.
         """
-        dt = inputs.number("dt", dt, low=inputs.LEAST)
+        dt = inputs.number("dt", dt, low=SHORTEST, high=LONGEST)
         left = inputs.number("end", end) - self.time
         if dt > left * (1 + 1e-9):
             raise InputError(

@@ -23,6 +23,7 @@ from tawami.compilation import CompiledForm
 from tawami.density import Density, LawQuantity, ParticleScalar, Rule
 from tawami.errors import ConvergenceError, InputError, SingularError
 from tawami.field import Field
+from tawami.inertia import Inertia
 from tawami.krylov import Blocks, KrylovSolver
 from tawami.linear import LinearSolver
 from tawami.numerics import Numerics
@@ -40,40 +41,12 @@ STRAIN_FLOOR = 1e-7
 
 
 @dataclass(frozen=True)
-class Inertia:
-    """Forces `m_i a_i` of the lumped mass, `a = slope u - offset` in the increments u of the step.
-
-    Attributes:
-        mass: Of each displacement coefficient [kg per metre depth].
-        slope: [1/s2]
-        offset: [m/s2]
-        impulse: Of the supports at the beginning of the step, over its length: what changed the
-            velocities that came from the particles into those they prescribe [N per metre depth].
-    """
-
-    mass: Array
-    slope: float
-    offset: Array
-    impulse: Array
-
-    def acceleration(self, u: Array) -> Array:
-        """At the end of the step, of each displacement coefficient [m/s2]."""
-        return np.asarray(self.slope * u - self.offset)
-
-    def force(self, coefficients: Array) -> Array:
-        """On all coefficients."""
-        n = len(self.mass)
-        forces = np.zeros(len(coefficients))
-        forces[:n] = self.mass * self.acceleration(coefficients[:n])
-        return forces
-
-
-@dataclass(frozen=True)
 class Converged:
     """A converged step.
 
     Attributes:
         coefficients: Increments of all fields.
+        acceleration: At the end of a dynamic step, of each displacement coefficient [m/s2].
         forces: What supports and walls give on all coefficients [N per metre depth].
         history: (momentum, volume) measures of every residual, the first before any solve.
         krylov: FGMRES iterations of every solve; 0 where the tangent was factorised.
@@ -83,6 +56,7 @@ class Converged:
     """
 
     coefficients: Array
+    acceleration: Array | None
     forces: Array
     history: History
     krylov: list[int]
@@ -202,16 +176,17 @@ class Newton:
         free = reduction.selection.T @ out_of_balance
         of_u = reduction.unknowns < n
         scale = max(self._started, *(float(np.linalg.norm(force[:n])) for force in forces))
-        # Forces of a body that supports move rigidly are round-off: it is in equilibrium.
-        moved = np.abs(reduction.offset[:n]).max()
-        round_off = 1e-13 * self._stiffest * moved * np.sqrt(n)
-        if not forces[1].any():  # and those of stress that is left of them
-            round_off += 1e-14 * self._stiffest * self.field.grid.h * np.sqrt(n)
-        if inertia is not None:  # and those of one that coasts
-            round_off += 1e-13 * float(np.linalg.norm(inertia.mass * inertia.offset))
-        at_rest: bool = self._comm.bcast(scale <= round_off)  # all ranks take the same way
-        if at_rest and inertia is None:
-            at_rest = self._moves_rigidly(coefficients[:n], moved)
+        at_rest = False
+        if not forces[1].any():
+            # Forces of a body that supports move rigidly, or that coasts, are round-off, and so are
+            # those of stress that is left of them. A load is none, however small.
+            way = moved = np.abs(reduction.offset[:n]).max()
+            if inertia is not None:
+                way = max(way, np.abs(inertia.course).max(initial=0.0))
+            round_off = 1e-14 * self._stiffest * (10 * way + self.field.grid.h) * np.sqrt(n)
+            at_rest = self._comm.bcast(scale <= round_off)  # all ranks take the same way
+            if at_rest and inertia is None:
+                at_rest = self._moves_rigidly(coefficients[:n], moved)
         momentum = 0.0 if at_rest or scale == 0 else float(np.linalg.norm(free[of_u])) / scale
         volume = None
         if self.kind is not None:
@@ -312,19 +287,24 @@ class Newton:
         if inertia is None and squares[0] > 0:  # a body that is unloaded ends without forces
             start = self.internal(np.zeros(len(external)))[: self.field.layout.num_displacement]
             self._started = float(np.linalg.norm(start))
-        unknowns = np.zeros(reduction.size) if guess is None else guess[reduction.unknowns]
+        coefficients, off = _begin(reduction, guess, inertia)
+        acceleration = None
         linear, history = self._linear, History()
         krylov: list[int] = []
         while True:
-            coefficients = reduction.selection @ unknowns + reduction.offset
             try:
                 internal = self.internal(coefficients)
             except _rust.InvertedError as error:
-                self._fail(history, f"Then {error}")
+                if guess is None:
+                    self._fail(history, f"Then {error}")
+                guess = None  # once more from nothing
+                coefficients, off = _begin(reduction, guess, inertia)
+                continue
             forces: tuple[Array, ...] = (internal, external)
             rest = internal - external
-            if inertia is not None:
-                forces += (inertia.force(coefficients),)
+            if inertia is not None and off is not None:
+                acceleration = inertia.acceleration(off)
+                forces += (inertia.force(acceleration, len(rest)),)
                 rest += forces[-1]
             held = rest
             if inertia is not None:
@@ -341,8 +321,9 @@ class Newton:
             if _worst(history[-1]) < self.numerics.tolerance:
                 tally.steps += 1
                 return Converged(
-                    coefficients, held, history, krylov, linear.condition, linear.symmetric
-                )
+                    coefficients, acceleration, held, history, krylov, linear.condition,
+                    linear.symmetric,
+                )  # fmt: skip
             if len(history) > self.numerics.max_iterations:
                 advice = self._lost() or "Take a smaller load, or check material and supports"
                 self._fail(history, advice)
@@ -353,13 +334,16 @@ class Newton:
             scale = functools.partial(self._scale, matrix, reduction)
             blocks = functools.partial(self._blocks, reduction)
             forcing = self._forcing(history)
-            change = linear.solve(matrix, scale, right[reduction.own], forcing, blocks)
+            found = linear.solve(matrix, scale, right[reduction.own], forcing, blocks)
             krylov.append(linear.iterations)
             tally.newton_iterations += 1
             tally.unknowns = max(tally.unknowns, reduction.size)
             if linear.singular:
                 self._report_singular(reduction, began=len(history) == 1)
-            unknowns += ranks.joined(self._comm, change)
+            change = reduction.selection @ ranks.joined(self._comm, found)
+            coefficients = coefficients + change
+            if off is not None:
+                off = off + change[: len(off)]
             self.stopwatch.lap()
 
     def _blocks(self, reduction: Reduction) -> Blocks:
@@ -417,6 +401,15 @@ class Newton:
         return singularity.lost_digits(
             comm, self.constants["K"] / self.constants["mu"], kinematics
         ) or singularity.contrast(comm, self.constants["mu"])
+
+
+def _begin(
+    reduction: Reduction, guess: Array | None, inertia: Inertia | None
+) -> tuple[Array, Array | None]:
+    """The first iterate: increments of all fields, and what is kept of them apart (`Inertia`)."""
+    unknowns = np.zeros(reduction.size) if guess is None else guess[reduction.unknowns]
+    coefficients = reduction.selection @ unknowns + reduction.offset
+    return coefficients, None if inertia is None else inertia.off_course(coefficients)
 
 
 def _worst(measures: tuple[float, float | None]) -> float:

@@ -26,8 +26,9 @@ from tawami.fast_field import FastField
 from tawami.field import Field
 from tawami.formulation import Form
 from tawami.grid import Edge, Grid
+from tawami.inertia import Inertia
 from tawami.loads import Loads, Traction
-from tawami.newton import Converged, Inertia, Newton
+from tawami.newton import Converged, Newton
 from tawami.numerics import Assembly, Factorise, Numerics, SolverName, TangentRule
 from tawami.numpy_law import NumpyLaw, NumpyStage
 from tawami.reduction import Reduction
@@ -62,12 +63,14 @@ class Accepted:
     Attributes:
         step: What Newton found.
         u: Increments of the displacement, functions x 2.
+        acceleration: At the end of a dynamic step, functions x 2 [m/s2].
         forces: What supports and walls give, functions x 2 [N per metre depth].
         smooth: The same without their impulse at the beginning of the step.
     """
 
     step: Converged
     u: Array
+    acceleration: Array | None
     forces: Array
     smooth: Array
 
@@ -559,7 +562,8 @@ class Scene(contents.Elsewhere):
             forces = step.forces[:n]
             inertia = settled.inertia
             smooth = forces if inertia is None else forces - inertia.impulse
-            accepted = Accepted(step, u, forces.reshape(-1, 2), smooth.reshape(-1, 2))
+            a = None if step.acceleration is None else step.acceleration.reshape(-1, 2)
+            accepted = Accepted(step, u, a, forces.reshape(-1, 2), smooth.reshape(-1, 2))
             store = also(accepted) if also is not None else None
             with self.stopwatch("commit"), ranks.together(self.grid.comm):
                 dissipated = self.attached.stage.commit(*self.split(step.coefficients))

@@ -1,0 +1,103 @@
+"""Particles flung out of the grid: a cloud without forces between its particles, each on its line.
+
+Reference: x + v t of each particle says which have left, when and where.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+from mpi4py import MPI
+
+import tawami
+from cases.extremes.attempt import Attempt, attempted
+
+SUBJECT = "departure"
+SIDE, STEPS = 2.0, 10  # of the grid [m]
+
+
+def cloud(speed: float, leaving: str) -> tawami.Dynamics:
+    """200 particles anywhere that fly apart, so heavy that they do not feel each other; the fastest by
+    `speed` cells in a step of 1 s.
+    """
+    h = SIDE / 16
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(-SIDE / 2, -SIDE / 2), h=h, cells=(16, 16))
+    random = np.random.default_rng(3)
+    x = random.uniform(-0.3, 0.3, (200, 2)) * SIDE
+    body = tawami.Body(x, np.full(200, 1e-3))
+    law = tawami.linear_elastic(E=1.0, nu=0.3)
+    scene = tawami.Scene(
+        grid,
+        body,
+        law,
+        form="u_finite",
+        density=1e25,
+        leaving=leaving,  # type: ignore[arg-type]
+    )
+    # linear in x, so that the grid has it as they do
+    rate = speed * h / (0.3 * SIDE)
+    motion = tawami.Dynamics(scene, velocity=rate * x)
+    motion.velocity_gradient[:] = rate * np.eye(2)
+    return motion
+
+
+def removed(speed: float) -> float:
+    """Wrong entries in the list of those that left: number, step and place; to the end of the cloud."""
+    motion = cloud(speed, "remove")
+    scene = motion.scene
+    x = np.array(scene.particles.x)
+    v = np.array(motion.velocity)
+    try:
+        for _ in range(STEPS):
+            motion.step(1.0)
+    except tawami.InputError as error:
+        if "the last particle" not in str(error) or motion.steps == 0:
+            raise
+    steps = motion.steps
+    times = np.arange(1, steps + 1)
+    outside = (np.abs(x + times[:, None, None] * v) > SIDE / 2 + 1e-6).any(axis=2)
+    gone = outside.any(axis=0)
+    first = np.where(gone, outside.argmax(axis=0) + 1, 0)
+    told = {number: (place, time) for number, place, time in scene.left}
+    wrong = set(told) ^ set(np.flatnonzero(gone))
+    for number in set(told) - wrong:
+        place, time = told[number]
+        where = x[number] + first[number] * v[number]
+        if time != first[number] or np.abs(np.array(place) / where - 1).max() > 1e-3:
+            wrong.add(number)
+    if len(scene.particles) + len(scene.left) != len(x) or len(told) != len(scene.left):
+        return np.inf
+    return float(len(wrong))
+
+
+def stopped(speed: float) -> float:
+    """Refused at the step in which the first leaves, nothing changed; its number counts one of these."""
+    motion = cloud(speed, "stop")
+    x, v = np.array(motion.scene.particles.x), np.array(motion.velocity)
+    for step in range(1, STEPS + 1):
+        gone = np.flatnonzero((np.abs(x + step * v) > SIDE / 2 + 1e-6).any(axis=1))
+        before = np.array(motion.scene.particles.x)
+        try:
+            motion.step(1.0)
+        except tawami.InputError as error:
+            words = f"particle {gone[0]} would leave the grid at {step} s"
+            if words not in str(error) or f"and {len(gone) - 1} others" not in str(error):
+                raise AssertionError(f"'{error}' instead of '{words}'") from error
+            if not np.array_equal(before, motion.scene.particles.x):
+                raise AssertionError("refused, and moved") from error
+            raise
+        if len(gone):
+            return np.inf
+    return 0.0
+
+
+def attempts(short: bool) -> Iterator[Attempt]:
+    """From a fraction of a cell to thousands of cells a step."""
+    for speed in (0.7, 3.0, 1e3) if short else (0.1, 0.7, 1.0, 3.0, 10.0, 100.0, 1e3, 1e6):
+        for what, run in (("remove", removed), ("stop", stopped)):
+            yield attempted(
+                SUBJECT, f"{speed:g} cells a step, {what}", 0.0,
+                partial(run, speed),
+            )  # fmt: skip

@@ -1,0 +1,146 @@
+"""Stretch by 100 % and more, compression to a tenth and less, at finite strain.
+
+Two ways, for edges of the grid stay where they are and move a body by a quarter of a cell at most:
+
+coasting  A block flies apart, or together, with the velocity (A - I) X, so heavy that its stress does
+          not hold it: F = I + t (A - I), the same everywhere. The stress is the closed form of F.
+hanging   A column between smooth sides, held at its foot, under its weight, up or down. The weight of
+          what is above, w (1 - Y), is tau(stretch)/stretch there. Hencky's law bears at most
+          (K + 4/3 mu)/e, at a stretch of e: more has no equilibrium.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+from scipy.optimize import brentq
+
+import tawami
+from cases.extremes import block
+from cases.extremes.attempt import Attempt, attempted
+
+SUBJECT = "stretch"
+Array = npt.NDArray[np.float64]
+LAWS = {"Hencky": tawami.linear_elastic, "neo-Hookean": tawami.neo_hookean}
+#: Of the column, along its height of 1 m; particles per cell and axis, so many that there are two where
+#: it is twice as long.
+CELLS, PER_AXIS = 16, 4
+#: Of `coasting`: moving particles are kept 1e-5 of a cell off its sides.
+COASTING = 1e-5
+#: Of `hanging`: the rms error of two particles a cell in tension is 1.3 and 2 % where a body ends
+#: (README, Limits), and stretched twice as long it has two; B-bar misses the patch test by up to 22 %.
+HANGING = {"u_epsv_finite": 0.05, "u_finite": 0.05, "u_bbar_finite": 0.22}
+
+
+def stress(law: str, K: float, mu: float, stretches: Array) -> Array:
+    """Principal Kirchhoff stresses of principal stretches (three), written out once more [Pa]."""
+    if law == "Hencky":
+        e = np.log(stretches)
+        return np.asarray(2 * mu * (e - e.mean()) + K * e.sum())
+    J = np.prod(stretches)
+    b = J ** (-2 / 3) * np.square(stretches)
+    return np.asarray(mu * (b - b.mean()) + K * np.log(J))
+
+
+def coasting(
+    form: str, law: str, nu: float, stretches: tuple[float, float], steps: int = 40
+) -> float:
+    """Largest error of the elastic strain (mean stress over K, deviator over 2 mu) and of place."""
+    made = LAWS[law](E=1.0, nu=nu)
+    n = 2 * int(np.ceil(2 * max(1.0, *stretches))) + 4
+    # E t^2/(rho L^2) = 1e-20: the stress does nothing to the motion, even through functions that hold
+    # little mass (the mean of B-bar is tested at the centre of a cell, wherever its particles are)
+    scene = block.scene(form, law=made, cells=(n, n), density=1e20 / block.SIDE**2, tolerance=1e-10)
+    begin, rate = np.array(scene.particles.x), np.diag(stretches) - np.eye(2)
+    motion = tawami.Dynamics(scene, velocity=begin @ rate)
+    motion.velocity_gradient[:] = rate
+    motion.run(1.0, 1.0 / steps)
+    K, mu = made.bulk_modulus, made.shear_modulus
+    expected = stress(law, K, mu, np.array([*stretches, 1.0]))
+    difference = scene.particles.stress - [*expected, 0.0]
+    mean = difference[:, :3].mean(axis=1, keepdims=True)
+    strains = np.abs(np.log(stretches)).max()
+    wrong = max(np.abs(mean).max() / K, np.abs(difference[:, :3] - mean).max() / (2 * mu)) / strains
+    place = begin @ np.diag(stretches)
+    return float(max(wrong, np.abs(scene.particles.x - place).max() / np.abs(place).max()))
+
+
+def hanging(form: str, law: str, nu: float, most: float) -> float:
+    """rms error of the stress of the particles, over its largest, and of the height."""
+    made = LAWS[law](E=1.0, nu=nu)
+
+    def nominal(stretch: float) -> float:
+        both = np.array([1.0, stretch, 1.0])
+        return float(stress(law, made.bulk_modulus, made.shear_modulus, both)[1] / stretch)
+
+    weight = nominal(most)  # of the whole column, upwards
+    y, stretch = (np.arange(1000) + 0.5) / 1000, np.empty(1000)
+    for k, share in enumerate(weight * (1 - y)):
+        stretch[k] = brentq(
+            lambda a, share=share: nominal(a) - share, min(most, 1.0), max(most, 1.0)
+        )
+    height = float(stretch.mean())
+    scene = column(made, form, height, weight)
+    tawami.ramp(scene, 0.05)
+    start = np.array(scene.particles.x - scene.particles.displacement)[:, 1]
+    exact = np.interp(start, y, stretch) * weight * (1 - start)
+    found = scene.particles.stress[:, 1]
+    top = start > start.max() - 1e-9
+    way = np.interp(start[top][0], y, np.cumsum(stretch) / 1000)
+    place = abs(scene.particles.x[top, 1].mean() / way - 1)
+    return float(max(np.sqrt(np.mean((found - exact) ** 2)) / np.abs(exact).max(), place))
+
+
+def column(made: tawami.Material, form: str, height: float, weight: float) -> tawami.Scene:
+    """1 m high, between smooth sides, held at its foot; its weight as if it were 1 m wide [N]."""
+    grid = tawami.Grid(
+        MPI.COMM_WORLD, origin=(0, 0), h=1 / CELLS,
+        cells=(2, int(np.ceil(CELLS * max(1.0, height))) + 4),
+    )  # fmt: skip
+    body = tawami.box(grid, (0, 0), (2 / CELLS, 1), per_axis=PER_AXIS)
+    options: dict[str, Any] = {"alpha": 0.01} if "epsv" in form else {}
+    scene = tawami.Scene(grid, body, made, form=form, density=1.0, **options)
+    scene.fix("left", "x")
+    scene.fix("right", "x")
+    scene.fix("bottom", "y")
+    scene.gravity((0.0, weight))
+    return scene
+
+
+def without_equilibrium(form: str) -> float:
+    """1.1 times what a Hencky column bears."""
+    made = tawami.linear_elastic(E=1.0, nu=0.3)
+    most = (made.bulk_modulus + 4 / 3 * made.shear_modulus) / np.e
+    tawami.ramp(column(made, form, 3.0, 1.1 * most), 0.1)
+    return np.inf
+
+
+def attempts(short: bool) -> Iterator[Attempt]:
+    """Each finite form and law, compressible or not."""
+    forms = block.FINITE[:1] if short else block.FINITE
+    shapes = {"2 x 1": (2.0, 1.0), "0.1 x 1": (0.1, 1.0)}
+    if not short:
+        shapes |= {"2 x 2": (2.0, 2.0), "2 x 0.5": (2.0, 0.5), "0.3 x 0.3": (0.3, 0.3),
+                   "10 x 0.1": (10.0, 0.1), "10 x 1": (10.0, 1.0), "0.01 x 1": (0.01, 1.0)}  # fmt: skip
+    for form in forms:
+        for law in LAWS:
+            for nu in (0.3, 0.4999):
+                for name, stretches in shapes.items():
+                    yield attempted(
+                        SUBJECT, f"{form}, {law}, nu = {nu:g}, {name}, coasting", COASTING,
+                        partial(coasting, form, law, nu, stretches),
+                    )  # fmt: skip
+                for stretch in (2.0,) if short else (2.0, 0.5, 0.1):
+                    yield attempted(
+                        SUBJECT, f"{form}, {law}, nu = {nu:g}, to {stretch:g}, hanging", HANGING[form],
+                        partial(hanging, form, law, nu, stretch),
+                    )  # fmt: skip
+        yield attempted(
+            SUBJECT, f"{form}, Hencky, 1.1 times its greatest load", None,
+            partial(without_equilibrium, form),
+        )  # fmt: skip
