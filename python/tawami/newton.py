@@ -168,8 +168,11 @@ class Newton:
         round_off = 0.0
         if not forces[1].any():
             # Forces of a body that supports move rigidly, or that coasts, are round-off, and so are
-            # those of stress that is left of them. A load is none, however small.
-            way = 10 * np.abs(coefficients[:n]).max() + self.field.grid.h
+            # those of stress that is left of them. A load is none, however small; nor is what an
+            # iterate gives that went further than anything sends it.
+            sent = [reduction.offset[:n]] + ([] if inertia is None else [inertia.course])
+            way = max(float(np.abs(part).max()) for part in sent)
+            way = 10 * min(way, float(np.abs(coefficients[:n]).max())) + self.field.grid.h
             round_off = 1e-14 * self._stiffest * way * np.sqrt(n)
         momentum = float(np.linalg.norm(free[of_u])) / scale if scale > round_off else 0.0
         volume = None
