@@ -179,12 +179,14 @@ class Newton:
         at_rest = False
         if not forces[1].any():
             # Forces of a body that supports move rigidly, or that coasts, are round-off, and so are
-            # those of stress that is left of them. A load is none, however small.
-            way = moved = np.abs(reduction.offset[:n]).max()
+            # those of stress that is left of them. A load is none, however small; nor is what an
+            # iterate gives that went further than anything sends it.
+            way = moved = float(np.abs(reduction.offset[:n]).max())
             if inertia is not None:
-                way = max(way, np.abs(inertia.course).max(initial=0.0))
-            round_off = 1e-14 * self._stiffest * (10 * way + self.field.grid.h) * np.sqrt(n)
-            at_rest = self._comm.bcast(scale <= round_off)  # all ranks take the same way
+                way = max(moved, float(np.abs(inertia.course).max(initial=0.0)))
+            way = 10 * min(way, float(np.abs(coefficients[:n]).max())) + self.field.grid.h
+            # all ranks take the same way
+            at_rest = self._comm.bcast(scale <= 1e-14 * self._stiffest * way * np.sqrt(n))
             if at_rest and inertia is None:
                 at_rest = self._moves_rigidly(coefficients[:n], moved)
         momentum = 0.0 if at_rest or scale == 0 else float(np.linalg.norm(free[of_u])) / scale
