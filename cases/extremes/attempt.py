@@ -24,6 +24,7 @@ Measured = float | tuple[float, str]
 
 #: What may be said of an answer beforehand.
 WARNINGS = (
+    tawami.EnergyWarning,
     tawami.InstabilityWarning,
     tawami.LockingWarning,
     tawami.ParameterWarning,

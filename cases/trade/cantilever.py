@@ -43,7 +43,7 @@ GRIDS = [
      "particles": tuple(BODIES)},
     {"form": ("u_epsv",), "stabilisation": ("laplacian",), "alpha": (0.01,), "n": CELLS,
      "particles": ("3 x 3",), "basis": ("quadratic_spline", "bilinear", "biquadratic")},
-    {"form": ("u_epsv_finite",), "alpha": (0.01,), "n": CELLS, "particles": PARTICLES,
+    {"form": ("u_epsv_finite",), "alpha": (0.01,), "n": (4, 8), "particles": PARTICLES,
      "tolerance": (1e-2, 1e-4, 1e-6, 1e-8)},
     {"form": ("u_epsv",), "stabilisation": ("laplacian",), "alpha": (0.01,), "n": (32, 64),
      "particles": ("2 x 2",), "linear_solver": ("direct", "iterative"),

@@ -5,6 +5,7 @@ from tawami.body import Body, box, polygon
 from tawami.dynamics import Dynamics
 from tawami.errors import (
     ConvergenceError,
+    EnergyWarning,
     FormError,
     InputError,
     InstabilityWarning,
@@ -38,6 +39,7 @@ __all__ = [
     "Body",
     "ConvergenceError",
     "Dynamics",
+    "EnergyWarning",
     "Form",
     "FormError",
     "Grid",

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami import contents, inputs, ranks
-from tawami.energy import Energies
+from tawami.energy import Energies, Growth
 from tawami.errors import InputError
 from tawami.inertia import Inertia
 from tawami.reduction import Reduction
@@ -50,6 +50,9 @@ class Dynamics:
 
     Raises:
         InputError: A scene without density, or a parameter out of its range.
+
+    Warns:
+        EnergyWarning: Once, where energy has come of nothing.
     """
 
     def __init__(
@@ -110,6 +113,8 @@ class Dynamics:
         self._kept: tuple[Array, Array, Array] | None = None
         self._borne: tuple[object, ...] = ()
         self.energies = Energies(kinetic=self.kinetic_energy, elastic=self.elastic_energy)
+        self._growth = Growth(self.energies.kinetic + self.energies.elastic)
+        self._particles_have = self.energies.kinetic
 
     # -- what the particles carry --------------------------------------------
 
@@ -161,6 +166,10 @@ class Dynamics:
                     f"{support} prescribes a displacement that the body does not have yet: expected "
                     "fix(..., velocity=...) for a motion, or ramp(scene) before Dynamics"
                 )
+        self._growth.given(
+            self.kinetic_energy - self._particles_have
+        )  # velocities that were written
+        self._particles_have = self.kinetic_energy
         zero, end = np.zeros(attached.layout.size), self.time + dt
         borne = (*scene.loads.signature, *map(id, supports.all), *map(id, supports.walls))
         sudden, left = borne != self._borne, len(scene.left)
@@ -376,6 +385,9 @@ class Dynamics:
         step.integration = step.external - gained - lost
         sums = {f.name: getattr(before, f.name) + getattr(step, f.name) for f in fields(Energies)}
         self.energies = Energies(**sums | {"kinetic": kinetic, "elastic": elastic})
+        self._particles_have = self.kinetic_energy
+        if self.scene.grid.comm.rank == 0:
+            self._growth.look(self.energies, self.steps, self.time)
 
 
 @dataclass(frozen=True)

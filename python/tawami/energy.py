@@ -8,7 +8,13 @@ and what the stabilisation of the form stores and takes (1/2 alpha h^2 sum V K^2
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, fields
+
+from tawami.errors import EnergyWarning
+
+#: Share of the most energy that a body had, from which a warning tells of what nothing gave it.
+GROWN = 0.05
 
 
 @dataclass
@@ -39,3 +45,41 @@ class Energies:
 
     def __str__(self) -> str:
         return ", ".join(f"{f.name} {getattr(self, f.name):.4g}" for f in fields(self)) + " J/m"
+
+
+class Growth:
+    """Warns, once, of a body with more energy than it was given.
+
+    Args:
+        energy: That it has at the start [J per metre depth].
+    """
+
+    def __init__(self, energy: float) -> None:
+        self._given = self._most = energy
+        self._warned = False
+
+    def given(self, energy: float) -> None:
+        """It gets this much from outside the balance."""
+        self._given += energy
+
+    def look(self, energies: Energies, steps: int, time: float) -> None:
+        """At the end of a step.
+
+        Args:
+            energies: The balance.
+            steps: Steps so far.
+            time: [s]
+        """
+        has = energies.kinetic + energies.elastic
+        self._most = max(self._most, has)
+        grown = has - self._given - energies.external
+        if self._warned or not grown > GROWN * self._most:
+            return
+        self._warned = True
+        warnings.warn(
+            f"after {steps} steps, at {time:g} s, the body has {grown:.3g} J/m more energy than it was "
+            f"given, {100 * grown / self._most:.2g} % of the most it had: its stress is not to be "
+            "trusted. Take shorter steps or more particles; motion.energies is the balance",
+            EnergyWarning,
+            stacklevel=6,
+        )

@@ -17,6 +17,10 @@ class SupportError(TawamiError):
     """Supports that leave a rigid motion free, contradict each other, or miss the body."""
 
 
+class EnergyWarning(UserWarning):
+    """A motion whose energy has grown by what no load and no support gave."""
+
+
 class InstabilityWarning(UserWarning):
     """An option of a form that is not stable for this body."""
 
@@ -63,6 +67,7 @@ class MissingDependencyError(TawamiError, ImportError):
 
 __all__ = [
     "ConvergenceError",
+    "EnergyWarning",
     "FormError",
     "InputError",
     "InstabilityWarning",
