@@ -76,7 +76,7 @@ def test_what_survives(subject, setting):
     ("overload", "at once", "turns particle .* inside out"),
     ("not_finite", "nan in (x|material|number)$", "read-only"),
     ("not_finite", "nan in volume", "volume: 1 entries are not finite.* NaN at particle 3"),
-    ("not_finite", "nan in (stress|velocity_gr)", ": 4 entries are not finite.* NaN at particle 3"),
+    ("not_finite", "nan in stress", ": 4 entries are not finite.* NaN at particle 3"),
     ("not_finite", "nan as", "not finite|finite number|finite modulus"),
 ])  # fmt: skip
 def test_what_is_refused_and_how(subject, setting, sentence):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -27,7 +28,7 @@ def test_the_driver_script_runs(tmp_path):
     (header,) = re.findall(r"```text\n(.*?)```", TEXT, flags=re.DOTALL)
     assert set(header.splitlines()) <= set(run.stdout.splitlines())
     deflection = float(run.stdout.split()[-1])
-    row, _ = mpm.solve("u_epsv", "clamped", 16, 0.1)
+    row, _ = mpm.solve("u_epsv", "clamped", 16)
     assert np.isclose(deflection, row.deflection_m, rtol=1e-9)
     assert {p.name for p in tmp_path.glob("*.vtu")} == {"particles.vtu", "grid.vtu"}
 
@@ -60,3 +61,15 @@ def test_the_block_in_motion_keeps_its_angular_momentum(tmp_path):
     assert float(run.stdout.split()[-1]) == pytest.approx(
         3.0 * size * 2 * 8 * (x**2).sum(), rel=5e-3
     )
+
+
+def test_the_study_recommends_the_coarse_grid(tmp_path):
+    script = tmp_path / "study.py"
+    script.write_text(next(block for block in BLOCKS if "tawami.Study" in block))
+    root = str(Path(__file__).parent.parent)
+    run = subprocess.run(
+        [sys.executable, script.name], cwd=tmp_path, capture_output=True, text=True, check=True,
+        env=os.environ | {"PYTHONPATH": root},
+    )  # fmt: skip
+    assert "Accuracy is bought by n 4 to 8" in run.stdout
+    assert run.stdout.splitlines()[-1].startswith("MPM: n 8, alpha 0.01: errors deflection 0.0061")

@@ -15,7 +15,7 @@ import tawami
 from cases.extremes import block
 from cases.extremes.attempt import Attempt, attempted
 
-SUBJECT = "NaN and infinity"
+SUBJECT = "NaN in motion"
 DT, PARTICLE = 0.004, 37
 ELASTIC = tawami.linear_elastic(E=block.E, nu=0.3)
 LAWS = {

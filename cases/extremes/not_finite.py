@@ -1,4 +1,4 @@
-"""NaN or infinity in any array of the particles between two steps, and in what a script passes.
+"""NaN or infinity in any array of the particles between two static steps, and in what a script passes.
 
 Refused with a sentence that names array and particle, before anything is solved; mended, the scene goes
 on as if nothing had happened. Positions, numbers and materials cannot be written at all.
@@ -23,7 +23,6 @@ VALUES = (float("nan"), float("inf"), -float("inf"))
 READ_ONLY = ("x", "material", "number")
 STATIC = ("volume", "stress", "displacement", "eps_v")
 HISTORY = ("plastic_strain", "dilatancy")
-CARRIED = ("velocity", "acceleration", "velocity_gradient", "acceleration_gradient")
 
 
 def scene_of(form: str = "u_epsv", **options: Any) -> tawami.Scene:
@@ -42,35 +41,23 @@ def array_of(scene: tawami.Scene, name: str) -> npt.NDArray[np.float64]:
     """An array of the particles by its name."""
     if name in HISTORY:
         return scene.particles.history(name)
-    if name in CARRIED:
-        return scene.particles.carried(name)
     return getattr(scene.particles, name)
 
 
-def static() -> tuple[tawami.Scene, Callable[[], object]]:
-    """A scene after a step, and the next one."""
+def after_a_step() -> tawami.Scene:
+    """A scene with the loads of the next step."""
     scene = scene_of()
     scene.solve()
     scene.gravity((0.02, -0.22))
-    return scene, scene.solve
+    return scene
 
 
-def moving() -> tuple[tawami.Scene, Callable[[], object]]:
-    """The same in motion at finite strain."""
-    scene = scene_of("u_epsv_finite")
-    motion = tawami.Dynamics(scene, velocity=(0.1, 0.0))
-    motion.step(1e-3)
-    return scene, lambda: motion.step(1e-3)
-
-
-def spoiled(
-    make: Callable[[], tuple[tawami.Scene, Callable[[], object]]], name: str, value: float
-) -> float:
+def spoiled(name: str, value: float) -> float:
     """A value written into an array; the sentence has to name it."""
-    scene, step = make()
+    scene = after_a_step()
     array_of(scene, name)[PARTICLE] = value
     try:
-        step()
+        scene.solve()
     except tawami.InputError as error:
         sentence = rf"^{name}: \d+ entries are not finite; .* at particle {PARTICLE}\b"
         if not re.search(sentence, str(error)):
@@ -81,21 +68,18 @@ def spoiled(
     return 0.0
 
 
-def mended(
-    make: Callable[[], tuple[tawami.Scene, Callable[[], object]]], name: str, value: float
-) -> float:
+def mended(name: str, value: float) -> float:
     """Largest difference of any array from that of a scene that was never spoiled."""
-    whole, go_on = make()
-    scene, step = make()
+    whole, scene = after_a_step(), after_a_step()
     array = array_of(scene, name)
     before = array[PARTICLE].copy()
     array[PARTICLE] = value
     try:
-        step()
+        scene.solve()
     except tawami.InputError:
         array[PARTICLE] = before
-    step()
-    go_on()
+    scene.solve()
+    whole.solve()
     names = [*READ_ONLY, *STATIC, *HISTORY]
     return max(float(np.abs(array_of(scene, n) - array_of(whole, n)).max()) for n in names)
 
@@ -148,24 +132,17 @@ def attempts(short: bool) -> Iterator[Attempt]:
                 SUBJECT,
                 f"{value} in {name}",
                 None,
-                lambda n=name, v=value: spoiled(static, n, v),
+                lambda n=name, v=value: spoiled(n, v),
                 refusals=(ValueError,),  # NumPy's: assignment destination is read-only
             )
         for name in (*STATIC, *HISTORY):
             yield attempted(
-                SUBJECT, f"{value} in {name}", None, lambda n=name, v=value: spoiled(static, n, v)
+                SUBJECT, f"{value} in {name}", None, lambda n=name, v=value: spoiled(n, v)
             )
-        for name in (*STATIC, *HISTORY, *CARRIED):
-            setting = f"{value} in {name}, in motion"
-            yield attempted(SUBJECT, setting, None, lambda n=name, v=value: spoiled(moving, n, v))
         for name, run in passed(value).items():
             yield attempted(SUBJECT, f"{value} as {name}", None, lambda r=run: _answered(r))
-    for make, names in ((static, (*STATIC, *HISTORY)), (moving, CARRIED)):
-        for name in names:
-            setting = f"{name} mended, {make.__name__}"
-            yield attempted(
-                SUBJECT, setting, 0.0, lambda m=make, n=name: mended(m, n, float("nan"))
-            )
+    for name in (*STATIC, *HISTORY):
+        yield attempted(SUBJECT, f"{name} mended", 0.0, lambda n=name: mended(n, float("nan")))
 
 
 def _answered(run: Callable[[], object]) -> float:

@@ -13,12 +13,20 @@ from pathlib import Path
 import tawami
 from cases.trade import cantilever, collapse, cook, self_weight, spinning_disc
 from tawami.environment import header
+from tawami.output import whole_file
 from tawami.study import Table
 
 CASES = (cantilever, cook, collapse, self_weight, spinning_disc)
 STUDIES = {case.STUDY.name: case.STUDY for case in CASES}
 #: Results that come with the repository.
 SHIPPED = Path(__file__).parent
+
+
+def in_words(table: Table) -> str:
+    """A paragraph a quantity, and what failed."""
+    paragraphs = [table.in_words(quantity) for quantity in table.quantities]
+    failed = [f"Failed: {str(row)[:300]}" for row in table.failed]
+    return "\n\n".join([f"# {table.name}", *paragraphs, *failed]) + "\n"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -41,11 +49,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
             study = STUDIES[name]
             study.path = Path(options.results) / name
             table = study.run(sample=options.sample)
-            print(f"\nResults: {study.path}/{name}.csv, {name}.png")
-        for quantity in table.quantities:
-            print(f"\n{table.in_words(quantity)}")
-        for row in table.failed:
-            print(f"failed: {row}")
+            with whole_file(study.path / f"{name}.md") as part:
+                part.write_text(in_words(table))
+            print(f"\nResults: {study.path}/{name}.csv, {name}.md, {name}.png")
+        print(f"\n{in_words(table)}")
 
 
 if __name__ == "__main__":

@@ -55,9 +55,14 @@ def picture(
             "pictures of studies need matplotlib: pip install matplotlib"
         ) from error
     quantities = list(quantities or table.quantities)
-    figure = Figure(figsize=(7.5 * len(quantities), 7.5), layout="constrained")
+    columns = min(len(quantities), 2)
+    rows = -(-len(quantities) // columns)
+    figure = Figure(figsize=(7.5 * columns, 6.5 * rows + 1), layout="constrained")
     FigureCanvasAgg(figure)
-    panels = figure.subplots(1, len(quantities), squeeze=False)[0]
+    panels = list(figure.subplots(rows, columns, squeeze=False).ravel())
+    for unused in panels[len(quantities) :]:
+        unused.remove()
+    panels = panels[: len(quantities)]
     values = list(
         dict.fromkeys(row.knobs.get(colour or "", "") for row in table.of(table.series[0]))
     )

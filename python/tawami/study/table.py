@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 #: Measured of every run: wall and processor time [s], peak memory [MB], and counts.
 COSTS = ("wall_s", "cpu_s", "peak_MB", "newton_iterations", "steps", "unknowns")
-#: Changes below this factor are not told from noise.
-NOISE = 1.1
+#: Changes below this factor are not told from noise; errors below this are round-off.
+NOISE, ROUND_OFF = 1.1, 1e-12
 
 
 def error_of(value: Any, reference: Any) -> float:
@@ -96,10 +96,13 @@ class Change:
 
     def __str__(self) -> str:
         """In a line."""
-        return (
-            f"{self.knob} {_short(self.before)} to {_short(self.after)} (error x {self.error:.2g}, "
-            f"time x {self.cost:.2g}; {self.pairs} {'pair' if self.pairs == 1 else 'pairs'})"
-        )
+        pairs = "1 pair" if self.pairs == 1 else f"{self.pairs} pairs"
+        return f"{self.step} (error x {self.error:.2g}, time x {self.cost:.2g}; {pairs})"
+
+    @property
+    def step(self) -> str:
+        """Knob and values."""
+        return f"{self.knob} {_short(self.before)} to {_short(self.after)}"
 
 
 @dataclass(frozen=True)
@@ -176,21 +179,12 @@ class Table:
     def changes(self, quantity: str, *, cost: str = "wall_s") -> list[Change]:
         """What each knob's next value does to error and cost of the study's own series."""
         self._check(quantity, cost)
-        rows = self.of(self.series[0])
-        knobs = list(dict.fromkeys(name for row in rows for name in row.knobs))
         changes = []
-        for knob in knobs:
-            groups: dict[tuple[Any, ...], dict[Any, Row]] = {}
-            for row in rows:
-                if knob in row.knobs:
-                    others = tuple(sorted((k, str(v)) for k, v in row.knobs.items() if k != knob))
-                    groups.setdefault(others, {})[row.knobs[knob]] = row
-            values = dict.fromkeys(v for group in groups.values() for v in group)
+        for knob, groups in self._groups().items():
+            values = dict.fromkeys(v for group in groups for v in group)
             ordered = sorted(values) if all(isinstance(v, int | float) for v in values) else values
             for before, after in pairwise(ordered):
-                pairs = [
-                    (g[before], g[after]) for g in groups.values() if {before, after} <= set(g)
-                ]
+                pairs = [(g[before], g[after]) for g in groups if {before, after} <= set(g)]
                 if pairs:
                     error = _mean_ratio([tuple(r.errors[quantity] for r in pair) for pair in pairs])
                     price = _mean_ratio([tuple(r.costs[cost] for r in pair) for pair in pairs])
@@ -198,23 +192,39 @@ class Table:
         return changes
 
     def dominated(self, quantity: str, *, cost: str = "wall_s") -> list[tuple[str, Any]]:
-        """Values of knobs without any run on the front, or within noise of it."""
-        front = self.front(quantity, cost=cost, series=self.series[0])
+        """Values of knobs that another value of the same knob beats wherever both were tried, all else
+        the same: as good in one, beyond noise better in the other.
+        """
+        self._check(quantity, cost)
 
-        def near(row: Row) -> bool:
-            return not any(
-                other.costs[cost] * NOISE < row.costs[cost]
-                and other.errors[quantity] * NOISE < row.errors[quantity]
-                for other in front
-            )
+        def beaten(row: Row, others: Iterable[Row]) -> bool:
+            def ratios(other: Row) -> tuple[float, float]:
+                error = _mean_ratio([(row.errors[quantity], other.errors[quantity])])
+                return error, _mean_ratio([(row.costs[cost], other.costs[cost])])
 
+            return any(max(r) <= NOISE and min(r) * NOISE < 1 for r in map(ratios, others))
+
+        found = []
+        for knob, groups in self._groups().items():
+            compared = [group for group in groups if len(group) > 1]
+            for value in dict.fromkeys(v for group in compared for v in group):
+                rows = [(group[value], group.values()) for group in compared if value in group]
+                if all(beaten(row, others) for row, others in rows):
+                    found.append((knob, value))
+        return found
+
+    def _groups(self) -> dict[str, list[dict[Any, Row]]]:
+        """Of each knob, its values' runs, together those that are alike in all else."""
         rows = self.of(self.series[0])
-        seen = {pair: False for row in rows for pair in row.knobs.items()}
-        for row in rows:
-            if near(row):
-                seen |= dict.fromkeys(row.knobs.items(), True)
-        several = {knob for knob, _ in seen if sum(name == knob for name, _ in seen) > 1}
-        return [pair for pair, is_near in seen.items() if not is_near and pair[0] in several]
+        found: dict[str, list[dict[Any, Row]]] = {}
+        for knob in dict.fromkeys(name for row in rows for name in row.knobs):
+            groups: dict[tuple[Any, ...], dict[Any, Row]] = {}
+            for row in rows:
+                if knob in row.knobs:
+                    others = tuple(sorted((k, str(v)) for k, v in row.knobs.items() if k != knob))
+                    groups.setdefault(others, {})[row.knobs[knob]] = row
+            found[knob] = list(groups.values())
+        return found
 
     def in_words(self, quantity: str, *, cost: str = "wall_s") -> str:
         """A paragraph: what buys accuracy, what only costs time, what is dominated, and the knee."""
@@ -233,8 +243,8 @@ class Table:
         parts = [
             ("Accuracy is bought by", [str(c) for c in buys]),
             ("Time only is spent by", [str(c) for c in wastes]),
-            ("Next to nothing comes from", [str(c) for c in nothing]),
-            ("Never within 10 % of the front:", [f"{k} {_short(v)}" for k, v in dominated]),
+            ("Neither by", [c.step for c in nothing]),
+            ("Dominated:", [f"{k} {_short(v)}" for k, v in dominated]),
         ]
         sentences = [f"{head} {'; '.join(items)}." for head, items in parts if items]
         sentences.append(f"The knee: {self.knee(quantity, cost=cost, series=self.series[0])}.")
@@ -320,7 +330,7 @@ def _point(row: Row, quantity: str, cost: str) -> Any:
 
 def _mean_ratio(pairs: Sequence[tuple[float, ...]]) -> float:
     """Geometric mean of the second over the first."""
-    logs = [np.log(max(b, 1e-300)) - np.log(max(a, 1e-300)) for a, b in pairs]
+    logs = [np.log(max(b, ROUND_OFF)) - np.log(max(a, ROUND_OFF)) for a, b in pairs]
     return float(np.exp(np.mean(logs)))
 
 
@@ -331,6 +341,8 @@ def recommend(
     cost: str = "wall_s",
 ) -> Row:
     """The cheapest measured setting within a tolerance.
+
+    One quantity alone may be right because two faults cancel: ask for several.
 
     Args:
         study: A study that has been run, its table, or the CSV file of one.
