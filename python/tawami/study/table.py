@@ -99,6 +99,13 @@ class Change:
         pairs = "1 pair" if self.pairs == 1 else f"{self.pairs} pairs"
         return f"{self.step} (error x {self.error:.2g}, time x {self.cost:.2g}; {pairs})"
 
+    def towards_accuracy(self) -> Change:
+        """The change, or its reverse where that costs more, or costs the same and errs less."""
+        same = 1 / NOISE <= self.cost <= NOISE
+        if self.error <= 1 if same else self.cost >= 1:
+            return self
+        return Change(self.knob, self.after, self.before, 1 / self.error, 1 / self.cost, self.pairs)
+
     @property
     def step(self) -> str:
         """Knob and values."""
@@ -228,14 +235,7 @@ class Table:
 
     def in_words(self, quantity: str, *, cost: str = "wall_s") -> str:
         """A paragraph: what buys accuracy, what only costs time, what is dominated, and the knee."""
-        changes = self.changes(quantity, cost=cost)
-        # the other way round where that is cheaper
-        turned = [
-            c
-            if c.cost >= 1
-            else Change(c.knob, c.after, c.before, 1 / c.error, 1 / c.cost, c.pairs)
-            for c in changes
-        ]
+        turned = [change.towards_accuracy() for change in self.changes(quantity, cost=cost)]
         buys = [c for c in turned if c.error * NOISE < 1]
         wastes = [c for c in turned if c.cost > NOISE and c.error * NOISE >= 1]
         nothing = [c for c in turned if c not in buys and c not in wastes]
