@@ -14,19 +14,12 @@ from mpi4py import MPI
 
 import tawami
 from cases.extremes.attempt import Attempt, attempted
+from cases.extremes.forms import BASES, FORMS
 
 SUBJECT = "stiffness contrast"
 NX, NY, H = 8, 4, 0.25
 LENGTH = NX * H
 MU, LAMBDA, STRETCH = 1e6, 1.5e6, 1e-3  # [Pa], [Pa], mean strain [-]; nu = 0.3 for the soft one
-FORMS: dict[str, dict[str, Any]] = {
-    "u": {"form": "u"},
-    "u_bbar": {"form": "u_bbar"},
-    "u_epsv": {"form": "u_epsv"},
-    "u_epsv, alpha = 0": {"form": "u_epsv", "alpha": 0.0},
-    "u_p": {"form": "u_p"},
-}
-BASES = ("quadratic_spline", "bilinear", "biquadratic")
 CONTRASTS = (1e1, 1e3, 1e5, 1e7, 1e9, 1e11, 1e13)
 
 

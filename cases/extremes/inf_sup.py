@@ -22,10 +22,10 @@ from mpi4py import MPI
 
 import tawami
 from cases.extremes.attempt import Attempt, attempted
+from cases.extremes.forms import BASES
 
 Array = npt.NDArray[np.float64]
 STABILISATIONS = ("laplacian", "residual_based", "projection")
-BASES = ("quadratic_spline", "bilinear", "biquadratic")
 BODIES = ("filled", "cut", "random")
 ALPHAS = (0.0, 0.01, 0.1, 1.0, 10.0)
 MU, K = 1.0, 3.0  # any will do: they are taken out again

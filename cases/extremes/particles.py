@@ -16,6 +16,7 @@ from mpi4py import MPI
 
 import tawami
 from cases.extremes.attempt import Attempt, attempted
+from cases.extremes.forms import BASES, FORMS
 
 Array = npt.NDArray[np.float64]
 SUBJECT = "particles per cell"
@@ -23,14 +24,6 @@ CELLS, H = (4, 3), 0.5
 E, NU, PULL = 3e6, 0.45, 1e3  # [Pa], [-], [Pa]
 K, MU = E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU))
 GRADIENT = np.array([[2e-3, -1e-3], [4e-4, -1.5e-3]])
-FORMS: dict[str, dict[str, Any]] = {
-    "u": {"form": "u"},
-    "u_bbar": {"form": "u_bbar"},
-    "u_epsv": {"form": "u_epsv"},
-    "u_epsv, alpha = 0": {"form": "u_epsv", "alpha": 0.0},
-    "u_p": {"form": "u_p"},
-}
-BASES = ("quadratic_spline", "bilinear", "biquadratic")
 
 
 def even(per_axis: int) -> Array:
