@@ -126,14 +126,18 @@ def _abort(text: str) -> NoReturn:
     raise SystemExit(1)
 
 
+def own_environment() -> dict[str, str]:
+    """The environment without what MPI put there for this process: its children are not its peers."""
+    own = ("OMPI_", "PMIX_", "PRTE_")
+    return {k: v for k, v in os.environ.items() if not k.startswith(own)}
+
+
 def mpirun(number: int, command: list[str]) -> tuple[list[str], dict[str, str]]:
     """Command and environment that start several ranks, from a process that may be a rank itself.
 
     There may be more ranks than processors, and root may start them (containers).
     """
-    own = ("OMPI_", "PMIX_", "PRTE_")  # of this process; its children are not its peers
-    environment = {k: v for k, v in os.environ.items() if not k.startswith(own)}
-    environment |= {
+    environment = own_environment() | {
         "OMPI_ALLOW_RUN_AS_ROOT": "1",
         "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
         "OMPI_MCA_rmaps_base_oversubscribe": "1",

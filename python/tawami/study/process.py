@@ -24,7 +24,7 @@ import numpy as np
 
 from tawami.environment import peak_memory
 from tawami.errors import InputError, TawamiError
-from tawami.ranks import mpirun
+from tawami.ranks import own_environment
 from tawami.tally import tally
 
 #: A run that takes less than this is repeated, so often at most, and the fastest counts [s].
@@ -97,19 +97,17 @@ def measured(name: str, knobs: Mapping[str, Any], limit: float) -> dict[str, Any
         values, wall_s, cpu_s, peak_MB, newton_iterations, steps, unknowns; or failure, a sentence, with
         `cut` where the process did not come to its end.
     """
-    own, environment = mpirun(1, [])[1], dict(os.environ)
-    own = {key: value for key, value in own.items() if key in environment} | {MARK: "1"}
-    knobs = dict(knobs)
+    environment, knobs = own_environment() | {MARK: "1"}, dict(knobs)
     if "threads" in knobs:
-        own["RAYON_NUM_THREADS"] = str(knobs.pop("threads"))
-    own["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
+        environment["RAYON_NUM_THREADS"] = str(knobs.pop("threads"))
+    environment["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
     with tempfile.TemporaryDirectory() as folder:
         job, result = Path(folder) / "job.json", Path(folder) / "result.json"
         job.write_text(json.dumps({"name": name, "knobs": knobs}))
         command = [sys.executable, "-m", "tawami.study", str(job), str(result)]
         try:
             ended = subprocess.run(
-                command, env=own, stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True,
                 timeout=limit, check=False,
             )  # fmt: skip
         except subprocess.TimeoutExpired:
@@ -117,8 +115,8 @@ def measured(name: str, knobs: Mapping[str, Any], limit: float) -> dict[str, Any
         if not result.exists():
             last = (ended.stderr.strip().splitlines() or ["it said nothing"])[-1]
             return {"failure": f"ended with code {ended.returncode}: {last}", "cut": True}
-        found_values: dict[str, Any] = json.loads(result.read_text())
-        return found_values
+        outcome: dict[str, Any] = json.loads(result.read_text())
+        return outcome
 
 
 def main() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import itertools
 import json
@@ -24,6 +25,8 @@ from tawami.study.table import COSTS, Row, Table, error_of, text_of
 
 Knobs = Mapping[str, Any]
 Grid = Mapping[str, Sequence[Any]]
+#: Label, setting and fingerprint.
+Key = tuple[str, str, str]
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,15 @@ class Series:
     run: process.Run
     knobs: Grid | Sequence[Grid]
 
+    @functools.cached_property
+    def fingerprint(self) -> str:
+        """What its measurements depend on besides the knobs."""
+        return process.fingerprint(self.run)
+
+    def key(self, setting: Knobs) -> Key:
+        """What a kept run of a setting is found by."""
+        return self.label, _text(setting), self.fingerprint
+
     def settings(self) -> Iterator[dict[str, Any]]:
         """Every setting once, in the order in which knobs and values were given."""
         grids = [self.knobs] if isinstance(self.knobs, Mapping) else self.knobs
@@ -49,8 +61,8 @@ class Series:
         for grid in grids:
             for values in itertools.product(*(_values(*knob) for knob in grid.items())):
                 setting = dict(zip(grid, values, strict=True))
-                if _key(setting) not in known:
-                    known.add(_key(setting))
+                if _text(setting) not in known:
+                    known.add(_text(setting))
                     yield setting
 
 
@@ -62,7 +74,7 @@ def _values(name: str, values: Any) -> Sequence[Any]:
     return list(values)
 
 
-def _key(setting: Knobs) -> str:
+def _text(setting: Knobs) -> str:
     return json.dumps(setting, sort_keys=True)
 
 
@@ -127,25 +139,23 @@ class Study:
             InputError: Nothing has, or the finest run failed.
         """
         runs = self._runs()
-        of_label = {s.label: (process.fingerprint(s.run), list(s.settings())) for s in self.series}
         found = [
-            (label, setting, runs[key])
-            for label, (print_, settings) in of_label.items()
-            for setting in settings
-            if (key := (label, _key(setting), print_)) in runs
+            (series.label, setting, runs[series.key(setting)])
+            for series in self.series
+            for setting in series.settings()
+            if series.key(setting) in runs
         ]
         if not found:
             raise InputError(f"study '{self.name}': nothing has been run: call run() first")
         reference = self._reference(runs)
         return Table(self.name, [_row(*one, reference) for one in found])
 
-    def _reference(self, runs: Mapping[tuple[str, str, str], Mapping[str, Any]]) -> dict[str, Any]:
+    def _reference(self, runs: Mapping[Key, Mapping[str, Any]]) -> dict[str, Any]:
         reference = dict(self.reference)
         if not self._of_finest:
             return reference
         assert self.finest is not None
-        own = self.series[0]
-        finest = runs.get((own.label, _key(self.finest), process.fingerprint(own.run)))
+        finest = runs.get(self.series[0].key(self.finest))
         if finest is None or "failure" in finest:
             why = "has not been run" if finest is None else finest["failure"]
             raise InputError(f"study '{self.name}': the finest run, {dict(self.finest)}: {why}")
@@ -155,7 +165,7 @@ class Study:
             reference[quantity] = finest["values"][quantity]
         return reference
 
-    def _runs(self) -> dict[tuple[str, str, str], dict[str, Any]]:
+    def _runs(self) -> dict[Key, dict[str, Any]]:
         """Kept runs by label, setting and fingerprint; a last line that was cut off does not count."""
         path, runs = self.path / "runs.jsonl", {}
         if path.exists():
@@ -164,7 +174,7 @@ class Study:
                     run = json.loads(line)
                 except ValueError:
                     continue
-                runs[run["label"], _key(run["knobs"]), run["fingerprint"]] = run
+                runs[run["label"], _text(run["knobs"]), run["fingerprint"]] = run
         return runs
 
     # -- running -----------------------------------------------------------------
@@ -206,13 +216,12 @@ class Study:
                 "process of its own"
             )
         folder, runs = result_folder(self.path), self._runs()
-        work = self._work(sample, seed)
         done = {key for key, run in runs.items() if "cut" not in run}
-        work = [job for job in work if (job[0].label, _key(job[1]), job[2]) not in done]
+        work = [(s, k) for s, k in self._work(sample, seed) if s.key(k) not in done]
         start = perf_counter()
-        for number, (series, setting, fingerprint) in enumerate(work):
+        for number, (series, setting) in enumerate(work):
             outcome = process.measured(process.name_of(series.run), setting, limit)
-            head = {"label": series.label, "knobs": setting, "fingerprint": fingerprint}
+            head = {"label": series.label, "knobs": setting, "fingerprint": series.fingerprint}
             _append(folder / "runs.jsonl", json.dumps(head | outcome))
             if not quiet:
                 left = (perf_counter() - start) / (number + 1) * (len(work) - number - 1)
@@ -233,17 +242,16 @@ class Study:
             print(f"study '{self.name}': no picture without matplotlib", file=sys.stderr)
         return table
 
-    def _work(self, sample: int | None, seed: int) -> list[tuple[Series, dict[str, Any], str]]:
-        own = self.series[0]
-        work = [(s, k, process.fingerprint(s.run)) for s in self.series for k in s.settings()]
+    def _work(self, sample: int | None, seed: int) -> list[tuple[Series, dict[str, Any]]]:
+        work = [(series, setting) for series in self.series for setting in series.settings()]
         if sample is not None:
             count = min(inputs.whole_number("sample", sample, low=1), len(work))
             chosen = np.random.default_rng(seed).choice(len(work), count, replace=False)
             work = [work[k] for k in sorted(chosen)]
         if self._of_finest:
             assert self.finest is not None
-            finest = (own, dict(self.finest), process.fingerprint(own.run))
-            work = [finest, *(job for job in work if job[:2] != finest[:2])]
+            finest = (self.series[0], dict(self.finest))
+            work = [finest, *(job for job in work if job != finest)]
         return work
 
 
