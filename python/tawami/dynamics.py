@@ -166,10 +166,9 @@ class Dynamics:
                     f"{support} prescribes a displacement that the body does not have yet: expected "
                     "fix(..., velocity=...) for a motion, or ramp(scene) before Dynamics"
                 )
-        self._growth.given(
-            self.kinetic_energy - self._particles_have
-        )  # velocities that were written
-        self._particles_have = self.kinetic_energy
+        has = self.kinetic_energy
+        self._growth.given(has - self._particles_have)  # velocities that were written
+        self._particles_have = has
         zero, end = np.zeros(attached.layout.size), self.time + dt
         borne = (*scene.loads.signature, *map(id, supports.all), *map(id, supports.walls))
         sudden, left = borne != self._borne, len(scene.left)
@@ -376,7 +375,8 @@ class Dynamics:
 
     def _balance(self, step: Energies, dissipated: float) -> None:
         """Add a step to the balance, the particles having what they have at its end."""
-        before, kinetic = self.energies, self.kinetic_energy if self._moves else step.kinetic
+        self._particles_have = self.kinetic_energy
+        before, kinetic = self.energies, self._particles_have if self._moves else step.kinetic
         step.dissipated = self._sum(dissipated)
         step.transfer += step.kinetic - kinetic
         elastic = self.elastic_energy
@@ -385,7 +385,6 @@ class Dynamics:
         step.integration = step.external - gained - lost
         sums = {f.name: getattr(before, f.name) + getattr(step, f.name) for f in fields(Energies)}
         self.energies = Energies(**sums | {"kinetic": kinetic, "elastic": elastic})
-        self._particles_have = self.kinetic_energy
         if self.scene.grid.comm.rank == 0:
             self._growth.look(self.energies, self.steps, self.time)
 
