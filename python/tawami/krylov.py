@@ -13,7 +13,6 @@ the condition number as in `linear`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from tawami.errors import SingularError
-from tawami.petsc import Handles
+from tawami.solver import Blocks, Solver
 from tawami.stopwatch import Stopwatch
 
 Array = npt.NDArray[np.float64]
@@ -30,8 +29,6 @@ Array = npt.NDArray[np.float64]
 LIMIT, RESTART = 500, 100
 #: How well the random vector is to be reached.
 ROUGHLY = 1e-2
-#: A scaled system beyond this condition number has no digit left to trust.
-SINGULAR = 1e14
 ADVICE = (
     "Likely causes: particles that do not stiffen every function of the grid, cells with little of the "
     "body, or K much larger than mu in a form without a field for the volume; linear_solver='direct' "
@@ -39,43 +36,15 @@ ADVICE = (
 )
 
 
-@dataclass(frozen=True)
-class Blocks:
-    """What this rank's unknowns are.
+class KrylovSolver(Solver):
+    """Solves the tangents of one scene iteratively, always to the tolerance; see `Solver`.
 
-    Attributes:
-        displacement: Which of them belong to the displacement.
-        rigid: Values of the three rigid motions for these, n x 3.
-    """
-
-    displacement: npt.NDArray[np.bool_]
-    rigid: Array
-
-
-class KrylovSolver:
-    """Solves the tangents of one scene iteratively, with the interface of `linear.LinearSolver`.
-
-    Args:
-        comm: Communicator.
-        stopwatch: Where the time goes.
-
-    Attributes:
-        symmetric: False; the symmetry of the tangent is of no use here.
-        condition: Estimate of the condition number of the first tangent, scaled.
-        weak: Empty.
-        singular: False: a singular tangent is refused.
-        iterations: FGMRES iterations of the last solve.
+    Its `condition` is that of the first tangent, and a singular one is refused at once.
     """
 
     def __init__(self, comm: Any, stopwatch: Stopwatch) -> None:
-        self._stopwatch = stopwatch
-        self._handles = Handles(self, comm)
-        self.condition, self.symmetric, self.iterations = 1.0, False, 0
-        self.weak, self.singular, self._tried = np.empty(0), False, False
-
-    def forget(self) -> None:
-        """Free the preconditioner; the next solve makes a new one anyway."""
-        self._handles.free()
+        super().__init__(comm, stopwatch)
+        self.symmetric, self._tried = False, False  # symmetry is of no use here
 
     def solve(
         self,
@@ -85,58 +54,53 @@ class KrylovSolver:
         tolerance: float,
         blocks: Callable[[], Blocks],
     ) -> Array:
-        """As `LinearSolver.solve`, always to the tolerance.
+        """As `Solver.solve`.
 
         Raises:
-            SingularError: FGMRES did not get there.
+            SingularError: FGMRES did not get there, or the tangent is singular.
         """
-        self.forget()
-        x, b = self._handles["x"], self._handles["b"] = matrix.createVecs()
-        factors = scale()
-        with self._stopwatch("scale"):
-            x.setArray(factors)
-            matrix.diagonalScale(x, x)
+        self._begin(matrix, scale)
         with self._stopwatch("factorise"):
-            ksp = self._preconditioned(matrix, factors, blocks())
+            self._precondition(matrix, blocks())
         with self._stopwatch("solve"):
             if not self._tried:
-                begin, end = matrix.getOwnershipRange()
-                size = matrix.getSize()[0]
-                b.setArray(np.random.default_rng(0).standard_normal(size)[begin:end])
-                self._reach(ksp, b, x, ROUGHLY)
-                norm = matrix.norm(PETSc.NormType.FROBENIUS)
-                self.condition, self._tried = float(norm / np.sqrt(size) * x.norm()), True
-                if not self.condition < SINGULAR:
-                    raise SingularError(
-                        f"the tangent is singular (condition number of the scaled matrix: about "
-                        f"{self.condition:.1e}, from a random vector). {ADVICE}"
-                    )
-            b.setArray(factors * right)
-            self._reach(ksp, b, x, tolerance)
-        return np.asarray(factors * x.array)
+                self._try(matrix)
+            self._reach(self._scale * right, tolerance)
+        return np.asarray(self._scale * self._handles["x"].array)
 
-    def _reach(self, ksp: Any, b: Any, x: Any, tolerance: float) -> None:
-        ksp.setTolerances(rtol=tolerance, atol=0.0, max_it=LIMIT)
-        ksp.solve(b, x)
-        self.iterations = ksp.getIterationNumber()
-        if ksp.getConvergedReason() <= 0:
-            reached = ksp.getResidualNorm() / b.norm()
+    def _try(self, matrix: Any) -> None:
+        """A random right-hand side: condition number, or a refusal."""
+        begin, end = matrix.getOwnershipRange()
+        size = matrix.getSize()[0]
+        self._reach(np.random.default_rng(0).standard_normal(size)[begin:end], ROUGHLY)
+        norm = matrix.norm(PETSc.NormType.FROBENIUS)
+        self.condition = float(norm / np.sqrt(size) * self._handles["x"].norm())
+        self._tried = True
+        if self.singular:
+            raise SingularError(
+                f"the tangent is singular (condition number of the scaled matrix: about "
+                f"{self.condition:.1e}, from a random vector). {ADVICE}"
+            )
+
+    def _reach(self, right: Array, tolerance: float) -> None:
+        if not self._fgmres(right, tolerance, LIMIT):
+            reached = self._handles["ksp"].getResidualNorm() / self._handles["b"].norm()
             raise SingularError(
                 f"FGMRES reached {reached:.1e} of the right-hand side in {self.iterations} iterations: "
                 f"expected {tolerance:.1e}. {ADVICE}"
             )
 
-    def _preconditioned(self, matrix: Any, factors: Array, blocks: Blocks) -> Any:
+    def _precondition(self, matrix: Any, blocks: Blocks) -> None:
         ksp = self._handles["ksp"] = PETSc.KSP().create(matrix.comm)
         ksp.setOperators(matrix)
         ksp.setType("fgmres")
         ksp.setGMRESRestart(RESTART)
         pc = self._handles["pc"] = ksp.getPC()
-        rigid = blocks.rigid / factors[blocks.displacement, None]
+        rigid = blocks.rigid / self._scale[blocks.displacement, None]
         if blocks.displacement.all():
             matrix.setNearNullSpace(self._near_null_space(rigid, matrix.comm))
             pc.setType("gamg")
-            return ksp
+            return
         start = matrix.getOwnershipRange()[0]
         fields = []
         for name, where in (("u", blocks.displacement), ("p", ~blocks.displacement)):
@@ -154,7 +118,6 @@ class KrylovSolver:
             inner.setType(kind)
             inner.destroy()
             solver.destroy()
-        return ksp
 
     def _near_null_space(self, rigid: Array, comm: Any) -> Any:
         basis, _ = np.linalg.qr(rigid)

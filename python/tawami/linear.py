@@ -24,8 +24,7 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from tawami.errors import SingularError
-from tawami.krylov import SINGULAR, Blocks
-from tawami.petsc import Handles
+from tawami.solver import Blocks, Solver
 from tawami.stopwatch import Stopwatch
 
 Array = npt.NDArray[np.float64]
@@ -38,40 +37,27 @@ ROOM = (50, 1000)
 PROBES = 3
 
 
-class LinearSolver:
-    """Solves the tangents of one scene; each rank passes and gets its own rows.
+class LinearSolver(Solver):
+    """Solves the tangents of one scene by factorisations that are kept; see `Solver`.
+
+    `symmetric`, `condition` and `weak` are of the tangent last factorised: whether it is symmetric was
+    probed by one product with a random vector; the condition is infinite where it met a zero pivot.
 
     Args:
         comm: Communicator.
         stopwatch: Where the time goes.
         always: Whether every tangent is factorised.
-
-    Attributes:
-        symmetric: Whether the tangent last factorised is symmetric (probed by one product with a
-            random vector).
-        condition: Estimate of its condition number, scaled; infinite where the factorisation met a
-            zero pivot.
-        weak: This rank's entries of the direction that it is weakest in, so far as known.
-        iterations: FGMRES iterations of the last solve; 0 where the tangent was factorised.
     """
 
     def __init__(self, comm: Any, stopwatch: Stopwatch, *, always: bool = False) -> None:
-        self._stopwatch, self._always = stopwatch, always
-        self._handles = Handles(self, comm)
+        super().__init__(comm, stopwatch)
+        self._always = always
         self._matrix: Any = None
-        self._scale = np.empty(0)
-        self.condition, self.symmetric, self.iterations = 1.0, True, 0
-        self.weak = np.empty(0)
 
     def forget(self) -> None:
         """Free the factorisation; the next solve makes a new one."""
-        self._handles.free()
+        super().forget()
         self._matrix = None
-
-    @property
-    def singular(self) -> bool:
-        """Whether the tangent last factorised cannot be solved to any accuracy."""
-        return not self.condition < SINGULAR
 
     def solve(
         self,
@@ -79,19 +65,13 @@ class LinearSolver:
         scale: Callable[[], Array],
         right: Array,
         tolerance: float,
-        _blocks: Callable[[], Blocks],
+        blocks: Callable[[], Blocks],
     ) -> Array:
-        """Solution of `K x = r`; of `S K S y = S r`, `x = S y`, in fact.
-
-        Args:
-            matrix: Reduced tangent K; scaled in place.
-            scale: Gives the factors S of the unknowns of a tangent that is to be factorised.
-            right: r.
-            tolerance: Of `|S (r - K x)| / |S r|` where the solve is not direct.
+        """As `Solver.solve`; direct where the tangent is factorised.
 
         Raises:
             SingularError: The factorisation ran out of memory or failed for another reason than a
-                singular matrix. Whether it is singular is for the caller to ask.
+                singular matrix.
         """
         if not self._always and self._matrix is matrix and self.iterations <= PAYS:
             self._multiply(matrix, self._scale)
@@ -99,30 +79,15 @@ class LinearSolver:
             if solution is not None:
                 return solution
             self._multiply(matrix, 1 / self._scale)
-        self.forget()
-        self._handles["x"], self._handles["b"] = matrix.createVecs()
-        self._scale = scale()
-        self._multiply(matrix, self._scale)
+        self._begin(matrix, scale)
         return self._direct(matrix, right)
-
-    def _multiply(self, matrix: Any, factors: Array) -> None:
-        """Rows and columns of a matrix with factors."""
-        with self._stopwatch("scale"):
-            vector = self._handles["x"]
-            vector.setArray(factors)
-            matrix.diagonalScale(vector, vector)
 
     def _iterate(self, right: Array, tolerance: float) -> Array | None:
         """By FGMRES with the factorisation that is there; None if it takes too long."""
         with self._stopwatch("solve"):
-            ksp, x, b = (self._handles[name] for name in ("ksp", "x", "b"))
-            ksp.setTolerances(rtol=tolerance, atol=0.0, max_it=LIMIT)
-            b.setArray(self._scale * right)
-            ksp.solve(b, x)
-            self.iterations = ksp.getIterationNumber()
-            if ksp.getConvergedReason() <= 0:
+            if not self._fgmres(self._scale * right, tolerance, LIMIT):
                 return None
-            return np.asarray(self._scale * x.array)
+            return np.asarray(self._scale * self._handles["x"].array)
 
     def _direct(self, matrix: Any, right: Array) -> Array:
         """By a new factorisation; the condition number and its direction with it."""

@@ -24,12 +24,13 @@ from tawami.density import Density, LawQuantity, ParticleScalar, Rule
 from tawami.errors import ConvergenceError, InputError, SingularError
 from tawami.field import Field
 from tawami.inertia import Inertia
-from tawami.krylov import Blocks, KrylovSolver
+from tawami.krylov import KrylovSolver
 from tawami.linear import LinearSolver
 from tawami.numerics import Numerics
 from tawami.numpy_law import NumpyStage
 from tawami.petsc import clean_up
 from tawami.reduction import Reduction
+from tawami.solver import Blocks, Solver
 from tawami.stopwatch import Stopwatch
 from tawami.tally import tally
 
@@ -111,7 +112,7 @@ class Newton:
         self.kind = volumetric[0][0] if volumetric else None
         self._p_ref = self._started = 0.0
         self._comm = field.grid.comm
-        self._linear: LinearSolver | KrylovSolver
+        self._linear: Solver
         if numerics.linear_solver == "iterative":
             self._linear = KrylovSolver(self._comm, stopwatch)
         else:
