@@ -125,6 +125,28 @@ impl Particles {
         })
     }
 
+    /// Take over the values of the same particles with the same arrays, in place; false if they are others.
+    pub fn assign(&mut self, other: &Self) -> bool {
+        if self.number != other.number || self.arrays() != other.arrays() {
+            return false;
+        }
+        self.x.assign(&other.x);
+        self.volume.assign(&other.volume);
+        self.material.assign(&other.material);
+        self.stress.assign(&other.stress);
+        self.displacement.assign(&other.displacement);
+        if let (Some(mine), Some(others)) = (&mut self.eps_v, &other.eps_v) {
+            mine.assign(others);
+        }
+        for ((_, mine), (_, others)) in self.history.iter_mut().zip(&other.history) {
+            mine.assign(others);
+        }
+        for ((_, mine), (_, others)) in self.carried.iter_mut().zip(&other.carried) {
+            mine.assign(others);
+        }
+        true
+    }
+
     /// Check what a user may have written into the arrays: finite values, positive volumes.
     ///
     /// # Errors

@@ -8,6 +8,8 @@ from conftest import grid_of
 from mpi4py import MPI
 
 import tawami
+from tawami.pace import Pace
+from tawami.results import Unwatched
 from tawami.stepping import march
 
 ELASTIC = tawami.linear_elastic(E=100.0, nu=0.3)
@@ -32,7 +34,7 @@ def refusing(limit, calls):
 
 def test_sizes_are_halved_on_failure_and_grow_after_three():
     calls = []
-    steps = march(0.0, 1.0, 0.25, 1e-3, refusing(lambda _: 0.1, calls), "s")
+    steps = march(Pace(0.0, 0.25), 1.0, 1e-3, refusing(lambda _: 0.1, calls), Unwatched("s"))
     assert calls[:4] == [0.25, 0.125, 0.0625, 0.0625]
     assert 0.125 in calls[4:]  # tried again
     assert steps[-1].end == 1.0
@@ -42,13 +44,19 @@ def test_sizes_are_halved_on_failure_and_grow_after_three():
 
 def test_at_the_smallest_size_the_error_says_where():
     with pytest.raises(tawami.ConvergenceError) as error:
-        march(0.0, 1.0, 0.5, 0.1, refusing(lambda end: 0.0 if end > 0.6 else 1.0, []), "s")
+        march(
+            Pace(0.0, 0.5),
+            1.0,
+            0.1,
+            refusing(lambda end: 0.0 if end > 0.6 else 1.0, []),
+            Unwatched("s"),
+        )
     assert error.value.__notes__ == ["at 0.5 s, with the smallest step of 0.125 s"]
 
 
 @pytest.mark.parametrize(("size", "count"), [(0.3, 4), (0.1, 10), (1.0, 1)])
 def test_the_end_is_met_exactly_and_without_a_crumb(size, count):
-    steps = march(0.0, 1.0, size, 0.0, refusing(lambda _: 1.0, []), "s")
+    steps = march(Pace(0.0, size), 1.0, 0.0, refusing(lambda _: 1.0, []), Unwatched("s"))
     assert len(steps) == count
     assert steps[-1].end == 1.0
 

@@ -4,6 +4,8 @@ from tawami._rust import Material
 from tawami.body import Body, box, polygon
 from tawami.dynamics import Dynamics
 from tawami.errors import (
+    CheckpointError,
+    CheckpointWarning,
     ConvergenceError,
     EnergyWarning,
     FormError,
@@ -30,6 +32,7 @@ from tawami.materials import (
 )
 from tawami.numpy_law import NumpyLaw
 from tawami.ranks import run
+from tawami.results import Results
 from tawami.scene import Scene
 from tawami.solution import Solution
 from tawami.stepping import ramp, settle
@@ -37,6 +40,8 @@ from tawami.study import Series, Study, recommend
 
 __all__ = [
     "Body",
+    "CheckpointError",
+    "CheckpointWarning",
     "ConvergenceError",
     "Dynamics",
     "EnergyWarning",
@@ -53,6 +58,7 @@ __all__ = [
     "OutputError",
     "ParameterWarning",
     "QuadratureWarning",
+    "Results",
     "Scene",
     "Series",
     "SingularError",

@@ -9,8 +9,9 @@ move and v and a stay on the grid.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,10 +20,12 @@ from tawami import contents, inputs, ranks
 from tawami.energy import Energies, Growth
 from tawami.errors import InputError
 from tawami.inertia import Inertia
+from tawami.pace import Pace, Step
 from tawami.reduction import Reduction
+from tawami.results import Results, phase
 from tawami.scene import Accepted, Problem, Scene
 from tawami.solution import Solution
-from tawami.stepping import Step, march
+from tawami.stepping import march
 from tawami.supports import Support
 from tawami.transfer import TRANSFERS, TransferName, gradient_of, to_grid
 
@@ -170,7 +173,7 @@ class Dynamics:
         self._growth.given(has - self._particles_have)  # velocities that were written
         self._particles_have = has
         zero, end = np.zeros(attached.layout.size), self.time + dt
-        borne = (*scene.loads.signature, *map(id, supports.all), *map(id, supports.walls))
+        borne = self._loads_and_supports
         sudden, left = borne != self._borne, len(scene.left)
         mass = attached.sums(self.mass, np.ones((len(self.mass), 1)))[:, 0]
         external, before = scene.external(), self._from_particles(mass)
@@ -237,10 +240,50 @@ class Dynamics:
             self.energies = replace(e, kinetic=kinetic, elastic=elastic, left=e.left + gone)
         return solution
 
+    @property
+    def _loads_and_supports(self) -> tuple[object, ...]:
+        """Another one once loads or supports are others."""
+        scene = self.scene
+        supports = scene.supports
+        return (*scene.loads.signature, *map(id, supports.all), *map(id, supports.walls))
+
+    def state(self) -> dict[str, Any]:
+        """As `Scene.state`, of the motion; what the particles carry is in that of the scene."""
+        kept = self._grid_has
+        return {
+            "time": self.time,
+            "steps": self.steps,
+            "kept": None if kept is None else list(kept),
+            "sudden": self._loads_and_supports != self._borne,
+            "energies": asdict(self.energies),
+            "growth": self._growth.state(),
+            "particles_have": self._particles_have,
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """The reverse of :meth:`state`, after `Scene.restore`."""
+        self.time, self.steps = state["time"], state["steps"]
+        self._borne = () if state["sudden"] else self._loads_and_supports
+        kept = state["kept"]
+        self._kept = None if kept is None else (kept[0], kept[1], np.array(self.velocity))
+        self.energies = Energies(**state["energies"])
+        self._growth.restore(state["growth"])
+        self._particles_have = state["particles_have"]
+
+    @property
+    def _grid_has(self) -> tuple[Array, Array] | None:
+        """v and a of a grid that stays, functions x 2; None once velocities were written."""
+        if self._kept is None:
+            return None
+        v, a, given = self._kept
+        written = np.array([not np.array_equal(given, self.velocity)])
+        return None if ranks.any_of(self.scene.grid.comm, written)[0] else (v, a)
+
     def _from_particles(self, mass: Array) -> tuple[Array, Array]:
         """v and a of the grid, functions x 2."""
-        if self._kept is not None and np.array_equal(self._kept[2], self.velocity):
-            return self._kept[:2]
+        kept = self._grid_has
+        if kept is not None:
+            return kept
         attached = self.scene.attached
         v, a = (
             _over(to_grid(attached, self.mass, values, gradient), mass[:, None])
@@ -299,6 +342,7 @@ class Dynamics:
         *,
         smallest: float | None = None,
         each: Callable[[Solution], None] | None = None,
+        results: Results | None = None,
     ) -> list[Step]:
         """Steps until `end` [s]; one that fails is halved, and the size grows again after three.
 
@@ -307,9 +351,10 @@ class Dynamics:
             dt: Size of a step [s].
             smallest: Size below which the run ends [s]; dt/1024 by default.
             each: Called with the solution of each accepted step.
+            results: Where the run writes its results and checkpoints.
 
         Returns:
-            The accepted steps.
+            The accepted steps, with those of a run that is gone on with.
 
         Raises:
             ConvergenceError, SingularError: At the smallest step, with its history; what was accepted
@@ -324,7 +369,10 @@ class Dynamics:
                 "step"
             )
         least = dt / 1024 if smallest is None else inputs.number("smallest", smallest, low=0.0)
-        return march(self.time, end, dt, least, lambda _, size: self.step(size), "s", each)
+        with phase(results, "motion", self.scene, self, end, "s") as watched:
+            return march(
+                Pace(self.time, dt), end, least, lambda _, size: self.step(size), watched, each
+            )
 
     # -- what is conserved ---------------------------------------------------
 

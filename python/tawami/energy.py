@@ -9,7 +9,9 @@ and what the stabilisation of the form stores and takes (1/2 alpha h^2 sum V K^2
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from typing import Any
 
 from tawami.errors import EnergyWarning
 
@@ -57,6 +59,14 @@ class Growth:
     def __init__(self, energy: float) -> None:
         self._given = self._most = energy
         self._warned = False
+
+    def state(self) -> dict[str, Any]:
+        """What it was given, the most it had, and whether it has warned."""
+        return dict(vars(self))
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """The reverse of :meth:`state`."""
+        vars(self).update(state)
 
     def given(self, energy: float) -> None:
         """It gets this much from outside the balance."""

@@ -61,11 +61,21 @@ class OutputError(TawamiError):
     """A result that cannot be written."""
 
 
+class CheckpointError(TawamiError):
+    """A checkpoint that cannot be used."""
+
+
+class CheckpointWarning(UserWarning):
+    """A checkpoint that was not used, or could not be written."""
+
+
 class MissingDependencyError(TawamiError, ImportError):
     """A package that tawami needs is not there; the message says how to install it."""
 
 
 __all__ = [
+    "CheckpointError",
+    "CheckpointWarning",
     "ConvergenceError",
     "EnergyWarning",
     "FormError",

@@ -71,7 +71,7 @@ class FastField(Field):
         as long as the unknowns do.
         """
         with self.stopwatch("pattern"):
-            if not reduction.same_unknowns(self._reduction):
+            if not reduction.same_unknowns(self.reduction):
                 self._new_pattern(reduction)
         with self.stopwatch("tangent"):
             kernels = self._kernels(self.compiled.tangent, data)
@@ -91,7 +91,7 @@ class FastField(Field):
         over the ranks is PETSc's.
         """
         self._petsc.free("of cells", "unassembled", "reduced")
-        self._reduction = None
+        self.reduction = None
         selection, used = reduction.selection, np.arange(reduction.size)
         if self.grid.comm.size > 1:
             reached = self.layout.reached_by(self._location.active)
@@ -111,7 +111,7 @@ class FastField(Field):
             unassembled.setISLocalMat(matrix)
             numbers.destroy()
             self._petsc["unassembled"], self._petsc["reduced"] = unassembled, PETSc.Mat()
-        self._pattern, self._reduction = (pattern, values), reduction
+        self._pattern, self.reduction = (pattern, values), reduction
 
 
 def _selection(s: sp.csr_matrix, unknowns: npt.NDArray[np.int64]) -> tuple[Any, ...]:

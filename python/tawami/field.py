@@ -80,7 +80,7 @@ class Field:
             rule: self._point_indices(rule) for rule in compiled.densities
         }
         self._packed: dict[int, Array] = {}
-        self._reduction: Reduction | None = None
+        self.reduction: Reduction | None = None
         self._ghost_matrix: sp.csr_matrix | None = None
         self._ghost_of: Any = None
         self._petsc = Handles(self, grid.comm)
@@ -257,9 +257,9 @@ class Field:
         """
         matrix = self._assemble_tangent(coefficients, data)
         with self.stopwatch("reduction"):
-            if not reduction.same_unknowns(self._reduction):
+            if not reduction.same_unknowns(self.reduction):
                 self._petsc.free("P", "reduced")
-                self._reduction = reduction
+                self.reduction = reduction
                 own = reduction.own.stop - reduction.own.start
                 rows = self.layout.extraction[: self._space.own] @ reduction.selection
                 p = aij(self.grid.comm, rows, own)

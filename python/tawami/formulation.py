@@ -33,6 +33,7 @@ from __future__ import annotations
 
 import functools
 import importlib.util
+import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -155,6 +156,14 @@ class Form:
             raise FormError(f"form file '{source}' does not exist")
         resolved = path.resolve()
         return _from_file(resolved, resolved.stat().st_mtime_ns)
+
+    @property
+    def source(self) -> str:
+        """Text of the residual; its byte code where there is no text."""
+        try:
+            return inspect.getsource(self.residual)
+        except (OSError, TypeError):
+            return repr(getattr(self.residual, "__code__", self.residual))
 
     def settings(self, given: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, str]]:
         """Parameters and options of this form, defaults filled in.

@@ -16,7 +16,7 @@ judged where it is factorised.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -51,13 +51,51 @@ class LinearSolver(Solver):
 
     def __init__(self, comm: Any, stopwatch: Stopwatch, *, always: bool = False) -> None:
         super().__init__(comm, stopwatch)
-        self._always = always
+        self._always, self._keeps = always, False
         self._matrix: Any = None
+        self._factorised: Array | None = None
 
     def forget(self) -> None:
         """Free the factorisation; the next solve makes a new one."""
         super().forget()
-        self._matrix = None
+        self._matrix, self._factorised = None, None
+
+    def keep(self) -> None:
+        """Keep a copy of each matrix that is factorised from now on, for :meth:`state`; so that none is
+        missing, the next solve makes a new one.
+        """
+        self._keeps = True
+        self.forget()
+
+    def state(self) -> dict[str, Any] | None:
+        """What makes the factorisation again, to the bit; None where there is none, or several ranks
+        have it.
+        """
+        if self._factorised is None:
+            return None
+        scalars = {name: getattr(self, name) for name in ("iterations", "condition", "symmetric")}
+        return {"matrix": self._factorised, "scale": self._scale, "weak": self.weak, **scalars}
+
+    def restore(self, state: Mapping[str, Any], matrix: Any) -> None:
+        """The reverse of :meth:`state`.
+
+        Args:
+            state: What it gave.
+            matrix: Of the same pattern; it keeps its values.
+        """
+        start, columns, values = (np.array(part) for part in matrix.getValuesCSR())
+        self._begin(matrix, lambda: np.asarray(state["scale"]))
+        self.symmetric, self.weak = state["symmetric"], state["weak"]
+        self._set(matrix, start, columns, state["matrix"])
+        if self._factorise(matrix):
+            self.condition, self.iterations = state["condition"], state["iterations"]
+            self._matrix, self._factorised = matrix, state["matrix"]
+        self._set(matrix, start, columns, values)
+
+    @staticmethod
+    def _set(matrix: Any, start: Array, columns: Array, values: Array) -> None:
+        matrix.setValuesCSR(start, columns, values)
+        matrix.assemble()
 
     def solve(
         self,
@@ -98,6 +136,8 @@ class LinearSolver(Solver):
             self.symmetric = self._is_symmetric(matrix, probes[0])
         with self._stopwatch("factorise"):
             norm = matrix.norm(PETSc.NormType.FROBENIUS)
+            if self._keeps and matrix.comm.size == 1:
+                self._factorised = np.array(matrix.getValuesCSR()[2])
             if not np.isfinite(norm):
                 raise SingularError(
                     "the tangent holds NaN or infinity where the residual does not: a derivative that "

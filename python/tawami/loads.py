@@ -6,7 +6,7 @@ there already stays.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,6 +58,22 @@ class Loads:
     def signature(self) -> tuple[Any, ...]:
         """Another one once the loads are others."""
         return (*self.gravity, *map(id, self.tractions), *map(id, self.forces))
+
+    def state(self) -> dict[str, Any]:
+        """What of them the body bears already."""
+        return {
+            "gravity": self._carried_gravity,
+            "tractions": [traction.carried for traction in self.tractions],
+            "forces": [forces.carried for forces in self.forces],
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """The reverse of :meth:`state`, of the same loads."""
+        self._carried_gravity = state["gravity"]
+        for traction, carried in zip(self.tractions, state["tractions"], strict=True):
+            traction.carried = carried
+        for forces, carried in zip(self.forces, state["forces"], strict=True):
+            forces.carried = carried
 
     def add_forces(self, particles: npt.ArrayLike, force: Sequence[float]) -> None:
         """Share a force [N per metre depth] out among particles of the body, a mask or numbers."""

@@ -111,6 +111,7 @@ class Newton:
         volumetric = list(compiled.form.fields.values())[1:]
         self.kind = volumetric[0][0] if volumetric else None
         self._p_ref = self._started = 0.0
+        self._stored: Mapping[str, Any] | None = None
         self._comm = field.grid.comm
         self._linear: Solver
         if numerics.linear_solver == "iterative":
@@ -152,6 +153,27 @@ class Newton:
         """What the particle data and the constants take."""
         arrays = [*self.data.values(), *self.constants.values()]
         return sum(array.itemsize * int(np.prod(array.shape[1:])) for array in arrays)
+
+    def keep(self) -> None:
+        """Keep what :meth:`state` needs."""
+        self._linear.keep()
+
+    def state(self) -> dict[str, Any] | None:
+        """What the next steps take from the last ones: a factorisation; None if there is none."""
+        factorised = self._linear.state()
+        if factorised is None or self.field.reduction is None:
+            return None
+        return {"unknowns": self.field.reduction.digest, "factorised": factorised}
+
+    def restore(self, state: Mapping[str, Any] | None) -> None:
+        """The reverse of :meth:`state`; it takes effect with the first tangent."""
+        self._stored = state
+
+    def _remake(self, matrix: Any, reduction: Reduction) -> None:
+        """The factorisation of a stored state, if the first tangent after it has the same unknowns."""
+        state, self._stored = self._stored, None
+        if state is not None and self._comm.size == 1 and reduction.digest == state["unknowns"]:
+            self._linear.restore(state["factorised"], matrix)
 
     def internal(self, coefficients: Array) -> Array:
         """Internal forces and volume residual on all coefficients, at given increments."""
@@ -333,6 +355,8 @@ class Newton:
             matrix = self.field.tangent(coefficients, self.data, reduction)
             if inertia is not None:
                 self._add_mass(matrix, inertia, reduction)
+            if self._stored is not None:
+                self._remake(matrix, reduction)
             right = -(reduction.selection.T @ rest)
             scale = functools.partial(self._scale, matrix, reduction)
             blocks = functools.partial(self._blocks, reduction)

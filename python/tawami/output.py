@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,12 @@ import numpy.typing as npt
 from tawami import ranks
 from tawami.basis import extraction
 from tawami.errors import OutputError
+from tawami.moment import Moment
 from tawami.solution import Solution
+
+if TYPE_CHECKING:
+    from tawami.dynamics import Dynamics
+    from tawami.scene import Scene
 
 Array = npt.NDArray[np.float64]
 
@@ -55,6 +60,29 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         raise OutputError(f"'{target}' cannot be written: {error.strerror or error}") from error
     finally:
         part.unlink(missing_ok=True)
+
+
+class Output:
+    """What looks at the moments of a run and writes some of them; a base class."""
+
+    def begin(
+        self, folder: Path, scene: Scene, motion: Dynamics | None, state: dict[str, Any] | None
+    ) -> None:
+        """A phase of the run begins; a call for all ranks.
+
+        Args:
+            folder: Of the phase.
+            scene, motion: What is observed.
+            state: What :meth:`state` gave at the checkpoint that the run goes on from; later files are
+                no part of it. None for a new phase.
+        """
+
+    def look(self, moment: Moment) -> None:
+        """At the start of a phase and after every accepted step, by all ranks."""
+
+    def state(self) -> dict[str, Any]:
+        """What JSON can hold of what was written so far."""
+        return {}
 
 
 def write_particles(path: str | Path, solution: Solution) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
 
 from tawami import _rust, ranks
-from tawami.errors import InputError
+from tawami.errors import CheckpointError, InputError
 from tawami.grid import Grid
 
 Array = npt.NDArray[np.float64]
@@ -51,6 +52,43 @@ def distributed(
         )
     mine = np.flatnonzero(grid.rank_of_cell[location.cell] == grid.comm.rank).astype(np.uint32)
     return body.select(mine), location.select(mine)
+
+
+def columns(particles: _rust.Particles) -> list[tuple[str, int]]:
+    """Name and width of the arrays of particles, as they stand in their rows."""
+    double = np.dtype(float).itemsize
+    return [(name, max(1, size // double)) for name, size in particles.arrays]
+
+
+def gathered(grid: Grid, particles: _rust.Particles) -> dict[str, Array]:
+    """The arrays of all ranks' particles by name, in the order of their numbers; on every rank."""
+    rows = ranks.joined(grid.comm, particles.rows())
+    names, widths = zip(*columns(particles), strict=True)
+    parts = dict(zip(names, np.split(rows, np.cumsum(widths)[:-1], axis=1), strict=True))
+    order = np.argsort(parts["number"][:, 0], kind="stable")
+    return {name: np.ascontiguousarray(part[order]) for name, part in parts.items()}
+
+
+def scattered(
+    grid: Grid, particles: _rust.Particles, arrays: Mapping[str, Array], *, moving: bool
+) -> tuple[_rust.Particles, _rust.Location]:
+    """The reverse of :func:`gathered`: this rank's particles, `particles` themselves if they are the
+    same ones, with these values.
+
+    Raises:
+        CheckpointError: Other arrays than those of the particles.
+    """
+    wanted = dict(columns(particles))
+    found = {name: array.shape[1] for name, array in arrays.items()}
+    if wanted != found:
+        differ = sorted(set(wanted.items()) ^ set(found.items()))
+        raise CheckpointError(
+            f"its particles have other arrays than those of the scene: {differ[0][0]} is in one of them "
+            "only, or has another width. Expected the same form, laws and motion"
+        )
+    whole = particles.of_rows(np.hstack([arrays[name] for name in wanted]))
+    mine, location = distributed(grid, whole, moving=moving)
+    return (particles if particles.assign(mine) else mine), location
 
 
 def migrated(grid: Grid, particles: _rust.Particles) -> tuple[_rust.Particles, _rust.Location]:

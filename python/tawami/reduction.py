@@ -8,6 +8,7 @@ S unknowns + offset` are what supports leave free, P = E S.
 from __future__ import annotations
 
 import functools
+import hashlib
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -280,6 +281,13 @@ class Reduction:
         self.size = len(unknowns)
         ends = np.cumsum(np.bincount(owner, minlength=comm.size))
         self.own = slice(int(ends[comm.rank - 1]) if comm.rank else 0, int(ends[comm.rank]))
+
+    @property
+    def digest(self) -> str:
+        """The same for reductions with the same unknowns and S."""
+        s = self.selection
+        parts = (self.unknowns, s.indptr, s.indices, s.data)
+        return hashlib.sha1(b"".join(np.ascontiguousarray(a).tobytes() for a in parts)).hexdigest()
 
     def same_unknowns(self, other: Reduction | None) -> bool:
         """Whether another reduction has the same unknowns and S, so that matrices are alike."""

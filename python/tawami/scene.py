@@ -240,6 +240,11 @@ class Scene(contents.Elsewhere):
         return [f"{name} ({history})" if history else name for name, history in histories]
 
     @property
+    def law_texts(self) -> list[str]:
+        """The laws with their parameters."""
+        return ["NumpyLaw"] if self._law is not None else [repr(law) for law in self._materials]
+
+    @property
     def constants(self) -> dict[str, Array]:
         """K and mu [Pa] of each particle."""
         of_particle = self._moduli[self.particles.material]
@@ -260,6 +265,11 @@ class Scene(contents.Elsewhere):
     def has_density(self) -> bool:
         """Whether the scene has a density."""
         return self._densities is not None
+
+    @property
+    def densities(self) -> list[float] | None:
+        """Density of each material [kg/m3]; None without any."""
+        return None if self._densities is None else self._densities.tolist()
 
     @property
     def least_density(self) -> float:
@@ -586,6 +596,37 @@ class Scene(contents.Elsewhere):
         self.particles, location = placement.migrated(self.grid, self.particles)
         self.attached = self._attach(location)
         return solution
+
+    def state(self) -> dict[str, Any]:
+        """All that it carries from one step to the next, of all ranks, for a checkpoint; a call for all
+        ranks.
+        """
+        return {
+            "particles": placement.gathered(self.grid, self.particles),
+            "total": self._total,
+            "left": self.left,
+            "looked_at": self._looked_at,
+            "supports": self.supports.state(),
+            "loads": self.loads.state(),
+            "newton": self.attached.newton.state(),
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """The reverse of :meth:`state`, of a scene that was made in the same way; a call for all ranks.
+
+        Raises:
+            CheckpointError: Particles with other arrays.
+        """
+        self.particles, location = placement.scattered(
+            self.grid, self.particles, state["particles"], moving=self._finite
+        )
+        self._total = state["total"]
+        self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
+        self._looked_at = state["looked_at"]
+        self.supports.restore(state["supports"])
+        self.loads.restore(state["loads"])
+        self.attached = self._attach(location)
+        self.attached.newton.restore(state["newton"])
 
     def _settled(self, problem: Callable[[], Problem]) -> tuple[Converged, Problem]:
         """A step in which no wall pulls, is passed through, or gives more friction than it has."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,6 +55,17 @@ class Solver:
     def forget(self) -> None:
         """Free what was made for a tangent; the next solve makes it anew."""
         self._handles.free()
+
+    def keep(self) -> None:
+        """Keep what :meth:`state` gives."""
+
+    def state(self) -> dict[str, Any] | None:
+        """What later solves take from earlier ones; None if that is nothing."""
+        return None
+
+    def restore(self, state: Mapping[str, Any], matrix: Any) -> None:
+        """The reverse of :meth:`state`, for a tangent of the same unknowns."""
+        raise NotImplementedError
 
     @property
     def singular(self) -> bool:

@@ -3,81 +3,62 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from tawami import inputs
 from tawami.errors import ConvergenceError, InputError, SingularError
-from tawami.newton import History
+from tawami.pace import Pace, Step
+from tawami.results import Results, Unwatched, phase
 from tawami.scene import Scene
 from tawami.solution import Solution
 
 
-@dataclass(frozen=True)
-class Step:
-    """What is kept of an accepted step.
-
-    Attributes:
-        end: Time [s], or share of the load, at its end.
-        size: Its size, likewise.
-        history: (momentum, volume) measures of every residual.
-        krylov: FGMRES iterations of every linear solve; 0 where the tangent was factorised.
-    """
-
-    end: float
-    size: float
-    history: History
-    krylov: tuple[int, ...]
-
-    @property
-    def iterations(self) -> int:
-        """Newton iterations."""
-        return len(self.history) - 1
-
-
 def march(
-    start: float,
+    pace: Pace,
     end: float,
-    size: float,
     smallest: float,
     attempt: Callable[[float, float], Solution],
-    unit: str,
+    watched: Unwatched,
     each: Callable[[Solution], None] | None = None,
 ) -> list[Step]:
-    """Steps from start to end.
+    """Steps to an end.
 
     Args:
-        start: Where they begin.
+        pace: Where they begin, and their largest size; one that fails is halved, after three good ones
+            it doubles.
         end: Where they end.
-        size: Their largest size; one that fails is halved, after three good ones it doubles.
         smallest: Size below which no step is tried again.
         attempt: Takes a step to a place, of a size; raises and leaves everything as it was if it fails.
-        unit: What messages say after numbers.
+        watched: What observes them.
         each: Called with each accepted step.
 
     Raises:
         ConvergenceError, SingularError: At the smallest size.
     """
-    largest, good, accepted, at = size, 0, list[Step](), start
-    while end - at > 1e-9 * largest:
-        now = min(size, end - at)
+    largest, steps = pace.size, list[Step]()
+    watched.begin(pace, steps)
+    while end - pace.at > 1e-9 * largest:
+        now = min(pace.size, end - pace.at)
         # no crumb is left for the last step
-        target = end if end - at - now < 1e-6 * largest else at + now
+        target = end if end - pace.at - now < 1e-6 * largest else pace.at + now
         try:
-            solution = attempt(target, target - at)
+            solution = attempt(target, target - pace.at)
         except (ConvergenceError, SingularError) as error:
-            size, good = now / 2, 0
-            if size < smallest:
-                error.add_note(f"at {at:g} {unit}, with the smallest step of {now:g} {unit}")
+            pace.size, pace.good = now / 2, 0
+            if pace.size < smallest:
+                unit = watched.unit
+                error.add_note(f"at {pace.at:g} {unit}, with the smallest step of {now:g} {unit}")
                 raise
+            watched.halved(error, pace)
             continue
-        accepted.append(Step(target, target - at, solution.history, solution.krylov))
-        at = target
+        steps.append(Step(target, target - pace.at, solution.history, solution.krylov))
+        pace.at = target
+        pace.good += 1
+        if pace.good >= 3 and pace.size < largest:
+            pace.size, pace.good = min(2 * pace.size, largest), 0
         if each is not None:
             each(solution)
-        good += 1
-        if good >= 3 and size < largest:
-            size, good = min(2 * size, largest), 0
-    return accepted
+        watched.accepted(solution, pace, steps, last=end - pace.at <= 1e-9 * largest)
+    return steps
 
 
 def ramp(
@@ -86,6 +67,7 @@ def ramp(
     *,
     smallest: float | None = None,
     each: Callable[[Solution], None] | None = None,
+    results: Results | None = None,
 ) -> list[Step]:
     """Bring up, without inertia, the loads and prescribed displacements that are new to a scene.
 
@@ -96,9 +78,10 @@ def ramp(
         size: Largest share of the load in a step, above 0 to 1.
         smallest: Share below which the run ends; size/1024 by default.
         each: Called with the solution of each accepted step.
+        results: Where the run writes its results and checkpoints.
 
     Returns:
-        The accepted steps.
+        The accepted steps, with those of a run that is gone on with.
 
     Raises:
         ConvergenceError, SingularError: At the smallest step, with its history; the scene is in the
@@ -107,23 +90,24 @@ def ramp(
     """
     size = inputs.number("size", size, low=inputs.LEAST, high=1.0)
     least = size / 1024 if smallest is None else inputs.number("smallest", smallest, low=0.0)
-
-    reached = 0.0
-
-    def attempt(part: float, _size: float) -> Solution:
-        nonlocal reached
-        solution = scene.solve_part(part)
-        reached = part
-        return solution
-
+    pace = Pace(0.0, size)
     try:
-        return march(0.0, 1.0, size, least, attempt, "of the load", each)
+        with phase(results, "ramp", scene, None, 1.0, "of the load") as watched:
+            return march(
+                pace, 1.0, least, lambda part, _size: scene.solve_part(part), watched, each
+            )
     finally:
-        if reached < 1.0:
-            scene.accept(reached)
+        if pace.at < 1.0:
+            scene.accept(pace.at)
 
 
-def settle(scene: Scene, *, tolerance: float = 1e-10, most: int = 200) -> list[Step]:
+def settle(
+    scene: Scene,
+    *,
+    tolerance: float = 1e-10,
+    most: int = 200,
+    results: Results | None = None,
+) -> list[Step]:
     """Solve under the present loads, the grid reset each time, until nothing is out of balance.
 
     With each reset the particles meet other functions, and what was in balance is so no longer.
@@ -132,6 +116,7 @@ def settle(scene: Scene, *, tolerance: float = 1e-10, most: int = 200) -> list[S
         scene: A scene of finite strain.
         tolerance: Of the momentum measure right after a reset.
         most: Number of solves after which it is given up.
+        results: Where the run writes its results and checkpoints.
 
     Raises:
         ConvergenceError: Not within `most` solves.
@@ -141,13 +126,23 @@ def settle(scene: Scene, *, tolerance: float = 1e-10, most: int = 200) -> list[S
         raise InputError(
             "settle(...) resets the grid: expected a scene with a form of finite strain"
         )
-    steps = list[Step]()
-    with scene.tolerance_of(max(0.1 * tolerance, 1e-14)):
-        for _ in range(inputs.whole_number("most", most, low=1)):
+    most = inputs.whole_number("most", most, low=1)
+    pace, steps = Pace(0.0, 1.0), list[Step]()
+    with (
+        scene.tolerance_of(max(0.1 * tolerance, 1e-14)),
+        phase(results, "settle", scene, None, most, "resets") as watched,
+    ):
+        watched.begin(pace, steps)
+        while pace.at < most and not watched.finished:
             solution = scene.solve()
             steps.append(Step(1.0, 0.0, solution.history, solution.krylov))
-            if solution.history[0][0] < tolerance:
+            pace.at += 1.0
+            settled = solution.history[0][0] < tolerance
+            watched.accepted(solution, pace, steps, last=settled)
+            if settled:
                 return steps
+        if watched.finished:
+            return steps
     raise ConvergenceError(
         f"settle: {steps[-1].history[0][0]:.1e} of the forces are out of balance after {most} resets of "
         f"the grid: expected less than {tolerance:g}; allow more resets, or a larger tolerance",

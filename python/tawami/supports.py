@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +16,7 @@ from tawami.boundary import Component, Interval, Profile
 from tawami.errors import InputError
 from tawami.grid import Edge, Grid
 from tawami.reduction import Reduction
-from tawami.wall import Wall
+from tawami.wall import Contact, Wall
 
 Array = npt.NDArray[np.float64]
 #: A velocity [m/s], constant or a function of time [s].
@@ -242,6 +243,27 @@ class Supports:
         for support, point in zip(supports, points, strict=True):
             x, y = point.place + point.weights @ u[point.indices // 2]
             support.place = (float(x), float(y))
+
+    def state(self) -> dict[str, Any]:
+        """Where points are, what of them the body has followed already, and what touches the walls."""
+        return {
+            "supports": [
+                {"place": s.place, "carried": s.carried, "applied": s.applied, "way": s.way}
+                for s in self.all
+            ],
+            "walls": [{"touching": w.state.touching, "slip": w.state.slip} for w in self.walls],
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """The reverse of :meth:`state`, of the same supports."""
+        for support, values in zip(self.all, state["supports"], strict=True):
+            if not isinstance(support.place, str):
+                x, y = values["place"]
+                support.place = (x, y)
+            support.carried, support.applied = values["carried"], values["applied"]
+            support.way = values["way"]
+        for wall, values in zip(self.walls, state["walls"], strict=True):
+            wall.state = Contact(values["touching"], values["slip"])
 
     def friction(self, forces: Array) -> Array:
         """Friction of the walls from what supports have to give, functions x 2."""

@@ -79,7 +79,7 @@ impl From<&Tangent> for Moduli {
 }
 
 /// A material law.
-pub trait Material: Send + Sync {
+pub trait Material: std::fmt::Debug + Send + Sync {
     /// What driver scripts call it.
     fn name(&self) -> &'static str;
 

@@ -69,6 +69,11 @@ impl PyParticles {
         particles.ok_or_else(|| PyRuntimeError::new_err("internal: rows of other particles"))
     }
 
+    /// Take over the values of the same particles; false if they are others.
+    fn assign(&mut self, other: PyRef<Self>) -> bool {
+        self.0.assign(&other.0)
+    }
+
     /// Make room for an array of a time integration.
     fn carry(&mut self, name: &str, width: usize) {
         self.0.carry(name, width);
@@ -250,6 +255,11 @@ impl PyMaterial {
     #[staticmethod]
     fn neo_hookean(k: f64, mu: f64) -> PyResult<Self> {
         Ok(Self(Arc::new(NeoHookean::new(LinearElastic::from_k_mu(k, mu)?))))
+    }
+
+    /// The law with its parameters.
+    fn __repr__(&self) -> String {
+        format!("{:?}", self.0)
     }
 
     /// What the law is called.

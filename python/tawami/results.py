@@ -1,0 +1,516 @@
+"""A run with a folder: what it writes there, its checkpoints, and how it goes on after it was stopped.
+
+Each `ramp`, `settle` or `Dynamics.run` that is given the results is a phase of the run. A script that
+is started again with `existing='resume'` is executed from its top; phases that had come to their end are
+not solved again, their end is loaded, and the one that was stopped goes on from its newest checkpoint.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import os
+import shutil
+import warnings
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Any, Literal, Self, get_args
+
+from tawami import checkpoint, inputs, pace, placement, progress, provenance
+from tawami.errors import (
+    CheckpointError,
+    CheckpointWarning,
+    ConvergenceError,
+    InputError,
+    OutputError,
+    SingularError,
+)
+from tawami.interruption import Interruption
+from tawami.moment import Moment
+from tawami.output import Output, result_folder, whole_file
+from tawami.pace import Pace, Step
+from tawami.ranks import together
+
+if TYPE_CHECKING:
+    from tawami.dynamics import Dynamics
+    from tawami.scene import Scene
+    from tawami.solution import Solution
+
+Existing = Literal["stop", "replace", "resume"]
+#: Takes precedence over `existing`: how `tawami resume` starts a script.
+VARIABLE = "TAWAMI_EXISTING"
+KINDS = ("ramp", "settle", "motion")
+RUN, LOG, CHECKPOINTS = "run.json", "log.txt", "checkpoints"
+log = logging.getLogger("tawami")
+
+
+class Results:
+    """The folder of a run, and what observes it.
+
+    Args:
+        folder: Made if it is not there.
+        outputs: What is written: `ParticleOutput`, `GridOutput`, `TableOutput`.
+        checkpoint_steps: Accepted steps between checkpoints; None for none by number.
+        checkpoint_minutes: Wall time between checkpoints [min]; None for none by time. The end of a
+            phase, SIGTERM, Ctrl-C and an error that ends the run write one in any case.
+        keep: Checkpoints of a phase that are kept.
+        existing: Where the folder holds a run: 'stop' with an error, 'replace' it, or 'resume' it. The
+            environment variable TAWAMI_EXISTING takes precedence.
+        progress: One live line on standard error; None for where that is a terminal.
+
+    Raises:
+        InputError: A parameter out of its range.
+    """
+
+    def __init__(
+        self,
+        folder: str | Path,
+        *outputs: Output,
+        checkpoint_steps: int | None = None,
+        checkpoint_minutes: float | None = 10.0,
+        keep: int = 2,
+        existing: Existing = "stop",
+        progress: bool | None = None,
+    ) -> None:
+        if not isinstance(folder, str | os.PathLike):
+            raise InputError(f"folder = {folder!r}: expected the path of a folder")
+        for output in outputs:
+            if not isinstance(output, Output):
+                raise InputError(
+                    f"Results(..., {output!r}): expected ParticleOutput(...), GridOutput(...) or "
+                    "TableOutput(...)"
+                )
+        self.folder, self.outputs = Path(folder), outputs
+        self.checkpoint_steps = (
+            None
+            if checkpoint_steps is None
+            else inputs.whole_number("checkpoint_steps", checkpoint_steps, low=1)
+        )
+        self.checkpoint_minutes = (
+            None
+            if checkpoint_minutes is None
+            else inputs.number("checkpoint_minutes", checkpoint_minutes, low=0.0)
+        )
+        self.keep = inputs.whole_number("keep", keep, low=1)
+        variable = os.environ.get(VARIABLE)
+        self.existing = existing if variable is None else variable
+        if self.existing not in get_args(Existing):
+            name = "existing" if variable is None else VARIABLE
+            raise InputError(f"{name} = {self.existing!r}: expected 'stop', 'replace' or 'resume'")
+        self.progress = progress
+        self._phases: list[str] = []
+        #: Whether the run goes on from where an earlier one was.
+        self.resumes = False
+
+    @property
+    def checkpoints(self) -> list[Path]:
+        """The checkpoints that there are, oldest first."""
+        return sorted((self.folder / CHECKPOINTS).glob("[0-9]*.npz"))
+
+    def phase(
+        self, kind: str, scene: Scene, motion: Dynamics | None, end: float, unit: str
+    ) -> Phase:
+        """The next phase of the run, for a with statement; a call for all ranks.
+
+        Args:
+            kind: 'ramp', 'settle' or 'motion'.
+            scene: The scene.
+            motion: Its motion; None without inertia.
+            end: Where it ends.
+            unit: Of that.
+
+        Raises:
+            InputError: The folder holds a run, and `existing` is 'stop'.
+            OutputError: It cannot be written.
+        """
+        if not self._phases:
+            with together(scene.grid.comm):
+                if scene.grid.comm.rank == 0:
+                    self._open(scene, motion)
+            self.resumes = scene.grid.comm.bcast(self.resumes)
+        before = sum(name.partition("-")[0] == kind for name in self._phases)
+        self._phases.append(f"{kind}-{before + 1}" if before else kind)
+        return Phase(self, len(self._phases), self._phases[-1], scene, motion, end, unit)
+
+    def _open(self, scene: Scene, motion: Dynamics | None) -> None:
+        result_folder(self.folder)
+        run = self.folder / RUN
+        if run.exists() or self.checkpoints:
+            if self.existing == "stop":
+                raise InputError(
+                    f"Results('{self.folder}'): the folder holds a run{self._reached()}. Expected "
+                    "another folder, existing='resume' to go on with it, or existing='replace' to "
+                    "write over it"
+                )
+            self.resumes = self.existing == "resume" and bool(self.checkpoints)
+            if not self.resumes:
+                self._clear()
+        result_folder(self.folder / CHECKPOINTS)
+        if not self.resumes:
+            provenance.write(self.folder, scene, motion)
+
+    def _reached(self) -> str:
+        """How far the run in the folder has come, for a message."""
+        files = self.checkpoints
+        return f", last checkpoint '{files[-1].name}'" if files else ""
+
+    def _clear(self) -> None:
+        """Remove what a run wrote here, and nothing else."""
+        try:
+            for name in (RUN, LOG, "form.py", "script.py"):
+                (self.folder / name).unlink(missing_ok=True)
+            for place in self.folder.iterdir():
+                if place.name == CHECKPOINTS or place.name.partition("-")[0] in KINDS:
+                    shutil.rmtree(place)
+        except OSError as error:
+            raise OutputError(
+                f"'{error.filename}' cannot be removed: {error.strerror}: expected a folder that can be "
+                "written"
+            ) from error
+
+    def note(self, phase: str, facts: Mapping[str, Any]) -> None:
+        """Write what is known of a phase into run.json; a call for the first rank."""
+        run = self.folder / RUN
+        try:
+            known = json.loads(run.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            known = {}
+        known.setdefault("phases", {})[phase] = dict(facts)
+        with whole_file(run) as part:
+            part.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
+
+
+class Unwatched:
+    """A phase of a run that nothing observes.
+
+    Args:
+        unit: Of times or shares, for messages.
+    """
+
+    #: Whether it had come to its end in an earlier run.
+    finished = False
+
+    def __init__(self, unit: str) -> None:
+        self.unit = unit
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def begin(self, pace: Pace, steps: list[Step]) -> None:
+        """Before the first step; a run that is gone on with gets its pace and its steps."""
+
+    def accepted(self, solution: Solution, pace: Pace, steps: list[Step], *, last: bool) -> None:
+        """After an accepted step."""
+
+    def halved(self, error: Exception, pace: Pace) -> None:
+        """After a step that failed."""
+
+
+def phase(
+    results: Results | None,
+    kind: str,
+    scene: Scene,
+    motion: Dynamics | None,
+    end: float,
+    unit: str,
+) -> Unwatched:
+    """The next phase of a run, with results or without; see `Results.phase`."""
+    if results is None:
+        return Unwatched(unit)
+    if not isinstance(results, Results):
+        raise InputError(f"results = {results!r}: expected tawami.Results(folder, ...), or None")
+    return results.phase(kind, scene, motion, end, unit)
+
+
+class Phase(Unwatched):
+    """A phase of a run with results; made by `Results.phase`."""
+
+    def __init__(
+        self,
+        results: Results,
+        number: int,
+        name: str,
+        scene: Scene,
+        motion: Dynamics | None,
+        end: float,
+        unit: str,
+    ) -> None:
+        super().__init__(unit)
+        self.results, self.number, self.name = results, number, name
+        self.scene, self.motion, self.end = scene, motion, end
+        self._comm = scene.grid.comm
+        self._writes = self._comm.rank == 0
+        self._interruption = Interruption()
+        self._line = progress.Line(results.progress if self._writes else False)
+        self._open = ExitStack()
+        self._pace, self._steps = Pace(0.0, 0.0), list[Step]()
+        self._identity: dict[str, Any] = {}
+        self._stored, self._since, self._began = 0, monotonic(), monotonic()
+
+    def __enter__(self) -> Self:
+        with together(self._comm):
+            path = self.results.folder / LOG if self._writes else None
+            self._open.enter_context(progress.logged(path))
+        self._open.enter_context(self._interruption)
+        return self
+
+    def __exit__(self, kind: Any, error: BaseException | None, _: Any) -> None:
+        try:
+            # what fails on one rank alone must not wait for the others
+            alone = self._comm.size == 1 and isinstance(error, Exception)
+            if alone or isinstance(error, ConvergenceError | SingularError):
+                assert error is not None
+                self._line.end()
+                log.error("%s ended by %s: %s", self.name, type(error).__name__, error)
+                if len(self._steps) > self._stored:
+                    self._write_or_warn(finished=False)
+                    error.add_note(
+                        f"the state after the last accepted step, at {self._at}, is in "
+                        f"'{self.results.folder / CHECKPOINTS}'"
+                    )
+        finally:
+            self._line.end()
+            self._open.close()
+
+    @property
+    def _at(self) -> str:
+        return f"{self._pace.at:g} {self.unit}"
+
+    # -- begin ---------------------------------------------------------------
+
+    def begin(self, pace: Pace, steps: list[Step]) -> None:
+        """Go on from the newest checkpoint of the phase, or begin it."""
+        self._pace, self._steps = pace, steps
+        self._identity = _identity(self.scene, self.motion, self.name)
+        self.scene.attached.newton.keep()
+        folder, state = self.results.folder / self.name, self._found()
+        if state is not None:
+            self._restore(state)
+        if self.finished and not self._pace.at < self.end * (1 - 1e-12):
+            log.info("%s had come to its end at %s", self.name, self._at)
+            return
+        self.finished = False
+        with together(self._comm):
+            if self._writes:
+                result_folder(folder)
+                for path in self.results.checkpoints:
+                    if int(path.name[:2]) > self.number:
+                        path.unlink()
+        for k, output in enumerate(self.results.outputs):
+            known = None if state is None else state["outputs"][k]
+            output.begin(folder, self.scene, self.motion, known)
+        if state is None:
+            log.info("%s begins at %s, to %g", self.name, self._at, self.end)
+            self._look(None, last=False)
+        else:
+            log.info("%s goes on at %s, to %g", self.name, self._at, self.end)
+        self._stored = len(steps)
+        self._remaining = progress.Remaining(pace.at, self.end)
+        self._since = self._began = monotonic()
+
+    def _found(self) -> dict[str, Any] | None:
+        """The newest state of this phase that can be used; None if the phase is new."""
+        if not self.results.resumes:
+            return None
+        state, error = None, None
+        if self._writes:
+            for path in reversed(self._files()):
+                try:
+                    state = checkpoint.read(path, self._identity)
+                    break
+                except CheckpointError as problem:
+                    error = error or problem
+                    warnings.warn(
+                        f"{problem}. The one before it is tried", CheckpointWarning, stacklevel=2
+                    )
+        state, error = self._comm.bcast((state, error))
+        if state is None and error is not None:
+            raise CheckpointError(f"{error}. No other checkpoint of '{self.name}' can be used")
+        return state
+
+    def _files(self) -> list[Path]:
+        """Checkpoints of this phase, oldest first."""
+        start = f"{self.number:02d}-"
+        return [path for path in self.results.checkpoints if path.name.startswith(start)]
+
+    def _restore(self, state: Mapping[str, Any]) -> None:
+        self.scene.restore(state["scene"])
+        if self.motion is not None:
+            self.motion.restore(state["motion"])
+        for name, value in state["pace"].items():
+            setattr(self._pace, name, value)
+        self._steps[:] = pace.unpacked(state["steps"])
+        self.finished = state["finished"]
+
+    # -- steps ---------------------------------------------------------------
+
+    def accepted(self, solution: Solution, pace: Pace, steps: list[Step], *, last: bool) -> None:
+        """Let the outputs look, write a checkpoint where one is due, end if a signal asks for it."""
+        step = steps[-1]
+        momentum, volume = step.history[-1]
+        measures = f"{momentum:.1e}" if volume is None else f"{momentum:.1e}, {volume:.1e}"
+        count = len(solution.number)
+        log.info(
+            "%s: step %d to %s, size %g, %d Newton iterations to %s, %d particles",
+            self.name, len(steps), self._at, step.size, step.iterations, measures, count,
+        )  # fmt: skip
+        parts = (
+            f"{self.name} {pace.at:.6g} of {self.end:g} {self.unit}",
+            f"step {len(steps)} ({step.size:.3g})",
+            f"Newton {step.iterations}: {measures}",
+            f"{count} particles",
+            self._remaining.text(pace.at),
+        )
+        self._line.show(" | ".join(part for part in parts if part), now=last)
+        self._look(solution, last=last)
+        stop, due = self._comm.allreduce(
+            (self._interruption.signal is not None, self._due()), op=_either
+        )
+        if last:
+            self._write(finished=True)
+            self._finish()
+        elif stop:
+            self._write(finished=False)
+        elif due:
+            self._write_or_warn(finished=False)
+        if stop:
+            self._stop()
+
+    def halved(self, error: Exception, pace: Pace) -> None:
+        """Say that a step failed; end if a signal asks for it."""
+        log.warning("%s: a step from %s failed, now %g: %s", self.name, self._at, pace.size, error)
+        if self._comm.allreduce(self._interruption.signal is not None, op=_any):
+            if len(self._steps) > self._stored:
+                self._write(finished=False)
+            self._stop()
+
+    def _look(self, solution: Solution | None, *, last: bool) -> None:
+        moment = Moment(self.scene, self.motion, solution, self._pace.at, len(self._steps), last)
+        for output in self.results.outputs:
+            output.look(moment)
+
+    def _due(self) -> bool:
+        every, minutes = self.results.checkpoint_steps, self.results.checkpoint_minutes
+        by_number = every is not None and len(self._steps) % every == 0
+        return by_number or (
+            self._writes and minutes is not None and monotonic() - self._since >= 60 * minutes
+        )
+
+    # -- checkpoints ---------------------------------------------------------
+
+    def _write(self, *, finished: bool) -> None:
+        """Write a checkpoint; a call for all ranks.
+
+        Raises:
+            OutputError: It cannot be written.
+        """
+        state = {
+            "scene": self.scene.state(),
+            "motion": None if self.motion is None else self.motion.state(),
+            "pace": asdict(self._pace),
+            "steps": pace.packed(self._steps),
+            "outputs": [output.state() for output in self.results.outputs],
+            "finished": finished,
+        }
+        name = "end" if finished else f"{len(self._steps):08d}"
+        path = self.results.folder / CHECKPOINTS / f"{self.number:02d}-{self.name}-{name}.npz"
+        with together(self._comm):
+            if self._writes:
+                checkpoint.write(path, self._identity, state)
+                for old in self._files()[: -self.results.keep]:
+                    old.unlink()
+        self._stored, self._since = len(self._steps), monotonic()
+        log.info("%s: checkpoint '%s'", self.name, path.name)
+
+    def _write_or_warn(self, *, finished: bool) -> None:
+        """As :meth:`_write`; a run need not end because it cannot be kept."""
+        try:
+            self._write(finished=finished)
+        except OutputError as error:
+            self._since = monotonic()
+            if self._writes:
+                warnings.warn(
+                    f"no checkpoint: {error}. The run goes on; the one before it is still there",
+                    CheckpointWarning,
+                    stacklevel=3,
+                )
+
+    def _finish(self) -> None:
+        log.info("%s came to its end at %s in %d steps", self.name, self._at, len(self._steps))
+        if self._writes:
+            seconds = monotonic() - self._began
+            facts = {
+                "reached": self._pace.at,
+                "steps": len(self._steps),
+                "seconds": seconds,
+                "finished": datetime.now(UTC).isoformat(timespec="seconds"),
+            }
+            self.results.note(self.name, facts)
+
+    def _stop(self) -> None:
+        """End as the signal asks for, on all ranks."""
+        self._line.end()
+        known = self._comm.allgather(self._interruption.signal)
+        self._interruption.signal = next(one for one in known if one is not None)
+        text = f"{self.name}: stopped by {self._interruption.signal.name} at {self._at}"
+        log.warning(text)
+        if self._writes:
+            advice = f"go on with: tawami resume {self.results.folder}"
+            print(f"{text}; {advice}", file=self._line.stream, flush=True)
+        self._interruption.end()
+
+
+def _either(a: tuple[bool, bool], b: tuple[bool, bool]) -> tuple[bool, bool]:
+    return a[0] or b[0], a[1] or b[1]
+
+
+def _any(a: bool, b: bool) -> bool:
+    return a or b
+
+
+def _identity(scene: Scene, motion: Dynamics | None, name: str) -> dict[str, Any]:
+    """What a phase starts from, as far as it decides what comes out; a call for all ranks."""
+    grid, form, supports = scene.grid, scene.form, scene.supports
+    arrays = placement.gathered(grid, scene.particles)
+    digest = hashlib.sha256(b"".join(array.tobytes() for array in arrays.values())).hexdigest()
+    facts = {
+        "phase": name,
+        "grid": [list(grid.origin), grid.h, list(grid.cells)],
+        "basis": scene.basis,
+        "form": form.name,
+        "form source": hashlib.sha256(form.source.encode()).hexdigest(),
+        "parameters": scene.parameters | scene.options,
+        "laws": scene.law_texts,
+        "density": scene.densities,
+        "numerics": asdict(scene.numerics) | {"assembly": ""},
+        "number of particles": scene.num_particles,
+        "supports": [
+            [str(s.given), s.component, _text(s.value), _text(s.velocity), _text(s.between)]
+            for s in supports.all
+        ]
+        + [["wall", w.edge, w.friction, w.separates] for w in supports.walls],
+        "loads": [
+            list(map(float, scene.loads.gravity)),
+            *([t.edge, *map(_text, t.value), _text(t.between)] for t in scene.loads.tractions),
+            *(hashlib.sha256(f.force.tobytes()).hexdigest() for f in scene.loads.forces),
+        ],
+        "motion": None
+        if motion is None
+        else [motion.gamma, _text(motion.damping), str(motion.transfer)],
+        "particles at the start": digest,
+    }
+    identity: dict[str, Any] = json.loads(json.dumps(facts))
+    return identity
+
+
+def _text(value: Any) -> str:
+    """A number, or that it is a function: what a function gives cannot be compared."""
+    return "a function" if callable(value) else repr(value)
