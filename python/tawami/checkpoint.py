@@ -6,6 +6,7 @@ the rest of it, and what the run is (`identity`), as JSON. The archive's checksu
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import zipfile
@@ -36,8 +37,10 @@ def write(path: Path, identity: Mapping[str, Any], state: Mapping[str, Any]) -> 
     """
     arrays: dict[str, Any] = {}
     about = {"format": FORMAT, "identity": identity, "state": _packed(state, "", arrays)}
+    archive = io.BytesIO()  # NumPy leaves an archive open that it cannot write to the end
+    np.savez(archive, **{ABOUT: np.frombuffer(json.dumps(about).encode(), np.uint8)}, **arrays)
     with whole_file(path) as part, part.open("wb") as file:
-        np.savez(file, **{ABOUT: np.frombuffer(json.dumps(about).encode(), np.uint8)}, **arrays)
+        file.write(archive.getbuffer())
         file.flush()
         os.fsync(file.fileno())
 

@@ -155,7 +155,8 @@ class Newton:
         return sum(array.itemsize * int(np.prod(array.shape[1:])) for array in arrays)
 
     def keep(self) -> None:
-        """Keep what :meth:`state` needs."""
+        """Keep what :meth:`state` needs from now on; nothing is taken over from earlier steps."""
+        self._stored = None
         self._linear.keep()
 
     def state(self) -> dict[str, Any] | None:

@@ -104,10 +104,11 @@ def logged(path: Path | None) -> Iterator[None]:
     if path is None:
         yield
         return
+    shown = level()
     handlers: list[logging.Handler] = [logging.FileHandler(path, encoding="utf-8")]
     if VARIABLE in os.environ:
         handlers.append(logging.StreamHandler())
-        handlers[-1].setLevel(level())
+        handlers[-1].setLevel(shown)
     before, show = (log.level, log.propagate), warnings.showwarning
 
     def noted(message: Any, category: Any, *rest: Any, **more: Any) -> None:
@@ -117,7 +118,7 @@ def logged(path: Path | None) -> Iterator[None]:
     for handler in handlers:
         handler.setFormatter(FORM)
         log.addHandler(handler)
-    log.setLevel(min(logging.INFO, level()))
+    log.setLevel(min(logging.INFO, shown))
     log.propagate = False  # others configure the root logger, and would print every step
     warnings.showwarning = noted
     try:

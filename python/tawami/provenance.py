@@ -1,8 +1,9 @@
 """Stand-in until merged."""
 
 import json
+from typing import Any
 
 
-def write(folder: object, scene: object, motion: object) -> None:
+def write(folder: Any, scene: object, motion: object) -> None:
     """Stand-in."""
     (folder / "run.json").write_text(json.dumps({"phases": {}}))

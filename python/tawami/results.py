@@ -201,7 +201,7 @@ class Unwatched:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         pass
 
     def begin(self, pace: Pace, steps: list[Step]) -> None:
@@ -262,7 +262,7 @@ class Phase(Unwatched):
         self._open.enter_context(self._interruption)
         return self
 
-    def __exit__(self, kind: Any, error: BaseException | None, _: Any) -> None:
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         try:
             # what fails on one rank alone must not wait for the others
             alone = self._comm.size == 1 and isinstance(error, Exception)
@@ -307,11 +307,13 @@ class Phase(Unwatched):
         for k, output in enumerate(self.results.outputs):
             known = None if state is None else state["outputs"][k]
             output.begin(folder, self.scene, self.motion, known)
+        verb = "begins" if state is None else "goes on"
+        log.info(
+            "%s %s at %s, to %g: tawami on %d ranks",
+            self.name, verb, self._at, self.end, self._comm.size,
+        )  # fmt: skip
         if state is None:
-            log.info("%s begins at %s, to %g", self.name, self._at, self.end)
             self._look(None, last=False)
-        else:
-            log.info("%s goes on at %s, to %g", self.name, self._at, self.end)
         self._stored = len(steps)
         self._remaining = progress.Remaining(pace.at, self.end)
         self._since = self._began = monotonic()
@@ -320,7 +322,8 @@ class Phase(Unwatched):
         """The newest state of this phase that can be used; None if the phase is new."""
         if not self.results.resumes:
             return None
-        state, error = None, None
+        state: dict[str, Any] | None = None
+        error: CheckpointError | None = None
         if self._writes:
             for path in reversed(self._files()):
                 try:

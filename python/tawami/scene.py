@@ -626,6 +626,7 @@ class Scene(contents.Elsewhere):
         self.supports.restore(state["supports"])
         self.loads.restore(state["loads"])
         self.attached = self._attach(location)
+        self.attached.newton.keep()
         self.attached.newton.restore(state["newton"])
 
     def _settled(self, problem: Callable[[], Problem]) -> tuple[Converged, Problem]:

@@ -57,7 +57,7 @@ class Solver:
         self._handles.free()
 
     def keep(self) -> None:
-        """Keep what :meth:`state` gives."""
+        """Keep what :meth:`state` gives from now on; nothing is taken over from earlier solves."""
 
     def state(self) -> dict[str, Any] | None:
         """What later solves take from earlier ones; None if that is nothing."""
