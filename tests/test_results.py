@@ -21,6 +21,7 @@ from mpi4py import MPI
 
 import tawami
 from tawami import checkpoint, progress
+from tawami import results as results_module
 from tawami.output import Output
 from tawami.ranks import mpirun
 
@@ -89,6 +90,7 @@ def drive(folder, results, *, form, law, transfer, leaving, each):
     if not finite:
         scene.hold((0.0, -0.75), "x", velocity=lambda t: 0.02 * t)
     motion = tawami.Dynamics(scene, velocity=(0.3, 0.0), transfer=transfer, gamma=0.6)
+    scene.particles.displacement[:, 0] += 1e-7  # between two phases
     steps.append(motion.run(0.05, 0.004, results=results, each=each))
     steps.append(motion.run(0.08, 0.005, results=results, each=each))
     return {
@@ -245,7 +247,7 @@ def test_no_damage_to_a_file_is_missed(tmp_path, data):
         ({"density": 900.0}, "density"),
         ({"alpha": 0.02}, "parameters"),
         ({"g": -9.8}, "loads"),
-        ({"shift": 0.01}, "particles at the start"),
+        ({"shift": 0.01}, "'x' of the particles at its start"),
     ],
 )
 def test_a_checkpoint_of_another_run_is_refused(stopped, changed, named):
@@ -259,7 +261,7 @@ def test_a_checkpoint_of_another_run_is_refused(stopped, changed, named):
 def test_another_motion_is_refused_too(stopped):
     with (
         pytest.warns(tawami.CheckpointWarning),
-        pytest.raises(tawami.CheckpointError, match="particles at the start"),
+        pytest.raises(tawami.CheckpointError, match="'velocity' of the particles at its start"),
     ):
         run(stopped, velocity=(1.1, 0.0))
 
@@ -325,6 +327,19 @@ def test_a_ramp_that_failed_goes_on_where_it_was(tmp_path):
     assert [step.end for step in steps] == [0.125 * k for k in range(1, 9)]
     weight = scene.solve().reaction("bottom")[1]
     assert weight == pytest.approx(0.25 * 1000 * 9.81, rel=1e-4)
+
+
+def test_checkpoints_by_the_clock(tmp_path, monkeypatch):
+    """Three seconds a step on this clock: every five steps a quarter of a minute has gone by."""
+    clock = iter(np.arange(0.0, 1e4, 1.5))
+    monkeypatch.setattr(results_module, "monotonic", lambda: next(clock))
+    written = []
+    monkeypatch.setattr(
+        results_module.checkpoint, "write", lambda path, *_: written.append(path.name)
+    )
+    run(tmp_path / "run", checkpoint_steps=None, checkpoint_minutes=0.2)
+    assert 2 <= len(written) <= 5
+    assert written[-1] == "01-motion-end.npz"
 
 
 def limited(size, what):
@@ -482,7 +497,7 @@ def main(folder: str) -> None:
     """Slow enough to be stopped; where the particles are in the end, into a file."""
     results = results_of(folder, checkpoint_steps=5)
     motion = tawami.Dynamics(block(), velocity=(1.0, 0.0))
-    motion.run(0.4, 0.002, results=results, each=lambda _: time.sleep(0.01))
+    motion.run(0.3, 0.002, results=results, each=lambda _: time.sleep(0.01))
     if MPI.COMM_WORLD.size == 1:
         np.save(Path(folder) / "end.npy", motion.scene.particles.rows())
 
