@@ -15,8 +15,8 @@ from ufl import SpatialCoordinate, div, dot, grad, inner, sym
 
 import tawami
 from tawami.density import ParticleScalar
+from tawami.errors import InexactSumWarning
 from tawami.formulation import Form, shipped
-from tawami.symbols import InexactSumWarning
 
 # A form in a driver script: this module is one. It is the shipped u_epsv, written differently.
 fields = {"v": ("displacement", "w"), "theta": ("volumetric_strain", "r")}
@@ -199,7 +199,7 @@ def test_wrong_declarations(make, message):
         make()
 
 
-@pytest.mark.filterwarnings("ignore::tawami.symbols.InexactSumWarning")
+@pytest.mark.filterwarnings("ignore::tawami.errors.InexactSumWarning")
 @pytest.mark.parametrize(
     ("function", "message"),
     [

@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 import tawami
 from tawami import _rust
-from tawami.symbols import InexactSumWarning
+from tawami.errors import InexactSumWarning
 
 ELASTIC = {"E": 1e6, "nu": 0.3}
 

@@ -7,6 +7,7 @@ from tawami.errors import (
     ConvergenceError,
     EnergyWarning,
     FormError,
+    InexactSumWarning,
     InputError,
     InstabilityWarning,
     LockingWarning,
@@ -17,8 +18,11 @@ from tawami.errors import (
     QuadratureWarning,
     SingularError,
     SupportError,
+    TawamiDeprecationWarning,
     TawamiError,
+    TawamiWarning,
 )
+from tawami.form_check import FormReport, check_form
 from tawami.formulation import Form
 from tawami.grid import Grid
 from tawami.materials import (
@@ -42,7 +46,9 @@ __all__ = [
     "EnergyWarning",
     "Form",
     "FormError",
+    "FormReport",
     "Grid",
+    "InexactSumWarning",
     "InputError",
     "InstabilityWarning",
     "LockingWarning",
@@ -59,8 +65,11 @@ __all__ = [
     "Solution",
     "Study",
     "SupportError",
+    "TawamiDeprecationWarning",
     "TawamiError",
+    "TawamiWarning",
     "box",
+    "check_form",
     "drucker_prager",
     "linear_elastic",
     "mohr_coulomb",

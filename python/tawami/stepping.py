@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from tawami import inputs
+from tawami.deprecation import renamed_parameter
 from tawami.errors import ConvergenceError, InputError, SingularError
 from tawami.newton import History
 from tawami.scene import Scene
@@ -123,7 +124,8 @@ def ramp(
             scene.accept(reached)
 
 
-def settle(scene: Scene, *, tolerance: float = 1e-10, most: int = 200) -> list[Step]:
+@renamed_parameter("most", "max_resets", goes_in="0.3")
+def settle(scene: Scene, *, tolerance: float = 1e-10, max_resets: int = 200) -> list[Step]:
     """Solve under the present loads, the grid reset each time, until nothing is out of balance.
 
     With each reset the particles meet other functions, and what was in balance is so no longer.
@@ -131,10 +133,10 @@ def settle(scene: Scene, *, tolerance: float = 1e-10, most: int = 200) -> list[S
     Args:
         scene: A scene of finite strain.
         tolerance: Of the momentum measure right after a reset.
-        most: Number of solves after which it is given up.
+        max_resets: Number of solves after which it is given up.
 
     Raises:
-        ConvergenceError: Not within `most` solves.
+        ConvergenceError: Not within `max_resets` solves.
     """
     tolerance = inputs.number("tolerance", tolerance, low=1e-14, high=0.1)
     if scene.form.strain != "finite":
@@ -143,13 +145,14 @@ def settle(scene: Scene, *, tolerance: float = 1e-10, most: int = 200) -> list[S
         )
     steps = list[Step]()
     with scene.tolerance_of(max(0.1 * tolerance, 1e-14)):
-        for _ in range(inputs.whole_number("most", most, low=1)):
+        for _ in range(inputs.whole_number("max_resets", max_resets, low=1)):
             solution = scene.solve()
             steps.append(Step(1.0, 0.0, solution.history, solution.krylov))
             if solution.history[0][0] < tolerance:
                 return steps
     raise ConvergenceError(
-        f"settle: {steps[-1].history[0][0]:.1e} of the forces are out of balance after {most} resets of "
-        f"the grid: expected less than {tolerance:g}; allow more resets, or a larger tolerance",
+        f"settle: {steps[-1].history[0][0]:.1e} of the forces are out of balance after {max_resets} "
+        f"resets of the grid: expected less than {tolerance:g}; allow more resets, or a larger "
+        "tolerance",
         steps[-1].history,
     )
