@@ -17,7 +17,7 @@ from typing import Any
 from tawami import launch
 from tawami.errors import InputError, OutputError, TawamiError
 
-CODES = "exit codes: 0 done; 1 what was run or checked failed; 2 not possible as given; 130 Ctrl-C"
+CODES = "Exit codes: 0 done; 1 what was run or checked failed; 2 not possible as given; 130 Ctrl-C"
 TEMPLATES = Path(__file__).parent / "templates"
 LEVELS = ("debug", "info", "warning", "error")
 
@@ -64,7 +64,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="tawami",
         description="Implicit material point method with the mixed u-eps_v formulation: runs driver "
         "scripts, on one rank or several, and what goes with them.",
-        epilog=f"tawami COMMAND --help says more. {CODES}.",
+        epilog=f"tawami COMMAND --help says more of each. {CODES}.",
         allow_abbrev=False,
     )
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)

@@ -210,8 +210,12 @@ def _displaced(form: Form, given: Settings) -> Found:
     yield _judged(scenes.displaced(form, given), UNIFORM, "error of the stress, border displaced")
 
 
+def _has_edge_term(form: Form, given: Settings) -> bool:
+    return compile_form(MPI.COMM_SELF, form, form.settings(given)[1]).edges is not None
+
+
 def _compressed(form: Form, given: Settings) -> Found:
-    if compile_form(MPI.COMM_SELF, form, form.settings(given)[1]).edges is None:
+    if not _has_edge_term(form, given):
         yield "note", "no term - dot(t, w) * ds: traction(...) will be refused"
         return
     cell = form.kinematics == "cell"
@@ -230,6 +234,9 @@ def _paths(form: Form, given: Settings) -> Found:
 
 
 def _locking(form: Form, given: Settings) -> Found:
+    if not _has_edge_term(form, given):
+        yield "not tried", "it needs a term - dot(t, w) * ds"
+        return
     error = scenes.bent_beam(form, given)
     words = f"mean stress of a bent beam, K/mu = 1e4: {100 * error:.2g} % off"
     yield ("ok", words) if error < BEAM else ("note", f"{words}: it locks")

@@ -17,7 +17,8 @@ from mpi4py import MPI
 from tawami import _rust
 from tawami.basis import Basis
 from tawami.body import Body, box
-from tawami.errors import InputError
+from tawami.boundary import Component
+from tawami.errors import InputError, SingularError
 from tawami.formulation import Form
 from tawami.grid import EDGES, Grid
 from tawami.materials import drucker_prager, linear_elastic, von_mises
@@ -27,6 +28,7 @@ Array = npt.NDArray[np.float64]
 Settings = dict[str, Any]
 Law = Callable[[_rust.Material], _rust.Material]
 
+COMPONENTS: tuple[Component, ...] = ("x", "y")
 K, MU = 5.0, 2.0
 #: Inwards, so that no particle leaves the grid.
 GRADIENT = np.array([[-0.05, 0.02], [0.01, -0.03]])
@@ -130,13 +132,16 @@ def stress_of(strain: Array) -> Array:
     return np.append(stress, 2 * MU * strain[0, 1])
 
 
+def _linear(slope: Array) -> Callable[[Array, Array], Array]:
+    return lambda x, y: slope[0] * x + slope[1] * y
+
+
 def displaced(form: Form, given: Settings) -> float:
     """A border displaced linearly gives one stress everywhere: largest error of it."""
     scene = _filled(form, given)
     for edge in EDGES:
-        for axis, component in enumerate("xy"):
-            g = GRADIENT[axis]
-            scene.fix(edge, component, lambda x, y, g=g: g[0] * x + g[1] * y)  # type: ignore[arg-type]
+        for axis, component in enumerate(COMPONENTS):
+            scene.fix(edge, component, _linear(GRADIENT[axis]))
     scene.solve()
     strain = (GRADIENT + GRADIENT.T) / 2
     if form.strain == "finite":
@@ -198,6 +203,7 @@ def inf_sup(form: Form, given: Settings) -> float:
 
     Raises:
         InputError: A form without a field for the volume.
+        SingularError: One that does not resist a change of shape.
     """
     if len(form.fields) == 1:
         raise InputError(f"form {form.name} has no field for the volume")
@@ -215,7 +221,14 @@ def inf_sup(form: Form, given: Settings) -> float:
     A, B = tangent[of_u][:, of_u], tangent[~of_u][:, of_u]
     # in p = K eps_v, and each equation of the volume without its K
     to_p = RATIO if form.kinematics == "mixed" else 1.0
-    schur = B @ np.linalg.solve(A, tangent[of_u][:, ~of_u]) - tangent[~of_u][:, ~of_u]
+    try:
+        lifted = np.linalg.solve(A, tangent[of_u][:, ~of_u])
+    except np.linalg.LinAlgError:
+        raise SingularError(
+            f"form {form.name}: displacements of a block that is held all around are free: expected a "
+            "term of the deviator, as sum_p(sigma, grad(w)) has it"
+        ) from None
+    schur = B @ lifted - tangent[~of_u][:, ~of_u]
     schur = (schur + schur.T) / (2 * to_p**2)
     neighbours = np.eye(n + 1, k=1) + np.eye(n + 1, k=-1)
     line = grid.h / 6 * (np.diag([2.0, *[4.0] * (n - 1), 2.0]) + neighbours)

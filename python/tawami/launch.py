@@ -139,14 +139,14 @@ def _on_ranks(script: Script, number: int) -> int:
         )
     own = [sys.executable, "-m", "tawami", "run", *script.command, "--", *script.arguments]
     command, variables = ranks.mpirun(number, own)
-    process = subprocess.Popen(command, env=variables)
-    while True:
+    process, interrupted = subprocess.Popen(command, env=variables), False
+    while process.poll() is None:
         try:
-            code = process.wait()
-            break
+            process.wait()
         except KeyboardInterrupt:  # mpirun got it too, and ends its ranks
-            continue
-    if code == -signal.SIGINT:
+            interrupted = True
+    code = int(process.returncode)
+    if interrupted or code == -signal.SIGINT:
         return INTERRUPTED
     return 128 - code if code < 0 else code
 

@@ -44,13 +44,13 @@ def main() -> None:
         checkpoint_steps=50,
     )
 
-    # a plate holds the right side while the weight comes up, without inertia; then it is taken away
-    corners = [(0.4, y) for y in (0.0, 0.1, 0.2)]
-    for corner in corners:
-        scene.hold(corner, "x")
+    # a gate holds the right side while the weight comes up, without inertia; then it is taken away
+    gate = [(0.4, 0.025 * k) for k in range(9)]
+    for point in gate:
+        scene.hold(point, "x")
     tawami.ramp(scene, 0.1, results=results)
-    for corner in corners:
-        scene.release(corner)
+    for point in gate:
+        scene.release(point)
 
     motion = tawami.Dynamics(scene)
     print(motion.header())
