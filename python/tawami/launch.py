@@ -95,7 +95,7 @@ def _check_module(name: str) -> None:
         if error.name is None or not f"{name}.".startswith(f"{error.name}."):
             raise  # something that the package itself imports
         found = None
-    except ValueError:
+    except (ImportError, ValueError):  # a relative name, an empty one
         found = None
     finally:
         sys.path.pop(0)
