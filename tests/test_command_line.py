@@ -268,7 +268,7 @@ def test_plot(capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "tawami.plot", stand_in)
     assert command_line.main(["plot", "pile"]) == 0
     assert command_line.main(["plot", "pile", "--quantity", "velocity", "--movie", "none"]) == 0
-    assert asked == [("pile", "mean stress", "gif"), ("pile", "velocity", "none")]
+    assert asked == [("pile", "mean stress", "gif"), ("pile", "velocity", None)]
     assert capsys.readouterr().out.splitlines()[:2] == ["pile/a.png", "pile/b.gif"]
     assert refused(capsys, "plot", "empty") == "tawami plot: 'empty' holds no results\n"
 

@@ -148,7 +148,7 @@ right = symbols.Symbols._direction
         (tawami.Form(ALONE, "displacement", lambda u: 3.0), "arguments", "expected a UFL form"),
         (
             tawami.Form(
-                ALONE, "displacement", None, parameters={"a": {"default": -1, "minimum": 0}}
+                ALONE, "displacement", lambda w: 0, parameters={"a": {"default": -1, "minimum": 0}}
             ),
             "parameters",
             "a = -1: expected",

@@ -233,7 +233,8 @@ def _resume(asked: argparse.Namespace) -> int:
 
 def _plot(asked: argparse.Namespace) -> int:
     plot = importlib.import_module("tawami.plot")  # here: it needs matplotlib
-    for path in plot.plot(asked.folder, quantity=asked.quantity, movie=asked.movie):
+    movie = None if asked.movie == "none" else asked.movie
+    for path in plot.plot(asked.folder, quantity=asked.quantity, movie=movie):
         print(path)
     return 0
 
