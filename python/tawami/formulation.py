@@ -34,12 +34,12 @@ from __future__ import annotations
 import functools
 import importlib.util
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from numbers import Real
 from pathlib import Path
 from types import ModuleType
-from typing import Any, NoReturn
+from typing import Any
 
 from tawami.density import COMPONENTS, LAW
 from tawami.errors import FormError, InputError
@@ -95,12 +95,18 @@ class Form:
     name: str = "of the driver script"
 
     def __post_init__(self) -> None:
-        self._check_types()
+        for name, declared in self.fields.items():
+            if isinstance(declared, str) or len(declared) != 2:
+                self._fail(f"field '{name}' is {declared!r}: expected (kind, test function)")
+        for name, limits in self.parameters.items():
+            if "default" not in limits:
+                self._fail(f"parameter '{name}' has no \"default\"")
         names = [*self.fields, *(test for _, test in self.fields.values())]
         names += [*self.parameters, *self.options, *RESERVED]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             self._fail(f"{listed(twice)} stands for two things: expected another name for one")
+        self._check_limits()
         kinds = [kind for kind, _ in self.fields.values()]
         for name, (kind, _) in self.fields.items():
             if kind not in KINDS:
@@ -121,45 +127,7 @@ class Form:
                 f"order; it declares {listed(kinds)}"
             )
 
-        if not callable(self.residual):
-            self._fail(f"residual = {self.residual!r}: expected a function that returns a UFL form")
-
-    def _check_types(self) -> None:
-        """Whether each declaration is of the kind that it must be, before they are compared."""
-        for what in ("fields", "parameters", "options"):
-            declared = getattr(self, what)
-            if not isinstance(declared, Mapping) or not _are_names(declared):
-                self._fail(f"{what} = {declared!r}: expected a dictionary from names")
-        for name, declared in self.fields.items():
-            if not _are_names(declared) or len(declared) != 2:
-                self._fail(f"field '{name}' is {declared!r}: expected (kind, test function)")
-        for name, choices in self.options.items():
-            if not _are_names(choices) or not choices:
-                self._fail(f"option '{name}' is {choices!r}: expected its values, default first")
-        for name, limits in self.parameters.items():
-            self._check_limits(name, limits)
-        for what in ("kinematics", "strain"):
-            if not isinstance(getattr(self, what), str):
-                self._fail(f"{what} = {getattr(self, what)!r}: expected a name")
-        if not _are_names(self.whole_cells):
-            self._fail(f"whole_cells = {self.whole_cells!r}: expected a tuple of options")
-
-    def _check_limits(self, name: str, limits: Any) -> None:
-        """Whether a parameter is declared as {"default": ..., ...}, with numbers."""
-        if not isinstance(limits, Mapping):
-            self._fail(f"parameter '{name}' is {limits!r}: expected {{\"default\": ...}}")
-        if "default" not in limits:
-            self._fail(f"parameter '{name}' has no \"default\"")
-        unknown = [key for key in limits if key not in LIMITS]
-        if unknown:
-            self._fail(f"parameter '{name}' has {listed(unknown)}: expected among {listed(LIMITS)}")
-        for key, value in limits.items():
-            several = key == "maximum" and isinstance(value, Mapping)
-            for one in value.values() if several else [value]:
-                if not isinstance(one, Real) or math.isnan(one):
-                    self._fail(f"parameter '{name}': \"{key}\" is {value!r}: expected a number")
-
-    def _fail(self, message: str) -> NoReturn:
+    def _fail(self, message: str) -> None:
         raise FormError(f"form {self.name}: {message}")
 
     @staticmethod
@@ -213,6 +181,14 @@ class Form:
                 has = f"it has {listed(known)}" if known else "it has none"
                 raise InputError(f"form {self.name} has no parameter '{name}': {has}")
         return {n: self._limited(n, v, options) for n, v in parameters.items()}, options
+
+    def _check_limits(self) -> None:
+        """Whether parameters declare what is looked at only: another word would limit nothing."""
+        for name, limits in self.parameters.items():
+            unknown = [key for key in limits if key not in LIMITS]
+            if unknown:
+                expected = f"expected among {listed(LIMITS)}"
+                self._fail(f"parameter '{name}' declares {listed(unknown)}: {expected}")
 
     def unusual(self, parameters: Mapping[str, float]) -> list[str]:
         """What to say of parameters beyond their usual range."""
@@ -273,12 +249,6 @@ def _from_module(module: ModuleType, _residual: Any, name: str | None = None) ->
         whole_cells=getattr(module, "whole_cells", ()),
         name=name,
     )
-
-
-def _are_names(values: Any) -> bool:
-    """Whether it is a collection of texts, and no text itself."""
-    sequence = isinstance(values, Collection) and not isinstance(values, str | bytes)
-    return sequence and all(isinstance(value, str) for value in values)
 
 
 def listed(names: Any) -> str:
