@@ -36,8 +36,8 @@ def main() -> None:
     scene.wall("bottom", friction=0.5)
     scene.gravity((0.0, -9.81))
 
-    # what is written, and how often: particles for ParaView with what the scene has, a table with
-    # the energies of the motion, checkpoints to go on from; without inertia `every` is a share of the load
+    # what is written, and how often: particles for ParaView, a table, checkpoints to go on from; in the
+    # ramp below `every` is a share of the load, in the motion it is a time [s]
     results = tawami.Results(
         RESULTS,
         tawami.ParticleOutput(every=0.02),
