@@ -94,11 +94,11 @@ $(STAMPS)/debian: $(STAMPS)/rust Makefile
 PIP = $(PYTHON) -m pip install --quiet --disable-pip-version-check --constraint .venv/constraints.txt
 
 $(STAMPS)/python: .venv/constraints.txt pyproject.toml
-	$(PIP) 'maturin>=1.12.1,<2' 'meshio>=5.3' 'shapely>=2.1' 'matplotlib>=3.7' 'tqdm>=4.60' 'hypothesis>=6.80' 'pytest>=7.4'
+	$(PIP) 'maturin>=1.12.1,<2' 'meshio>=5.3' 'shapely>=2.1' 'matplotlib>=3.7' 'tqdm>=4.60' 'hypothesis>=6.80' 'mypy>=1.10' 'pytest>=7.4'
 	@mkdir -p $(STAMPS) && touch $@
 
 $(STAMPS)/lint: $(STAMPS)/python
-	$(PIP) 'ruff>=0.6' 'mypy>=1.10'
+	$(PIP) 'ruff>=0.6'
 	@mkdir -p $(STAMPS) && touch $@
 
 # Built for the processor it runs on, and again where that is another one.

@@ -81,19 +81,50 @@ def test_the_reference_blas_is_warned_of(monkeypatch, tmp_path):
     assert "Warning" not in environment.header()
 
 
-@pytest.mark.mpi
-def test_every_form_runs_from_an_installed_wheel(tmp_path):
-    """Built, installed in an environment that has only its dependencies, imported from there, run."""
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory) -> Path:
+    """The wheel, built and installed in an environment that has only its dependencies: its Python."""
+    folder = tmp_path_factory.mktemp("wheel")
     build = [sys.executable, "-m", "maturin", "build", "--release", "--locked", "--quiet"]
-    subprocess.run([*build, "--out", tmp_path], cwd=ROOT, check=True, capture_output=True)
-    (wheel,) = tmp_path.glob("tawami-*.whl")
-    home = tmp_path / "empty"
+    subprocess.run([*build, "--out", folder], cwd=ROOT, check=True, capture_output=True)
+    (wheel,) = folder.glob("tawami-*.whl")
+    home = folder / "empty"
     venv.create(home, system_site_packages=True, with_pip=True)
-    executable = str(home / "bin" / "python")
-    install = [executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", str(wheel)]
+    executable = home / "bin" / "python"
+    install = [executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", wheel]
     subprocess.run(install, check=True, capture_output=True)
     (packages,) = home.glob("lib/python*/site-packages")
     (packages / "dependencies.pth").write_text(sysconfig.get_path("platlib"))
+    return executable
+
+
+def without_path() -> dict[str, str]:
+    return {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+
+
+@pytest.mark.mpi
+def test_the_wheel_has_the_command_its_templates_and_types(installed, tmp_path):
+    command, environment = installed.parent / "tawami", without_path()
+    for kind in ("statics", "dynamics"):
+        subprocess.run(
+            [command, "new", kind, f"--{kind}"], cwd=tmp_path, env=environment, check=True
+        )
+        text = (tmp_path / f"{kind}.py").read_text()
+        assert text == (ROOT / f"python/tawami/templates/{kind}.py").read_text().replace(
+            "SCRIPT", kind
+        )
+    run = subprocess.run(
+        [command, "run", "statics.py"], cwd=tmp_path, env=environment, capture_output=True, text=True,
+        check=True,
+    )  # fmt: skip
+    assert "written to results/statics" in run.stdout
+    (package,) = installed.parent.parent.glob("lib/python*/site-packages/tawami")
+    assert (package / "py.typed").exists()
+    assert (package / "_rust.pyi").exists()
+
+
+@pytest.mark.mpi
+def test_every_form_runs_from_an_installed_wheel(installed, tmp_path):
     code = f"""
 import logging; logging.disable(logging.INFO)
 from mpi4py import MPI
@@ -108,8 +139,7 @@ for options in {[*FORMS.values(), *FINITE.values()]!r}:
     scene.traction("right", (0.0, -1.0))
     print(options["form"], scene.solve().displacement((2, 0.5))[1] < 0)
 """
-    environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
-    run = python(code, executable=executable, cwd=tmp_path, env=environment)
+    run = python(code, executable=str(installed), cwd=tmp_path, env=without_path())
     assert run.returncode == 0, run.stderr
     lines = run.stdout.splitlines()[-len(FORMS) - len(FINITE) :]  # MPI may have had its say before
     assert {line.split()[0] for line in lines} == set(shipped())

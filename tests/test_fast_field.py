@@ -18,9 +18,9 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_matrix, identity
 
 import tawami
+from tawami.errors import InexactSumWarning
 from tawami.fast_field import _selection
 from tawami.formulation import Form
-from tawami.symbols import InexactSumWarning
 
 SUPPORTS = {
     "edges": lambda s: (s.fix("left", "x"), s.fix("left", "y", lambda x, y: 1e-3 * y)),

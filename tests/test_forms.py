@@ -15,8 +15,8 @@ from ufl import SpatialCoordinate, div, dot, grad, inner, sym
 
 import tawami
 from tawami.density import ParticleScalar
+from tawami.errors import InexactSumWarning
 from tawami.formulation import Form, shipped
-from tawami.symbols import InexactSumWarning
 
 # A form in a driver script: this module is one. It is the shipped u_epsv, written differently.
 fields = {"v": ("displacement", "w"), "theta": ("volumetric_strain", "r")}
@@ -190,6 +190,10 @@ WRONG = [
     (lambda: form_of(None, kinematics="large"), "kinematics = 'large': expected one of"),
     (lambda: form_of(None, kinematics="mixed"), "'mixed' needs fields of the kinds"),
     (lambda: form_of(None, BOTH), "'displacement' needs fields of the kinds 'displacement'"),
+    (
+        lambda: form_of(None, parameters={"a": {"default": 1, "min": 0}}),
+        "'a' declares 'min': expected among 'default', 'minimum', 'maximum', 'usual'",
+    ),
 ]
 
 
@@ -199,7 +203,7 @@ def test_wrong_declarations(make, message):
         make()
 
 
-@pytest.mark.filterwarnings("ignore::tawami.symbols.InexactSumWarning")
+@pytest.mark.filterwarnings("ignore::tawami.errors.InexactSumWarning")
 @pytest.mark.parametrize(
     ("function", "message"),
     [

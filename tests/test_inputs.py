@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 import tawami
 from tawami import _rust
-from tawami.symbols import InexactSumWarning
+from tawami.errors import InexactSumWarning
 
 ELASTIC = {"E": 1e6, "nu": 0.3}
 
@@ -334,6 +334,8 @@ def test_internal_shapes_are_checked_at_the_border_and_never_panic():
     scene = tawami.Scene(grid, body_of(grid), tawami.linear_elastic(**ELASTIC))
     with pytest.raises(RuntimeError, match="wrong number of grid coefficients"):
         scene.attached.stage.commit(np.zeros(3), None)
+    with pytest.raises(tawami.InputError, match="coefficients: expected an array of real"):
+        scene.split(None)
     u, v = scene.split(np.zeros(scene.num_coefficients))
     data = np.zeros((len(scene.particles), 2))
     with pytest.raises(RuntimeError, match="outside the particle data"):

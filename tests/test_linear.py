@@ -11,8 +11,8 @@ from ufl import div, dot, grad, inner
 import tawami
 from cases.cantilever import mpm
 from tawami import linear
+from tawami.errors import InexactSumWarning
 from tawami.formulation import Form
-from tawami.symbols import InexactSumWarning
 
 
 def hardening(strength):

@@ -119,7 +119,7 @@ def test_settle_needs_a_grid_that_is_reset_and_says_when_it_gives_up():
     scene = block()
     scene.gravity((0.0, -20.0))
     with pytest.raises(tawami.ConvergenceError, match="out of balance after 1 resets of the grid"):
-        tawami.settle(scene, most=1)
+        tawami.settle(scene, max_resets=1)
     assert tawami.settle(scene)[-1].history[0][0] < 1e-10
 
 

@@ -31,9 +31,9 @@ from cases.cantilever import mpm
 from cases.cantilever.beam import NU, D, E, L, P
 from tawami.compilation import compile_form
 from tawami.environment import header, peak_memory
+from tawami.errors import InexactSumWarning
 from tawami.output import result_folder, whole_file
 from tawami.ranks import mpirun
-from tawami.symbols import InexactSumWarning
 
 #: Stages of a Newton step; not every path has all of them.
 STAGES = {

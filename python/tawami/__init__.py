@@ -9,6 +9,7 @@ from tawami.errors import (
     ConvergenceError,
     EnergyWarning,
     FormError,
+    InexactSumWarning,
     InputError,
     InstabilityWarning,
     LockingWarning,
@@ -19,8 +20,11 @@ from tawami.errors import (
     QuadratureWarning,
     SingularError,
     SupportError,
+    TawamiDeprecationWarning,
     TawamiError,
+    TawamiWarning,
 )
+from tawami.form_check import FormReport, check_form
 from tawami.formulation import Form
 from tawami.grid import Grid
 from tawami.materials import (
@@ -47,7 +51,9 @@ __all__ = [
     "EnergyWarning",
     "Form",
     "FormError",
+    "FormReport",
     "Grid",
+    "InexactSumWarning",
     "InputError",
     "InstabilityWarning",
     "LockingWarning",
@@ -65,8 +71,11 @@ __all__ = [
     "Solution",
     "Study",
     "SupportError",
+    "TawamiDeprecationWarning",
     "TawamiError",
+    "TawamiWarning",
     "box",
+    "check_form",
     "drucker_prager",
     "linear_elastic",
     "mohr_coulomb",

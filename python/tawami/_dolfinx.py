@@ -179,7 +179,7 @@ def _vertices(geometry: Any) -> Any:
 
 
 @functools.cache
-def _cache_directory() -> Path:
+def cache_directory() -> Path:
     """Kernels are compiled for this processor, so they are kept apart from those of others."""
     try:
         flags = next(s for s in Path("/proc/cpuinfo").read_text().splitlines() if "flags" in s)
@@ -232,7 +232,7 @@ COMPILER_FLAGS = (
 
 def compile_kernel(comm: Any, form: Any, kind: Kind = "cell") -> Kernel:
     """Compile a UFL form with one kind of integral; the result is cached on disk."""
-    settings = {"cffi_extra_compile_args": list(COMPILER_FLAGS), "cache_dir": _cache_directory()}
+    settings = {"cffi_extra_compile_args": list(COMPILER_FLAGS), "cache_dir": cache_directory()}
     with _quiet():
         compiled, module, _ = jit.ffcx_jit(comm, form, {}, settings)
     place = KINDS.index(kind)

@@ -1,4 +1,35 @@
-"""What can go wrong: every message says which input, what came, what was expected, what to do."""
+"""What can go wrong: every message says which input, what came, what was expected, what to do.
+
+A mistake in a driver script raises a `TawamiError`, whatever it passes to tawami; `tawami.run` and
+`tawami run` make one line of it. Anything else that comes out of tawami is a fault of tawami, or of
+a function of the driver script that tawami called.
+
+========================= ========================================================================
+TawamiError               base of all of them
+  InputError              an argument, a value or a file that is wrong
+    NotModelledError      an attribute that this scene does not have (also an AttributeError)
+  FormError               a weak form that cannot be used as it stands
+  SupportError            supports that leave a rigid motion free, contradict each other, miss the body
+  SingularError           a tangent that cannot be solved
+  ConvergenceError        an iteration that did not converge, with its history
+  OutputError             a result that cannot be written
+  CheckpointError         a checkpoint that cannot be used
+  MissingDependencyError  a package that is not there (also an ImportError)
+
+TawamiWarning             base of what is computed and should not be trusted (a UserWarning)
+  CheckpointWarning       a checkpoint that was not used, or not written
+  EnergyWarning           energy that nothing gave
+  InexactSumWarning       a `sum_p` that is not exactly the sum over the particles
+  InstabilityWarning      an option that is not stable for this body
+  LockingWarning          a form that locks
+  ParameterWarning        a parameter beyond its usual range
+  QuadratureWarning       particles that integrate badly
+TawamiDeprecationWarning  an old name that still works, and until when (a FutureWarning, which Python
+                          shows wherever it comes from; it hides a DeprecationWarning in modules)
+========================= ========================================================================
+
+After an error of a step nothing is lost: the particles are as they were before it.
+"""
 
 from __future__ import annotations
 
@@ -17,23 +48,35 @@ class SupportError(TawamiError):
     """Supports that leave a rigid motion free, contradict each other, or miss the body."""
 
 
-class EnergyWarning(UserWarning):
+class TawamiWarning(UserWarning):
+    """Base of every warning about what is computed."""
+
+
+class TawamiDeprecationWarning(FutureWarning):
+    """A name that has another one now; the message says which, and until when the old one works."""
+
+
+class EnergyWarning(TawamiWarning):
     """A motion whose energy has grown by what no load and no support gave."""
 
 
-class InstabilityWarning(UserWarning):
+class InexactSumWarning(TawamiWarning):
+    """A `sum_p` of an expression of too high a degree to be the sum over the particles."""
+
+
+class InstabilityWarning(TawamiWarning):
     """An option of a form that is not stable for this body."""
 
 
-class LockingWarning(UserWarning):
+class LockingWarning(TawamiWarning):
     """A form without a field for the volume, where that makes its mean stress useless."""
 
 
-class ParameterWarning(UserWarning):
+class ParameterWarning(TawamiWarning):
     """A parameter of a form beyond its usual range, where answers are far off."""
 
 
-class QuadratureWarning(UserWarning):
+class QuadratureWarning(TawamiWarning):
     """Particles that do not integrate over the cells that they fill."""
 
 
@@ -65,7 +108,7 @@ class CheckpointError(TawamiError):
     """A checkpoint that cannot be used."""
 
 
-class CheckpointWarning(UserWarning):
+class CheckpointWarning(TawamiWarning):
     """A checkpoint that was not used, or could not be written."""
 
 
@@ -79,6 +122,7 @@ __all__ = [
     "ConvergenceError",
     "EnergyWarning",
     "FormError",
+    "InexactSumWarning",
     "InputError",
     "InstabilityWarning",
     "LockingWarning",
@@ -89,5 +133,7 @@ __all__ = [
     "QuadratureWarning",
     "SingularError",
     "SupportError",
+    "TawamiDeprecationWarning",
     "TawamiError",
+    "TawamiWarning",
 ]

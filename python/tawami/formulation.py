@@ -53,6 +53,8 @@ KINEMATICS: Mapping[str, tuple[str, ...]] = {
     "mixed": ("volumetric_strain",),
     "deviatoric": ("pressure",),
 }
+#: What a parameter may declare.
+LIMITS = ("default", "minimum", "maximum", "usual")
 #: Names that every form has.
 RESERVED = frozenset(
     (
@@ -105,6 +107,7 @@ class Form:
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             self._fail(f"{listed(twice)} stands for two things: expected another name for one")
+        self._check_limits()
         kinds = [kind for kind, _ in self.fields.values()]
         for name, (kind, _) in self.fields.items():
             if kind not in KINDS:
@@ -187,6 +190,14 @@ class Form:
                 has = f"it has {listed(known)}" if known else "it has none"
                 raise InputError(f"form {self.name} has no parameter '{name}': {has}")
         return {n: self._limited(n, v, options) for n, v in parameters.items()}, options
+
+    def _check_limits(self) -> None:
+        """Whether parameters declare what is looked at only: another word would limit nothing."""
+        for name, limits in self.parameters.items():
+            unknown = [key for key in limits if key not in LIMITS]
+            if unknown:
+                expected = f"expected among {listed(LIMITS)}"
+                self._fail(f"parameter '{name}' declares {listed(unknown)}: {expected}")
 
     def unusual(self, parameters: Mapping[str, float]) -> list[str]:
         """What to say of parameters beyond their usual range."""

@@ -146,6 +146,13 @@ def mpirun(number: int, command: list[str]) -> tuple[list[str], dict[str, str]]:
     return ["mpirun", "-n", str(number), *command], environment
 
 
+def stop(text: str) -> NoReturn:
+    """Print a message once and end all ranks, exit code 1."""
+    if MPI.COMM_WORLD.size > 1:
+        _abort(text)
+    sys.exit(text.removesuffix("\n"))
+
+
 def run(main: Callable[[], None], name: str) -> None:
     """Run a driver: an error of tawami becomes one line, on all ranks together, and exit code 1.
 
@@ -160,9 +167,8 @@ def run(main: Callable[[], None], name: str) -> None:
     try:
         main()
     except TawamiError as error:
-        if comm.size == 1:
-            sys.exit(f"{name}: {error}")
-        _abort(f"{name}: {error}\n")
+        notes = getattr(error, "__notes__", [])  # as that of `march`: when it was
+        stop(f"{name}: {'; '.join([str(error), *notes])}\n")
     except SystemExit as end:  # sys.exit on one rank: the others would wait for it
         if comm.size == 1 or end.code in (0, None):
             raise

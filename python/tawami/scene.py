@@ -419,8 +419,12 @@ class Scene(contents.Elsewhere):
         return contents.header(self)
 
     def split(self, coefficients: Array) -> tuple[Array, Array | None]:
-        """Coefficients of the displacement and of the bilinear field (None if there is none)."""
-        return self.attached.field.layout.split(coefficients)
+        """Coefficients of the displacement and of the bilinear field (None if there is none).
+
+        Raises:
+            InputError: Not the coefficients of all fields.
+        """
+        return self.attached.field.layout.split(self._coefficients(coefficients))
 
     @property
     def particles_per_cell(self) -> npt.NDArray[np.int64]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from tawami import inputs
+from tawami.deprecation import renamed_parameter
 from tawami.errors import ConvergenceError, InputError, SingularError
 from tawami.pace import Pace, Step
 from tawami.results import Results, Unwatched, phase
@@ -101,11 +102,12 @@ def ramp(
             scene.accept(pace.at)
 
 
+@renamed_parameter("most", "max_resets", goes_in="0.3")
 def settle(
     scene: Scene,
     *,
     tolerance: float = 1e-10,
-    most: int = 200,
+    max_resets: int = 200,
     results: Results | None = None,
 ) -> list[Step]:
     """Solve under the present loads, the grid reset each time, until nothing is out of balance.
@@ -115,25 +117,25 @@ def settle(
     Args:
         scene: A scene of finite strain.
         tolerance: Of the momentum measure right after a reset.
-        most: Number of solves after which it is given up.
+        max_resets: Number of solves after which it is given up.
         results: Where the run writes its results and checkpoints.
 
     Raises:
-        ConvergenceError: Not within `most` solves.
+        ConvergenceError: Not within `max_resets` solves.
     """
     tolerance = inputs.number("tolerance", tolerance, low=1e-14, high=0.1)
     if scene.form.strain != "finite":
         raise InputError(
             "settle(...) resets the grid: expected a scene with a form of finite strain"
         )
-    most = inputs.whole_number("most", most, low=1)
+    max_resets = inputs.whole_number("max_resets", max_resets, low=1)
     pace, steps = Pace(0.0, 1.0), list[Step]()
     with (
         scene.tolerance_of(max(0.1 * tolerance, 1e-14)),
-        phase(results, "settle", scene, None, most, "resets") as watched,
+        phase(results, "settle", scene, None, max_resets, "resets") as watched,
     ):
         watched.begin(pace, steps)
-        while pace.at < most and not watched.finished:
+        while pace.at < max_resets and not watched.finished:
             solution = scene.solve()
             steps.append(Step(1.0, 0.0, solution.history, solution.krylov))
             pace.at += 1.0
@@ -144,7 +146,8 @@ def settle(
         if watched.finished:
             return steps
     raise ConvergenceError(
-        f"settle: {steps[-1].history[0][0]:.1e} of the forces are out of balance after {most} resets of "
-        f"the grid: expected less than {tolerance:g}; allow more resets, or a larger tolerance",
+        f"settle: {steps[-1].history[0][0]:.1e} of the forces are out of balance after {max_resets} "
+        f"resets of the grid: expected less than {tolerance:g}; allow more resets, or a larger "
+        "tolerance",
         steps[-1].history,
     )

@@ -26,7 +26,7 @@ from tawami.density import (
     Quantity,
     Rule,
 )
-from tawami.errors import FormError
+from tawami.errors import FormError, InexactSumWarning
 from tawami.formulation import Form, listed
 
 #: FFCx 0.5 writes C that does not compile when a coefficient's number has two digits, so those that
@@ -34,10 +34,6 @@ from tawami.formulation import Form, listed
 PLACEHOLDERS = 1000
 #: Degree along x and y that the densities of `sum_p` integrate exactly.
 EXACT_DEGREE = 4
-
-
-class InexactSumWarning(UserWarning):
-    """A `sum_p` of an expression of too high a degree to be the sum over the particles."""
 
 
 class Symbols:

@@ -1,0 +1,7 @@
+"""`python -m tawami` is `tawami`."""
+
+import sys
+
+from tawami.command_line import main
+
+sys.exit(main())
