@@ -29,6 +29,7 @@ from tawami.materials import (
     von_mises,
 )
 from tawami.numpy_law import NumpyLaw
+from tawami.output import GridOutput, ParticleOutput, TableOutput
 from tawami.ranks import run
 from tawami.scene import Scene
 from tawami.solution import Solution
@@ -43,6 +44,7 @@ __all__ = [
     "Form",
     "FormError",
     "Grid",
+    "GridOutput",
     "InputError",
     "InstabilityWarning",
     "LockingWarning",
@@ -52,6 +54,7 @@ __all__ = [
     "NumpyLaw",
     "OutputError",
     "ParameterWarning",
+    "ParticleOutput",
     "QuadratureWarning",
     "Scene",
     "Series",
@@ -59,6 +62,7 @@ __all__ = [
     "Solution",
     "Study",
     "SupportError",
+    "TableOutput",
     "TawamiError",
     "box",
     "drucker_prager",
