@@ -6,6 +6,7 @@ is killed leaves a series that opens.
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -165,11 +166,21 @@ def check_format(kind: str) -> Format:
     raise InputError(f"format = {kind!r}: expected one of {', '.join(map(repr, get_args(Format)))}")
 
 
+def components(label: str, values: Array) -> dict[str, Array]:
+    """A tensor 'stress xx yy zz xy [Pa]' as 'stress xx [Pa]' and so on, others as they are."""
+    found = re.fullmatch(r"(.*) xx yy zz xy (\[.*\])", label)
+    if found is None:
+        return {label: np.asarray(values)}
+    name, unit = found.groups()
+    return {f"{name} {c} {unit}": values[:, k] for k, c in enumerate(("xx", "yy", "zz", "xy"))}
+
+
 # -- XDMF --------------------------------------------------------------------
 
 
-def write_xdmf(path: Path, name: str, time: float, frame: Frame) -> ElementTree.Element:
-    """Write the numbers of a frame one after the other, and return the entry that says where they are.
+def write_xdmf(path: Path, file_name: str, time: float, frame: Frame) -> ElementTree.Element:
+    """Write the numbers of a frame one after the other, and return the entry that says where they are;
+    components of tensors apart, as readers of XDMF differ in what they know of four.
 
     Raises:
         OutputError: The file cannot be written.
@@ -186,16 +197,15 @@ def write_xdmf(path: Path, name: str, time: float, frame: Frame) -> ElementTree.
     arrays = [(topology, frame.cells.astype(np.int32)), (geometry, frame.points)]
     for centre, data in (("Node", frame.on_points), ("Cell", frame.on_cells)):
         for label, values in data.items():
-            kind = "Vector" if values.ndim == 2 and values.shape[1] == 3 else "Scalar"
-            if values.ndim == 2 and values.shape[1] != 3:
-                kind = "Matrix"
-            attribute = ElementTree.SubElement(
-                grid, "Attribute", Name=label, AttributeType=kind, Center=centre
-            )
-            arrays.append((attribute, np.asarray(values)))
-    with whole_file(path) as part, part.open("wb") as file:
+            for name, part in components(label, values).items():
+                kind = "Vector" if part.ndim == 2 else "Scalar"
+                attribute = ElementTree.SubElement(
+                    grid, "Attribute", Name=name, AttributeType=kind, Center=centre
+                )
+                arrays.append((attribute, part))
+    with whole_file(path) as temporary, temporary.open("wb") as file:
         for parent, values in arrays:
-            _data_item(parent, name, file.tell(), values)
+            _data_item(parent, file_name, file.tell(), values)
             file.write(np.ascontiguousarray(values).tobytes())
     return grid
 
