@@ -57,7 +57,7 @@ def write(folder: str | Path, scene: Scene, motion: Dynamics | None = None) -> N
                 "threads": {name: os.environ.get(name) for name in THREADS},
                 "processors": os.cpu_count(),
                 "git": None if script is None else git(script.parent),
-                "form": {"name": scene.form.name, "source": _file_of(scene.form)},
+                "form": {"name": scene.form.name.strip("'"), "source": _file_of(scene.form)},
                 "input": header.splitlines(),
                 "grid": {
                     "origin": scene.grid.origin, "h": scene.grid.h, "cells": scene.grid.cells
