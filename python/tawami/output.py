@@ -89,7 +89,9 @@ class Output:
             raise InputError(f"name = {name!r}: expected the name of a file without its ending")
         self.names, self.name = tuple(names), name
         self._every = None if every is None else inputs.number("every", every, low=inputs.LEAST)
-        self._steps = inputs.whole_number("every_steps", every_steps or 1, low=1)
+        self._steps = inputs.whole_number(
+            "every_steps", 1 if every_steps is None else every_steps, low=1
+        )
         self._seen = self._written = -1
         self._multiple, self._time = -math.inf, math.nan
 
@@ -309,8 +311,9 @@ def _append(path: Path, line: str) -> None:
         with path.open("ab", buffering=0) as file:
             size = file.tell()
             try:
-                if file.write(line.encode()) != len(line.encode()):
-                    raise OSError(27, "no room for a line")
+                rest = line.encode()
+                while rest:
+                    rest = rest[file.write(rest) :]
             except OSError:
                 file.truncate(size)
                 raise

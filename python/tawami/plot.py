@@ -26,8 +26,10 @@ Array = npt.NDArray[np.float64]
 Movie = Literal["gif", "mp4"]
 #: Frames of a film at most, and how many a second.
 MOST, RATE = 120, 12
-#: Share of the particles whose values may lie outside the colours, half on each side.
+#: Share of the particles of a frame whose values may lie outside the colours, half on each side.
 BEYOND = 0.01
+#: Map for values of both signs.
+DIVERGING = "RdBu_r"
 PREFIXES = (("G", 1e9), ("M", 1e6), ("k", 1e3))
 
 
@@ -177,6 +179,8 @@ class _Film:
                             [grid.lower[0], grid.upper[1]], grid.lower])  # fmt: skip
         axes.plot(*corners.T, color="0.35", linewidth=1.2, zorder=1)
         low, high, colours = self._colours()
+        if colours == DIVERGING:
+            axes.set_facecolor("0.85")  # its middle is white
         self.points = axes.scatter([], [], c=[], linewidths=0, cmap=colours,
                                    vmin=low, vmax=high, zorder=2)  # fmt: skip
         below, above = self._outside(low, high)
@@ -217,11 +221,12 @@ class _Film:
 
     def _colours(self) -> tuple[float, float, str]:
         """Range and map: about 0 where the values are of both signs."""
-        values = np.concatenate([v for _, _, v in self.frames]) / self.factor
-        low, high = (float(v) for v in np.quantile(values, [BEYOND / 2, 1 - BEYOND / 2]))
+        outer = [np.quantile(v, [BEYOND / 2, 1 - BEYOND / 2]) for _, _, v in self.frames]
+        low = float(min(pair[0] for pair in outer)) / self.factor
+        high = float(max(pair[1] for pair in outer)) / self.factor
         if low < 0 < high and min(-low, high) > 0.2 * max(-low, high):
             high = max(-low, high)
-            return -high, high, "RdBu_r"
+            return -high, high, DIVERGING
         return low, (high if high > low else low + 1e-12 + 1e-9 * abs(low)), "viridis"
 
     def _outside(self, low: float, high: float) -> tuple[bool, bool]:
@@ -286,7 +291,7 @@ def _mp4(path: Path, images: Sequence[npt.NDArray[np.uint8]]) -> None:
 
 def _moment(phase: str, time: float) -> str:
     if phase.startswith("ramp"):
-        return f"{time:.3g} of the load"
+        return f"{100 * time:.3g} % of the load"
     if phase.startswith("settle"):
         return f"reset {time:g} of the grid"
     return f"$t$ = {time:.4g} s"
@@ -346,6 +351,10 @@ def _panel(axes: Axes, head: Sequence[str], numbers: Sequence[int], values: Arra
             own = name.removeprefix(kind).strip() or name
             axes.plot(rows[:, 1], rows[:, k], "." if of_steps else "-", markersize=3, label=own)
     axes.set_xlabel(head[1].replace("time [s]", "$t$ [s]"))
+    if kind == "Newton":
+        from matplotlib.ticker import MaxNLocator
+
+        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     if len(numbers) == 1:
         axes.set_ylabel(labels[0])
     else:
