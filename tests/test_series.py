@@ -148,7 +148,7 @@ def test_every_so_many_steps_and_the_last(scene):
         (lambda: tawami.ParticleOutput(every_steps=0), r"every_steps = 0: expected a whole number, at"),
         (lambda: tawami.TableOutput(every=1.0, every_steps=1), "both given: expected one of them"),
         (lambda: tawami.GridOutput(format="hdf5"), "format = 'hdf5': expected one of 'vtu', 'xdmf'"),
-        (lambda: tawami.GridOutput(projection="l2"), "projection = 'l2': expected one of 'mean', 'li"),
+        (lambda: tawami.GridOutput(projection="l2"), "projection = 'l2': expected one of 'lumped', '"),
         (lambda: tawami.TableOutput(3), r"TableOutput\(3,\): expected names of quantities"),
         (lambda: tawami.TableOutput(name="a/b"), "name = 'a/b': expected the name of a file without"),
     ],

@@ -225,7 +225,7 @@ class GridOutput(_SeriesOutput):
             with their sum and moment), or, projected from the particles, 'stress', 'mean stress',
             'deviatoric stress q', or a history variable.
         every, every_steps, format, name: As in `ParticleOutput`.
-        projection: 'mean' or 'linear': see `tawami.projection`.
+        projection: 'lumped' or 'consistent': see `tawami.projection`.
     """
 
     def __init__(
@@ -235,7 +235,7 @@ class GridOutput(_SeriesOutput):
         every_steps: int | None = None,
         format: Literal["vtu", "xdmf"] = "vtu",
         name: str = "grid",
-        projection: Projection = "mean",
+        projection: Projection = "lumped",
     ) -> None:
         super().__init__(names, every, every_steps, name, format)
         self._projection = check_projection(projection)

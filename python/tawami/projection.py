@@ -1,13 +1,13 @@
 """Particle fields on the vertices of the grid, for smooth pictures: on the bilinear functions M_i.
 
-    mean      f_i = sum_p V_p M_i f_p / sum_p V_p M_i
-    linear    f_i = a of the a, b that minimise sum_p V_p M_i (f_p - a - b . (x_p - x_i))^2
+    lumped        f_i = sum_p V_p M_i f_p / sum_p V_p M_i
+    consistent    sum_p V_p M_i (sum_j M_j f_j - f_p) = 0
 
-`mean` (lumped projection) stays within the range of the particles around a vertex and is exact for
-constants; at the border of a body, where particles stand on one side of the vertex, it is off by the
-slope. `linear` (moving least squares) is exact for linear fields, also there, and may overshoot. The
-consistent L2 projection is neither local nor regular where a cell holds fewer than four particles.
-Vertices without particles in their cells have no value: NaN.
+`lumped` stays within the range of the particles around a vertex; at the border of a body, where they
+stand on one side of it, it is off by the slope. `consistent`, the projection in L2, is exact for
+bilinear fields and may overshoot elsewhere. Its matrix is singular where a cell holds fewer than four
+particles; conjugate gradients from `lumped` leave there what no particle sees (`cases/projection.py`:
+errors of both). Vertices without particles in their cells have no value: NaN.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
+from tawami import _rust
 from tawami.errors import InputError
 
 if TYPE_CHECKING:
     from tawami.scene import Scene
 
 Array = npt.NDArray[np.float64]
-Projection = Literal["mean", "linear"]
-#: Least eigenvalue of the particles' second moments about their centre, in h^2, from which a vertex has
-#: a slope: below, they stand on one spot or in a row.
-SPREAD = 1e-3
+Projection = Literal["lumped", "consistent"]
+#: Residual, of the field's own size, at which conjugate gradients end, and the most iterations.
+SMALL, MOST = 1e-10, 200
 
 
 def check_projection(method: str) -> Projection:
-    """'mean' or 'linear'.
+    """'lumped' or 'consistent'.
 
     Raises:
         InputError: Anything else.
@@ -53,13 +53,13 @@ def vertices(scene: Scene) -> Array:
     return np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
 
 
-def nodal(scene: Scene, values: Array, method: Projection = "mean") -> Array:
+def nodal(scene: Scene, values: Array, method: Projection = "lumped") -> Array:
     """A field of the particles on the vertices of the grid; a call for all ranks.
 
     Args:
         scene: The scene with its particles where they are.
         values: Of this rank's particles, particles or particles x components.
-        method: 'mean' or 'linear'.
+        method: 'lumped' or 'consistent'.
 
     Returns:
         Vertices (x fastest), by components where there are any; NaN where no particle is near.
@@ -69,8 +69,13 @@ def nodal(scene: Scene, values: Array, method: Projection = "mean") -> Array:
     """
     method = check_projection(method)
     columns = np.asarray(values, dtype=float).reshape(len(scene.particles), -1)
-    on_vertices = _mean(scene, columns) if method == "mean" else _linear(scene, columns)
-    return on_vertices.reshape(-1, *np.shape(values)[1:])
+    sums = _sums(scene, np.column_stack([np.ones(len(columns)), columns]))
+    weight, right = sums[:, :1], sums[:, 1:]
+    near = weight > 0
+    found = np.divide(right, weight, out=np.zeros_like(right), where=near)
+    if method == "consistent":
+        found = _conjugate_gradients(scene, found, weight, right)
+    return np.where(near, found, np.nan).reshape(-1, *np.shape(values)[1:])
 
 
 def _sums(scene: Scene, data: Array) -> Array:
@@ -78,31 +83,31 @@ def _sums(scene: Scene, data: Array) -> Array:
     return scene.attached.sums(np.asarray(scene.particles.volume), data, "bilinear")
 
 
-def _mean(scene: Scene, values: Array) -> Array:
-    sums = _sums(scene, np.column_stack([np.ones(len(values)), values]))
-    weight = np.where(sums[:, :1] > 0, sums[:, :1], np.nan)
-    return np.asarray(sums[:, 1:] / weight)
+def _conjugate_gradients(scene: Scene, start: Array, weight: Array, right: Array) -> Array:
+    """The consistent projection, every column by itself, preconditioned by the lumped matrix.
 
+    Every rank has whole vectors and takes the same steps.
+    """
+    location, columns = scene.attached.location, start.shape[1]
 
-def _linear(scene: Scene, values: Array) -> Array:
-    """By moments about the corner of the grid in cells, then about the centre of what is around."""
-    grid = scene.grid
-    x = (np.asarray(scene.particles.x) - grid.origin) / grid.h
-    n, k = len(values), values.shape[1]
-    one, xy = np.ones((n, 1)), x[:, [0]] * x[:, [1]]
-    slopes = (values[:, :, None] * x[:, None, :]).reshape(n, -1)
-    sums = _sums(scene, np.column_stack([one, x, x**2, xy, values, slopes]))
-    sums = sums / np.where(sums[:, :1] > 0, sums[:, :1], np.nan)
-    centre, mean = sums[:, 1:3], sums[:, 6 : 6 + k]
-    second = np.stack([sums[:, [3, 5]], sums[:, [5, 4]]], axis=1)
-    second = second - centre[:, :, None] * centre[:, None, :]
-    mixed = sums[:, 6 + k :].reshape(-1, k, 2) - mean[:, :, None] * centre[:, None, :]
-    offset = (vertices(scene) - grid.origin) / grid.h - centre
-    known = np.isfinite(centre).all(axis=1)
-    spread = np.zeros(len(known))
-    spread[known] = np.linalg.eigvalsh(second[known])[:, 0]
-    sure = spread > SPREAD
-    found = mean.copy()
-    slope = np.linalg.solve(second[sure], mixed[sure].transpose(0, 2, 1))
-    found[sure] += np.einsum("ij,ijk->ik", offset[sure], slope)
-    return np.asarray(found)
+    def product(f: Array) -> Array:
+        at_particles = _rust.interpolate(location, "bilinear", columns, f.ravel())
+        return _sums(scene, np.asarray(at_particles))
+
+    def over(top: Array, bottom: Array) -> Array:
+        return np.divide(top, bottom, out=np.zeros_like(top), where=bottom > 0)
+
+    f, r = start.copy(), right - product(start)
+    z = over(r, np.broadcast_to(weight, r.shape))
+    d, rz = z.copy(), (r * z).sum(axis=0)
+    enough = SMALL**2 * (right * start).sum(axis=0)  # round-off must not be followed
+    for _ in range(MOST):
+        if (rz <= enough).all():
+            break
+        q = product(d)
+        step = np.where(rz > enough, over(rz, (d * q).sum(axis=0)), 0.0)
+        f, r = f + step * d, r - step * q
+        z = over(r, np.broadcast_to(weight, r.shape))
+        before, rz = rz, (r * z).sum(axis=0)
+        d = z + over(rz, before) * d
+    return f

@@ -176,7 +176,7 @@ class GridQuantity:
 
 
 def on_grid(
-    names: Iterable[str], scene: Scene, motion: Dynamics | None, projection: Projection = "mean"
+    names: Iterable[str], scene: Scene, motion: Dynamics | None, projection: Projection = "lumped"
 ) -> list[GridQuantity]:
     """Fields of the grid by their names: its own, or those of particles, projected.
 
