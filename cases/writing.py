@@ -25,6 +25,7 @@ import tawami
 from cases.table import as_text
 from tawami.moment import Moment
 from tawami.output import Output
+from tawami.series import Format
 
 COLUMNS = ("what", "us_per_particle", "bytes_per_particle")
 
@@ -75,7 +76,8 @@ def rows_of(cells: int, repeat: int, folder: Path) -> list[Row]:
     """Every kind of output once."""
     motion, rows = motion_of(cells), []
     scene, grid = motion.scene, ("displacement", "mean stress", "particles")
-    for kind in ("vtu", "xdmf"):
+    kinds: tuple[Format, ...] = ("vtu", "xdmf")
+    for kind in kinds:
         output = tawami.ParticleOutput(format=kind)
         row, file = measure(f"particles, {kind}", motion, output, folder / kind, repeat)
         rows.append(row)
@@ -83,7 +85,7 @@ def rows_of(cells: int, repeat: int, folder: Path) -> list[Row]:
             mesh, packed = meshio.read(file), folder / "zlib.vtu"
             seconds = min(_timed(lambda m=mesh, p=packed: m.write(p)) for _ in range(repeat))  # type: ignore[misc]
             rows.append(_row("the same file with zlib", scene, seconds, packed))
-    for kind in ("vtu", "xdmf"):
+    for kind in kinds:
         output_of_grid = tawami.GridOutput(*grid, format=kind)
         rows.append(measure(f"grid, {kind}", motion, output_of_grid, folder / kind, repeat)[0])
     table = tawami.TableOutput("momentum", "run-out", "step size")

@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mpi4py import MPI
+from test_ranks import start
 
 import tawami
 from tawami.energy import Energies
@@ -522,3 +523,64 @@ def test_a_full_disk_stops_with_a_sentence_and_keeps_the_series(output, room, tm
         assert [len(meshio.read(p).points) for _, p in pvd(path)] == [36] * (2 + len(moments))
     for path in tmp_path.glob("*.xdmf"):
         assert len(xdmf(path)) == 2 + len(moments)
+
+
+# -- several ranks, particles that leave -------------------------------------
+
+MANY = """
+import sys
+from pathlib import Path
+import logging; logging.disable(logging.INFO)
+import tawami
+from test_series import block, drive
+outputs = [
+    tawami.ParticleOutput("number", "velocity", "plastic_strain", every_steps=4),
+    tawami.GridOutput("velocity", "reaction", "stress", every_steps=4, projection="consistent"),
+    tawami.GridOutput("mean stress", "particles", name="lumped", format="xdmf"),
+    tawami.TableOutput("energies", "momentum", "run-out", "displacement (0.0, 1.25)", "particles"),
+]
+tawami.run(lambda: drive(block(), outputs, Path(sys.argv[1]), 12), "driver")
+"""
+
+
+@pytest.mark.mpi
+def test_several_ranks_write_the_same_once(tmp_path):
+    for number in (1, 2):
+        run = start(number, "-c", MANY, str(tmp_path / str(number)))
+        assert run.returncode == 0, run.stderr
+    one, two = (tmp_path / "1", tmp_path / "2")
+    assert sorted(contents(one)) == sorted(contents(two))
+    for index in ("particles.pvd", "grid.pvd"):
+        for (_, alone), (_, shared) in zip(pvd(one / index), pvd(two / index), strict=True):
+            a, b = meshio.read(alone), meshio.read(shared)
+            np.testing.assert_allclose(a.points, b.points, rtol=0, atol=1e-10)
+            for name, values in a.point_data.items():
+                size = max(np.nanmax(np.abs(values), initial=0.0), 1e-6)
+                np.testing.assert_allclose(b.point_data[name], values, rtol=0, atol=1e-7 * size)
+    for (_, a), (_, b) in zip(xdmf(one / "lumped.xdmf"), xdmf(two / "lumped.xdmf"), strict=True):
+        for name, values in a.items():
+            np.testing.assert_allclose(b[name], values, rtol=0, atol=1e-8)
+    a, b = table(one / "table.csv"), table(two / "table.csv")
+    for name, values in a.items():
+        np.testing.assert_allclose(b[name], values, rtol=1e-8, atol=1e-8)
+    assert np.ptp(a["energy dissipated [J/m]"]) > 0
+
+
+def test_particles_that_left_are_not_written(tmp_path):
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(4, 4))
+    body = tawami.box(grid, (0.5, 0.25), (1.0, 0.75))
+    law = tawami.linear_elastic(E=1e2, nu=0.3)
+    options = {"form": "u_finite", "density": 1.0, "leaving": "remove"}
+    scene = tawami.Scene(grid, body, law, **options)
+    motion = tawami.Dynamics(scene, velocity=(2.0, 0.0))
+    output = tawami.ParticleOutput("number", "velocity")
+    drive(motion, [output, tawami.TableOutput("particles")], tmp_path, 6, dt=0.02)
+    present = table(tmp_path / "table.csv")["particles [-]"]
+    assert present[0] == 16
+    assert 0 < present[-1] < 16
+    for (_, path), number in zip(pvd(tmp_path / "particles.pvd"), present, strict=True):
+        mesh = meshio.read(path)
+        numbers = mesh.point_data["number [-]"]
+        assert len(mesh.points) == number == len(np.unique(numbers))
+        assert (np.diff(numbers.astype(int)) > 0).all()
+    assert set(numbers) == set(range(16)) - {number for number, _, _ in scene.left}

@@ -88,11 +88,14 @@ def _conjugate_gradients(scene: Scene, start: Array, weight: Array, right: Array
 
     Every rank has whole vectors and takes the same steps.
     """
-    location, columns = scene.attached.location, start.shape[1]
+    location = scene.attached.location
 
     def product(f: Array) -> Array:
-        at_particles = _rust.interpolate(location, "bilinear", columns, f.ravel())
-        return _sums(scene, np.asarray(at_particles))
+        at_particles = [
+            _rust.interpolate(location, "bilinear", 1, np.ascontiguousarray(column))
+            for column in f.T
+        ]
+        return _sums(scene, np.column_stack(at_particles))
 
     def over(top: Array, bottom: Array) -> Array:
         return np.divide(top, bottom, out=np.zeros_like(top), where=bottom > 0)

@@ -135,7 +135,8 @@ def source_of(form: Form) -> bytes | None:
 
 def _file_of(form: Form) -> str | None:
     try:
-        return str(Path(inspect.getsourcefile(form.residual) or "").resolve(strict=True))
+        file = inspect.getsourcefile(form.residual)
+        return None if file is None else str(Path(file).resolve(strict=True))
     except (OSError, TypeError):
         return None
 
