@@ -470,6 +470,18 @@ def test_what_is_later_than_the_checkpoint_goes_at_once(tmp_path):
     assert not list((tmp_path / "particles").iterdir())
 
 
+def test_a_table_that_goes_on_has_the_same_columns(tmp_path):
+    output = tawami.TableOutput("run-out")
+    motion = block()
+    drive(motion, [output], tmp_path, 2)
+    before = (tmp_path / "table.csv").read_text()
+    with pytest.raises(
+        tawami.InputError, match=r"run-out \[m\], and .*momentum y .* are asked for"
+    ):
+        T("momentum").begin(tmp_path, motion.scene, motion, output.state())
+    assert (tmp_path / "table.csv").read_text() == before
+
+
 def test_an_index_that_is_none(tmp_path):
     (tmp_path / "particles.pvd").write_text("<VTKFile><Coll")
     motion = block()

@@ -190,9 +190,10 @@ class ParticleOutput(_SeriesOutput):
     """Particles as points, in the order of their numbers.
 
     Args:
-        names: 'displacement', 'stress', 'mean stress', 'deviatoric stress q', 'volume', 'eps_v',
-            'velocity', 'acceleration', 'material', 'number', or a history variable of the laws;
-            by default the usual ones of what the scene has.
+        names: 'displacement', 'stress', 'mean stress', 'deviatoric stress q' (Kirchhoff's where
+            strains are finite), 'volume' (at the start), 'eps_v', 'velocity', 'acceleration',
+            'material', 'number', or a history variable of the laws; by default the usual ones of what
+            the scene has.
         every, every_steps: When: see `Output`; every step by default.
         format: 'vtu', or 'xdmf', which takes a quarter of the time (`python -m cases.writing`).
         name: Of index and folder.
@@ -278,7 +279,12 @@ class TableOutput(Output):
         labels = [label for column in self._columns for label in column.labels]
         text = _line(["step [-]", time, *labels])
         if last is not None and self.path.exists():
-            rows = self.path.read_text().splitlines(keepends=True)[1:]
+            head, *rows = self.path.read_text().splitlines(keepends=True) or [""]
+            if head != text:
+                raise InputError(
+                    f"'{self.path}' has the columns {head.strip()}, and {text.strip()} are asked for: "
+                    "expected the same in a run that goes on; give the new table another name="
+                )
             text += "".join(row for row in rows if row.endswith("\n") and _step(row) <= last)
         with whole_file(self.path) as part:
             part.write_text(text)
