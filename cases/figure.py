@@ -6,11 +6,10 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-from tawami.output import whole_file
+from tawami import figure as pictures
 
 
 def save(figure: plt.Figure, path: Path, *, dpi: int = 160) -> None:
     """Write a figure as PNG, whole or not at all, and close it."""
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=dpi, format="png")
+    pictures.save(figure, path, dpi=dpi)
     plt.close(figure)

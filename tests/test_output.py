@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import tawami
+from cases import writing
 from cases.cantilever import __main__ as study
 from cases.cantilever import bench, mpm
 from cases.cantilever.beam import COLUMNS, SUPPORTS
@@ -160,3 +161,15 @@ def test_wrong_numbers_for_the_benchmark(capsys):
     with pytest.raises(SystemExit):
         bench.main(["--ranks", "two"])
     assert "expected whole numbers" in capsys.readouterr().err
+
+
+def test_what_writing_costs(capsys):
+    """Sizes of raw files are known: x, displacement, velocity 24 bytes each, stress 32, two scalars 8
+    each and the number of the point 4.
+    """
+    writing.main(["--cells", "8", "--repeat", "2"])
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "256 particles"
+    (raw,) = (line for line in lines if "particles, xdmf" in line)
+    assert float(raw.split()[-1]) == 3 * 24 + 32 + 2 * 8 + 4
+    assert len(lines) == 8

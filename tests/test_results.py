@@ -53,7 +53,8 @@ class Kill:
 class Recorder(Output):
     """What outputs are told."""
 
-    def __init__(self) -> None:
+    def __init__(self, phases=None) -> None:
+        super().__init__((), None, None, "recorder", phases)
         self.began: list[tuple[str, object]] = []
         self.seen: list[tuple[float, int, bool]] = []
 

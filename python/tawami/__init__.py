@@ -35,6 +35,7 @@ from tawami.materials import (
     von_mises,
 )
 from tawami.numpy_law import NumpyLaw
+from tawami.output import GridOutput, ParticleOutput, TableOutput
 from tawami.ranks import run
 from tawami.results import Results
 from tawami.scene import Scene
@@ -53,6 +54,7 @@ __all__ = [
     "FormError",
     "FormReport",
     "Grid",
+    "GridOutput",
     "InexactSumWarning",
     "InputError",
     "InstabilityWarning",
@@ -63,6 +65,7 @@ __all__ = [
     "NumpyLaw",
     "OutputError",
     "ParameterWarning",
+    "ParticleOutput",
     "QuadratureWarning",
     "Results",
     "Scene",
@@ -71,6 +74,7 @@ __all__ = [
     "Solution",
     "Study",
     "SupportError",
+    "TableOutput",
     "TawamiDeprecationWarning",
     "TawamiError",
     "TawamiWarning",

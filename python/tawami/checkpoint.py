@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from tawami.errors import CheckpointError
-from tawami.output import whole_file
+from tawami.files import whole_file
 
 #: Changes with what a state holds.
 FORMAT = 1

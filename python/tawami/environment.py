@@ -53,14 +53,24 @@ def peak_memory() -> float:
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
+def versions() -> dict[str, str]:
+    """Versions of what a result depends on."""
+    return {
+        "tawami": version("tawami"),
+        "dolfinx": _dolfinx.version,
+        "PETSc": ".".join(map(str, PETSc.Sys.getVersion())),
+        "Python": platform.python_version(),
+        "NumPy": np.__version__,
+    }
+
+
 def header() -> str:
     """A line for the start of a run, and a warning below it where the BLAS is slow."""
     name, slow = blas()
-    petsc = ".".join(map(str, PETSc.Sys.getVersion()))
-    line = (
-        f"tawami {version('tawami')}, dolfinx {_dolfinx.version}, PETSc {petsc}, Python "
-        f"{platform.python_version()}, NumPy {np.__version__}, BLAS {name}, OMP_NUM_THREADS="
-        f"{os.environ.get('OMP_NUM_THREADS', 'unset')}, {os.cpu_count()} processors"
+    line = ", ".join(f"{package} {number}" for package, number in versions().items())
+    line += (
+        f", BLAS {name}, OMP_NUM_THREADS={os.environ.get('OMP_NUM_THREADS', 'unset')}, "
+        f"{os.cpu_count()} processors"
     )
     if slow:
         line += (

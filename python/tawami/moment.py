@@ -1,4 +1,4 @@
-"""What observers of a run get to see."""
+"""What observers of a run look at."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Moment:
-    """The start of a phase of a run, or the end of one of its accepted steps.
+    """A run after the start of a phase (step 0) and after every accepted step.
 
     Attributes:
         scene: The scene.
         motion: Its motion; None in `ramp` and `settle`.
-        solution: What the step found; None at the start.
-        time: [s], or share of the load in a ramp, or number of the reset in `settle`.
-        step: Number of the step in its phase; 0 at the start.
-        last: Whether the phase ends here.
+        solution: Of the step; None at step 0.
+        time: [s], or the share of the load in `ramp`, the number of the reset in `settle`.
+        step: Number of the step in the phase.
+        last: Whether it is the last of the phase.
     """
 
     scene: Scene

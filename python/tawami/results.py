@@ -32,9 +32,10 @@ from tawami.errors import (
     OutputError,
     SingularError,
 )
+from tawami.files import result_folder, whole_file
 from tawami.interruption import Interruption
 from tawami.moment import Moment
-from tawami.output import Output, result_folder, whole_file
+from tawami.output import PHASES, Output
 from tawami.pace import Pace, Step
 from tawami.ranks import together
 
@@ -46,7 +47,6 @@ if TYPE_CHECKING:
 Existing = Literal["stop", "replace", "resume"]
 #: Takes precedence over `existing`: how `tawami resume` starts a script.
 VARIABLE = "TAWAMI_EXISTING"
-KINDS = ("ramp", "settle", "motion")
 RUN, LOG, CHECKPOINTS = "run.json", "log.txt", "checkpoints"
 log = logging.getLogger("tawami")
 
@@ -133,13 +133,15 @@ class Results:
         if not self._phases:
             with together(scene.grid.comm):
                 if scene.grid.comm.rank == 0:
-                    self._open(scene, motion)
+                    self._open()
             self.resumes = scene.grid.comm.bcast(self.resumes)
+            if not self.resumes:
+                provenance.write(self.folder, scene, motion)
         before = sum(name.partition("-")[0] == kind for name in self._phases)
         self._phases.append(f"{kind}-{before + 1}" if before else kind)
         return Phase(self, len(self._phases), self._phases[-1], scene, motion, end, unit)
 
-    def _open(self, scene: Scene, motion: Dynamics | None) -> None:
+    def _open(self) -> None:
         result_folder(self.folder)
         run = self.folder / RUN
         if run.exists() or self.checkpoints:
@@ -153,8 +155,6 @@ class Results:
             if not self.resumes:
                 self._clear()
         result_folder(self.folder / CHECKPOINTS)
-        if not self.resumes:
-            provenance.write(self.folder, scene, motion)
 
     def _reached(self) -> str:
         """How far the run in the folder has come, for a message."""
@@ -167,7 +167,7 @@ class Results:
             for name in (RUN, LOG, "form.py", "script.py"):
                 (self.folder / name).unlink(missing_ok=True)
             for place in self.folder.iterdir():
-                if place.name == CHECKPOINTS or place.name.partition("-")[0] in KINDS:
+                if place.name == CHECKPOINTS or place.name.partition("-")[0] in PHASES:
                     shutil.rmtree(place)
         except OSError as error:
             raise OutputError(
@@ -182,7 +182,8 @@ class Results:
             known = json.loads(run.read_text(encoding="utf-8"))
         except (OSError, ValueError):
             known = {}
-        known.setdefault("phases", {})[phase] = dict(facts)
+        others = [one for one in known.get("phases", []) if one.get("name") != phase]
+        known["phases"] = [*others, {"name": phase, **facts}]
         with whole_file(run) as part:
             part.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
 
@@ -247,6 +248,8 @@ class Phase(Unwatched):
     ) -> None:
         super().__init__(unit)
         self.results, self.number, self.name = results, number, name
+        kind = name.partition("-")[0]
+        self._outputs = [o for o in results.outputs if o.phases is None or kind in o.phases]
         self.scene, self.motion, self.end = scene, motion, end
         self._comm = scene.grid.comm
         self._writes = self._comm.rank == 0
@@ -306,8 +309,8 @@ class Phase(Unwatched):
                 for path in self.results.checkpoints:
                     if int(path.name[:2]) > self.number:
                         path.unlink()
-        for k, output in enumerate(self.results.outputs):
-            known = None if state is None else state["outputs"][k]
+        told = [None] * len(self._outputs) if state is None else state["outputs"]
+        for output, known in zip(self._outputs, told, strict=True):
             output.begin(folder, self.scene, self.motion, known)
         verb = "begins" if state is None else "goes on"
         log.info(
@@ -399,7 +402,7 @@ class Phase(Unwatched):
 
     def _look(self, solution: Solution | None, *, last: bool) -> None:
         moment = Moment(self.scene, self.motion, solution, self._pace.at, len(self._steps), last)
-        for output in self.results.outputs:
+        for output in self._outputs:
             output.look(moment)
 
     def _due(self) -> bool:
@@ -422,7 +425,7 @@ class Phase(Unwatched):
             "motion": None if self.motion is None else self.motion.state(),
             "pace": asdict(self._pace),
             "steps": pace.packed(self._steps),
-            "outputs": [output.state() for output in self.results.outputs],
+            "outputs": [output.state() for output in self._outputs],
             "finished": finished,
         }
         name = "end" if finished else f"{len(self._steps):08d}"

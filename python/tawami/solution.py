@@ -10,14 +10,37 @@ import numpy.typing as npt
 
 from tawami import _rust, boundary, contents, ranks
 from tawami.errors import InputError
-from tawami.grid import EDGES
+from tawami.grid import EDGES, Edge
 from tawami.newton import Converged, History
 from tawami.reduction import Reduction
 
 if TYPE_CHECKING:
     from tawami.scene import Scene
+    from tawami.supports import Supports
 
 Array = npt.NDArray[np.float64]
+
+
+def supported_edges(supports: Supports) -> set[str]:
+    """Names of the edges of the grid that supports or walls act on."""
+    edges = {support.place for support in supports.all if isinstance(support.place, str)}
+    return edges | {wall.edge for wall in supports.walls}
+
+
+def supported_edge(place: str, edges: set[str]) -> Edge:
+    """The edge of that name, one of those with supports.
+
+    Raises:
+        InputError: No such edge, or none with supports.
+    """
+    if place not in EDGES:
+        raise InputError(f"reaction('{place}'): expected one of {', '.join(EDGES)}")
+    if place not in edges:
+        raise InputError(
+            f"reaction('{place}'): nothing supports that edge: expected one of "
+            f"{', '.join(sorted(edges)) or 'none'}, or fix('{place}', ...) or wall('{place}') before"
+        )
+    return place
 
 
 class Solution(contents.Elsewhere):
@@ -42,6 +65,7 @@ class Solution(contents.Elsewhere):
             Frobenius norm over the square root of its size, times that of its inverse as random
             vectors show it.
         symmetric: Whether that tangent was symmetric.
+        on_edges: Forces of edges and walls on the body, functions x 2 [N per metre depth].
     """
 
     def __init__(
@@ -119,17 +143,9 @@ class Solution(contents.Elsewhere):
             InputError: No such edge or nothing that supports it, or no point held there.
         """
         if isinstance(place, str):
-            if place not in EDGES:
-                raise InputError(f"reaction('{place}'): expected one of {', '.join(EDGES)}")
-            if place not in self._edges:
-                raise InputError(
-                    f"reaction('{place}'): nothing supports that edge: expected one of "
-                    f"{', '.join(sorted(self._edges)) or 'none'}, or fix('{place}', ...) or "
-                    f"wall('{place}') before"
-                )
-            scene = self.scene
-            functions = boundary.edge_functions(scene.grid, scene.basis, place)
-            return np.asarray(self._on_edges[functions].sum(axis=0))
+            edge = supported_edge(place, self._edges)
+            functions = boundary.edge_functions(self.scene.grid, self.scene.basis, edge)
+            return np.asarray(self.on_edges[functions].sum(axis=0))
         force, found = np.zeros(2), False
         for places, component, multiplier in self._on_points:
             near = 1e-8 * self.scene.grid.h
@@ -140,6 +156,14 @@ class Solution(contents.Elsewhere):
             raise InputError(f"reaction({tuple(place)}): no point is held there")
         return force
 
+    @property
+    def on_points(self) -> list[tuple[tuple[float, float], Array]]:
+        """Where each point is held (x, y) [m], as the step began, and its force [N per metre depth]."""
+        return [
+            (places[-1], force * np.eye(2)[component])
+            for places, component, force in self._on_points
+        ]
+
     def _reactions(self, forces: Array, reduction: Reduction) -> None:
         """What supports give: of the points by their multipliers, the rest of the edges and walls.
 
@@ -149,8 +173,7 @@ class Solution(contents.Elsewhere):
         """
         n = len(self.u)
         scene, points = self.scene, reduction.points
-        self._edges = {s.place for s in scene.supports.all if isinstance(s.place, str)}
-        self._edges |= {wall.edge for wall in scene.supports.walls}
+        self._edges = supported_edges(scene.supports)
         rest = forces[:n].copy()
         if points:
             weights = np.zeros((n, len(points)))
@@ -164,7 +187,7 @@ class Solution(contents.Elsewhere):
                 places = (support.given, support.place, point.place)
                 self._on_points.append((places, support.component, float(multiplier)))
         held = np.where(reduction.fixed[:n], rest, 0.0).reshape(-1, 2)
-        self._on_edges = held + scene.supports.friction(forces[:n].reshape(-1, 2))
+        self.on_edges = held + scene.supports.friction(forces[:n].reshape(-1, 2))
 
     @property
     def mean_stress(self) -> Array:

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tawami.errors import MissingDependencyError
-from tawami.output import whole_file
+from tawami.figure import new_figure, save
 from tawami.study.table import Row, Table, text_of
 
 if TYPE_CHECKING:
@@ -47,18 +46,10 @@ def picture(
         MissingDependencyError: matplotlib is not installed.
         OutputError: The file cannot be written.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingDependencyError(
-            "pictures of studies need matplotlib: pip install matplotlib"
-        ) from error
     quantities = list(quantities or table.quantities)
     columns = min(len(quantities), 2)
     rows = -(-len(quantities) // columns)
-    figure = Figure(figsize=(7.5 * columns, 6.5 * rows + 1), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(7.5 * columns, 6.5 * rows + 1)
     panels = list(figure.subplots(rows, columns, squeeze=False).ravel())
     for unused in panels[len(quantities) :]:
         unused.remove()
@@ -72,8 +63,7 @@ def picture(
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=9)
     figure.suptitle(title or table.name)
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=150, format="png")
+    save(figure, path, dpi=150)
 
 
 def _panel(
