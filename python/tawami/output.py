@@ -83,7 +83,7 @@ class Output:
         every: float | None,
         every_steps: int | None,
         name: str,
-        phases: Sequence[str] | None,
+        phases: Sequence[str] | None = None,
     ) -> None:
         if not all(isinstance(given, str) for given in names):
             raise InputError(f"{type(self).__name__}{tuple(names)!r}: expected names of quantities")
