@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import io
+import json
 import logging
 import os
 import resource
@@ -390,6 +391,31 @@ def test_wrong_settings(tmp_path, options, message):
     folder, outputs = options.pop("folder", tmp_path), options.pop("outputs", [])
     with pytest.raises(tawami.InputError, match=message):
         tawami.Results(folder, *outputs, **options)
+
+
+def test_run_json_knows_the_phases(tmp_path):
+    with pytest.raises(Killed):
+        run(tmp_path / "run", each=Kill(5))
+    run(tmp_path / "run")
+    known = json.loads((tmp_path / "run" / "run.json").read_text())
+    assert known["script"] is not None
+    (motion,) = known["phases"]
+    assert (motion["name"], motion["reached"], motion["steps"]) == ("motion", 0.05, 10)
+    assert motion["began"] <= motion["finished"]
+    assert any(line.startswith("motion ") for line in motion["input"])
+
+
+def test_outputs_see_the_phases_that_they_are_for(tmp_path):
+    scene, outputs = block(), [Recorder(), Recorder(phases=["motion"]), Recorder(phases=["ramp"])]
+    scene.fix("bottom", "x")
+    results = results_of(tmp_path / "run", *outputs)
+    tawami.ramp(scene, 0.5, results=results)
+    scene.release("bottom", "x")
+    tawami.Dynamics(scene).run(0.02, 0.01, results=results)
+    began = [[name for name, _ in output.began] for output in outputs]
+    assert began == [["ramp", "motion"], ["motion"], ["ramp"]]
+    with pytest.raises(tawami.InputError, match="phases = 'ramp': expected some of ramp, settle"):
+        tawami.ParticleOutput(phases="ramp")
 
 
 def test_other_results_are_refused():

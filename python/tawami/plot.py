@@ -351,6 +351,8 @@ def _panel(axes: Axes, head: Sequence[str], numbers: Sequence[int], values: Arra
             own = name.removeprefix(kind).strip() or name
             axes.plot(rows[:, 1], rows[:, k], "." if of_steps else "-", markersize=3, label=own)
     axes.set_xlabel(head[1].replace("time [s]", "$t$ [s]"))
+    if of_steps:
+        axes.set_ylim(bottom=0)
     if kind == "Newton":
         from matplotlib.ticker import MaxNLocator
 

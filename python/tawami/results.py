@@ -176,14 +176,15 @@ class Results:
             ) from error
 
     def note(self, phase: str, facts: Mapping[str, Any]) -> None:
-        """Write what is known of a phase into run.json; a call for the first rank."""
+        """Add to what run.json knows of a phase; a call for the first rank."""
         run = self.folder / RUN
         try:
             known = json.loads(run.read_text(encoding="utf-8"))
         except (OSError, ValueError):
             known = {}
-        others = [one for one in known.get("phases", []) if one.get("name") != phase]
-        known["phases"] = [*others, {"name": phase, **facts}]
+        phases = {one["name"]: one for one in known.get("phases", [])}
+        phases[phase] = phases.get(phase, {"name": phase}) | facts
+        known["phases"] = list(phases.values())
         with whole_file(run) as part:
             part.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
 
@@ -318,6 +319,10 @@ class Phase(Unwatched):
             self.name, verb, self._at, self.end, self._comm.size,
         )  # fmt: skip
         if state is None:
+            header = (self.motion or self.scene).header().splitlines()
+            with together(self._comm):
+                if self._writes:
+                    self.results.note(self.name, {"began": _now(), "input": header})
             self._look(None, last=False)
         self._stored = len(steps)
         self._remaining = progress.Remaining(pace.at, self.end)
@@ -459,7 +464,7 @@ class Phase(Unwatched):
                 "reached": self._pace.at,
                 "steps": len(self._steps),
                 "seconds": seconds,
-                "finished": datetime.now(UTC).isoformat(timespec="seconds"),
+                "finished": _now(),
             }
             self.results.note(self.name, facts)
 
@@ -524,6 +529,10 @@ def _fingerprint(values: Any) -> float:
     """
     weights = np.random.default_rng(0).uniform(0.5, 1.5, values.shape)
     return float((weights * values + 2 * np.abs(values)).sum())
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def _text(value: Any) -> str:
