@@ -1,7 +1,8 @@
 """tawami: implicit material point method with the mixed displacement - volumetric strain form."""
 
 from tawami._rust import Material
-from tawami.body import Body, box, polygon
+from tawami.body import Body, box
+from tawami.disc import disc
 from tawami.dynamics import Dynamics
 from tawami.errors import (
     ConvergenceError,
@@ -29,6 +30,7 @@ from tawami.materials import (
     von_mises,
 )
 from tawami.numpy_law import NumpyLaw
+from tawami.polygon import polygon
 from tawami.ranks import run
 from tawami.scene import Scene
 from tawami.solution import Solution
@@ -61,6 +63,7 @@ __all__ = [
     "SupportError",
     "TawamiError",
     "box",
+    "disc",
     "drucker_prager",
     "linear_elastic",
     "mohr_coulomb",
