@@ -8,6 +8,7 @@ from tawami.errors import (
     ConvergenceError,
     EnergyWarning,
     FormError,
+    GeometryWarning,
     InputError,
     InstabilityWarning,
     LockingWarning,
@@ -22,6 +23,7 @@ from tawami.errors import (
 )
 from tawami.formulation import Form
 from tawami.grid import Grid
+from tawami.level_set import level_set
 from tawami.materials import (
     drucker_prager,
     linear_elastic,
@@ -29,6 +31,7 @@ from tawami.materials import (
     neo_hookean,
     von_mises,
 )
+from tawami.mesh import mesh
 from tawami.numpy_law import NumpyLaw
 from tawami.polygon import polygon
 from tawami.ranks import run
@@ -44,6 +47,7 @@ __all__ = [
     "EnergyWarning",
     "Form",
     "FormError",
+    "GeometryWarning",
     "Grid",
     "InputError",
     "InstabilityWarning",
@@ -65,7 +69,9 @@ __all__ = [
     "box",
     "disc",
     "drucker_prager",
+    "level_set",
     "linear_elastic",
+    "mesh",
     "mohr_coulomb",
     "neo_hookean",
     "polygon",

@@ -81,5 +81,3 @@ def box(
         x=np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))]),
         volume=np.outer(wy, wx).ravel(),
     )
-
-

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import legendre
 from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
@@ -169,7 +168,7 @@ def _of_cell(x: Array, weight: Array, kept: Any) -> tuple[Array, Array]:
         return x, weight
     low, high = x.min(axis=0), x.max(axis=0)
     t = (2 * x - low - high) / np.maximum(high - low, np.finfo(float).tiny)
-    px, py = (legendre.legvander(t[:, k], DEGREE) for k in range(2))
+    px, py = (t[:, k, None] ** np.arange(DEGREE + 1) for k in range(2))
     moments = np.column_stack(
         [px[:, i] * py[:, j] for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i)]
     )

@@ -101,8 +101,8 @@ def _ring(grid: Grid, middle: Array, r: float, chords: int) -> tuple[Array, Arra
     ends = sorted_angles[np.diff(sorted_angles, append=np.inf) > ONE_ANGLE]
     x = middle + r * np.column_stack([np.cos(ends), np.sin(ends)])
     near = np.abs(x - np.rint(x)) < ONE_ANGLE * max(r, 1.0)
-    x = np.clip(np.where(near, np.rint(x), x), 0, grid.cells)
-    return x, np.append(ends, ends[0] + 2 * np.pi)
+    corners: Array = np.clip(np.where(near, np.rint(x), x), 0, grid.cells)
+    return corners, np.append(ends, ends[0] + 2 * np.pi)
 
 
 def _caps(grid: Grid, middle: Array, r: float, ends: Array) -> Points:
@@ -120,13 +120,13 @@ def _caps(grid: Grid, middle: Array, r: float, ends: Array) -> Points:
     first, last = r * at(begin), r * at(begin + span)
     chord, along = first + t[:, None] * (last - first), last - first
     height = arc - chord
-    x = chord[:, :, None] + s[:, None] * height[:, :, None]
+    x: Array = chord[:, :, None] + s[:, None] * height[:, :, None]
     slope = along[:, :, None] + s[:, None] * (tangent - along)[:, :, None]
     area = slope[..., 1] * height[:, :, None, 0] - slope[..., 0] * height[:, :, None, 1]
     weight = area * wt[:, None] * ws
-    x = (middle + x).reshape(len(large), -1, 2)
+    x = (middle + x).reshape(len(span), -1, 2)
     cell = np.clip(np.floor(x.mean(axis=1)), 0, np.subtract(grid.cells, 1)).astype(np.int64)
-    x = np.clip(x, cell[:, None], cell[:, None] + 1)
+    x = np.asarray(np.clip(x, cell[:, None], cell[:, None] + 1.0), dtype=float)
     return Points(x.reshape(-1, 2), weight.ravel(), np.repeat(cell, ALONG * ACROSS, axis=0))
 
 

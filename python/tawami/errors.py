@@ -21,6 +21,10 @@ class EnergyWarning(UserWarning):
     """A motion whose energy has grown by what no load and no support gave."""
 
 
+class GeometryWarning(UserWarning):
+    """A body that is not quite of the shape that was given."""
+
+
 class InstabilityWarning(UserWarning):
     """An option of a form that is not stable for this body."""
 
@@ -69,6 +73,7 @@ __all__ = [
     "ConvergenceError",
     "EnergyWarning",
     "FormError",
+    "GeometryWarning",
     "InputError",
     "InstabilityWarning",
     "LockingWarning",

@@ -125,6 +125,4 @@ def on_lines(scaled: Array) -> Array:
 
 def extent(grid: Grid) -> str:
     """The grid's range in words [m]."""
-    return (
-        f"[{grid.origin[0]:g}, {grid.upper[0]:g}] x [{grid.origin[1]:g}, {grid.upper[1]:g}]"
-    )
+    return f"[{grid.origin[0]:g}, {grid.upper[0]:g}] x [{grid.origin[1]:g}, {grid.upper[1]:g}]"
