@@ -14,8 +14,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import solve_triangular
-from scipy.optimize import nnls
 
 from tawami import _dolfinx, _rust
 from tawami.errors import InputError
@@ -177,7 +175,7 @@ def _of_cell(x: Array, weight: Array, kept: Any) -> tuple[Array, Array]:
     q, r = np.linalg.qr(root[:, None] * moments[may])
     wanted = q.T @ root
     if not may.all():
-        wanted = wanted + solve_triangular(r, moments[~may].T @ weight[~may], trans="T")
+        wanted = wanted + np.linalg.solve(r.T, moments[~may].T @ weight[~may])
     area, size = weight.sum(), np.linalg.norm(wanted)
     found, rest = _fitted((q / root[:, None]).T, wanted, weight[may])
     if rest > MOMENT_ERROR * size and may.all():
@@ -189,6 +187,8 @@ def _of_cell(x: Array, weight: Array, kept: Any) -> tuple[Array, Array]:
 
 def _fitted(functions: Array, moments: Array, weight: Array) -> tuple[Array, float]:
     """Non-negative weights with these moments, and how far they are off."""
+    from scipy.optimize import nnls  # here: a scene without cut cells does without it
+
     try:
         found, rest = nnls(functions, moments)
     except RuntimeError:  # too many iterations

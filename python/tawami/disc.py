@@ -119,8 +119,8 @@ def _caps(grid: Grid, middle: Array, r: float, ends: Array) -> Points:
     arc, tangent = r * at(begin + span * t), r * span[..., None] * at(begin + span * t + np.pi / 2)
     first, last = r * at(begin), r * at(begin + span)
     chord, along = first + t[:, None] * (last - first), last - first
-    height = arc - chord
-    x: Array = chord[:, :, None] + s[:, None] * height[:, :, None]
+    height: Array = arc - chord
+    x: Array = np.asarray(chord[:, :, None] + s[:, None] * height[:, :, None], dtype=float)
     slope = along[:, :, None] + s[:, None] * (tangent - along)[:, :, None]
     area = slope[..., 1] * height[:, :, None, 0] - slope[..., 0] * height[:, :, None, 1]
     weight = area * wt[:, None] * ws

@@ -40,8 +40,8 @@ def polygon(
     Args:
         grid: The grid.
         shape: Corners [m] in order, n x 2, either way round; or a Polygon or MultiPolygon of shapely,
-            as its set operations and `buffer` give them.
-        holes: Corners of each hole [m], likewise.
+            as its set operations and `buffer` give them, with the holes that it has.
+        holes: Corners of each hole of a polygon that is given by its corners [m].
         per_axis: Particles per full cell and axis.
         gauss: Put those at the Gauss points, with the Gauss weights, instead of evenly.
 
@@ -50,45 +50,38 @@ def polygon(
             the polygon, a vertex outside the grid, or a geometry without an area.
     """
     cut_cells.along_an_axis(per_axis, gauss)
-    found = _valid(grid, _in_cells(grid, _geometry(shape, holes)))
+    found = _valid(grid, _geometry(grid, shape, holes))
     full, triangles, cell = cut_cells.clipped(found)
     cut = cut_cells.in_triangles(triangles, cell)
     return Body(*cut_cells.to_body(grid, full, cut, per_axis, gauss))
 
 
-def _geometry(shape: Any, holes: Sequence[npt.ArrayLike]) -> Any:
-    """The geometry of shapely, in metres."""
-    import shapely
-
-    if isinstance(shape, shapely.Geometry):
-        if not isinstance(shape, shapely.Polygon | shapely.MultiPolygon) or shape.is_empty:
-            what = "empty" if shape.is_empty else f"a {shape.geom_type}"
-            raise InputError(
-                f"polygon: the geometry is {what}: expected a Polygon or MultiPolygon with an area"
-            )
-        return shape if not len(holes) else shape - shapely.MultiPolygon(_rings(holes))
-    (outer,) = _rings([shape], "vertices")
-    return shapely.Polygon(outer, _rings(holes))
-
-
-def _rings(given: Sequence[npt.ArrayLike], name: str = "") -> list[Array]:
-    rings = []
-    for k, corners in enumerate(given):
-        what = name or f"holes[{k}]"
-        ring = array(what, corners, 2)
-        if len(ring) < 3 or ring.shape[1] != 2:
-            raise InputError(
-                f"polygon: {what} has shape {ring.shape}: expected three or more points (x, y)"
-            )
-        rings.append(ring)
-    return rings
-
-
-def _in_cells(grid: Grid, shape: Any) -> Any:
+def _geometry(grid: Grid, shape: Any, holes: Sequence[npt.ArrayLike]) -> Any:
     """In cells from the origin; round-off must not leave slivers beyond a line."""
     import shapely
 
-    corners = shapely.get_coordinates(shape)
+    inner = [_ring(grid, corners, f"holes[{k}]") for k, corners in enumerate(holes)]
+    if not isinstance(shape, shapely.Geometry):
+        return shapely.Polygon(_ring(grid, shape, "vertices"), inner)
+    if not isinstance(shape, shapely.Polygon | shapely.MultiPolygon) or shape.is_empty:
+        what = f"a {shape.geom_type}" + (" that is empty" if shape.is_empty else "")
+        raise InputError(f"polygon: it is {what}: expected a Polygon or MultiPolygon with an area")
+    if inner:
+        raise InputError("polygon: a geometry of shapely has its own holes: expected no holes=")
+    scaled = _in_cells(grid, shapely.get_coordinates(shape))
+    return shapely.set_coordinates(shapely.force_2d(shape), scaled)
+
+
+def _ring(grid: Grid, given: npt.ArrayLike, what: str) -> Array:
+    corners = array(what, given, 2)
+    if len(corners) < 3 or corners.shape[1] != 2:
+        raise InputError(
+            f"polygon: {what} has shape {corners.shape}: expected three or more points (x, y)"
+        )
+    return _in_cells(grid, corners)
+
+
+def _in_cells(grid: Grid, corners: Array) -> Array:
     scaled = on_lines((corners - grid.origin) / grid.h)
     outside = np.flatnonzero(~((scaled >= 0) & (scaled <= grid.cells)).all(axis=1))
     if len(outside):
@@ -97,7 +90,7 @@ def _in_cells(grid: Grid, shape: Any) -> Any:
             f"polygon: vertex {outside[0]} at ({x:g}, {y:g}) m lies outside the grid, {extent(grid)}; "
             "enlarge the grid or move the vertex"
         )
-    return shapely.set_coordinates(shapely.force_2d(shape), scaled)
+    return scaled
 
 
 def _valid(grid: Grid, shape: Any) -> Any:
