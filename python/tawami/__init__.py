@@ -37,6 +37,7 @@ from tawami.polygon import polygon
 from tawami.ranks import run
 from tawami.scene import Scene
 from tawami.solution import Solution
+from tawami.source import earlier, table
 from tawami.stepping import ramp, settle
 from tawami.study import Series, Study, recommend
 
@@ -69,6 +70,7 @@ __all__ = [
     "box",
     "disc",
     "drucker_prager",
+    "earlier",
     "level_set",
     "linear_elastic",
     "mesh",
@@ -79,5 +81,6 @@ __all__ = [
     "recommend",
     "run",
     "settle",
+    "table",
     "von_mises",
 ]

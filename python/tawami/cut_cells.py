@@ -164,6 +164,10 @@ def _of_cell(x: Array, weight: Array, kept: Any) -> tuple[Array, Array]:
         may &= kept(x)
     if may.all() and len(x) <= MOST:
         return x, weight
+    area = weight.sum()
+    if area <= 0:  # what is taken away leaves round-off
+        return x[:0], weight[:0]
+    may = may if may.any() else weight > 0
     low, high = x.min(axis=0), x.max(axis=0)
     t = (2 * x - low - high) / np.maximum(high - low, np.finfo(float).tiny)
     px, py = (t[:, k, None] ** np.arange(DEGREE + 1) for k in range(2))
@@ -175,8 +179,8 @@ def _of_cell(x: Array, weight: Array, kept: Any) -> tuple[Array, Array]:
     q, r = np.linalg.qr(root[:, None] * moments[may])
     wanted = q.T @ root
     if not may.all():
-        wanted = wanted + np.linalg.solve(r.T, moments[~may].T @ weight[~may])
-    area, size = weight.sum(), np.linalg.norm(wanted)
+        wanted = wanted + np.linalg.lstsq(r.T, moments[~may].T @ weight[~may], rcond=None)[0]
+    size = np.linalg.norm(wanted)
     found, rest = _fitted((q / root[:, None]).T, wanted, weight[may])
     if rest > MOMENT_ERROR * size and may.all():
         return x, weight
