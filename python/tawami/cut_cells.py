@@ -28,7 +28,7 @@ DEGREE = 6
 MOST = (DEGREE + 1) * (DEGREE + 2) // 2
 #: A side or vertex this near to a line of the grid lies on it.
 ON_LINE = 1e-6
-#: A part of a cell this small is round-off.
+#: A part of a cell this small, or this share of a body smaller than a cell, is round-off.
 ROUND_OFF = 1e-12
 #: Error of a moment, over the area, from which on points are not thinned out.
 MOMENT_ERROR = 1e-12
@@ -115,7 +115,7 @@ def clipped(shape: Any) -> tuple[Numbers, Array, Numbers]:
     triangles, of_part = shapely.get_parts(
         shapely.constrained_delaunay_triangles(parts[cut]), return_index=True
     )
-    large = shapely.area(triangles) > ROUND_OFF
+    large = shapely.area(triangles) > ROUND_OFF * min(1.0, shape.area)
     corners = shapely.get_coordinates(triangles[large]).reshape(-1, 4, 2)[:, :3]
     return cell[full], corners, cell[rest[cut][of_part[large]]]
 

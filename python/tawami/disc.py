@@ -64,7 +64,8 @@ def disc(
             f"disc: the circle around ({x:g}, {y:g}) m with a radius of {radius:g} m leaves the grid, "
             f"{extent(grid)}; enlarge the grid or move the disc"
         )
-    hole = inner / grid.h
+    # a hole that is round-off is none
+    hole = inner / grid.h if inner > ROUND_OFF * radius else 0.0
     # the chords of the outer circle stay clear of the inner one
     chords = max(CHORDS, int(np.ceil(2 * np.pi / np.sqrt(1 - hole / r))))
     outer, ends = _ring(grid, middle, r, chords)
@@ -109,8 +110,8 @@ def _caps(grid: Grid, middle: Array, r: float, ends: Array) -> Points:
     """Points that integrate over what is between the chords of a circle and its arcs."""
     (t, wt), (s, ws) = _rust.gauss(ALONG), _rust.gauss(ACROSS)
     span = np.diff(ends)
-    # thinner ones are round-off
-    large = np.flatnonzero(r * r * span**3 > ROUND_OFF * 1e-2)
+    # thinner ones are round-off of r^2
+    large = np.flatnonzero(span**3 > ROUND_OFF * 1e-2)
     begin, span = ends[large, None], span[large, None]
 
     def at(angle: Array) -> Array:
@@ -124,7 +125,7 @@ def _caps(grid: Grid, middle: Array, r: float, ends: Array) -> Points:
     slope = along[:, :, None] + s[:, None] * (tangent - along)[:, :, None]
     area = slope[..., 1] * height[:, :, None, 0] - slope[..., 0] * height[:, :, None, 1]
     weight = area * wt[:, None] * ws
-    x = (middle + x).reshape(len(span), -1, 2)
+    x = (middle + x).reshape(len(span), ALONG * ACROSS, 2)
     cell = np.clip(np.floor(x.mean(axis=1)), 0, np.subtract(grid.cells, 1)).astype(np.int64)
     x = np.asarray(np.clip(x, cell[:, None], cell[:, None] + 1.0), dtype=float)
     return Points(x.reshape(-1, 2), weight.ravel(), np.repeat(cell, ALONG * ACROSS, axis=0))

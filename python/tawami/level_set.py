@@ -20,8 +20,11 @@ Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 #: Halvings that find where the function changes its sign, and the most often that a square is divided.
 BISECTIONS, DEEPEST = 46, 20
-#: Triangles of a square of corners (0, 0), (1, 0), (0, 1), (1, 1), counter-clockwise.
-HALVES = np.array([[0, 1, 3], [0, 3, 2]])
+#: Squares along a border from which on it is no curve, besides four times those at first.
+MANY = 100_000
+#: Corners of a square, and its two triangles by one diagonal or the other, counter-clockwise.
+LATTICE = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
+HALVES = np.array([[[0, 1, 3], [0, 3, 2]], [[0, 1, 2], [1, 3, 2]]])
 
 
 @dataclass(frozen=True)
@@ -141,8 +144,8 @@ def level_set(
     squares = Squares(corner, 1 / samples, at.reshape(-1, 4))
     border = squares.beside(squares.cut)
     inside = corner[(squares.f < 0).all(axis=1) & ~border]
-    triangles = _refined(sign, squares[border], len(inside) / samples**2, tolerance / 2)
-    return _filled(grid, inside, triangles, tolerance / 2, samples, per_axis, gauss)
+    triangles = _refined(sign, squares[border], len(inside) / samples**2, tolerance)
+    return _filled(grid, inside, triangles, samples, per_axis, gauss)
 
 
 def _check_ends(grid: Grid, signs: Numbers, ends: Sequence[Edge]) -> None:
@@ -162,7 +165,6 @@ def _filled(
     grid: Grid,
     corner: Array,
     triangles: Array,
-    tolerance: float,
     samples: int,
     per_axis: int,
     gauss: bool,
@@ -177,11 +179,9 @@ def _filled(
     key_of_square, key_of_triangle = of_square @ [1, nx], of_triangle @ [1, nx]
     area = np.bincount(key_of_square, minlength=nx * ny) * size**2
     area += np.bincount(key_of_triangle, areas(triangles), minlength=nx * ny)
-    # a cell that lacks no more than the tolerance is full
-    cut = (area > 0) & (area < 1 - ROUND_OFF)
-    whole = (area > 0) & (area > 1 - ROUND_OFF - tolerance * area.sum() / max(cut.sum(), 1))
+    whole = area > 1 - ROUND_OFF
     rest, cut = ~whole[key_of_square], ~whole[key_of_triangle]
-    halves = (np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * size)[HALVES]
+    halves = (LATTICE * size)[HALVES[0]]
     squares = (corner[rest][:, None, None] + halves).reshape(-1, 3, 2)
     points = cut_cells.in_triangles(
         np.concatenate([squares, triangles[cut]]),
@@ -209,8 +209,11 @@ def _refined(sign: Function, squares: Squares, inside: float, tolerance: float) 
     """
     done = list[Array]()
     triangles, of_square = _pieces(sign, squares)
+    most = MANY + 4 * len(squares.corner)
     for level in range(DEEPEST):
         count = len(squares.corner)
+        if count > most:
+            break
         if not count:
             return np.concatenate([triangles, *done])
         before = np.bincount(of_square, areas(triangles), minlength=count)
@@ -218,8 +221,8 @@ def _refined(sign: Function, squares: Squares, inside: float, tolerance: float) 
         triangles, of_part = _pieces(sign, parts)
         found = areas(triangles)
         change = np.abs(np.bincount(of_part // 4, found, minlength=count) - before)
-        # what all levels leave adds up to the tolerance at most
-        limit = 0.6 * tolerance * (inside + found.sum()) / (level + 1) ** 2
+        # what all levels leave adds up to a tenth of the tolerance: a change is no bound of the error
+        limit = 0.06 * tolerance * (inside + found.sum()) / (level + 1) ** 2
         split = (change > limit / count) & (change.sum() > limit)
         # a border that bends into the next square and back is seen there when that is divided
         again = np.repeat(squares.beside(split), 4) & parts.beside(parts.cut & np.repeat(split, 4))
@@ -254,9 +257,12 @@ def _pieces(sign: Function, squares: Squares) -> tuple[Array, Numbers]:
     point in between: where a parabola has its area (two thirds of what is below its height, so 4/3 of
     the height).
     """
-    lattice = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * squares.size
-    corners = (squares.corner[:, None] + lattice)[:, HALVES].reshape(-1, 3, 2)
-    f = squares.f[:, HALVES].reshape(-1, 3)
+    # the diagonal goes through a corner whose sign is that of no other
+    odd = np.abs((squares.f * squares.f.sum(axis=1)[:, None]).argmin(axis=1) - 1.5) < 1
+    halves = HALVES[odd.astype(int)].reshape(-1, 6)
+    corners = squares.corner[:, None] + squares.size * LATTICE
+    corners = np.take_along_axis(corners, halves[..., None], axis=1).reshape(-1, 3, 2)
+    f = np.take_along_axis(squares.f, halves, axis=1).reshape(-1, 3)
     number = np.repeat(np.arange(len(squares.corner)), 2)
     count = (f < 0).sum(axis=1)
     found, of = [corners[count == 3]], [number[count == 3]]
