@@ -21,7 +21,7 @@ Mask = npt.NDArray[np.bool_]
 #: Halvings that find where the function changes its sign, and the most often that a square is divided.
 BISECTIONS, DEEPEST = 46, 20
 #: Squares along a border from which on it is no curve, besides four times those at first.
-MANY = 100_000
+MANY = 20_000
 #: Corners of a square, and its two triangles by one diagonal or the other, counter-clockwise.
 LATTICE = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 HALVES = np.array([[[0, 1, 3], [0, 3, 2]], [[0, 1, 2], [1, 3, 2]]])

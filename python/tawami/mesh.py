@@ -112,7 +112,7 @@ def _plane(read: Any) -> Array:
         raise InputError(f"mesh: points of shape {points.shape}: expected nodes x 2 or 3")
     if points.shape[1] == 3 and len(points):
         z = points[:, 2]
-        if not np.ptp(z) <= 1e-9 * max(np.ptp(points[:, :2], axis=0).max(), np.abs(z).max()):
+        if not np.ptp(z) <= 1e-9 * np.nanmax(np.abs(points)):
             raise InputError(
                 f"mesh: its nodes have z from {z.min():g} to {z.max():g} m: expected a plane mesh, "
                 "with one z everywhere"
