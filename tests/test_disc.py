@@ -46,9 +46,7 @@ def test_area_centroid_and_second_moments(place, size, hole, per_axis):
     radius = 0.5 * size * min(5, 4) * grid.h
     room = np.array(grid.upper) - grid.origin - 2 * radius
     centre = np.array(grid.origin) + radius + np.array(place) * room
-    body = tawami.disc(
-        grid, centre, radius, inner=hole * radius, per_axis=per_axis, gauss=True
-    )
+    body = tawami.disc(grid, centre, radius, inner=hole * radius, per_axis=per_axis, gauss=True)
     exact = moments_of_ring(centre, radius, hole * radius)
     assert moments_of_particles(body) == pytest.approx(exact, rel=1e-11, abs=1e-11 * exact[0])
     assert (body.volume > 0).all()

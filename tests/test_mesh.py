@@ -212,7 +212,7 @@ def wrong(what):
     kind = "triangle"
     match what:
         case "outside":
-            points = points + [0.8, 0.0]
+            points[:, 0] += 0.8
         case "inverted":  # a node pushed through the side opposite
             points[8] += [0.9, 0.05]
         case "twice":

@@ -78,17 +78,17 @@ def _ring(grid: Grid, given: npt.ArrayLike, what: str) -> Array:
         raise InputError(
             f"polygon: {what} has shape {corners.shape}: expected three or more points (x, y)"
         )
-    return _in_cells(grid, corners)
+    return _in_cells(grid, corners, "" if what == "vertices" else f" of {what}")
 
 
-def _in_cells(grid: Grid, corners: Array) -> Array:
+def _in_cells(grid: Grid, corners: Array, of: str = "") -> Array:
     scaled = on_lines((corners - grid.origin) / grid.h)
     outside = np.flatnonzero(~((scaled >= 0) & (scaled <= grid.cells)).all(axis=1))
     if len(outside):
         x, y = corners[outside[0]]
         raise InputError(
-            f"polygon: vertex {outside[0]} at ({x:g}, {y:g}) m lies outside the grid, {extent(grid)}; "
-            "enlarge the grid or move the vertex"
+            f"polygon: vertex {outside[0]}{of} at ({x:g}, {y:g}) m lies outside the grid, "
+            f"{extent(grid)}; enlarge the grid or move the vertex"
         )
     return scaled
 

@@ -238,7 +238,10 @@ def _of_numbers(source: Any, n: int, width: int, name: str) -> Array:
     few = {1: "a number", 2: "two numbers"}.get(width, f"{width} numbers")
     shape = (n, width) if width > 1 else (n,)
     try:
-        given = np.broadcast_to(np.asarray(source, dtype=float), shape)
+        array = np.asarray(source, dtype=float)
+        if array.shape not in (shape, shape[1:]):
+            raise ValueError
+        given = np.broadcast_to(array, shape)
     except (TypeError, ValueError):
         more = f"{n} x {width}" if width > 1 else f"{n} of them"
         raise InputError(
@@ -252,6 +255,8 @@ def _shape(source: Any) -> str:
     try:
         return f"shape {np.asarray(source, dtype=float).shape}"
     except (TypeError, ValueError):
+        if isinstance(source, tuple | list):
+            return f"parts of shape {', '.join(str(np.shape(part)) for part in source)}"
         return f"the value {source!r}"
 
 
