@@ -214,6 +214,9 @@ def values(scene: Scene, name: str, source: Any, components: str, unit: str) -> 
     """
     x, number = np.asarray(scene.particles.x), np.asarray(scene.particles.number)
     width = len(components.split())
+    given = isinstance(source, Earlier | Table) or callable(source)
+    if given and not len(x):  # a rank without particles
+        return np.empty((0, width))
     if isinstance(source, Earlier):
         found = source.at(name, x, number, width, scene.grid.h, name)
     elif isinstance(source, Table):
@@ -226,9 +229,9 @@ def values(scene: Scene, name: str, source: Any, components: str, unit: str) -> 
     elif callable(source):
         found = _of_function(source, x, name, components)
     else:
-        given = _of_numbers(source, scene.num_particles, width, name)
-        _check_finite(given, np.arange(len(given)), name, unit)
-        found = given[number]
+        whole = _of_numbers(source, scene.num_particles, width, name)
+        _check_finite(whole, np.arange(len(whole)), name, unit)
+        found = whole[number]
     _check_finite(found, number, name, unit)
     return found
 
