@@ -37,7 +37,7 @@ def square(side, angle):
     return f
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(
     centre=st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1)),
     axes=st.tuples(st.floats(0.1, 0.8), st.floats(0.1, 0.8)),
@@ -76,7 +76,7 @@ def test_curved_borders_are_not_cut_short(sign):
     assert abs(error) < 0.01 * chords
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.1, 0.4, np.pi / 4])
+@pytest.mark.parametrize("angle", [0.0, 0.1, np.pi / 4])
 def test_corners(angle):
     for tolerance in (1e-4, 1e-6, 1e-7):
         body = tawami.level_set(square_grid(), square(1.03, angle), tolerance=tolerance, gauss=True)

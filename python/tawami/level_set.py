@@ -117,7 +117,7 @@ def level_set(
         f: A function on arrays of x and y [m].
         ends: Edges of the grid ('left', 'right', 'bottom', 'top') at which the body may end, f being
             negative there.
-        tolerance: Of the area, as a share of it; 1e-13 at least.
+        tolerance: Of the area, as a share of it, judged by what dividing changes; 1e-13 at least.
         samples: Along a cell in each axis.
         per_axis: Particles per full cell and axis.
         gauss: Put those at the Gauss points, with the Gauss weights, instead of evenly.
