@@ -133,23 +133,27 @@ def to_body(
         kept: Says which points (n x 2) particles may be at; all by default.
     """
     whole = in_full_cells(full, per_axis, gauss)
-    x, weight, _ = thinned(cut, kept)
+    x, weight, _ = thinned(cut, len(full), kept)
     x, weight = np.concatenate([whole.x, x]), np.concatenate([whole.weight, weight])
     if not len(x):
         raise InputError("a body without particles: expected a shape with an area")
     return grid.origin + grid.h * x, grid.h**2 * weight
 
 
-def thinned(points: Points, kept: Any = None) -> tuple[Array, Array, Numbers]:
-    """At most MOST points for each cell, their weights, and the first of the points of that cell."""
-    if not len(points.x):
-        return points.x, points.weight, np.empty(0, dtype=np.int64)
-    width = int(points.cell[:, 0].max()) + 1
+def thinned(points: Points, full: int, kept: Any = None) -> tuple[Array, Array, Numbers]:
+    """At most MOST points for each cell, their weights, and the first of the points of that cell; none
+    where that is round-off of the body, which has so many full cells besides.
+    """
+    none = np.empty(0, dtype=np.int64)
+    x, weight, first = [points.x[:0]], [points.weight[:0]], [none]
+    width = int(points.cell[:, 0].max(initial=0)) + 1
     key = points.cell[:, 0] + width * points.cell[:, 1]
     order = np.argsort(key, kind="stable")
     starts = np.flatnonzero(np.diff(key[order], prepend=-1))
-    x, weight, first = list[Array](), list[Array](), list[Numbers]()
-    for group in np.split(order, starts[1:]):
+    least = ROUND_OFF * min(1.0, full + float(points.weight.sum()))
+    for group in np.split(order, starts)[1:]:
+        if points.weight[group].sum() <= least:
+            continue
         found = _of_cell(points.x[group], points.weight[group], kept)
         x.append(found[0])
         weight.append(found[1])
@@ -165,8 +169,6 @@ def _of_cell(x: Array, weight: Array, kept: Any) -> tuple[Array, Array]:
     if may.all() and len(x) <= MOST:
         return x, weight
     area = weight.sum()
-    if area <= 0:  # what is taken away leaves round-off
-        return x[:0], weight[:0]
     may = may if may.any() else weight > 0
     low, high = x.min(axis=0), x.max(axis=0)
     t = (2 * x - low - high) / np.maximum(high - low, np.finfo(float).tiny)

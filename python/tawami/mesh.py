@@ -72,7 +72,7 @@ def mesh(
     elements.check_apart(grid, parts)
     full, of_full, cut, of_cut = elements.by_cells(grid, parts, len(names))
     whole = cut_cells.in_full_cells(full, per_axis, gauss)
-    thin, weight, first = cut_cells.thinned(cut)
+    thin, weight, first = cut_cells.thinned(cut, len(full))
     positions = np.concatenate([whole.x, thin])
     volume = np.concatenate([whole.weight, weight])
     material = np.concatenate([np.repeat(of_full, per_axis**2), of_cut[first]])
