@@ -133,6 +133,33 @@ def motion() -> dict[str, np.ndarray]:
     return found
 
 
+def initial() -> dict[str, np.ndarray]:
+    """A ring in a stress of its own, some of it beyond the yield surface: some ranks have none of it."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(16, 16))
+    ring = tawami.disc(grid, (0.6, 0.7), 0.5, inner=0.2)
+    elastic = tawami.linear_elastic(E=1e6, nu=0.3)
+    steel = tawami.von_mises(elastic, yield_stress=1e3)
+    stress = np.column_stack([4e3 * (ring.x[:, 0] - 0.6), *(3 * [0 * ring.x[:, 0]])])
+    plastic = tawami.Scene(grid, ring, steel)
+    told = "nothing"
+    try:
+        plastic.initial("stress", stress)
+    except tawami.InputError as error:
+        told = str(error)
+    assert "beyond what its law bears" in told
+    plastic.initial("stress", stress, beyond="return")
+    order = np.argsort(joined(grid.comm, plastic.particles.number))
+    found = {"initial stress": joined(grid.comm, np.array(plastic.particles.stress))[order]}
+    scene = tawami.Scene(grid, ring, elastic, density=10.0)
+    scene.initial("stress", lambda x, y: (4e3 * (x - 0.6), 0.0, 0.0, 0.0))
+    for point in ((0.6, 0.3), (0.2, 0.7)):
+        scene.hold(point, "x")
+        scene.hold(point, "y")
+    scene.gravity((0, -1))
+    solution = scene.solve()
+    return found | {"initial solved": solution.stress, "initial eps_v": solution.eps_v}
+
+
 def whole(motion: tawami.Dynamics) -> dict[str, np.ndarray]:
     """What the particles carry, in the order of their numbers."""
     particles, comm = motion.scene.particles, motion.scene.grid.comm
@@ -142,6 +169,6 @@ def whole(motion: tawami.Dynamics) -> dict[str, np.ndarray]:
 
 
 if __name__ == "__main__":
-    found = beams() | random_clouds() | nonlinear() | singular() | motion()
+    found = beams() | random_clouds() | nonlinear() | singular() | motion() | initial()
     if MPI.COMM_WORLD.rank == 0:
         np.savez(sys.argv[1], **found)

@@ -38,7 +38,9 @@ def results(tmp_path_factory):
 
 
 @pytest.mark.parametrize("number", [2, 4])
-@pytest.mark.parametrize("subject", ["beam", "cloud", "nonlinear", "fem", "singular", "motion"])
+@pytest.mark.parametrize(
+    "subject", ["beam", "cloud", "nonlinear", "fem", "singular", "motion", "initial"]
+)
 def test_results_do_not_depend_on_the_number_of_ranks(results, number, subject):
     names = [name for name in results[1] if name.startswith(subject)]
     assert names

@@ -1,7 +1,8 @@
 """tawami: implicit material point method with the mixed displacement - volumetric strain form."""
 
 from tawami._rust import Material
-from tawami.body import Body, box, polygon
+from tawami.body import Body, box
+from tawami.disc import disc
 from tawami.dynamics import Dynamics
 from tawami.errors import (
     CheckpointError,
@@ -9,6 +10,7 @@ from tawami.errors import (
     ConvergenceError,
     EnergyWarning,
     FormError,
+    GeometryWarning,
     InexactSumWarning,
     InputError,
     InstabilityWarning,
@@ -27,6 +29,7 @@ from tawami.errors import (
 from tawami.form_check import FormReport, check_form
 from tawami.formulation import Form
 from tawami.grid import Grid
+from tawami.level_set import level_set
 from tawami.materials import (
     drucker_prager,
     linear_elastic,
@@ -34,12 +37,15 @@ from tawami.materials import (
     neo_hookean,
     von_mises,
 )
+from tawami.mesh import mesh
 from tawami.numpy_law import NumpyLaw
 from tawami.output import GridOutput, ParticleOutput, TableOutput
+from tawami.polygon import polygon
 from tawami.ranks import run
 from tawami.results import Results
 from tawami.scene import Scene
 from tawami.solution import Solution
+from tawami.source import earlier, table
 from tawami.stepping import ramp, settle
 from tawami.study import Series, Study, recommend
 
@@ -53,6 +59,7 @@ __all__ = [
     "Form",
     "FormError",
     "FormReport",
+    "GeometryWarning",
     "Grid",
     "GridOutput",
     "InexactSumWarning",
@@ -80,8 +87,12 @@ __all__ = [
     "TawamiWarning",
     "box",
     "check_form",
+    "disc",
     "drucker_prager",
+    "earlier",
+    "level_set",
     "linear_elastic",
+    "mesh",
     "mohr_coulomb",
     "neo_hookean",
     "polygon",
@@ -89,5 +100,6 @@ __all__ = [
     "recommend",
     "run",
     "settle",
+    "table",
     "von_mises",
 ]

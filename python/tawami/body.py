@@ -1,29 +1,19 @@
-"""Filling a body with particles."""
+"""A body: its particles; a rectangle filled with them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tawami import _dolfinx, _rust
+from tawami.cut_cells import ON_LINE, along_an_axis
 from tawami.errors import InputError
 from tawami.grid import Grid
-from tawami.inputs import array, point, whole_number
-
-if TYPE_CHECKING:
-    import shapely
+from tawami.inputs import point
 
 Array = npt.NDArray[np.float64]
-#: Degree of the rule on the triangles of a cut cell: grad w : C : grad u of quadratic splines.
-CUT_DEGREE = 6
-#: A side or vertex this near to a line of the grid [cells] lies on it.
-ON_LINE = 1e-6
-#: A part of a cell this small [cells^2] is round-off.
-ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True)
@@ -33,10 +23,14 @@ class Body:
     Attributes:
         x: Positions [m], particles x 2.
         volume: Volumes per metre depth [m2], one per particle.
+        material_of: Number of the material of each particle; the first for all without it.
+        names: Of the materials, in the order of these numbers, where they have some.
     """
 
     x: Array
     volume: Array
+    material_of: npt.NDArray[np.uint32] | None = None
+    names: tuple[str, ...] = ()
 
 
 def box(
@@ -63,7 +57,7 @@ def box(
         InputError: Sides off the lines of the grid or outside the grid, or no particle.
     """
     lower, upper = point("lower", lower), point("upper", upper)
-    points, weights = _along_an_axis(per_axis, gauss)
+    points, weights = along_an_axis(per_axis, gauss)
     positions, widths = [], []
     for axis in range(2):
         ends = (np.array([lower[axis], upper[axis]]) - grid.origin[axis]) / grid.h
@@ -87,91 +81,3 @@ def box(
         x=np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))]),
         volume=np.outer(wy, wx).ravel(),
     )
-
-
-def polygon(grid: Grid, vertices: npt.ArrayLike, *, per_axis: int = 2, gauss: bool = False) -> Body:
-    """A simple polygon filled with particles; its sides may cut cells of the grid.
-
-    A full cell gets `per_axis` x `per_axis` particles, as `box` puts them. What the polygon leaves of
-    another cell is divided into triangles, with particles at the 12 points of a Gauss rule of degree
-    6 in each: however little is left, moments up to that degree are exact.
-
-    Args:
-        grid: The grid.
-        vertices: Corners [m] in order, n x 2, either way round.
-        per_axis: Particles per full cell and axis.
-        gauss: Put those at the Gauss points, with the Gauss weights, instead of evenly.
-
-    Raises:
-        InputError: Fewer than three vertices, all on a line, sides that cross or touch, or a vertex
-            outside the grid.
-    """
-    import shapely  # here and below: a scene without polygons does without it
-
-    points, weights = _along_an_axis(per_axis, gauss)
-    shape = _in_cells(grid, vertices)
-    lower, upper = np.floor(shape.bounds[:2]), np.ceil(shape.bounds[2:])
-    i, j = (np.arange(a, b) for a, b in zip(lower, upper, strict=True))
-    corner = np.column_stack([np.tile(i, len(j)), np.repeat(j, len(i))])
-    parts = shapely.intersection(shape, shapely.box(*corner.T, *(corner + 1).T))
-    full = shapely.area(parts) > 1 - ROUND_OFF
-    lattice = np.column_stack([np.tile(points, len(points)), np.repeat(points, len(points))])
-    x, volume = _in_triangles(parts[~full])
-    x = np.concatenate([(corner[full][:, None] + lattice).reshape(-1, 2), x])
-    volume = np.concatenate([np.tile(np.outer(weights, weights).ravel(), full.sum()), volume])
-    return Body(x=grid.origin + grid.h * x, volume=grid.h**2 * volume)
-
-
-def _along_an_axis(number: int, gauss: bool) -> tuple[Array, Array]:
-    """Positions and weights of the particles of a full cell along an axis, the cell being 0 to 1."""
-    number = whole_number("per_axis", number, low=1)
-    if gauss:
-        return _rust.gauss(number)
-    return (np.arange(number) + 0.5) / number, np.full(number, 1 / number)
-
-
-def _in_cells(grid: Grid, vertices: npt.ArrayLike) -> shapely.Polygon:
-    """The polygon in cells from the origin; round-off must not leave slivers beyond a line."""
-    import shapely
-
-    corners = array("vertices", vertices, 2)
-    if len(corners) < 3 or corners.shape[1] != 2:
-        raise InputError(
-            f"polygon: vertices has shape {corners.shape}: expected three or more points (x, y)"
-        )
-    scaled = (corners - grid.origin) / grid.h
-    on_line = np.isclose(scaled, np.rint(scaled), rtol=0, atol=ON_LINE)
-    scaled = np.where(on_line, np.rint(scaled), scaled)
-    outside = np.flatnonzero(~((scaled >= 0) & (scaled <= grid.cells)).all(axis=1))
-    if len(outside):
-        x, y = corners[outside[0]]
-        raise InputError(
-            f"polygon: vertex {outside[0]} at ({x:g}, {y:g}) m lies outside the grid, "
-            f"[{grid.origin[0]:g}, {grid.upper[0]:g}] x [{grid.origin[1]:g}, {grid.upper[1]:g}]; "
-            "enlarge the grid or move the vertex"
-        )
-    shape = shapely.Polygon(scaled)
-    if shape.convex_hull.area < ROUND_OFF:
-        raise InputError(
-            "polygon: its vertices lie on a line: a body without particles. Expected an area"
-        )
-    if not shape.is_valid:
-        where = shapely.is_valid_reason(shapely.Polygon(grid.origin + grid.h * scaled))
-        raise InputError(
-            f"polygon: its sides cross or touch each other ({where} m): expected a simple polygon, "
-            "its vertices in order around it"
-        )
-    return shape
-
-
-def _in_triangles(parts: Any) -> tuple[Array, Array]:
-    """Positions and volumes of particles that integrate over parts of cells."""
-    import shapely
-
-    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(parts))
-    area = shapely.area(triangles)
-    triangles, area = triangles[area > ROUND_OFF], area[area > ROUND_OFF]
-    corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
-    points, weights = _dolfinx.triangle_rule(CUT_DEGREE)
-    barycentric = np.column_stack([1 - points.sum(axis=1), points])
-    return (barycentric @ corners).reshape(-1, 2), np.outer(area, 2 * weights).ravel()

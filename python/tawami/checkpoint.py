@@ -23,6 +23,8 @@ from tawami.files import whole_file
 #: Changes with what a state holds.
 FORMAT = 1
 ABOUT = "about.json"
+#: In the folder of results.
+FOLDER = "checkpoints"
 
 
 def write(path: Path, identity: Mapping[str, Any], state: Mapping[str, Any]) -> None:

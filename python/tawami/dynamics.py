@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tawami import contents, inputs, ranks
+from tawami import contents, inputs, ranks, source
 from tawami.energy import Energies, Growth
 from tawami.errors import InputError
 from tawami.inertia import Inertia
@@ -25,6 +25,7 @@ from tawami.reduction import Reduction
 from tawami.results import Results, phase
 from tawami.scene import Accepted, Problem, Scene
 from tawami.solution import Solution
+from tawami.source import Source
 from tawami.stepping import march
 from tawami.supports import Support
 from tawami.transfer import TRANSFERS, TransferName, gradient_of, to_grid
@@ -39,8 +40,8 @@ class Dynamics:
 
     Args:
         scene: The scene with its supports and loads; a prescribed motion is given by its velocity.
-        velocity: Velocities at the start [m/s]: one for all particles, or particles x 2 in the order of
-            the body.
+        velocity: Velocities at the start [m/s]: one for all particles, particles x 2 in the order of the
+            body, a function f(x, y) on arrays, `tawami.table(...)` or `tawami.earlier(...)`.
         transfer: 'affine_flip', 'flip', 'apic', 'tpic' or 'pic'; at finite strain.
         damping: Time in which velocities of FLIP relax towards those of PIC [s]: per step a share
             1 - exp(-dt/damping) of the difference goes; infinite for none.
@@ -62,7 +63,7 @@ class Dynamics:
         self,
         scene: Scene,
         *,
-        velocity: npt.ArrayLike = (0.0, 0.0),
+        velocity: Source = (0.0, 0.0),
         transfer: TransferName = "affine_flip",
         damping: float = np.inf,
         gamma: float = 0.5,
@@ -91,26 +92,15 @@ class Dynamics:
                 f"damping = {damping:g} s relaxes the velocities of FLIP: expected transfer "
                 "'affine_flip' or 'flip' and a form of finite strain; gamma > 0.5 damps too"
             )
-        n = scene.num_particles
-        try:
-            given = np.broadcast_to(np.asarray(velocity, dtype=float), (n, 2))
-        except ValueError:
-            raise InputError(
-                f"velocity has shape {np.shape(velocity)}: expected two numbers, or {n} x 2"
-            ) from None
-        if not np.isfinite(given).all():
-            p = np.flatnonzero(~np.isfinite(given).all(axis=1))[0]
-            raise InputError(
-                f"velocity of particle {p} is ({given[p, 0]:g}, {given[p, 1]:g}) m/s: expected finite "
-                "numbers"
-            )
+        with ranks.together(scene.grid.comm):
+            given = source.values(scene, "velocity", velocity, "x y", "m/s")
         for name, width in (
             ("velocity", 2), ("acceleration", 2),
             ("velocity_gradient", 4), ("acceleration_gradient", 4),
         ):  # fmt: skip
             scene.particles.carry(name, width)
             scene.particles.carried(name)[:] = 0.0
-        self.velocity[:] = given[scene.particles.number]
+        self.velocity[:] = given
         self.time, self.steps = 0.0, 0
         #: v and a of the grid where it stays (functions x 2), and the velocities that it gave particles.
         self._kept: tuple[Array, Array, Array] | None = None

@@ -19,6 +19,7 @@ TawamiError               base of all of them
 TawamiWarning             base of what is computed and should not be trusted (a UserWarning)
   CheckpointWarning       a checkpoint that was not used, or not written
   EnergyWarning           energy that nothing gave
+  GeometryWarning         a body that is not quite of the shape that was given
   InexactSumWarning       a `sum_p` that is not exactly the sum over the particles
   InstabilityWarning      an option that is not stable for this body
   LockingWarning          a form that locks
@@ -58,6 +59,10 @@ class TawamiDeprecationWarning(FutureWarning):
 
 class EnergyWarning(TawamiWarning):
     """A motion whose energy has grown by what no load and no support gave."""
+
+
+class GeometryWarning(TawamiWarning):
+    """A body that is not quite of the shape that was given."""
 
 
 class InexactSumWarning(TawamiWarning):
@@ -122,6 +127,7 @@ __all__ = [
     "ConvergenceError",
     "EnergyWarning",
     "FormError",
+    "GeometryWarning",
     "InexactSumWarning",
     "InputError",
     "InstabilityWarning",

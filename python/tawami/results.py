@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 Existing = Literal["stop", "replace", "resume"]
 #: Takes precedence over `existing`: how `tawami resume` starts a script.
 VARIABLE = "TAWAMI_EXISTING"
-RUN, LOG, CHECKPOINTS = "run.json", "log.txt", "checkpoints"
+RUN, LOG = "run.json", "log.txt"
 log = logging.getLogger("tawami")
 
 
@@ -112,7 +112,7 @@ class Results:
     @property
     def checkpoints(self) -> list[Path]:
         """The checkpoints that there are, oldest first."""
-        return sorted((self.folder / CHECKPOINTS).glob("[0-9]*.npz"))
+        return sorted((self.folder / checkpoint.FOLDER).glob("[0-9]*.npz"))
 
     def phase(
         self, kind: str, scene: Scene, motion: Dynamics | None, end: float, unit: str
@@ -154,7 +154,7 @@ class Results:
             self.resumes = self.existing == "resume" and bool(self.checkpoints)
             if not self.resumes:
                 self._clear()
-        result_folder(self.folder / CHECKPOINTS)
+        result_folder(self.folder / checkpoint.FOLDER)
 
     def _reached(self) -> str:
         """How far the run in the folder has come, for a message."""
@@ -167,7 +167,7 @@ class Results:
             for name in (RUN, LOG, "form.py", "script.py"):
                 (self.folder / name).unlink(missing_ok=True)
             for place in self.folder.iterdir():
-                if place.name == CHECKPOINTS or place.name.partition("-")[0] in PHASES:
+                if place.name == checkpoint.FOLDER or place.name.partition("-")[0] in PHASES:
                     shutil.rmtree(place)
         except OSError as error:
             raise OutputError(
@@ -280,7 +280,7 @@ class Phase(Unwatched):
                     self._write_or_warn(finished=False)
                     error.add_note(
                         f"the state after the last accepted step, at {self._at}, is in "
-                        f"'{self.results.folder / CHECKPOINTS}'"
+                        f"'{self.results.folder / checkpoint.FOLDER}'"
                     )
         finally:
             self._line.end()
@@ -434,7 +434,7 @@ class Phase(Unwatched):
             "finished": finished,
         }
         name = "end" if finished else f"{len(self._steps):08d}"
-        path = self.results.folder / CHECKPOINTS / f"{self.number:02d}-{self.name}-{name}.npz"
+        path = self.results.folder / checkpoint.FOLDER / f"{self.number:02d}-{self.name}-{name}.npz"
         with together(self._comm):
             if self._writes:
                 checkpoint.write(path, self._identity, state)

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from tawami import _rust, contents, inputs, placement, quadrature, ranks
+from tawami import _rust, assignment, contents, initial, inputs, placement, quadrature, ranks
 from tawami.attached import Attached
 from tawami.basis import BASES, Basis
 from tawami.body import Body
@@ -30,9 +30,10 @@ from tawami.inertia import Inertia
 from tawami.loads import Loads, Traction
 from tawami.newton import Converged, Newton
 from tawami.numerics import Assembly, Factorise, Numerics, SolverName, TangentRule
-from tawami.numpy_law import NumpyLaw, NumpyStage
+from tawami.numpy_law import NumpyStage
 from tawami.reduction import Reduction
 from tawami.solution import Solution
+from tawami.source import Source
 from tawami.stopwatch import Stopwatch
 from tawami.supports import Support, Supports, Velocity
 
@@ -86,14 +87,16 @@ class Scene(contents.Elsewhere):
         grid: The background grid.
         body: Positions and volumes of the particles, as `box(...)` or `Body(x, volume)`; the same on
             every rank.
-        material: The material law, or several; or one `NumpyLaw` for all particles.
-        material_of: Number of the law of each particle; the first for all by default.
+        material: The material law, or several as a list or, by the names of the body, as a dictionary;
+            or one `NumpyLaw` for all particles.
+        material_of: Number of the law of each particle; that of the body by default, or the first.
         form: Weak form: the name of a shipped one ('u_epsv', 'u_p', 'u_bbar', 'u'), the path of a
             file, a module, or a `Form`.
         basis: Basis of the displacement: 'quadratic_spline', 'bilinear' or 'biquadratic'.
         tolerance, max_iterations, assembly, tangent_rule, factorise, linear_solver: How a step is
             solved; see `tawami.numerics.Numerics`.
-        density: Mass density at the start [kg/m3], one for all materials or one each; gravity needs it.
+        density: Mass density at the start [kg/m3], one for all materials or one each (a list or a
+            dictionary as that of the materials); gravity needs it.
         leaving: What to do with particles that leave the grid: 'stop' with an error before they do, or
             'remove' them; `left` says which and where.
         parameters: What the form names: alpha, stabilisation, ...
@@ -108,6 +111,7 @@ class Scene(contents.Elsewhere):
         left: Number, position [m] and time [s] (NaN in a static scene) of the particles that left.
         supports, loads: As fix(...), gravity(...) and their like have made them.
         parameters, options: Of the form, as they are used.
+        begun: Whether it has been solved, or moves: initial fields come before.
         numerics: How a step is solved.
 
     Raises:
@@ -126,7 +130,7 @@ class Scene(contents.Elsewhere):
         self,
         grid: Grid,
         body: Body,
-        material: _rust.Material | Sequence[_rust.Material] | NumpyLaw,
+        material: assignment.Given,
         *,
         material_of: npt.ArrayLike | None = None,
         form: str | Path | ModuleType | Form = "u_epsv",
@@ -137,7 +141,7 @@ class Scene(contents.Elsewhere):
         tangent_rule: TangentRule = "full",
         factorise: Factorise = "when_it_pays",
         linear_solver: SolverName = "direct",
-        density: float | Sequence[float] | None = None,
+        density: float | Sequence[float] | Mapping[str, float] | None = None,
         leaving: Literal["stop", "remove"] = "stop",
         **parameters: Any,
     ) -> None:
@@ -159,25 +163,15 @@ class Scene(contents.Elsewhere):
         for sentence in [] if grid.comm.rank else self.form.unusual(values):
             warnings.warn(sentence, ParameterWarning, stacklevel=2)
         self._whole_cells = [o for o in options.values() if o in self.form.whole_cells]
-        law = None
-        if isinstance(material, NumpyLaw):
-            law, material = material, material.elastic()
-        many = isinstance(material, Sequence)
-        materials: list[_rust.Material] = list(material) if many else [material]  # type: ignore[list-item, arg-type]
-        if not materials or not all(isinstance(m, _rust.Material) for m in materials):
-            raise InputError(
-                f"material = {material!r}: expected a material as linear_elastic(...) makes it, a "
-                "list of these, or a NumpyLaw"
-            )
         x, volume = inputs.array("x", body.x, 2), inputs.array("volume", body.volume, 1)
-        numbers = np.zeros(len(x)) if material_of is None else material_of
-        numbers = inputs.numbering("material_of", numbers, len(x))
+        assigned = assignment.assigned(material, material_of, body, len(x))
+        materials, law, numbers = assigned.materials, assigned.law, assigned.number
         whole = _rust.Particles(x, volume, numbers)
         whole.check_materials(materials, self.form.kinematics, self.form.strain == "finite")
         whole.add_history(materials)
         self._materials, self._law, self._values = materials, law, values
         self._moduli = np.array([(m.bulk_modulus, m.shear_modulus) for m in materials])
-        self._densities = None if density is None else _densities(density, len(materials))
+        self._densities = assignment.densities(density, len(materials), body.names)
         self._finite = self.form.strain == "finite"
         if self._finite and law is not None:
             raise InputError(
@@ -198,7 +192,7 @@ class Scene(contents.Elsewhere):
         self.attached = self._attach(location)
         self.supports, self.loads = Supports(grid, basis), Loads(grid, self.num_particles)
         self._total = np.zeros(self.num_coefficients)
-        self._looked_at = False
+        self._looked_at = self.begun = False
 
     def _warn_of_locking(self, particles: _rust.Particles) -> None:
         bulk, mu = self._moduli[particles.material].T
@@ -249,6 +243,12 @@ class Scene(contents.Elsewhere):
         """K and mu [Pa] of each particle."""
         of_particle = self._moduli[self.particles.material]
         return {"K": of_particle[:, 0].copy(), "mu": of_particle[:, 1].copy()}
+
+    @property
+    def elastic(self) -> npt.NDArray[np.bool_]:
+        """Whether each particle's law has no history."""
+        plain = [self._law is None and not m.history_names for m in self._materials]
+        return np.array(plain)[self.particles.material]
 
     @property
     def mass(self) -> Array:
@@ -404,6 +404,28 @@ class Scene(contents.Elsewhere):
         if self._densities is None:
             raise InputError("gravity(...) needs Scene(..., density=...) [kg/m3]")
         self.loads.gravity = np.array(inputs.point("gravity", acceleration))
+
+    def initial(self, name: str, source: Source, *, beyond: initial.Beyond = "stop") -> None:
+        """Give the particles a field to begin with, before anything is solved; loads and supports act
+        on top of it. A call for all ranks.
+
+        'stress' is what the laws go on from: (xx, yy, zz, xy) [Pa], Kirchhoff's per V0 at finite
+        strain. With a field eps_v it sets that too, to sigma_m / K, the elastic part. 'eps_v' (more
+        than this part, by plastic strain; or 0: counted from this state) and 'displacement' [m] are
+        records that enter no equation: positions stay. Then the history variables of the laws by name.
+
+        Args:
+            name: 'stress', 'displacement', 'eps_v', or a history variable.
+            source: Numbers, the same for all or one row a particle of the body; a function f(x, y) on
+                arrays that returns the components; `tawami.table(...)` or `tawami.earlier(...)`.
+            beyond: What to do with stress beyond the yield surface: 'stop' with an error, or 'return'
+                it to the surface as the law does.
+
+        Raises:
+            InputError: An unknown name, another shape, a number that is not finite, stress beyond the
+                yield surface, eps_v that does not fit an elastic stress, or a scene that was solved.
+        """
+        initial.give(self, name, source, beyond)
 
     # -- what it is made of --------------------------------------------------
 
@@ -585,6 +607,7 @@ class Scene(contents.Elsewhere):
             for wall, state in zip(self.supports.walls, walls, strict=True):
                 wall.state = state
             raise
+        self.begun = True
         if store is not None:
             store(dissipated)
         if moved is None:
@@ -659,14 +682,3 @@ class Scene(contents.Elsewhere):
             "in the particles. Take a smaller step",
             step.history,
         )
-
-
-def _densities(density: float | Sequence[float], materials: int) -> Array:
-    """Density of each material [kg/m3]."""
-    given = list(density) if isinstance(density, Sequence) else [density] * materials
-    if len(given) != materials:
-        raise InputError(
-            f"density has {len(given)} values: expected one, or one for each of the {materials} "
-            "materials"
-        )
-    return np.array([inputs.number("density", rho, low=0.0) for rho in given])
