@@ -393,6 +393,26 @@ def test_wrong_settings(tmp_path, options, message):
         tawami.Results(folder, *outputs, **options)
 
 
+def test_the_end_of_a_run_is_the_start_of_another_scene(tmp_path):
+    motion, _ = run(tmp_path / "run")
+    end = motion.scene.particles
+    for path in (tmp_path / "run", results_of(tmp_path / "run").checkpoints[-1]):
+        state = tawami.earlier(path)
+        scene = tawami.Scene(
+            motion.scene.grid, state.body, ELASTIC, form="u_epsv_finite", density=1000.0
+        )
+        scene.initial("stress", state)
+        again = tawami.Dynamics(scene, velocity=state)
+        for mine, others in (
+            (scene.particles.x, end.x),
+            (scene.particles.stress, end.stress),
+            (again.velocity, motion.velocity),
+        ):
+            assert np.array_equal(mine, others)
+    with pytest.raises(tawami.InputError, match="a folder of results with checkpoints"):
+        tawami.earlier(tmp_path)
+
+
 def test_run_json_knows_the_phases(tmp_path):
     with pytest.raises(Killed):
         run(tmp_path / "run", each=Kill(5))

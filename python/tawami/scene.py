@@ -649,7 +649,7 @@ class Scene(contents.Elsewhere):
         )
         self._total = state["total"]
         self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
-        self._looked_at = state["looked_at"]
+        self._looked_at, self.begun = state["looked_at"], True
         self.supports.restore(state["supports"])
         self.loads.restore(state["loads"])
         self.attached = self._attach(location)
