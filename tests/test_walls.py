@@ -166,7 +166,7 @@ def test_walls_in_a_corner_carry_the_load_once(form):
     scene.wall("bottom", 0.2)
     scene.wall("left", 0.2)
     solution = scene.solve()
-    corner = solution._on_edges[0]
+    corner = solution.on_edges[0]
     total = solution.reaction("bottom") + solution.reaction("left") - corner
     assert total == pytest.approx([1500.0, 250 * G], rel=1e-4)
     before = solution.reaction("bottom")
