@@ -54,8 +54,8 @@ class Kill:
 class Recorder(Output):
     """What outputs are told."""
 
-    def __init__(self, phases=None) -> None:
-        super().__init__((), None, None, "recorder", phases)
+    def __init__(self, name="recorder", phases=None) -> None:
+        super().__init__((), None, None, name, phases)
         self.began: list[tuple[str, object]] = []
         self.seen: list[tuple[float, int, bool]] = []
 
@@ -385,6 +385,10 @@ def test_a_folder_that_cannot_be_made(tmp_path):
         ({"keep": 0}, "keep = 0"),
         ({"existing": "append"}, "existing = 'append'"),
         ({"outputs": ["stress"]}, "'stress'"),
+        (
+            {"outputs": [tawami.TableOutput(), tawami.TableOutput("energies")]},
+            "2 outputs are called 'table'.*expected another name",
+        ),
     ],
 )
 def test_wrong_settings(tmp_path, options, message):
@@ -426,7 +430,9 @@ def test_run_json_knows_the_phases(tmp_path):
 
 
 def test_outputs_see_the_phases_that_they_are_for(tmp_path):
-    scene, outputs = block(), [Recorder(), Recorder(phases=["motion"]), Recorder(phases=["ramp"])]
+    phases = [None, ["motion"], ["ramp"]]
+    outputs = [Recorder(f"recorder-{k}", phases=of) for k, of in enumerate(phases)]
+    scene = block()
     scene.fix("bottom", "x")
     results = results_of(tmp_path / "run", *outputs)
     tawami.ramp(scene, 0.5, results=results)

@@ -87,6 +87,13 @@ class Results:
                     f"Results(..., {output!r}): expected ParticleOutput(...), GridOutput(...) or "
                     "TableOutput(...)"
                 )
+        names = [output.name for output in outputs]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise InputError(
+                f"Results: {names.count(twice[0])} outputs are called '{twice[0]}', and their files would "
+                "be the same: expected another name for one, as ParticleOutput(..., name='fine')"
+            )
         self.folder, self.outputs = Path(folder), outputs
         self.checkpoint_steps = (
             None
