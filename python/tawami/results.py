@@ -91,8 +91,8 @@ class Results:
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise InputError(
-                f"Results: {names.count(twice[0])} outputs are called '{twice[0]}', and their files would "
-                "be the same: expected another name for one, as ParticleOutput(..., name='fine')"
+                f"Results: {names.count(twice[0])} outputs are called '{twice[0]}', and their files "
+                "would be the same: expected another name for one, as ParticleOutput(..., name='fine')"
             )
         self.folder, self.outputs = Path(folder), outputs
         self.checkpoint_steps = (
