@@ -50,6 +50,19 @@ def test_the_law_in_numpy_is_linear_elasticity():
     assert np.allclose(u[0], u[1], rtol=0, atol=1e-9 * np.abs(u[1]).max())
 
 
+def test_the_block_in_motion_leaves_its_results(tmp_path):
+    blocks = (
+        next(b for b in BLOCKS if name in b) for name in ("tawami.Dynamics", "tawami.Results")
+    )
+    (tmp_path / "script.py").write_text("\n".join(blocks))
+    subprocess.run([sys.executable, "script.py"], cwd=tmp_path, capture_output=True, check=True)
+    folder = tmp_path / "results" / "block"
+    assert {path.name for path in folder.iterdir()} == {
+        "checkpoints", "form.py", "log.txt", "motion", "run.json", "script.py"
+    }  # fmt: skip
+    assert len(list((folder / "motion" / "particles").glob("*.vtu"))) == 11
+
+
 def test_the_block_in_motion_keeps_its_angular_momentum(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(next(block for block in BLOCKS if "tawami.Dynamics" in block))
