@@ -122,11 +122,14 @@ def case_page(name: str) -> str:
         files = [folder.with_suffix(".py")]
     about = "\n\n".join(_docstring(file) for file in files)
     named = ", ".join(f"{{src}}`{file.relative_to(ROOT)}`" for file in files)
+    options = executed.SHORTER.get(name, ())
+    command = " ".join(["python -m", f"cases.{name}", *options])
+    shorter = " Without the option it takes a few times as long." if options else ""
     pictures = "\n\n".join(
         f"![{title}: {path.stem.replace('_', ' ')}]({name}/{path.name})" for path in output.pictures
     )
     return (
-        f"# {title}\n\n`python -m cases.{name}`, {_duration(output.seconds)}; {named}.\n\n"
+        f"# {title}\n\n`{command}`, {_duration(output.seconds)}; {named}.{shorter}\n\n"
         f"````text\n{about}\n````\n\n{pictures}\n\n"
         f"## What it printed\n\n````text\n{output.text.strip()}\n````\n"
     )
