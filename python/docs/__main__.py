@@ -24,7 +24,7 @@ def build(links: bool) -> int:
     start = perf_counter()
     try:
         names = pages.assemble(executed.RESULTS)
-    except executed.Failed as error:
+    except executed.RunError as error:
         print(f"docs: {error}", file=sys.stderr)
         return 1
     source = str(executed.RESULTS)

@@ -49,8 +49,8 @@ FORMS: dict[str, dict[str, Any]] = {
 def _numpy_law() -> tawami.NumpyLaw:
     """Linear elasticity once more."""
     K, mu = E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU))
-    I = np.array([1.0, 1.0, 1.0, 0.0])
-    C = K * np.outer(I, I) + mu * (np.diag([2.0, 2.0, 2.0, 1.0]) - 2 / 3 * np.outer(I, I))
+    one = np.array([1.0, 1.0, 1.0, 0.0])
+    C = K * np.outer(one, one) + mu * (np.diag([2.0, 2.0, 2.0, 1.0]) - 2 / 3 * np.outer(one, one))
 
     def respond(strain: Any, stress: Any) -> tuple[Any, Any]:
         return stress + strain @ C, np.broadcast_to(C, (len(strain), 4, 4))

@@ -36,7 +36,7 @@ MINUTES = 30
 SHORTER = {"elastica": ("--steps", "40")}
 
 
-class Failed(Exception):
+class RunError(Exception):
     """A run that failed, or did not end as it should."""
 
 
@@ -78,7 +78,7 @@ def command(words: Sequence[str], folder: Path, what: str) -> str:
     """What a command prints.
 
     Raises:
-        Failed: It ended with another code than 0, or not at all.
+        RunError: It ended with another code than 0, or not at all.
     """
     environment = os.environ | {"MPLBACKEND": "Agg", "PYTHONPATH": str(ROOT)}
     print(f"docs: {what}", file=sys.stderr, flush=True)
@@ -88,9 +88,9 @@ def command(words: Sequence[str], folder: Path, what: str) -> str:
             text=True, check=False, timeout=60 * MINUTES,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        raise Failed(f"{what} did not end within {MINUTES} minutes") from None
+        raise RunError(f"{what} did not end within {MINUTES} minutes") from None
     if run.returncode:
-        raise Failed(f"{what} ended with {run.returncode}:\n{run.stderr[-3000:]}")
+        raise RunError(f"{what} ended with {run.returncode}:\n{run.stderr[-3000:]}")
     return run.stdout
 
 
@@ -133,7 +133,7 @@ def run_blocks(found: Sequence[tuple[str, str]]) -> list[str]:
     """What each block prints, one after the other in one namespace.
 
     Raises:
-        Failed: A block raised what it should not, or did not raise what it should.
+        RunError: A block raised what it should not, or did not raise what it should.
     """
     names: dict[str, Any] = {"__name__": "__page__"}
     return [_printed(code, expected, names) for expected, code in found]
@@ -141,17 +141,20 @@ def run_blocks(found: Sequence[tuple[str, str]]) -> list[str]:
 
 def _printed(code: str, expected: str, names: dict[str, Any]) -> str:
     raised = ""
-    with contextlib.redirect_stdout(io.StringIO()) as out, warnings.catch_warnings(record=True) as w:
+    with (
+        contextlib.redirect_stdout(io.StringIO()) as out,
+        warnings.catch_warnings(record=True) as w,
+    ):
         warnings.simplefilter("default", UserWarning)
         try:
             exec(compile(code, "<page>", "exec"), names)
         except Exception as error:
             raised = type(error).__name__
             if raised != expected:
-                raise Failed(f"{code}\n{traceback.format_exc()}") from error
+                raise RunError(f"{code}\n{traceback.format_exc()}") from error
             out.write(f"{raised}: {error}\n")
     if raised != expected:
-        raise Failed(f"{code}\nexpected {expected}, and nothing was raised")
+        raise RunError(f"{code}\nexpected {expected}, and nothing was raised")
     said = [f"{m.category.__name__}: {m.message}" for m in w if issubclass(m.category, UserWarning)]
     return "\n".join([*said, out.getvalue()])
 

@@ -44,7 +44,7 @@ def assemble(target: Path) -> list[str]:
     """Write all pages to a folder.
 
     Raises:
-        executed.Failed: Code or a case on a page failed, or a link is not well-formed.
+        executed.RunError: Code or a case on a page failed, or a link is not well-formed.
     """
     texts = {f"cases/{name}": case_page(name) for name in CASES}
     for path in sorted(SOURCE.rglob("*.md")):
@@ -74,7 +74,7 @@ def _check_links(name: str, text: str) -> None:
     for link in LINK.findall(text):
         parts = urlsplit(link)
         if not re.fullmatch(r"[\w-]+(\.[\w-]+)+", parts.hostname or ""):
-            raise executed.Failed(f"{name}.md: the link {link} is not well-formed")
+            raise executed.RunError(f"{name}.md: the link {link} is not well-formed")
 
 
 def complete(name: str, text: str) -> str:
@@ -190,8 +190,8 @@ def _peers() -> str:
     methods = {
         "displacement only": ("u", ""),
         "B-bar": ("u_bbar", ""),
-        "u-ε_v, α = 0": ("u_epsv", "0.0"),
-        "u-ε_v, α = 0.1": ("u_epsv", "0.1"),
+        "u-ε_v, $\\alpha$ = 0": ("u_epsv", "0.0"),
+        "u-ε_v, $\\alpha$ = 0.1": ("u_epsv", "0.1"),
     }
     cells = sorted({int(row["n"]) for row in rows if row["method"] == "u"})
     error = {(row["method"], row["alpha"], int(row["n"])): row for row in rows}
@@ -215,30 +215,14 @@ def _sizes() -> str:
     return " and ".join(f"{len(t.splitlines())} lines ({len(t)} characters)" for t in texts)
 
 
-def _leaving() -> str:
-    """What a scene says that loses a particle, and what it keeps count of."""
-    code = (
-        "```{run} InputError\nfrom mpi4py import MPI\nimport tawami\n\n"
-        "grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(8, 8))\n"
-        "body = tawami.box(grid, (0.5, 0.5), (1.5, 1.5))\n"
-        'law = tawami.linear_elastic(E=1e6, nu=0.3)\nform = "u_epsv_finite"\n'
-        "scene = tawami.Scene(grid, body, law, form=form, density=1000.0)\n"
-        "tawami.Dynamics(scene, velocity=(10.0, 0.0)).run(end=0.06, dt=0.01)\n```\n\n"
-        "```{run}\nscene = tawami.Scene(grid, body, law, form=form, density=1000.0, leaving=\"remove\")\n"
-        "motion = tawami.Dynamics(scene, velocity=(10.0, 0.0))\n"
-        "motion.run(end=0.06, dt=0.01)\n"
-        'print(len(scene.left), "of", scene.num_particles, "left; the first:", scene.left[0])\n'
-        'print("energy that they took:", f"{motion.energies.left:.0f} J/m")\n```\n'
-    )
-    return executed.blocks("leaving", code)
-
-
 def _classes() -> str:
     """Exceptions and warnings with what they inherit and say."""
     lines = ["| class | is a | when |", "| --- | --- | --- |"]
     names = [*errors.__all__, "InexactSumWarning"]
     for name in sorted(names, key=lambda name: (name.endswith("Warning"), name)):
-        kind = getattr(tawami, name, None) or getattr(importlib.import_module("tawami.symbols"), name)
+        kind = getattr(tawami, name, None) or getattr(
+            importlib.import_module("tawami.symbols"), name
+        )
         parents = ", ".join(f"`{base.__name__}`" for base in kind.__bases__)
         says = inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[0]
         lines.append(f"| `{name}` | {parents} | {messages.plain(says)} |")
@@ -250,7 +234,6 @@ GENERATED: dict[str, Callable[[], str]] = {
     "compatibility": _compatibility,
     "peers": _peers,
     "form sizes": _sizes,
-    "leaving": _leaving,
     "classes": _classes,
     "messages": messages.listing,
 }
