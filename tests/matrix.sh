@@ -62,6 +62,7 @@ for suite in "${suites[@]}"; do
     esac
 done
 [[ $minutes =~ ^[1-9][0-9]*$ ]] || die "MATRIX_MINUTES=$minutes: expected a whole number of minutes"
+# shellcheck disable=SC2016 # apt fills it in
 mirror=${MATRIX_MIRROR:-$(apt-get indextargets --format '$(REPO_URI)' \
     'Created-By: Packages' 'Origin: Debian' 'Label: Debian' 2>/dev/null | sort -u | head -n 1)}
 [ -n "$mirror" ] || die "apt knows no mirror of Debian: run 'apt-get update', or set MATRIX_MIRROR"
@@ -76,6 +77,7 @@ commit=$(git -C "$repository" rev-parse HEAD)
 base=$(mktemp -d "${MATRIX_ROOT:-${TMPDIR:-/tmp}}/tawami-matrix.XXXXXX")
 running=
 
+# shellcheck disable=SC2317 # called by the traps
 cleanup() {
     local status=$?
     trap - EXIT INT TERM HUP

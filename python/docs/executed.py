@@ -16,6 +16,7 @@ import re
 import shutil
 import subprocess
 import sys
+import textwrap
 import traceback
 import warnings
 from collections.abc import Callable, Iterable, Sequence
@@ -124,9 +125,19 @@ def blocks(page: str, text: str) -> str:
     def shown(match: re.Match[str]) -> str:
         says = next(printed)
         code = f"```python\n{match[2]}```\n"
-        return code + (f"\n```text\n{says.rstrip()}\n```\n" if says.strip() else "")
+        return code + (f"\n```text\n{_wrapped(says.rstrip())}\n```\n" if says.strip() else "")
 
     return BLOCK.sub(shown, text)
+
+
+def _wrapped(text: str) -> str:
+    """Sentences of errors and warnings in lines that fit."""
+    lines = text.splitlines()
+    sentence = re.compile(r"\w+(Error|Warning): ")
+    return "\n".join(
+        textwrap.fill(line, 92, subsequent_indent="    ") if sentence.match(line) else line
+        for line in lines
+    )
 
 
 def run_blocks(found: Sequence[tuple[str, str]]) -> list[str]:

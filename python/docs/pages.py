@@ -225,7 +225,8 @@ def _classes() -> str:
         )
         parents = ", ".join(f"`{base.__name__}`" for base in kind.__bases__)
         says = inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[0]
-        lines.append(f"| `{name}` | {parents} | {messages.plain(says)} |")
+        says = messages.plain(says).replace("\\`", "`")
+        lines.append(f"| `{name}` | {parents} | {says} |")
     return "\n".join(lines)
 
 
