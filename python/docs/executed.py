@@ -19,7 +19,7 @@ import sys
 import textwrap
 import traceback
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -75,17 +75,19 @@ def kept(folder: Path, mark: str, work: Callable[[], str]) -> Output:
     return Output(text, sorted(folder.glob("*.png")), seconds)
 
 
-def command(words: Sequence[str], folder: Path, what: str) -> str:
+def command(
+    words: Sequence[str], folder: Path, what: str, environment: Mapping[str, str] = os.environ
+) -> str:
     """What a command prints.
 
     Raises:
         RunError: It ended with another code than 0, or not at all.
     """
-    environment = os.environ | {"MPLBACKEND": "Agg", "PYTHONPATH": str(ROOT)}
+    own = {**environment, "MPLBACKEND": "Agg", "PYTHONPATH": str(ROOT)}
     print(f"docs: {what}", file=sys.stderr, flush=True)
     try:
         run = subprocess.run(
-            words, cwd=folder, env=environment, stdin=subprocess.DEVNULL, capture_output=True,
+            words, cwd=folder, env=own, stdin=subprocess.DEVNULL, capture_output=True,
             text=True, check=False, timeout=60 * MINUTES,
         )  # fmt: skip
     except subprocess.TimeoutExpired:

@@ -6,6 +6,7 @@ import csv
 import importlib
 import inspect
 import json
+import os
 import re
 import shutil
 import sys
@@ -173,10 +174,12 @@ def _try_all() -> str:
     cells: list[compatibility.Cell] = []
     seconds: dict[int, float] = {}
     for number in (1, 2):
-        script = [sys.executable, str(SOURCE / "compatibility.py")]
-        words = script if number == 1 else ranks.mpirun(number, script)[0]
+        words, environment = [sys.executable, str(SOURCE / "compatibility.py")], dict(os.environ)
+        if number > 1:
+            words, environment = ranks.mpirun(number, words)
         start = perf_counter()
-        text = executed.command(words, ROOT, f"compatibility on {number} rank(s)")
+        what = f"compatibility, ranks: {number}"
+        text = executed.command(words, ROOT, what, environment)
         seconds[number] = perf_counter() - start
         for row in json.loads(text):
             cells.append(compatibility.Cell(**row | {"numbers": tuple(row["numbers"])}))
