@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import compatibility
@@ -244,3 +247,19 @@ def test_the_matrix_of_the_readme_has_the_columns_of_make_matrix():
     (header,) = re.findall(r"echo '(\| Debian .*\|)'", script)
     assert header in (sources.ROOT / "README.md").read_text()
     assert "SUITES:-bookworm trixie sid}" in script
+
+
+def test_make_matrix_says_what_it_needs():
+    """Whichever comes first here: root, its tools, or a suite that it knows."""
+    script = sources.ROOT / "tests" / "matrix.sh"
+    run = subprocess.run(
+        [script], env=os.environ | {"SUITES": "buster"}, capture_output=True, text=True, check=False
+    )
+    said = run.stderr.strip()
+    assert (run.returncode, run.stdout, said.count("\n")) == (1, "", 0)
+    if os.geteuid() != 0:
+        assert "root is needed" in said
+    elif not all(map(shutil.which, ("debootstrap", "unshare", "git"))):
+        assert "apt-get install debootstrap" in said
+    else:
+        assert said == "matrix: SUITES holds 'buster': expected bookworm, trixie or sid"
