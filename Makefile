@@ -1,5 +1,7 @@
 # make cantilever   set up what is missing, run the study of the cantilever
-# make test         set up what is missing, pass every test
+# make test         set up what is missing, pass every test (TESTS="..." some of pytest's files)
+# make docs         the documentation as HTML, every script and case in it run; LINKS=1 checks the web's links
+# make matrix       make test on Debian 12, 13 and sid, each in a throw-away root (see tests/matrix.sh)
 # make extremes     try the method at its extremes, say what survives and what is refused
 # make bench        speed and memory, stage by stage
 # make trade        what accuracy costs: every knob of four cases; goes on where it was
@@ -20,7 +22,7 @@ export OMP_NUM_THREADS ?= 1
 export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 
-.PHONY: cantilever test extremes bench trade lint format setup clean
+.PHONY: cantilever test docs matrix extremes bench trade lint format setup clean
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 
@@ -29,7 +31,13 @@ cantilever: setup
 
 test: setup
 	cargo test --locked --quiet
-	$(PYTHON) -m pytest --quiet
+	$(PYTHON) -m pytest --quiet $(TESTS)
+
+docs: setup $(STAMPS)/docs
+	$(PYTHON) python/docs $(if $(LINKS),--links)
+
+matrix:
+	tests/matrix.sh
 
 extremes: setup
 	$(PYTHON) -m cases.extremes
@@ -99,6 +107,10 @@ $(STAMPS)/python: .venv/constraints.txt pyproject.toml
 
 $(STAMPS)/lint: $(STAMPS)/python
 	$(PIP) 'ruff>=0.6'
+	@mkdir -p $(STAMPS) && touch $@
+
+$(STAMPS)/docs: $(STAMPS)/python
+	$(PIP) 'sphinx>=7.2' 'myst-parser>=3' 'furo>=2024.1.29'
 	@mkdir -p $(STAMPS) && touch $@
 
 # Built for the processor it runs on, and again where that is another one.

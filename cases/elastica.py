@@ -25,7 +25,7 @@ that is singular as soon as the beam leaves the lines of the grid: the first par
 functions that no other particle holds. The ghost penalty of the shipped forms, k = 0.01, ties these to
 the others. Each reset costs some accuracy: more steps are not better.
 
-python -m cases.elastica [--results results/elastica]
+python -m cases.elastica [--results results/elastica] [--steps 160]
 """
 
 from __future__ import annotations
@@ -340,6 +340,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study, print the table, draw the figures, say where."""
     parser = argparse.ArgumentParser(prog="python -m cases.elastica")
     parser.add_argument("--results", default="results/elastica", help="folder for the results")
+    parser.add_argument("--steps", type=int, default=160, help="leave out runs of more steps")
     options = parser.parse_args(arguments)
     matplotlib.use("Agg")
     logging.disable(logging.INFO)  # the compilation of forms is talkative
@@ -348,7 +349,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for load in LOADS:
         x, y = tip(load)
         print(f"elastica, PL^2/EI = {load:g}: the tip moves ({x:.4f}, {y:.4f}) L")
-    work = [(name, load, change) for name in STUDY for load in LOADS for change in STUDY[name]]
+    work = [
+        (name, load, change)
+        for name in STUDY
+        for load in LOADS
+        for change in STUDY[name]
+        if change.get("steps", 0) <= options.steps
+    ]
     runs: dict[str, list[Run]] = {name: [] for name in STUDY}
     for name, load, change in tqdm(work, desc="elastica", disable=not sys.stderr.isatty()):
         run = solve(load, **change)

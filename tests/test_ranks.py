@@ -253,3 +253,42 @@ def test_the_study_on_two_ranks(tmp_path):
     assert run.stdout.count("66 computations") == 1
     written = {path.name for path in tmp_path.iterdir()}
     assert {"cantilever.csv", "report.md", "mean_stress_exact.png"} <= written
+
+
+INVERTED = """
+from mpi4py import MPI
+import tawami
+from tawami import _rust, newton
+grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(6, 4))
+body = tawami.box(grid, (0, 0), (1, 1), per_axis=3, gauss=True)
+law = tawami.von_mises(tawami.linear_elastic(E=1e6, nu=0.3), yield_stress=2e3)
+s = tawami.Scene(grid, body, law, form="u_epsv_finite")
+s.fix("left", "x")
+s.fix("bottom", "y")
+s.fix("top", "y", -0.01)
+evaluate, met = newton.Newton.internal, []
+def internal(self, coefficients):
+    try:
+        return evaluate(self, coefficients)
+    except _rust.InvertedError:
+        met.append(1)
+        raise
+newton.Newton.internal = internal
+last = []
+tawami.ramp(s, 0.25, each=last.append)
+floor = last[-1].reaction("bottom")[1]
+if MPI.COMM_WORLD.rank == 0:
+    print(len(met), floor)
+"""
+
+
+def test_an_iterate_that_inverts_a_particle_is_tried_again_on_all_ranks():
+    """The step meets one on its way: several ranks find what one does, and do not end there."""
+    found = []
+    for number in (1, 2):
+        run = start(number, "-c", INVERTED)
+        assert run.returncode == 0, run.stderr
+        met, floor = map(float, run.stdout.split()[-2:])
+        assert met > 0
+        found.append(floor)
+    assert found[0] == pytest.approx(found[1], rel=1e-6)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from cases.vibrating_beam import beam, fem, mpm
+from cases.vibrating_beam import beam, fem, figures, mpm
+from tawami.dynamics import TRANSFERS
 
 
 @pytest.fixture(scope="module")
@@ -80,3 +82,9 @@ def test_half_the_cell_a_quarter_of_the_error(runs, periods):
     of_rule = (2 * np.pi / 50) ** 2 / 12
     errors = [run.period / periods[0.3] - 1 - of_rule for run in (coarse, fine)]
     assert errors[1] < 0.3 * errors[0]
+
+
+def test_the_figure_knows_every_transfer(runs, periods, tmp_path):
+    all_of_them = [replace(runs[nu], transfer=name) for nu in beam.NUS for name in TRANSFERS]
+    figures.motion(all_of_them, periods, tmp_path / "motion.png")
+    assert (tmp_path / "motion.png").stat().st_size > 10_000

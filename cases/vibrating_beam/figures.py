@@ -14,10 +14,13 @@ from cases.vibrating_beam.mpm import Run
 
 COLOURS = {
     "affine_flip": "tab:red",
+    "apic": "tab:cyan",
     "tpic": "tab:blue",
     "flip": "tab:orange",
     "pic": "tab:gray",
 }
+#: Those that lie on affine FLIP.
+DASHES = {"apic": ":", "tpic": "--"}
 OF_NU = {0.3: "tab:green", 0.49: "tab:purple"}
 
 
@@ -34,7 +37,7 @@ def motion(runs: Sequence[Run], periods: Mapping[float, float], path: Path) -> N
         top, middle, bottom = panels[:, column]
         for run in (run for run in runs if run.nu == nu):
             time = np.array(run.time) / periods[nu]
-            dashes = "--" if run.transfer == "tpic" else "-"  # it lies on affine FLIP
+            dashes = DASHES.get(run.transfer, "-")
             style = {"color": COLOURS[run.transfer], "label": run.transfer, "linestyle": dashes}
             top.plot(time, np.array(run.deflection) / AMPLITUDE, **style)
             middle.plot(time, run.energy, **style)

@@ -17,7 +17,12 @@ use crate::error::Error;
 
 create_exception!(tawami, TawamiError, PyException, "Base of every error that tawami raises.");
 create_exception!(tawami, InputError, TawamiError, "An input is wrong; the message says which.");
-create_exception!(tawami, InvertedError, TawamiError, "An iterate turns a particle inside out.");
+create_exception!(
+    tawami._rust,
+    InvertedError,
+    TawamiError,
+    "An iterate turns a particle inside out."
+);
 
 impl From<Error> for PyErr {
     fn from(error: Error) -> Self {

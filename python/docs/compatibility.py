@@ -1,0 +1,227 @@
+"""What goes with what, found out by trying: form x law x time x ranks, each on a small body.
+
+python python/docs/compatibility.py            on this many ranks: JSON of every cell, for `table`
+
+Static: a block on a smooth floor is pressed down by 1 % in four steps; floor and top must give opposite
+forces. Dynamic: a block stretches in free fall for three steps; its momentum must be m (v + g t). A
+law with history must have flowed. On two ranks the same numbers must come out.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import sys
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+import tawami
+from tawami.formulation import Form
+
+E, NU, RHO, G = 1e6, 0.3, 1000.0, -9.81  # [Pa], [-], [kg/m3], [m/s2]
+PRESSED, CELL = 0.01, 0.25  # [m], [m]
+STEP = 1e-3  # [s]
+TIMES = ("static", "dynamic")
+#: Forms with their options, and bases.
+FORMS: dict[str, dict[str, Any]] = {
+    "u": {"form": "u"},
+    "u_bbar": {"form": "u_bbar"},
+    "u_p": {"form": "u_p"},
+    "u_epsv": {"form": "u_epsv"},
+    "u_epsv, residual_based": {"form": "u_epsv", "stabilisation": "residual_based"},
+    "u_epsv, projection": {"form": "u_epsv", "stabilisation": "projection"},
+    "u_epsv, ghost penalty": {"form": "u_epsv", "ghost_penalty": "on"},
+    "u_epsv, bilinear": {"form": "u_epsv", "basis": "bilinear"},
+    "u_epsv, biquadratic": {"form": "u_epsv", "basis": "biquadratic"},
+    "u_finite": {"form": "u_finite"},
+    "u_bbar_finite": {"form": "u_bbar_finite"},
+    "u_epsv_finite": {"form": "u_epsv_finite"},
+    "u_epsv_finite, ghost penalty": {"form": "u_epsv_finite", "ghost_penalty": "on"},
+    "u_epsv_finite, bilinear": {"form": "u_epsv_finite", "basis": "bilinear"},
+}
+
+
+def _numpy_law() -> tawami.NumpyLaw:
+    """Linear elasticity once more."""
+    K, mu = E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU))
+    one = np.array([1.0, 1.0, 1.0, 0.0])
+    C = K * np.outer(one, one) + mu * (np.diag([2.0, 2.0, 2.0, 1.0]) - 2 / 3 * np.outer(one, one))
+
+    def respond(strain: Any, stress: Any) -> tuple[Any, Any]:
+        return stress + strain @ C, np.broadcast_to(C, (len(strain), 4, 4))
+
+    return tawami.NumpyLaw(respond, K=K, mu=mu)
+
+
+def _elastic() -> tawami.Material:
+    return tawami.linear_elastic(E=E, nu=NU)
+
+
+LAWS: dict[str, Callable[[], Any]] = {
+    "linear_elastic": _elastic,
+    "von_mises": lambda: tawami.von_mises(_elastic(), yield_stress=2e3),
+    "drucker_prager": lambda: tawami.drucker_prager(_elastic(), phi=30.0, c=1e3),
+    "mohr_coulomb": lambda: tawami.mohr_coulomb(_elastic(), phi=30.0, c=1e3),
+    "neo_hookean": lambda: tawami.neo_hookean(E=E, nu=NU),
+    "NumpyLaw": _numpy_law,
+}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What became of a combination.
+
+    Attributes:
+        form, law, time: Of `FORMS`, `LAWS`, `TIMES`.
+        ranks: On how many.
+        error: Class of the exception; empty where it works.
+        says: Its sentence.
+        numbers: Forces or momenta, mean of the stress: what other ranks must find too.
+    """
+
+    form: str
+    law: str
+    time: str
+    ranks: int
+    error: str = ""
+    says: str = ""
+    numbers: tuple[float, ...] = ()
+
+
+def attempt(form: str, law: str, time: str) -> Cell:
+    """Try one combination on the present ranks.
+
+    Raises:
+        AssertionError: It went through, and the numbers are wrong.
+    """
+    ranks = MPI.COMM_WORLD.size
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            scene = _block(form, law, moving=time == "dynamic")
+            numbers = (_press if time == "static" else _fall)(scene, law)
+    except tawami.TawamiError as error:
+        return Cell(form, law, time, ranks, type(error).__name__, str(error))
+    return Cell(form, law, time, ranks, numbers=numbers)
+
+
+def _block(form: str, law: str, *, moving: bool) -> tawami.Scene:
+    cells = (8, 8) if moving else (6, 4)
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=CELL, cells=cells)
+    low = 2 * CELL if moving else 0.0
+    body = tawami.box(grid, (low, low), (low + 1, low + 1), per_axis=3, gauss=True)
+    return tawami.Scene(grid, body, LAWS[law](), density=RHO, **FORMS[form])
+
+
+def _press(scene: tawami.Scene, law: str) -> tuple[float, ...]:
+    """Forces of the floor and the top [N per metre depth], mean stress [Pa]."""
+    scene.fix("left", "x")
+    scene.fix("bottom", "y")
+    scene.fix("top", "y", -PRESSED)
+    last: list[tawami.Solution] = []
+    tawami.ramp(scene, 0.25, each=last.append)
+    floor, top = (float(last[-1].reaction(edge)[1]) for edge in ("bottom", "top"))
+    assert floor > 0, (law, floor)
+    assert abs(floor + top) < 1e-4 * floor, (law, floor, top)
+    _check_flow(scene, law)
+    return floor, top, float(np.mean(last[-1].mean_stress))
+
+
+def _fall(scene: tawami.Scene, law: str) -> tuple[float, ...]:
+    """Momentum [kg m/s per metre depth] and kinetic energy [J per metre depth]."""
+    scene.gravity((0.0, G))
+    stretch = 4.0 * (_positions(scene) - 1.0) + [0.5, 0.0]
+    motion = tawami.Dynamics(scene, velocity=stretch)
+    motion.run(end=3 * STEP, dt=STEP)
+    momentum = motion.linear_momentum
+    assert np.allclose(momentum, [RHO * 0.5, RHO * G * 3 * STEP], atol=1e-6 * RHO), (law, momentum)
+    _check_flow(scene, law)
+    return (*map(float, momentum), motion.kinetic_energy)
+
+
+def _positions(scene: tawami.Scene) -> Any:
+    """Of the body, in its order, on every rank."""
+    low = 2 * CELL
+    return tawami.box(scene.grid, (low, low), (low + 1, low + 1), per_axis=3, gauss=True).x
+
+
+def _check_flow(scene: tawami.Scene, law: str) -> None:
+    if law in ("von_mises", "drucker_prager", "mohr_coulomb"):
+        flowed = float(np.max(scene.particles.history("plastic_strain"), initial=0.0))
+        assert MPI.COMM_WORLD.allreduce(flowed, op=MPI.MAX) > 0, law
+
+
+def difference(cells: Sequence[Cell]) -> float:
+    """Largest difference, relative, of what the ranks found for a combination.
+
+    Raises:
+        AssertionError: One refused what the other did not, or with another sentence.
+    """
+    largest = 0.0
+    groups: dict[tuple[str, str, str], list[Cell]] = {}
+    for cell in cells:
+        groups.setdefault((cell.form, cell.law, cell.time), []).append(cell)
+    for first, *others in groups.values():
+        for other in others:
+            assert (first.error, first.says) == (other.error, other.says), (first, other)
+            scale = np.abs(first.numbers).max(initial=1e-300)
+            off = np.abs(np.subtract(first.numbers, other.numbers)).max(initial=0.0)
+            largest = max(largest, float(off / scale))
+    return largest
+
+
+def table(cells: Sequence[Cell], time: str, footnotes: dict[str, int]) -> str:
+    """A table of Markdown: forms down, laws across; sentences of refusals become footnotes."""
+    mine = {(c.form, c.law): c for c in cells if c.time == time}
+    forms = list(dict.fromkeys(form for form, _ in mine))
+    laws = list(dict.fromkeys(law for _, law in mine))
+    lines = ["| form | kinematics | strain | " + " | ".join(f"`{law}`" for law in laws) + " |"]
+    lines.append("|" + " --- |" * (3 + len(laws)))
+    for name in forms:
+        form = Form.load(FORMS[name]["form"])
+        entries = [_entry(mine[name, law], footnotes) for law in laws]
+        row = [f"`{FORMS[name]['form']}`" + name[len(FORMS[name]["form"]) :], form.kinematics]
+        lines.append("| " + " | ".join([*row, form.strain, *entries]) + " |")
+    return "\n".join(lines)
+
+
+def _entry(cell: Cell, footnotes: dict[str, int]) -> str:
+    if not cell.error:
+        return "works"
+    says = cell.says.replace(f"form '{FORMS[cell.form]['form']}'", "form '...'", 1)
+    number = footnotes.setdefault(f"`{cell.error}`: {says}", len(footnotes) + 1)
+    return f"refused {number}"
+
+
+def page(cells: Sequence[Cell], seconds: Mapping[int, float]) -> str:
+    """The tables with their footnotes, and what they took."""
+    footnotes: dict[str, int] = {}
+    text = [f"## {time.capitalize()}\n\n{table(cells, time, footnotes)}" for time in TIMES]
+    text.append("## Refusals\n\n" + "\n".join(f"{n}. {says}" for says, n in footnotes.items()))
+    works = sum(not cell.error for cell in cells)
+    took = " and ".join(f"{s:.0f} s on {n} rank{'s' * (n > 1)}" for n, s in seconds.items())
+    several = sum(cell.ranks > 1 for cell in cells)
+    text.append(
+        f"{len(cells)} were tried, {several} of them on 2 ranks (each form, without options); {works} "
+        f"work, {len(cells) - works} are refused; {took}. What 1 and 2 ranks find differs by "
+        f"{difference(cells):.1e} at most, and refusals are the same."
+    )
+    return "\n\n".join(text) + "\n"
+
+
+def main() -> None:
+    """Every cell; on several ranks those of the forms as they are, without options."""
+    logging.disable(logging.INFO)  # the compilation of forms is talkative
+    forms = [f for f in FORMS if MPI.COMM_WORLD.size == 1 or FORMS[f] == {"form": f}]
+    cells = [attempt(f, law, time) for f in forms for law in LAWS for time in TIMES]
+    if MPI.COMM_WORLD.rank == 0:
+        json.dump([asdict(cell) for cell in cells], sys.stdout)
+
+
+if __name__ == "__main__":
+    tawami.run(main, "compatibility")
