@@ -35,9 +35,10 @@ CASES: dict[str, tuple[str, tuple[str, ...]]] = {
     "vibrating_beam": ("Vibrating beam", ("beam",)),
     "spinning_disc": ("Spinning disc", ()),
     "collapse": ("Collapse", ()),
+    "projection": ("Nodal projection", ()),
+    "writing": ("Writing results", ()),
 }
 TRADE = ("cantilever", "cook", "collapse", "self_weight", "spinning_disc")
-CONDITION = re.compile(r"^<!-- if (\S+) -->\n(.*?)^<!-- end -->\n", flags=re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"https?://[^\s)>\"'`]+")
 
 
@@ -79,8 +80,7 @@ def _check_links(name: str, text: str) -> None:
 
 
 def complete(name: str, text: str) -> str:
-    """A page with what holds in this version, its code run, its generated parts."""
-    text = CONDITION.sub(lambda match: match[2] if exists(match[1]) else "", text)
+    """A page with its code run and its generated parts."""
     text = executed.blocks(name, text)
     return re.sub(r"^\{\{(.+)\}\}$|\{\{(.+?)\}\}", _generated, text, flags=re.MULTILINE)
 
