@@ -20,7 +20,6 @@ import executed
 import messages
 from sources import ROOT
 
-import tawami
 from tawami import errors, ranks
 
 SOURCE = Path(__file__).parent
@@ -221,11 +220,8 @@ def _sizes() -> str:
 def _classes() -> str:
     """Exceptions and warnings with what they inherit and say."""
     lines = ["| class | is a | when |", "| --- | --- | --- |"]
-    names = [*errors.__all__, "InexactSumWarning"]
-    for name in sorted(names, key=lambda name: (name.endswith("Warning"), name)):
-        kind = getattr(tawami, name, None) or getattr(
-            importlib.import_module("tawami.symbols"), name
-        )
+    for name in sorted(errors.__all__, key=lambda name: (name.endswith("Warning"), name)):
+        kind = getattr(errors, name)
         parents = ", ".join(f"`{base.__name__}`" for base in kind.__bases__)
         says = inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[0]
         says = messages.plain(says).replace("\\`", "`")

@@ -19,7 +19,7 @@ from mpi4py import MPI
 
 from tawami import form_scenes as scenes
 from tawami.compilation import compile_form
-from tawami.errors import FormError, InexactSumWarning, TawamiError
+from tawami.errors import FormError, InexactSumWarning, InputError, TawamiError
 from tawami.formulation import Form, listed
 from tawami.symbols import Symbols
 
@@ -71,12 +71,13 @@ class FormReport:
         """The check of a subject.
 
         Raises:
-            KeyError: No such subject.
+            InputError: No such subject.
         """
         for line in self.lines:
             if line.subject == subject:
                 return line
-        raise KeyError(subject)
+        known = ", ".join(repr(line.subject) for line in self.lines)
+        raise InputError(f"line({subject!r}): expected one of {known}")
 
     def __str__(self) -> str:
         notes = sum(line.verdict == "note" for line in self.lines)

@@ -128,7 +128,7 @@ def of_particles(names: Iterable[str], scene: Scene, motion: Dynamics | None) ->
     view, found = local_view(scene, motion), []
     for name in names:
         if name not in known and name not in HISTORY:
-            raise _unknown("particles", name, known)
+            raise InputError(_unknown("particles", name, known))
         quantity = known.get(name, _history(name))
         with _not_modelled():
             quantity.of(view)
@@ -144,8 +144,8 @@ def usual_of_particles(scene: Scene, motion: Dynamics | None) -> tuple[str, ...]
     return (*names, *scene.particles.history_names)
 
 
-def _unknown(place: str, name: str, known: Iterable[str]) -> InputError:
-    return InputError(f"{place}: '{name}' is unknown: expected one of {', '.join(known)}")
+def _unknown(place: str, name: str, known: Iterable[str]) -> str:
+    return f"{place}: '{name}' is unknown: expected one of {', '.join(known)}"
 
 
 @contextmanager
@@ -199,7 +199,7 @@ def on_grid(
         elif name in projected or name in HISTORY:
             found.append(_projected(of_particles([name], scene, motion)[0], projection))
         else:
-            raise _unknown("grid", name, dict.fromkeys([*own, *projected]))
+            raise InputError(_unknown("grid", name, dict.fromkeys([*own, *projected])))
     return found
 
 
