@@ -206,7 +206,8 @@ def _peers() -> str:
             for n in cells:
                 value = abs(float(error[method, alpha, n][key]))
                 percent = value if key == "error_percent" else 100 * value
-                entries.append(f"{percent:.2g} % ({value / best[n]:.2g})")
+                digits = f"{percent:.0f}" if percent > 99 else f"{percent:.2g}"
+                entries.append(f"{digits} % ({value / best[n]:.2g})")
             lines.append(f"| {what}: {title} | " + " | ".join(entries) + " |")
     return "\n".join(lines)
 
