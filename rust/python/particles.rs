@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use numpy::{PyArray, PyArray1, PyArray2, ToPyArray};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
+use super::array::{Read1, Read2};
 use super::{require, view, InputError};
 use crate::constitutive;
 use crate::material::{
@@ -20,17 +21,16 @@ fn read_only<T, D>(array: Bound<'_, PyArray<T, D>>) -> PyResult<Bound<'_, PyArra
     Ok(array)
 }
 
+/// Columns that an array of a time integration has at most.
+const MAX_WIDTH: usize = 64;
+
 #[pyclass(name = "Particles")]
 pub(super) struct PyParticles(pub(super) Particles);
 
 #[pymethods]
 impl PyParticles {
     #[new]
-    fn new(
-        x: PyReadonlyArray2<f64>,
-        volume: PyReadonlyArray1<f64>,
-        material: PyReadonlyArray1<u32>,
-    ) -> PyResult<Self> {
+    fn new(x: Read2<f64>, volume: Read1<f64>, material: Read1<u32>) -> PyResult<Self> {
         let x = x.as_array().as_standard_layout().into_owned();
         let (volume, material) = (volume.as_array().to_owned(), material.as_array().to_owned());
         Ok(Self(Particles::new(x, volume, material)?))
@@ -51,7 +51,7 @@ impl PyParticles {
     }
 
     /// Some of the particles.
-    fn select(&self, particles: PyReadonlyArray1<u32>) -> PyResult<Self> {
+    fn select(&self, particles: Read1<u32>) -> PyResult<Self> {
         let particles = particles.as_slice()?;
         let inside = particles.iter().all(|&p| (p as usize) < self.0.len());
         require(inside, "a selection of other particles")?;
@@ -64,19 +64,21 @@ impl PyParticles {
     }
 
     /// Particles with the same arrays, from such rows.
-    fn of_rows(&self, rows: PyReadonlyArray2<f64>) -> PyResult<Self> {
+    fn of_rows(&self, rows: Read2<f64>) -> PyResult<Self> {
         let particles = self.0.of_rows(&rows.as_array()).map(Self);
         particles.ok_or_else(|| PyRuntimeError::new_err("internal: rows of other particles"))
     }
 
     /// Make room for an array of a time integration.
-    fn carry(&mut self, name: &str, width: usize) {
+    fn carry(&mut self, name: &str, width: usize) -> PyResult<()> {
+        require(width <= MAX_WIDTH, "an array of very many columns")?;
         self.0.carry(name, width);
+        Ok(())
     }
 
     /// An array of a time integration by its name: n x width.
     fn carried<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let object = slf.borrow();
+        let object = slf.try_borrow()?;
         let Some((_, array)) = object.0.carried.iter().find(|(known, _)| known == name) else {
             let known: Vec<_> = object.0.carried.iter().map(|(known, _)| known.as_str()).collect();
             return Err(InputError::new_err(if known.is_empty() {
@@ -99,9 +101,11 @@ impl PyParticles {
     }
 
     /// Put the particles elsewhere.
-    fn move_to(&mut self, x: PyReadonlyArray2<f64>) -> PyResult<()> {
+    fn move_to(&mut self, x: Read2<f64>) -> PyResult<()> {
         require(x.as_array().dim() == self.0.x.dim(), "positions of other particles")?;
-        self.0.x.assign(&x.as_array());
+        // a copy: the positions may be a view of these particles' own, in another order
+        let x = x.as_array().to_owned();
+        self.0.x.assign(&x);
         Ok(())
     }
 
@@ -113,7 +117,7 @@ impl PyParticles {
 
     /// A history variable by its name.
     fn history<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let object = slf.borrow();
+        let object = slf.try_borrow()?;
         let Some((_, array)) = object.0.history.iter().find(|(known, _)| *known == name) else {
             let known: Vec<_> = object.0.history.iter().map(|(name, _)| *name).collect();
             return Err(InputError::new_err(if known.is_empty() {
@@ -150,37 +154,37 @@ impl PyParticles {
 
     #[getter]
     fn x<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        read_only(view(|p: &Self| &p.0.x, slf))
+        read_only(view(|p: &Self| &p.0.x, slf)?)
     }
 
     #[getter]
-    fn volume<'py>(slf: &Bound<'py, Self>) -> Bound<'py, PyArray1<f64>> {
+    fn volume<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         view(|p: &Self| &p.0.volume, slf)
     }
 
     #[getter]
     fn material<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<u32>>> {
-        read_only(view(|p: &Self| &p.0.material, slf))
+        read_only(view(|p: &Self| &p.0.material, slf)?)
     }
 
     #[getter]
     fn number<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<u32>>> {
-        read_only(view(|p: &Self| &p.0.number, slf))
+        read_only(view(|p: &Self| &p.0.number, slf)?)
     }
 
     #[getter]
-    fn stress<'py>(slf: &Bound<'py, Self>) -> Bound<'py, PyArray2<f64>> {
+    fn stress<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         view(|p: &Self| &p.0.stress, slf)
     }
 
     #[getter]
-    fn displacement<'py>(slf: &Bound<'py, Self>) -> Bound<'py, PyArray2<f64>> {
+    fn displacement<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         view(|p: &Self| &p.0.displacement, slf)
     }
 
     #[getter]
     fn eps_v<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let object = slf.borrow();
+        let object = slf.try_borrow()?;
         let Some(array) = object.0.eps_v.as_ref() else {
             return Err(InputError::new_err(
                 "eps_v: the form of this scene has no volumetric strain: expected one with the \
