@@ -12,7 +12,7 @@ import numpy.typing as npt
 from tawami import _dolfinx, _rust
 from tawami.errors import InputError
 from tawami.grid import Grid
-from tawami.inputs import array, point, whole_number
+from tawami.inputs import array, instance, point, room, shown, switch, whole_number
 
 if TYPE_CHECKING:
     import shapely
@@ -24,6 +24,10 @@ CUT_DEGREE = 6
 ON_LINE = 1e-6
 #: A part of a cell this small [cells^2] is round-off.
 ROUND_OFF = 1e-12
+#: Points along an axis of the largest Gauss rule.
+MOST_POINTS = 1000
+#: Memory that a particle takes while a body is filled and in the arrays of a scene [bytes].
+PARTICLE = 128.0
 
 
 @dataclass(frozen=True)
@@ -62,13 +66,15 @@ def box(
     Raises:
         InputError: Sides off the lines of the grid or outside the grid, or no particle.
     """
+    instance("box: grid", grid, Grid, "a tawami.Grid")
     lower, upper = point("lower", lower), point("upper", upper)
-    points, weights = _along_an_axis(per_axis, gauss)
-    positions, widths = [], []
+    ranges = []
     for axis in range(2):
-        ends = (np.array([lower[axis], upper[axis]]) - grid.origin[axis]) / grid.h
-        first, last = np.rint(ends).astype(int)
-        if np.abs(ends - [first, last]).max() > ON_LINE or first < 0 or last > grid.cells[axis]:
+        with np.errstate(over="ignore"):
+            ends = (np.array([lower[axis], upper[axis]]) - grid.origin[axis]) / grid.h
+        first, last = np.rint(ends)
+        off = np.abs(ends - [first, last]).max() if np.isfinite(ends).all() else np.inf
+        if off > ON_LINE or first < 0 or last > grid.cells[axis]:
             raise InputError(
                 f"box: its {'xy'[axis]} range [{lower[axis]:g}, {upper[axis]:g}] m must lie on "
                 f"lines of the grid (every {grid.h:g} m from {grid.origin[axis]:g} to "
@@ -79,7 +85,10 @@ def box(
                 f"box: its {'xy'[axis]} range [{lower[axis]:g}, {upper[axis]:g}] m holds no cell: "
                 "a body without particles. Expected lower < upper"
             )
-        cell = np.arange(first, last)
+        ranges.append(np.arange(int(first), int(last)))
+    points, weights = _along_an_axis(per_axis, gauss, len(ranges[0]) * len(ranges[1]))
+    positions, widths = [], []
+    for axis, cell in enumerate(ranges):
         positions.append(grid.axis_positions(axis, cell[:, None], points).ravel())
         widths.append(np.tile(weights * grid.h, len(cell)))
     (x, y), (wx, wy) = positions, widths
@@ -108,9 +117,10 @@ def polygon(grid: Grid, vertices: npt.ArrayLike, *, per_axis: int = 2, gauss: bo
     """
     import shapely  # here and below: a scene without polygons does without it
 
-    points, weights = _along_an_axis(per_axis, gauss)
+    instance("polygon: grid", grid, Grid, "a tawami.Grid")
     shape = _in_cells(grid, vertices)
     lower, upper = np.floor(shape.bounds[:2]), np.ceil(shape.bounds[2:])
+    points, weights = _along_an_axis(per_axis, gauss, int(np.ceil(shape.area)))
     i, j = (np.arange(a, b) for a, b in zip(lower, upper, strict=True))
     corner = np.column_stack([np.tile(i, len(j)), np.repeat(j, len(i))])
     parts = shapely.intersection(shape, shapely.box(*corner.T, *(corner + 1).T))
@@ -122,11 +132,15 @@ def polygon(grid: Grid, vertices: npt.ArrayLike, *, per_axis: int = 2, gauss: bo
     return Body(x=grid.origin + grid.h * x, volume=grid.h**2 * volume)
 
 
-def _along_an_axis(number: int, gauss: bool) -> tuple[Array, Array]:
-    """Positions and weights of the particles of a full cell along an axis, the cell being 0 to 1."""
+def _along_an_axis(number: int, gauss: bool, cells: int) -> tuple[Array, Array]:
+    """Positions and weights of the particles of a full cell along an axis, the cell being 0 to 1, for
+    so many cells.
+    """
     number = whole_number("per_axis", number, low=1)
-    if gauss:
-        return _rust.gauss(number)
+    what = f"per_axis = {shown(number)} in {cells} cells"
+    room(what, cells * number**2, PARTICLE, "expected fewer particles")
+    if switch("gauss", gauss):
+        return _rust.gauss(whole_number("per_axis", number, low=1, high=MOST_POINTS))
     return (np.arange(number) + 0.5) / number, np.full(number, 1 / number)
 
 
@@ -139,7 +153,8 @@ def _in_cells(grid: Grid, vertices: npt.ArrayLike) -> shapely.Polygon:
         raise InputError(
             f"polygon: vertices has shape {corners.shape}: expected three or more points (x, y)"
         )
-    scaled = (corners - grid.origin) / grid.h
+    with np.errstate(over="ignore", invalid="ignore"):
+        scaled = (corners - grid.origin) / grid.h
     on_line = np.isclose(scaled, np.rint(scaled), rtol=0, atol=ON_LINE)
     scaled = np.where(on_line, np.rint(scaled), scaled)
     outside = np.flatnonzero(~((scaled >= 0) & (scaled <= grid.cells)).all(axis=1))

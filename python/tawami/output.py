@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tawami import ranks
+from tawami import inputs, ranks
 from tawami.basis import extraction
 from tawami.errors import OutputError
 from tawami.solution import Solution
 
 Array = npt.NDArray[np.float64]
+SOLVED = "a tawami.Solution, as scene.solve() gives it"
 
 
 def result_folder(path: str | Path) -> Path:
@@ -25,13 +26,15 @@ def result_folder(path: str | Path) -> Path:
     Raises:
         OutputError: It cannot be made or written.
     """
-    folder = Path(path)
+    folder = inputs.path("result folder", path)
+    probe = folder / f".probe-{os.getpid()}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / f".probe-{os.getpid()}"
         probe.touch()
         probe.unlink()
     except OSError as error:
+        with suppress(OSError):
+            probe.unlink(missing_ok=True)
         raise OutputError(
             f"result folder '{folder}' cannot be written ({error.strerror}): expected a folder with "
             "write permission; choose another one"
@@ -46,7 +49,9 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     Raises:
         OutputError: The file cannot be written; what was at `path` before is still there.
     """
-    target = Path(path)
+    target = inputs.path("path", path)
+    if not target.name:
+        raise OutputError(f"'{target}': expected the name of a file")
     part = target.with_name(f".{os.getpid()}-{target.name}")
     try:
         yield part
@@ -54,7 +59,8 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     except OSError as error:
         raise OutputError(f"'{target}' cannot be written: {error.strerror or error}") from error
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):  # where it could not be made, in a folder that is gone, ...
+            part.unlink(missing_ok=True)
 
 
 def write_particles(path: str | Path, solution: Solution) -> None:
@@ -67,6 +73,7 @@ def write_particles(path: str | Path, solution: Solution) -> None:
     Raises:
         OutputError: The file cannot be written.
     """
+    inputs.instance("write_particles: solution", solution, Solution, SOLVED)
     n = len(solution.x)
     data: dict[str, Array] = {
         "displacement [m]": _with_z(solution.displacement_of_particles),
@@ -91,6 +98,7 @@ def write_grid(path: str | Path, solution: Solution) -> None:
     Raises:
         OutputError: The file cannot be written.
     """
+    inputs.instance("write_grid: solution", solution, Solution, SOLVED)
     scene = solution.scene
     grid = scene.grid
     (nx, ny), (x0, y0) = grid.cells, grid.origin
@@ -127,7 +135,7 @@ def _write(
     import meshio  # here: a scene without output does without it
 
     mesh = meshio.Mesh(_with_z(points), cells, point_data=point_data, cell_data=cell_data)
-    if Path(path).suffix != ".vtu":
+    if inputs.path("path", path).suffix != ".vtu":
         raise OutputError(f"'{path}': expected a file name ending in .vtu")
     with ranks.together(comm):
         if comm.rank == 0:

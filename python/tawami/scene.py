@@ -141,10 +141,11 @@ class Scene(contents.Elsewhere):
         leaving: Literal["stop", "remove"] = "stop",
         **parameters: Any,
     ) -> None:
-        if basis not in BASES:
-            raise InputError(f"basis '{basis}': expected one of {', '.join(map(repr, BASES))}")
-        if leaving not in ("stop", "remove"):
-            raise InputError(f"leaving = {leaving!r}: expected 'stop' or 'remove'")
+        if not inputs.one_of(basis, BASES):
+            names = ", ".join(map(repr, BASES))
+            raise InputError(f"basis {inputs.shown(basis)}: expected one of {names}")
+        if not inputs.one_of(leaving, ("stop", "remove")):
+            raise InputError(f"leaving = {inputs.shown(leaving)}: expected 'stop' or 'remove'")
         if not isinstance(grid, Grid) or not isinstance(body, Body):
             raise InputError(
                 f"Scene({type(grid).__name__}, {type(body).__name__}, ...): expected a tawami.Grid and "
@@ -166,8 +167,8 @@ class Scene(contents.Elsewhere):
         materials: list[_rust.Material] = list(material) if many else [material]  # type: ignore[list-item, arg-type]
         if not materials or not all(isinstance(m, _rust.Material) for m in materials):
             raise InputError(
-                f"material = {material!r}: expected a material as linear_elastic(...) makes it, a "
-                "list of these, or a NumpyLaw"
+                f"material = {inputs.shown(material)}: expected a material as linear_elastic(...) makes "
+                "it, a list of these, or a NumpyLaw"
             )
         x, volume = inputs.array("x", body.x, 2), inputs.array("volume", body.volume, 1)
         numbers = np.zeros(len(x)) if material_of is None else material_of
@@ -365,7 +366,8 @@ class Scene(contents.Elsewhere):
                 f"{what}: form {self.form.name} has no edge term; add "
                 "- dot(t, w) * ds to its residual"
             )
-        components = inputs.pair(what, value, "components (t_x, t_y)")
+        t_x, t_y = inputs.pair(what, value, "components (t_x, t_y)")
+        components = inputs.profile(f"{what}[0]", t_x), inputs.profile(f"{what}[1]", t_y)
         cells_between(self.grid, edge, between)
         self.loads.tractions.append(Traction(edge, components, between))
 
@@ -617,7 +619,8 @@ class Scene(contents.Elsewhere):
 
 def _densities(density: float | Sequence[float], materials: int) -> Array:
     """Density of each material [kg/m3]."""
-    given = list(density) if isinstance(density, Sequence) else [density] * materials
+    many = isinstance(density, Sequence) or (isinstance(density, np.ndarray) and density.ndim == 1)
+    given: list[Any] = list(density) if many else [density] * materials  # type: ignore[arg-type]
     if len(given) != materials:
         raise InputError(
             f"density has {len(given)} values: expected one, or one for each of the {materials} "

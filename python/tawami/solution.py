@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from tawami import _rust, boundary, contents, ranks
+from tawami import _rust, boundary, contents, inputs, ranks
 from tawami.errors import InputError
 from tawami.grid import EDGES
 from tawami.newton import Converged, History
@@ -120,7 +120,9 @@ class Solution(contents.Elsewhere):
         """
         if isinstance(place, str):
             if place not in EDGES:
-                raise InputError(f"reaction('{place}'): expected one of {', '.join(EDGES)}")
+                raise InputError(
+                    f"reaction({inputs.shown(place)}): expected one of {', '.join(EDGES)}"
+                )
             if place not in self._edges:
                 raise InputError(
                     f"reaction('{place}'): nothing supports that edge: expected one of "
@@ -130,6 +132,7 @@ class Solution(contents.Elsewhere):
             scene = self.scene
             functions = boundary.edge_functions(scene.grid, scene.basis, place)
             return np.asarray(self._on_edges[functions].sum(axis=0))
+        place = inputs.point("reaction(...)", place)
         force, found = np.zeros(2), False
         for places, component, multiplier in self._on_points:
             near = 1e-8 * self.scene.grid.h

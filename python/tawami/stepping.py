@@ -105,8 +105,11 @@ def ramp(
             last equilibrium that was found.
         InputError: A size out of its range, or as `Scene.solve`.
     """
+    inputs.instance("ramp: scene", scene, Scene, "a tawami.Scene")
     size = inputs.number("size", size, low=inputs.LEAST, high=1.0)
+    inputs.number("size", size, low=1e-9)  # more steps than that would never end
     least = size / 1024 if smallest is None else inputs.number("smallest", smallest, low=0.0)
+    each = inputs.function("each", each, "of a solution")
 
     reached = 0.0
 
@@ -136,14 +139,16 @@ def settle(scene: Scene, *, tolerance: float = 1e-10, most: int = 200) -> list[S
     Raises:
         ConvergenceError: Not within `most` solves.
     """
+    inputs.instance("settle: scene", scene, Scene, "a tawami.Scene")
     tolerance = inputs.number("tolerance", tolerance, low=1e-14, high=0.1)
+    most = inputs.whole_number("most", most, low=1)
     if scene.form.strain != "finite":
         raise InputError(
             "settle(...) resets the grid: expected a scene with a form of finite strain"
         )
     steps = list[Step]()
     with scene.tolerance_of(max(0.1 * tolerance, 1e-14)):
-        for _ in range(inputs.whole_number("most", most, low=1)):
+        for _ in range(most):
             solution = scene.solve()
             steps.append(Step(1.0, 0.0, solution.history, solution.krylov))
             if solution.history[0][0] < tolerance:
