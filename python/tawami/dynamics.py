@@ -25,6 +25,7 @@ from tawami.solution import Solution
 from tawami.stepping import Step, march
 from tawami.supports import Support
 from tawami.transfer import TRANSFERS, TransferName, gradient_of, to_grid
+from tawami.unique import Unique
 
 Array = npt.NDArray[np.float64]
 #: Steps [s] whose squares, and what is divided by these, are numbers.
@@ -33,7 +34,7 @@ SHORTEST, LONGEST = 1e-100, 1e100
 MOST_STEPS = 1e12
 
 
-class Dynamics:
+class Dynamics(Unique):
     """Motion of the particles of a scene with a density.
 
     Args:
@@ -234,13 +235,14 @@ class Dynamics:
 
             return store
 
-        solution = scene.advance(problem, also, end)
-        scene.accept(1.0)
-        if len(scene.left) > left:
-            e, kinetic, elastic = self.energies, self.kinetic_energy, self.elastic_energy
-            gone = e.kinetic + e.elastic - kinetic - elastic
-            self.energies = replace(e, kinetic=kinetic, elastic=elastic, left=e.left + gone)
-        return solution
+        def done() -> None:
+            scene.accept(1.0)
+            if len(scene.left) > left:
+                e, kinetic, elastic = self.energies, self.kinetic_energy, self.elastic_energy
+                gone = e.kinetic + e.elastic - kinetic - elastic
+                self.energies = replace(e, kinetic=kinetic, elastic=elastic, left=e.left + gone)
+
+        return scene.advance(problem, also, end, done)
 
     def _from_particles(self, mass: Array) -> tuple[Array, Array]:
         """v and a of the grid, functions x 2."""

@@ -13,6 +13,7 @@ from mpi4py import MPI
 from tawami import _dolfinx, _rust, ranks
 from tawami.errors import InputError
 from tawami.inputs import number, one_of, pair, point, room, shown, whole_number
+from tawami.unique import Unique, check_process
 
 Array = npt.NDArray[np.float64]
 Edge = Literal["left", "right", "bottom", "top"]
@@ -25,7 +26,7 @@ SMALLEST, LARGEST = 1e-100, 1e100
 CELL = 600.0
 
 
-class Grid:
+class Grid(Unique):
     """Uniform grid of squares; all scenes on it share its dolfinx mesh.
 
     Args:
@@ -45,6 +46,7 @@ class Grid:
             raise InputError(
                 f"comm = {shown(comm)}: expected a communicator, as mpi4py's MPI.COMM_WORLD"
             )
+        check_process()
         ranks.watch(comm)
         self.comm = comm
         self.origin = point("origin", origin)

@@ -13,6 +13,7 @@ from tawami.errors import InputError
 from tawami.grid import EDGES
 from tawami.newton import Converged, History
 from tawami.reduction import Reduction
+from tawami.unique import Unique
 
 if TYPE_CHECKING:
     from tawami.scene import Scene
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 
-class Solution(contents.Elsewhere):
+class Solution(contents.Elsewhere, Unique):
     """Equilibrium of a scene, or the end of a step. On several ranks all of it is on every rank, and
     arrays of particles are in the order of their numbers.
 

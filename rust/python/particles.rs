@@ -5,6 +5,7 @@ use std::sync::Arc;
 use numpy::{PyArray, PyArray1, PyArray2, ToPyArray};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
 use super::array::{Read1, Read2};
 use super::{require, view, InputError};
@@ -24,7 +25,7 @@ fn read_only<T, D>(array: Bound<'_, PyArray<T, D>>) -> PyResult<Bound<'_, PyArra
 /// Columns that an array of a time integration has at most.
 const MAX_WIDTH: usize = 64;
 
-#[pyclass(name = "Particles")]
+#[pyclass(name = "Particles", module = "tawami._rust")]
 pub(super) struct PyParticles(pub(super) Particles);
 
 #[pymethods]
@@ -197,30 +198,42 @@ impl PyParticles {
     }
 }
 
-#[pyclass(name = "Material", frozen)]
-pub(super) struct PyMaterial(pub(super) Arc<dyn Material>);
+#[pyclass(name = "Material", frozen, module = "tawami._rust")]
+pub(super) struct PyMaterial {
+    law: Arc<dyn Material>,
+    /// The function that made it, and what that got: how it is copied and pickled.
+    made: (&'static str, Vec<f64>),
+}
+
+impl PyMaterial {
+    fn new(law: impl Material + 'static, made: &'static str, given: &[f64]) -> Self {
+        Self { law: Arc::new(law), made: (made, given.to_vec()) }
+    }
+}
 
 #[pymethods]
 impl PyMaterial {
     #[staticmethod]
     fn linear_elastic_e_nu(e: f64, nu: f64) -> PyResult<Self> {
-        Ok(Self(Arc::new(LinearElastic::from_e_nu(e, nu)?)))
+        Ok(Self::new(LinearElastic::from_e_nu(e, nu)?, "linear_elastic_e_nu", &[e, nu]))
     }
 
     #[staticmethod]
     fn linear_elastic_e_one_minus_2nu(e: f64, one_minus_2nu: f64) -> PyResult<Self> {
-        Ok(Self(Arc::new(LinearElastic::from_e_one_minus_2nu(e, one_minus_2nu)?)))
+        let law = LinearElastic::from_e_one_minus_2nu(e, one_minus_2nu)?;
+        Ok(Self::new(law, "linear_elastic_e_one_minus_2nu", &[e, one_minus_2nu]))
     }
 
     #[staticmethod]
     fn linear_elastic_k_mu(k: f64, mu: f64) -> PyResult<Self> {
-        Ok(Self(Arc::new(LinearElastic::from_k_mu(k, mu)?)))
+        Ok(Self::new(LinearElastic::from_k_mu(k, mu)?, "linear_elastic_k_mu", &[k, mu]))
     }
 
     #[staticmethod]
     fn von_mises(k: f64, mu: f64, yield_stress: f64, hardening: f64) -> PyResult<Self> {
         let elastic = LinearElastic::from_k_mu(k, mu)?;
-        Ok(Self(Arc::new(VonMises::new(elastic, yield_stress, hardening)?)))
+        let law = VonMises::new(elastic, yield_stress, hardening)?;
+        Ok(Self::new(law, "von_mises", &[k, mu, yield_stress, hardening]))
     }
 
     #[staticmethod]
@@ -232,9 +245,10 @@ impl PyMaterial {
         eps_v_max: f64,
         tiny: bool,
     ) -> PyResult<Self> {
+        let given = [elastic.0, elastic.1, phi, c, psi, eps_v_max, f64::from(u8::from(tiny))];
         let elastic = LinearElastic::from_k_mu(elastic.0, elastic.1)?;
         let friction = Friction { phi, c, psi, eps_v_max, tiny };
-        Ok(Self(Arc::new(DruckerPrager::new(elastic, friction)?)))
+        Ok(Self::new(DruckerPrager::new(elastic, friction)?, "drucker_prager", &given))
     }
 
     #[staticmethod]
@@ -246,45 +260,62 @@ impl PyMaterial {
         eps_v_max: f64,
         tiny: bool,
     ) -> PyResult<Self> {
+        let given = [elastic.0, elastic.1, phi, c, psi, eps_v_max, f64::from(u8::from(tiny))];
         let elastic = LinearElastic::from_k_mu(elastic.0, elastic.1)?;
         let friction = Friction { phi, c, psi, eps_v_max, tiny };
-        Ok(Self(Arc::new(MohrCoulomb::new(elastic, friction)?)))
+        Ok(Self::new(MohrCoulomb::new(elastic, friction)?, "mohr_coulomb", &given))
     }
 
     #[staticmethod]
     fn neo_hookean(k: f64, mu: f64) -> PyResult<Self> {
-        Ok(Self(Arc::new(NeoHookean::new(LinearElastic::from_k_mu(k, mu)?))))
+        let law = NeoHookean::new(LinearElastic::from_k_mu(k, mu)?);
+        Ok(Self::new(law, "neo_hookean", &[k, mu]))
+    }
+
+    /// How a copy is made, here or in another process.
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let (name, given) = &self.made;
+        let arguments = match given[..] {
+            [k, mu, phi, c, psi, eps_v_max, tiny] => {
+                ((k, mu), phi, c, psi, eps_v_max, tiny > 0.0).into_pyobject(py)?
+            }
+            _ => PyTuple::new(py, given)?,
+        };
+        Ok((py.get_type::<Self>().getattr(*name)?, arguments))
     }
 
     /// What the law is called.
     #[getter]
     fn name(&self) -> &'static str {
-        self.0.name()
+        self.law.name()
     }
 
     /// Names of its history variables.
     #[getter]
     fn history_names(&self) -> Vec<&'static str> {
-        self.0.history().to_vec()
+        self.law.history().to_vec()
     }
 
     /// Whether the law exists at finite strain only.
     #[getter]
     fn finite_only(&self) -> bool {
-        self.0.finite_only()
+        self.law.finite_only()
     }
 
     #[getter]
     fn bulk_modulus(&self) -> f64 {
-        self.0.bulk_modulus()
+        self.law.bulk_modulus()
     }
 
     #[getter]
     fn shear_modulus(&self) -> f64 {
-        self.0.shear_modulus()
+        self.law.shear_modulus()
     }
 }
 
 pub(super) fn laws(materials: &[PyRef<PyMaterial>]) -> Vec<Arc<dyn Material>> {
-    materials.iter().map(|m| Arc::clone(&m.0)).collect()
+    materials.iter().map(|m| Arc::clone(&m.law)).collect()
 }
