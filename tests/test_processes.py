@@ -38,12 +38,12 @@ def outcome(_: int) -> float | str:
 
 
 ELASTIC = tawami.linear_elastic(E=1e4, nu=0.3)
-FRICTION = {"phi": 1.5, "c": 20.0, "psi": 1.0, "eps_v_max": 0.01, "tiny_angle": True}
+FRICTION = {"phi": 1.5, "c": 400.0, "psi": 1.0, "eps_v_max": 0.01, "tiny_angle": True}
 LAWS = [
     ELASTIC,
     tawami.linear_elastic(K=3e4, mu=1e4),
     tawami.linear_elastic(E=1e4, one_minus_2nu=1e-12),
-    tawami.von_mises(ELASTIC, yield_stress=100.0, hardening=7.0),
+    tawami.von_mises(ELASTIC, yield_stress=300.0, hardening=1e3),
     tawami.drucker_prager(ELASTIC, **FRICTION),
     tawami.mohr_coulomb(ELASTIC, **FRICTION),
 ]
