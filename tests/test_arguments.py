@@ -285,7 +285,7 @@ def test_any_argument_works_or_is_named(name):
     with contextlib.suppress(EnoughError):
         function(**good)
 
-    @settings(max_examples=10 if name == "Study.run" else 25)
+    @settings(max_examples=10 if name == "Study.run" else 15)
     @given(st.sampled_from(sorted(good)), NASTY)
     def replaced(argument: str, value: Any) -> None:
         if argument in CALLS and callable(value):

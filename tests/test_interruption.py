@@ -97,7 +97,7 @@ def test_an_interrupted_step_is_there_or_not(form):
     seen = {"before": 0, "after": 0}
     # everywhere, and more where a step is stored, which is near its end
     for at in sorted(
-        {*range(1, lines, lines // 12), *range(lines // 2, lines, max(lines // 50, 1))}
+        {*range(1, lines, lines // 8), *range(lines // 2, lines, max(lines // 30, 1))}
     ):
         motion = falling(form)
         try:

@@ -103,7 +103,7 @@ def held(form: str, steps: int) -> tuple[float, str]:
             scene.hold((-block.SIDE / 2, y), component)
     scene.gravity((0.0, -9.81))
     motion = tawami.Dynamics(scene)
-    found, every = list[tuple[int, int, int]](), max(steps // 100, 1)
+    found, every = list[tuple[int, int, int]](), max(steps // 40, 1)
 
     def look(_: tawami.Solution) -> None:
         if motion.steps % every == 0:
@@ -158,7 +158,7 @@ def attempts(short: bool) -> Iterator[Attempt]:
             SUBJECT, f"bytes a scene, {number} scenes, {where}", BOUND,
             partial(scenes, number, one_grid=one_grid),
         )  # fmt: skip
-    steps = 200 if short else 10_000
+    steps = 120 if short else 10_000
     for form in ("u_epsv_finite",) if short else ("u_epsv", "u_epsv_finite"):
         yield attempted(
             SUBJECT, f"{form}, bytes a step that the process grows, {steps} steps",
