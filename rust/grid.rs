@@ -6,6 +6,9 @@ use crate::error::{check_finite, Error, Result};
 /// computed in floating point miss the border by round-off.
 const BORDER: f64 = 1e-9;
 
+/// Largest number of cells along an axis.
+pub const MAX_CELLS: usize = 1 << 15;
+
 /// Uniform grid of `cells[0]` x `cells[1]` squares of side `h`; cell (i, j) has the index
 /// `i + j * cells[0]`, x fastest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,7 +40,7 @@ impl Grid {
             }
         }
         for (name, n) in [("cells[0]", cells[0]), ("cells[1]", cells[1])] {
-            if n == 0 || n > 1 << 15 {
+            if n == 0 || n > MAX_CELLS {
                 return Err(Error::Parameter {
                     name,
                     value: n as f64,

@@ -8,6 +8,7 @@ import re
 from typing import Any
 
 import pytest
+from petsc4py import PETSc
 
 from cases.extremes import (
     corruption,
@@ -76,6 +77,15 @@ def test_extremes(subject):
         assert row.outcome == "refused", place
         assert re.search(expected[words[0]], row.says), place
     assert seen == set(expected)
+
+
+def test_objects_of_petsc_are_counted():
+    before = endurance.objects()
+    vectors = [PETSc.Vec().createMPI((3, PETSc.DETERMINE)) for _ in range(3)]
+    assert endurance.objects() == before + 3
+    for vector in vectors:
+        vector.destroy()
+    assert endurance.objects() == before
 
 
 def test_what_is_wrong_is_told():

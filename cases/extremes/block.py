@@ -26,6 +26,7 @@ def scene(
     cells: tuple[int, int] = (16, 16),
     shift: tuple[float, float] = (0.0, 0.0),
     per_axis: int = 2,
+    grid: tawami.Grid | None = None,
     **options: Any,
 ) -> tawami.Scene:
     """The block on lines of the grid.
@@ -36,10 +37,11 @@ def scene(
         cells: Of the grid; the block is about its middle.
         shift: Of the block from the lines of the grid [cells].
         per_axis: Particles per cell and axis.
+        grid: One that was made so before; another one by default.
         options: For `tawami.Scene`.
     """
     origin = tuple(-H * (n // 2) for n in cells)
-    grid = tawami.Grid(MPI.COMM_WORLD, origin=origin, h=H, cells=cells)
+    grid = grid or tawami.Grid(MPI.COMM_WORLD, origin=origin, h=H, cells=cells)
     half = SIDE / 2
     body = tawami.box(grid, (-half, -half), (half, half), per_axis=per_axis)
     body = tawami.Body(body.x + H * np.array(shift), body.volume)

@@ -1,25 +1,38 @@
 """A long run of a small scene: memory that the process has taken and not given back.
 
 Measured with the C library's own count of what is in use (mallinfo2, glibc), after the first steps have
-filled the caches of Python, PETSc, MUMPS and of the C library.
+filled the caches of Python, PETSc, MUMPS and of the C library; over ten thousand steps also what the
+process holds (Linux), its open files, and the objects of PETSc that there are.
 """
 
 from __future__ import annotations
 
 import ctypes
 import gc
+import os
 from collections.abc import Iterator
 from functools import partial
+from pathlib import Path
 from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
 
 import tawami
 from cases.extremes import block
 from cases.extremes.attempt import Attempt, attempted
+from tawami.environment import MAPS
 
 SUBJECT = "endurance"
 #: Bytes that a step may leave behind: a leaked vector of the grid has 5 kB, the smallest object of
 #: PETSc 1 kB. Patterns of the matrix that are larger than all before make it grow a little, late too.
 BOUND = 500.0
+
+
+#: The same of the memory that the process holds, over the last half of a run. It grows by whole pages of
+#: 4 kB, and with the largest pattern so far.
+RESIDENT = 500.0
 
 
 class _Mallinfo(ctypes.Structure):
@@ -54,11 +67,68 @@ def growth(form: str, first: int, steps: int, **options: Any) -> float:
     return max(in_use() - start, 0) / steps
 
 
-def scenes(number: int) -> float:
-    """Bytes a scene that are in use after so many were made, stepped and dropped."""
+class _Counter(ctypes.Structure):
+    """What PETSc keeps with a communicator: the second number is that of the objects on it."""
+
+    _fields_ = [("tag", ctypes.c_int), ("objects", ctypes.c_int)]
+
+
+def objects() -> int:
+    """Objects of PETSc that there are, on the communicators of all ranks and of this one alone."""
+    (library,) = {line.split()[-1] for line in MAPS.read_text().splitlines() if "libpetsc" in line}
+    key = ctypes.c_int.in_dll(ctypes.CDLL(library), "Petsc_Counter_keyval").value
+    there = 0
+    for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
+        probe = PETSc.Vec().createMPI((1, PETSc.DETERMINE), comm=comm)
+        there += _Counter.from_address(probe.comm.tompi4py().Get_attr(key)).objects - 1
+        probe.destroy()
+    return int(there)
+
+
+def resident() -> int:
+    """Memory that the process holds [bytes]."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def held(form: str, steps: int) -> tuple[float, str]:
+    """Bytes a step by which the process grows over the last half of a run: slope of the line of least
+    squares. The block hangs from points and vibrates; solutions are dropped.
+
+    Raises:
+        RuntimeError: In the last half there are more files or objects of PETSc than ever in the first.
+    """
+    scene = block.scene(form)
+    for y in (-block.SIDE / 2, block.SIDE / 2):
+        for component in ("x", "y"):
+            scene.hold((-block.SIDE / 2, y), component)
+    scene.gravity((0.0, -9.81))
+    motion = tawami.Dynamics(scene)
+    found, every = list[tuple[int, int, int]](), max(steps // 40, 1)
+
+    def look(_: tawami.Solution) -> None:
+        if motion.steps % every == 0:
+            gc.collect()
+            found.append((resident(), len(os.listdir("/proc/self/fd")), objects()))
+
+    motion.run(end=1e-3 * steps, dt=1e-3, each=look)
+    bytes_held, files, there = np.array(found).T
+    half = len(found) // 2
+    for name, counts in (("files", files), ("objects of PETSc", there)):
+        if counts[half:].max() > counts[:half].max():
+            raise RuntimeError(f"{name}: {counts[:half].max()}, later {counts[half:].max()}")
+    slope = np.polyfit(every * np.arange(half, len(found)), bytes_held[half:], 1)[0]
+    remark = f"{bytes_held[-1] / 2**20:.0f} MB, {files[-1]} files, {there[-1]} objects of PETSc"
+    return max(float(slope), 0.0), remark
+
+
+def scenes(number: int, *, one_grid: bool = False) -> float:
+    """Bytes a scene that are in use after so many were made, stepped and dropped; each on a grid of its
+    own, or all on one.
+    """
+    shared = block.scene().grid if one_grid else None
 
     def once() -> None:
-        tawami.Dynamics(block.scene()).step(0.004)
+        tawami.Dynamics(block.scene(grid=shared)).step(0.004)
 
     for _ in range(number):
         once()
@@ -81,5 +151,16 @@ def attempts(short: bool) -> Iterator[Attempt]:
             SUBJECT, "reference assembly, bytes a step, 300 steps after 200", BOUND,
             partial(growth, "u_epsv_finite", 200, 300, assembly="reference"),
         )  # fmt: skip
-    number = 20 if short else 50
-    yield attempted(SUBJECT, f"bytes a scene, {number} scenes", BOUND, partial(scenes, number))
+    number = 20 if short else 1000
+    for one_grid in (False, True):
+        where = "on one grid" if one_grid else "a grid each"
+        yield attempted(
+            SUBJECT, f"bytes a scene, {number} scenes, {where}", BOUND,
+            partial(scenes, number, one_grid=one_grid),
+        )  # fmt: skip
+    steps = 120 if short else 10_000
+    for form in ("u_epsv_finite",) if short else ("u_epsv", "u_epsv_finite"):
+        yield attempted(
+            SUBJECT, f"{form}, bytes a step that the process grows, {steps} steps",
+            RESIDENT * (20 if short else 1), partial(held, form, steps),
+        )  # fmt: skip

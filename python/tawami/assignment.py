@@ -63,8 +63,8 @@ def assigned(material: Given, material_of: npt.ArrayLike | None, body: Body, n: 
             )
     if not materials or not all(isinstance(m, _rust.Material) for m in materials):
         raise InputError(
-            f"material = {material!r}: expected a material as linear_elastic(...) makes it, a "
-            "list or a dictionary of these, or a NumpyLaw"
+            f"material = {inputs.shown(material)}: expected a material as linear_elastic(...) makes "
+            "it, a list or a dictionary of these, or a NumpyLaw"
         )
     number = inputs.numbering("material_of", np.zeros(n) if numbers is None else numbers, n)
     return Assignment(materials, law, number)
@@ -84,7 +84,8 @@ def densities(
         return None
     if isinstance(density, Mapping):
         density = _by_name("density", density, names)
-    given = list(density) if isinstance(density, Sequence) else [density] * materials
+    many = isinstance(density, Sequence) or (isinstance(density, np.ndarray) and density.ndim == 1)
+    given: list[Any] = list(density) if many else [density] * materials  # type: ignore[arg-type]
     if len(given) != materials:
         raise InputError(
             f"density has {len(given)} values: expected one, or one for each of the {materials} "

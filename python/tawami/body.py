@@ -11,7 +11,7 @@ import numpy.typing as npt
 from tawami.cut_cells import ON_LINE, along_an_axis
 from tawami.errors import InputError
 from tawami.grid import Grid
-from tawami.inputs import point
+from tawami.inputs import instance, point
 
 Array = npt.NDArray[np.float64]
 
@@ -56,13 +56,15 @@ def box(
     Raises:
         InputError: Sides off the lines of the grid or outside the grid, or no particle.
     """
+    instance("box: grid", grid, Grid, "a tawami.Grid")
     lower, upper = point("lower", lower), point("upper", upper)
-    points, weights = along_an_axis(per_axis, gauss)
-    positions, widths = [], []
+    ranges = []
     for axis in range(2):
-        ends = (np.array([lower[axis], upper[axis]]) - grid.origin[axis]) / grid.h
-        first, last = np.rint(ends).astype(int)
-        if np.abs(ends - [first, last]).max() > ON_LINE or first < 0 or last > grid.cells[axis]:
+        with np.errstate(over="ignore"):
+            ends = (np.array([lower[axis], upper[axis]]) - grid.origin[axis]) / grid.h
+        first, last = np.rint(ends)
+        off = np.abs(ends - [first, last]).max() if np.isfinite(ends).all() else np.inf
+        if off > ON_LINE or first < 0 or last > grid.cells[axis]:
             raise InputError(
                 f"box: its {'xy'[axis]} range [{lower[axis]:g}, {upper[axis]:g}] m must lie on "
                 f"lines of the grid (every {grid.h:g} m from {grid.origin[axis]:g} to "
@@ -73,7 +75,10 @@ def box(
                 f"box: its {'xy'[axis]} range [{lower[axis]:g}, {upper[axis]:g}] m holds no cell: "
                 "a body without particles. Expected lower < upper"
             )
-        cell = np.arange(first, last)
+        ranges.append(np.arange(int(first), int(last)))
+    points, weights = along_an_axis(per_axis, gauss, len(ranges[0]) * len(ranges[1]))
+    positions, widths = [], []
+    for axis, cell in enumerate(ranges):
         positions.append(grid.axis_positions(axis, cell[:, None], points).ravel())
         widths.append(np.tile(weights * grid.h, len(cell)))
     (x, y), (wx, wy) = positions, widths

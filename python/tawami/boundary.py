@@ -49,8 +49,8 @@ def component_index(component: str) -> int:
     Raises:
         InputError: Anything else.
     """
-    if component not in ("x", "y"):
-        raise InputError(f"component '{component}': expected 'x' or 'y'")
+    if not inputs.one_of(component, ("x", "y")):
+        raise InputError(f"component {inputs.shown(component)}: expected 'x' or 'y'")
     return "xy".index(component)
 
 
@@ -145,14 +145,14 @@ def cells_between(grid: Grid, edge: Edge, between: Interval | None) -> npt.NDArr
     if between is None:
         return np.ones(n, dtype=bool)
     a, b = inputs.pair(f"edge='{edge}': between", between, "positions [m]")
-    ends = (
-        np.array([inputs.number("between", end) for end in (a, b)]) - grid.origin[axis]
-    ) / grid.h
-    first, last = np.rint(ends).astype(int)
-    if np.abs(ends - [first, last]).max() > ON_LINE or not 0 <= first < last <= n:
+    lines = np.array([inputs.number(f"edge='{edge}': between", end) for end in (a, b)])
+    with np.errstate(over="ignore"):
+        ends = (lines - grid.origin[axis]) / grid.h
+    first, last = np.rint(ends)
+    if not 0 <= first < last <= n or np.abs(ends - [first, last]).max() > ON_LINE:
         raise InputError(
-            f"edge='{edge}': between = {between}: expected two lines of the grid, in order, every "
-            f"{grid.h:g} m from {grid.origin[axis]:g} to {grid.upper[axis]:g} m"
+            f"edge='{edge}': between = {inputs.shown(between)}: expected two lines of the grid, in "
+            f"order, every {grid.h:g} m from {grid.origin[axis]:g} to {grid.upper[axis]:g} m"
         )
     cell = np.arange(n)
     inside: npt.NDArray[np.bool_] = (cell >= first) & (cell < last)

@@ -20,7 +20,7 @@ from ufl.algorithms.check_arities import ArityMismatch, check_form_arity
 
 from tawami import _dolfinx
 from tawami.density import DEGREE, Density, Rule
-from tawami.errors import FormError, InputError, MissingDependencyError
+from tawami.errors import FormError, InputError, MissingDependencyError, OutputError
 from tawami.formulation import Form
 from tawami.numerics import TangentRule
 from tawami.symbols import PLACEHOLDERS, Symbols
@@ -111,7 +111,13 @@ def _refusals(form: Form) -> Iterator[None]:
         if type(error).__name__ in ("VerificationError", "CompileError"):
             raise MissingDependencyError(
                 f"form {form.name}: the C compiler failed on the code of FFCx: {error}. It needs gcc "
-                "and Python's headers; on Debian: apt install g++ python3-dev"
+                "and Python's headers (on Debian: apt install g++ python3-dev) and room in ~/.cache"
+            ) from error
+        if isinstance(error, OSError):
+            raise OutputError(
+                f"the code of form {form.name} cannot be compiled, because the folder of compiled forms "
+                f"cannot be written ({error}): expected room and write permission in ~/.cache, or "
+                "another folder in the environment variable XDG_CACHE_HOME"
             ) from error
         advice = ""
         if isinstance(error, ArityMismatch):

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from tawami import _dolfinx, _rust
 from tawami.errors import InputError
 from tawami.grid import Grid
-from tawami.inputs import whole_number
+from tawami.inputs import room, shown, switch, whole_number
 
 Array = npt.NDArray[np.float64]
 Numbers = npt.NDArray[np.int64]
@@ -30,6 +30,10 @@ MOST = (DEGREE + 1) * (DEGREE + 2) // 2
 ON_LINE = 1e-6
 #: A part of a cell this small, or this share of a body smaller than a cell, is round-off.
 ROUND_OFF = 1e-12
+#: Points along an axis of the largest Gauss rule.
+MOST_POINTS = 1000
+#: Memory that a particle takes while a body is filled and in the arrays of a scene [bytes].
+PARTICLE = 128.0
 #: Error of a moment, over the area, from which on points are not thinned out.
 MOMENT_ERROR = 1e-12
 
@@ -57,17 +61,21 @@ class Points:
         )
 
 
-def along_an_axis(number: int, gauss: bool) -> tuple[Array, Array]:
-    """Positions and weights of the particles of a full cell along an axis, the cell being 0 to 1."""
+def along_an_axis(number: int, gauss: bool, cells: int = 1) -> tuple[Array, Array]:
+    """Positions and weights of the particles of a full cell along an axis, the cell being 0 to 1, for
+    so many cells.
+    """
     number = whole_number("per_axis", number, low=1)
-    if gauss:
-        return _rust.gauss(number)
+    what = f"per_axis = {shown(number)} in {cells} cell{'s' if cells > 1 else ''}"
+    room(what, cells * number**2, PARTICLE, "expected fewer particles")
+    if switch("gauss", gauss):
+        return _rust.gauss(whole_number("per_axis", number, low=1, high=MOST_POINTS))
     return (np.arange(number) + 0.5) / number, np.full(number, 1 / number)
 
 
 def in_full_cells(cell: Numbers, per_axis: int, gauss: bool) -> Points:
     """The particles of full cells, given by their lower left corners."""
-    points, weights = along_an_axis(per_axis, gauss)
+    points, weights = along_an_axis(per_axis, gauss, max(len(cell), 1))
     n = len(points)
     lattice = np.column_stack([np.tile(points, n), np.repeat(points, n)])
     return Points(

@@ -29,13 +29,16 @@ from tawami.source import Source
 from tawami.stepping import march
 from tawami.supports import Support
 from tawami.transfer import TRANSFERS, TransferName, gradient_of, to_grid
+from tawami.unique import Unique
 
 Array = npt.NDArray[np.float64]
 #: Steps [s] whose squares, and what is divided by these, are numbers.
 SHORTEST, LONGEST = 1e-100, 1e100
+#: Steps of a run, beyond which it would never end.
+MOST_STEPS = 1e12
 
 
-class Dynamics:
+class Dynamics(Unique):
     """Motion of the particles of a scene with a density.
 
     Args:
@@ -68,10 +71,13 @@ class Dynamics:
         damping: float = np.inf,
         gamma: float = 0.5,
     ) -> None:
+        inputs.instance("Dynamics: scene", scene, Scene, "a tawami.Scene")
         if not scene.has_density:
             raise InputError("Dynamics needs Scene(..., density=...) [kg/m3]")
-        if transfer not in TRANSFERS:
-            raise InputError(f"transfer = {transfer!r}: expected one of {', '.join(TRANSFERS)}")
+        if not inputs.one_of(transfer, TRANSFERS):
+            raise InputError(
+                f"transfer = {inputs.shown(transfer)}: expected one of {', '.join(TRANSFERS)}"
+            )
         if scene.basis == "biquadratic":
             raise InputError(
                 "Dynamics with the basis 'biquadratic': its lumped masses are not all positive; use "
@@ -81,11 +87,13 @@ class Dynamics:
             raise InputError(
                 "Dynamics: a density of 0: expected more than 0 kg/m3 for every material"
             )
-        if not isinstance(damping, (int, float)) or not damping > 0:
-            raise InputError(f"damping = {damping!r}: expected a time in s, more than 0")
+        expected = "a time in s, more than 0"
+        damping = inputs.real("damping", damping, expected)
+        if not damping > 0:
+            raise InputError(f"damping = {damping!r}: expected {expected}")
         self.gamma = inputs.number("gamma", gamma, low=0.5, high=1.0)
         self.beta = (self.gamma + 0.5) ** 2 / 4
-        self.scene, self.damping = scene, float(damping)
+        self.scene, self.damping = scene, damping
         self.transfer, self._moves = TRANSFERS[transfer], scene.form.strain == "finite"
         if damping != np.inf and not (self.transfer.flip and self._moves):
             raise InputError(
@@ -222,13 +230,14 @@ class Dynamics:
 
             return store
 
-        solution = scene.advance(problem, also, end)
-        scene.accept(1.0)
-        if len(scene.left) > left:
-            e, kinetic, elastic = self.energies, self.kinetic_energy, self.elastic_energy
-            gone = e.kinetic + e.elastic - kinetic - elastic
-            self.energies = replace(e, kinetic=kinetic, elastic=elastic, left=e.left + gone)
-        return solution
+        def done() -> None:
+            scene.accept(1.0)
+            if len(scene.left) > left:
+                e, kinetic, elastic = self.energies, self.kinetic_energy, self.elastic_energy
+                gone = e.kinetic + e.elastic - kinetic - elastic
+                self.energies = replace(e, kinetic=kinetic, elastic=elastic, left=e.left + gone)
+
+        return scene.advance(problem, also, end, done)
 
     @property
     def _loads_and_supports(self) -> tuple[object, ...]:
@@ -358,7 +367,9 @@ class Dynamics:
                 f"dt = {dt:g} s is longer than the {left:g} s until end = {end:g} s: expected a shorter "
                 "step"
             )
+        inputs.number("dt", dt, low=max(left, 0.0) / MOST_STEPS)
         least = dt / 1024 if smallest is None else inputs.number("smallest", smallest, low=0.0)
+        each = inputs.function("each", each, "of a solution")
         with phase(results, "motion", self.scene, self, end, "s") as watched:
             return march(
                 Pace(self.time, dt), end, least, lambda _, size: self.step(size), watched, each
@@ -379,7 +390,7 @@ class Dynamics:
         """sum m (x - about) x v [kg m2/s per metre depth], the part of the affine velocity fields, which
         is of the size of a particle, left out.
         """
-        x, v = np.array(self.scene.particles.x) - np.asarray(about), self.velocity
+        x, v = np.array(self.scene.particles.x) - inputs.point("about", about), self.velocity
         return self._sum(self.mass @ (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0]))
 
     @property

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from tawami import inputs
 from tawami.errors import OutputError
 
 
@@ -16,13 +17,15 @@ def result_folder(path: str | Path) -> Path:
     Raises:
         OutputError: It cannot be made or written.
     """
-    folder = Path(path)
+    folder = inputs.path("result folder", path)
+    probe = folder / f".probe-{os.getpid()}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / f".probe-{os.getpid()}"
         probe.touch()
         probe.unlink()
     except OSError as error:
+        with suppress(OSError):
+            probe.unlink(missing_ok=True)
         raise OutputError(
             f"result folder '{folder}' cannot be written ({error.strerror}): expected a folder with "
             "write permission; choose another one"
@@ -37,7 +40,9 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     Raises:
         OutputError: The file cannot be written; what was at `path` before is still there.
     """
-    target = Path(path)
+    target = inputs.path("path", path)
+    if not target.name:
+        raise OutputError(f"'{target}': expected the name of a file")
     part = target.with_name(f".{os.getpid()}-{target.name}")
     try:
         yield part
@@ -45,4 +50,5 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     except OSError as error:
         raise OutputError(f"'{target}' cannot be written: {error.strerror or error}") from error
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):  # where it could not be made, in a folder that is gone, ...
+            part.unlink(missing_ok=True)

@@ -35,7 +35,7 @@ import functools
 import importlib.util
 import inspect
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
 from pathlib import Path
@@ -44,7 +44,8 @@ from typing import Any
 
 from tawami.density import COMPONENTS, LAW
 from tawami.errors import FormError, InputError
-from tawami.inputs import number
+from tawami.inputs import TEXT, number, one_of, real, shown
+from tawami.inputs import path as as_path
 
 KINDS = ("displacement", "volumetric_strain", "pressure")
 KINEMATICS: Mapping[str, tuple[str, ...]] = {
@@ -96,12 +97,7 @@ class Form:
     name: str = "of the driver script"
 
     def __post_init__(self) -> None:
-        for name, declared in self.fields.items():
-            if isinstance(declared, str) or len(declared) != 2:
-                self._fail(f"field '{name}' is {declared!r}: expected (kind, test function)")
-        for name, limits in self.parameters.items():
-            if "default" not in limits:
-                self._fail(f"parameter '{name}' has no \"default\"")
+        self._check_declarations()
         names = [*self.fields, *(test for _, test in self.fields.values())]
         names += [*self.parameters, *self.options, *RESERVED]
         twice = sorted({name for name in names if names.count(name) > 1})
@@ -127,6 +123,37 @@ class Form:
                 f"kinematics '{self.kinematics}' needs fields of the kinds {listed(wanted)}, in this "
                 f"order; it declares {listed(kinds)}"
             )
+        if not callable(self.residual):
+            self._fail(f"residual = {shown(self.residual)}: expected a function")
+
+    def _check_declarations(self) -> None:
+        """Whether what is declared is of the kind that it has to be."""
+        for what in ("fields", "parameters", "options"):
+            declared = getattr(self, what)
+            if not isinstance(declared, Mapping) or not all(isinstance(n, str) for n in declared):
+                self._fail(f"{what} = {shown(declared)}: expected a mapping from names")
+        for name, declared in self.fields.items():
+            if not _are_names(declared) or len(declared) != 2:
+                self._fail(f"field '{name}' is {shown(declared)}: expected (kind, test function)")
+        for name, limits in self.parameters.items():
+            if not isinstance(limits, Mapping) or "default" not in limits:
+                self._fail(f"parameter '{name}' has no \"default\"")
+            for limit, value in limits.items():
+                numbers = list(value.values()) if isinstance(value, Mapping) else [value]
+                if not all(isinstance(number, Real) for number in numbers):
+                    self._fail(
+                        f"parameter '{name}': {shown(limit)}: {shown(value)}: expected a number"
+                    )
+        for name, choices in self.options.items():
+            if not _are_names(choices) or not choices:
+                self._fail(
+                    f"option '{name}' is {shown(choices)}: expected its values, default first"
+                )
+        if not _are_names(self.whole_cells):
+            self._fail(f"whole_cells = {shown(self.whole_cells)}: expected names of options")
+        for what in ("kinematics", "strain"):
+            if not isinstance(getattr(self, what), str):
+                self._fail(f"{what} = {shown(getattr(self, what))}: expected a name")
 
     def _fail(self, message: str) -> None:
         raise FormError(f"form {self.name}: {message}")
@@ -144,19 +171,19 @@ class Form:
             return _from_module(source, getattr(source, "residual", None))
         if not isinstance(source, str | Path):
             raise FormError(
-                f"form = {source!r}: expected the name of a shipped form, the path of a .py file, a "
-                "module or a Form"
+                f"form = {shown(source)}: expected the name of a shipped form, the path of a .py file, "
+                "a module or a Form"
             )
-        path = Path(source)
+        path = as_path("form", source)
         if path.suffix != ".py":
             path = Path(__file__).parent / "forms" / f"{source}.py"
-            if not path.exists():
+            if not _is_there(path):
                 raise FormError(
                     f"form '{source}' is not shipped: expected one of {listed(shipped())}, "
                     "or the path of a .py file"
                 )
-        elif not path.exists():
-            raise FormError(f"form file '{source}' does not exist")
+        elif not _is_there(path):
+            raise FormError(f"form file '{source}' does not exist, or cannot be read")
         resolved = path.resolve()
         return _from_file(resolved, resolved.stat().st_mtime_ns)
 
@@ -180,9 +207,9 @@ class Form:
             if name in parameters:
                 parameters[name] = value
             elif name in options:
-                if value not in self.options[name]:
+                if not one_of(value, self.options[name]):
                     raise InputError(
-                        f"{name} = {value!r}: expected one of {listed(self.options[name])}"
+                        f"{name} = {shown(value)}: expected one of {listed(self.options[name])}"
                     )
                 options[name] = value
             else:
@@ -211,16 +238,29 @@ class Form:
     def _limited(self, name: str, value: Any, options: Mapping[str, str]) -> float:
         """The value of a parameter, within its limits."""
         limits = self.parameters[name]
-        high = limits.get("maximum", math.inf)
+        value, high = real(name, value), limits.get("maximum", math.inf)
         if isinstance(high, Mapping):
             chosen = [option for option in options.values() if option in high]
-            if chosen and isinstance(value, Real) and value > high[chosen[0]]:
+            if chosen and value > high[chosen[0]]:
                 raise InputError(
                     f"{name} = {value:g} with '{chosen[0]}': expected at most {high[chosen[0]]:g}, "
                     f"beyond which form {self.name} is not stable; use a smaller {name}"
                 )
             high = math.inf
         return number(name, value, low=limits.get("minimum", -math.inf), high=high)
+
+
+def _are_names(value: Any) -> bool:
+    """Whether it is a sequence of names."""
+    sequence = isinstance(value, Sequence) and not isinstance(value, TEXT)
+    return sequence and all(isinstance(name, str) for name in value)
+
+
+def _is_there(path: Path) -> bool:
+    try:
+        return path.exists()
+    except OSError:  # a name too long, a folder without permission
+        return False
 
 
 def shipped() -> list[str]:

@@ -12,16 +12,21 @@ from mpi4py import MPI
 
 from tawami import _dolfinx, _rust, ranks
 from tawami.errors import InputError
-from tawami.inputs import number, pair, point, whole_number
+from tawami.inputs import number, one_of, pair, point, room, shown, whole_number
+from tawami.unique import Unique, check_process
 
 Array = npt.NDArray[np.float64]
 Edge = Literal["left", "right", "bottom", "top"]
 EDGES: tuple[Edge, ...] = ("left", "right", "bottom", "top")
 #: Cells from (0, 0) to the origin of a grid from which on positions are off by more than 1e-7 cells.
 FAR = 1e9
+#: Sides of a cell [m] whose squares, and what is divided by these, are numbers.
+SMALLEST, LARGEST = 1e-100, 1e100
+#: Memory that a cell takes in the mesh and in what a scene keeps of it, measured [bytes].
+CELL = 600.0
 
 
-class Grid:
+class Grid(Unique):
     """Uniform grid of squares; all scenes on it share its dolfinx mesh.
 
     Args:
@@ -37,16 +42,21 @@ class Grid:
     def __init__(
         self, comm: Any, *, origin: Sequence[float], h: float, cells: Sequence[int]
     ) -> None:
-        if not isinstance(comm, MPI.Comm):
+        if not isinstance(comm, MPI.Comm) or comm == MPI.COMM_NULL:
             raise InputError(
-                f"comm = {comm!r}: expected a communicator, as mpi4py's MPI.COMM_WORLD"
+                f"comm = {shown(comm)}: expected a communicator, as mpi4py's MPI.COMM_WORLD"
             )
+        check_process()
         ranks.watch(comm)
         self.comm = comm
         self.origin = point("origin", origin)
         self.h = number("h", h)
         self.cells = _cells(cells)
+        nx, ny = self.cells
+        advice = "expected fewer cells, or more ranks"
+        room(f"cells = {shown(cells)}", nx * ny, CELL / comm.size, advice)
         self.rust = _rust.Grid(self.origin, self.h, self.cells)
+        number("h", h, low=SMALLEST, high=LARGEST)
         if max(map(abs, self.origin)) > FAR * self.h:
             raise InputError(
                 f"origin = {self.origin}: expected at most {FAR:g} cells of {self.h:g} m from (0, 0): "
@@ -88,8 +98,8 @@ class Grid:
         Raises:
             InputError: No such edge.
         """
-        if name not in EDGES:
-            raise InputError(f"edge '{name}': expected 'left', 'right', 'bottom' or 'top'")
+        if not one_of(name, EDGES):
+            raise InputError(f"edge {shown(name)}: expected 'left', 'right', 'bottom' or 'top'")
         return EDGES.index(name) // 2, -(EDGES.index(name) % 2)
 
     def axis_positions(self, axis: int, cell: Any, t: Any) -> Array:

@@ -78,14 +78,14 @@ class Loads:
     def add_forces(self, particles: npt.ArrayLike, force: Sequence[float]) -> None:
         """Share a force [N per metre depth] out among particles of the body, a mask or numbers."""
         total = np.array(inputs.point("load(...): force", force))
-        chosen = np.asarray(particles)
+        chosen = inputs.any_array("load(...): particles", particles)
         if chosen.dtype == bool and chosen.shape == (self.num_particles,):
             chosen = np.flatnonzero(chosen)
         inside = chosen.dtype.kind in "iu" and chosen.ndim == 1
         if not (inside and ((chosen >= 0) & (chosen < self.num_particles)).all()):
             raise InputError(
-                f"load(particles={particles!r}): expected a mask of the {self.num_particles} "
-                "particles of the body, or their numbers"
+                f"load(particles={inputs.shown(particles)}): expected a mask of the "
+                f"{self.num_particles} particles of the body, or their numbers"
             )
         chosen = np.unique(chosen)
         if chosen.size == 0:

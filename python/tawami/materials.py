@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from numbers import Real
 from typing import Any
 
-from tawami import _rust
+from tawami import _rust, inputs
 from tawami.errors import InputError
 
 
@@ -80,6 +79,8 @@ def von_mises(
         InputError: A parameter out of its range.
     """
     K, mu = _moduli("von_mises", elastic)
+    yield_stress = inputs.real("von_mises: yield_stress", yield_stress)
+    hardening = inputs.real("von_mises: hardening", hardening)
     return _made("von_mises", _rust.Material.von_mises, K, mu, yield_stress, hardening)
 
 
@@ -107,9 +108,8 @@ def drucker_prager(
     Raises:
         InputError: A parameter out of its range.
     """
-    K, mu = _moduli("drucker_prager", elastic)
     make = _rust.Material.drucker_prager
-    return _made("drucker_prager", make, (K, mu), phi, c, psi, eps_v_max, tiny_angle)
+    return _frictional("drucker_prager", make, elastic, tiny_angle, phi, c, psi, eps_v_max)
 
 
 def mohr_coulomb(
@@ -139,9 +139,8 @@ def mohr_coulomb(
     Raises:
         InputError: A parameter out of its range.
     """
-    K, mu = _moduli("mohr_coulomb", elastic)
     make = _rust.Material.mohr_coulomb
-    return _made("mohr_coulomb", make, (K, mu), phi, c, psi, eps_v_max, tiny_angle)
+    return _frictional("mohr_coulomb", make, elastic, tiny_angle, phi, c, psi, eps_v_max)
 
 
 def _elastic(law: str, **given: float | None) -> _rust.Material:
@@ -157,17 +156,23 @@ def _elastic(law: str, **given: float | None) -> _rust.Material:
             f"{law} got {', '.join(values) or 'nothing'}: expected (E, nu), (K, mu) or "
             "(E, one_minus_2nu)"
         )
-    for name, value in values.items():
-        if not isinstance(value, Real):
-            raise InputError(f"{law}: {name} = {value!r}: expected a number")
-    first, second = (float(value) for value in values.values())
+    first, second = (inputs.real(f"{law}: {name}", value) for name, value in values.items())
     return _made(law, makers[tuple(values)], first, second)
+
+
+def _frictional(
+    law: str, make: Callable[..., _rust.Material], elastic: Any, tiny: Any, *given: Any
+) -> _rust.Material:
+    """A law of phi, c, psi and eps_v_max."""
+    moduli, names = _moduli(law, elastic), ("phi", "c", "psi", "eps_v_max")
+    values = [inputs.real(f"{law}: {n}", v) for n, v in zip(names, given, strict=True)]
+    return _made(law, make, moduli, *values, inputs.switch(f"{law}: tiny_angle", tiny))
 
 
 def _moduli(name: str, elastic: Any) -> tuple[float, float]:
     if not isinstance(elastic, _rust.Material) or elastic.finite_only:
         raise InputError(
-            f"{name}: elastic = {elastic!r}: expected a material of linear_elastic(...)"
+            f"{name}: elastic = {inputs.shown(elastic)}: expected a material of linear_elastic(...)"
         )
     return elastic.bulk_modulus, elastic.shear_modulus
 
@@ -175,5 +180,5 @@ def _moduli(name: str, elastic: Any) -> tuple[float, float]:
 def _made(name: str, make: Callable[..., _rust.Material], *parameters: Any) -> _rust.Material:
     try:
         return make(*parameters)
-    except (InputError, TypeError) as error:
+    except InputError as error:
         raise InputError(f"{name}: {error}") from None

@@ -54,6 +54,6 @@ class Numerics:
             "linear_solver": SolverName,
         }
         for name, possible in choices.items():
-            if getattr(self, name) not in get_args(possible):
+            if not inputs.one_of(getattr(self, name), get_args(possible)):
                 listed = " or ".join(map(repr, get_args(possible)))
-                raise InputError(f"{name} = {getattr(self, name)!r}: expected {listed}")
+                raise InputError(f"{name} = {inputs.shown(getattr(self, name))}: expected {listed}")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from tawami import _rust
+from tawami import _rust, inputs
 from tawami.errors import InputError
 
 Array = npt.NDArray[np.float64]
@@ -36,13 +36,19 @@ class NumpyLaw:
     mu: float
 
     def __post_init__(self) -> None:
+        if not callable(self.respond):
+            raise InputError(
+                f"NumpyLaw: respond = {inputs.shown(self.respond)}: expected a function of strain and "
+                "stress"
+            )
         self.elastic()
 
     def elastic(self) -> _rust.Material:
         """The elastic law of K and mu, which stands for this one where only these matter."""
         try:
-            return _rust.Material.linear_elastic_k_mu(self.K, self.mu)
-        except (InputError, TypeError) as error:
+            K, mu = inputs.real("K", self.K), inputs.real("mu", self.mu)
+            return _rust.Material.linear_elastic_k_mu(K, mu)
+        except InputError as error:
             raise InputError(f"NumpyLaw: {error}") from None
 
 
@@ -81,7 +87,9 @@ class NumpyStage:
             ("stress", result[0], (n, 4)),
             ("tangent", result[1], (n, 4, 4)),
         ):
-            array = np.ascontiguousarray(values, dtype=np.float64)
+            what = f"NumpyLaw: the {name} that respond returned"
+            raw = inputs.any_array(what, values)
+            array = inputs.array(what, raw, raw.ndim)
             if array.shape != shape:
                 raise InputError(
                     f"NumpyLaw: respond returned a {name} of shape {array.shape}: expected {shape}"

@@ -58,6 +58,7 @@ __all__ = [
 ]
 
 Array = npt.NDArray[np.float64]
+SOLVED = "a tawami.Solution, as scene.solve() gives it"
 #: Kinds of phases of a run.
 PHASES = ("ramp", "settle", "motion")
 
@@ -354,6 +355,7 @@ def write_particles(path: str | Path, solution: Solution) -> None:
     Raises:
         OutputError: The file cannot be written.
     """
+    inputs.instance("write_particles: solution", solution, Solution, SOLVED)
     scene = solution.scene
     names = ["displacement", "stress", "mean stress", "volume"]
     names += ["eps_v"] if scene.form.kinematics == "mixed" else []
@@ -372,6 +374,7 @@ def write_grid(path: str | Path, solution: Solution) -> None:
     Raises:
         OutputError: The file cannot be written.
     """
+    inputs.instance("write_grid: solution", solution, Solution, SOLVED)
     scene = solution.scene
     now = Moment(scene, None, solution, 0.0, 0, last=True)
     _write_once(path, _of_grid(on_grid(usual_on_grid(scene), scene, None), now), scene.grid)

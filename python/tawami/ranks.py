@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from tawami import inputs
 from tawami.errors import TawamiError
 from tawami.petsc import clean_up, stay
 
@@ -161,6 +162,7 @@ def run(main: Callable[[], None], name: str) -> None:
         name: What the line starts with.
     """
     comm = MPI.COMM_WORLD
+    inputs.instance("run: main", main, Callable, "a function without arguments")
     watch(comm)
     if comm.rank > 0:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - until the end of the process

@@ -15,7 +15,17 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from tawami import _rust, assignment, contents, initial, inputs, placement, quadrature, ranks
+from tawami import (
+    _rust,
+    assignment,
+    contents,
+    initial,
+    inputs,
+    interruption,
+    placement,
+    quadrature,
+    ranks,
+)
 from tawami.attached import Attached
 from tawami.basis import BASES, Basis
 from tawami.body import Body
@@ -36,6 +46,7 @@ from tawami.solution import Solution
 from tawami.source import Source
 from tawami.stopwatch import Stopwatch
 from tawami.supports import Support, Supports, Velocity
+from tawami.unique import Unique, check_process
 
 Array = npt.NDArray[np.float64]
 FIELDS: dict[str, type[Field]] = {"fast": FastField, "reference": Field}
@@ -76,7 +87,7 @@ class Accepted:
     smooth: Array
 
 
-class Scene(contents.Elsewhere):
+class Scene(contents.Elsewhere, Unique):
     """Particles on a grid with a weak form, supports and loads.
 
     By itself it is static; `ramp` brings its loads up in steps, `Dynamics` sets it in motion. With a
@@ -145,15 +156,17 @@ class Scene(contents.Elsewhere):
         leaving: Literal["stop", "remove"] = "stop",
         **parameters: Any,
     ) -> None:
-        if basis not in BASES:
-            raise InputError(f"basis '{basis}': expected one of {', '.join(map(repr, BASES))}")
-        if leaving not in ("stop", "remove"):
-            raise InputError(f"leaving = {leaving!r}: expected 'stop' or 'remove'")
+        if not inputs.one_of(basis, BASES):
+            names = ", ".join(map(repr, BASES))
+            raise InputError(f"basis {inputs.shown(basis)}: expected one of {names}")
+        if not inputs.one_of(leaving, ("stop", "remove")):
+            raise InputError(f"leaving = {inputs.shown(leaving)}: expected 'stop' or 'remove'")
         if not isinstance(grid, Grid) or not isinstance(body, Body):
             raise InputError(
                 f"Scene({type(grid).__name__}, {type(body).__name__}, ...): expected a tawami.Grid and "
                 "a tawami.Body"
             )
+        check_process()
         self.numerics = Numerics(
             tolerance, max_iterations, assembly, tangent_rule, factorise, linear_solver
         )
@@ -375,7 +388,8 @@ class Scene(contents.Elsewhere):
                 f"{what}: form {self.form.name} has no edge term; add "
                 "- dot(t, w) * ds to its residual"
             )
-        components = inputs.pair(what, value, "components (t_x, t_y)")
+        t_x, t_y = inputs.pair(what, value, "components (t_x, t_y)")
+        components = inputs.profile(f"{what}[0]", t_x), inputs.profile(f"{what}[1]", t_y)
         cells_between(self.grid, edge, between)
         self.loads.tractions.append(Traction(edge, components, between))
 
@@ -514,9 +528,7 @@ class Scene(contents.Elsewhere):
         if not self._looked_at:
             quadrature.warn(self.attached, self.particles.volume)
             self._looked_at = True
-        solution = self.advance(lambda: self.problem(part))
-        self.carry(part)
-        return solution
+        return self.advance(lambda: self.problem(part), done=lambda: self.carry(part))
 
     def problem(self, part: float = 1.0) -> Problem:
         """The static problem under this share of what is new, in the present states of the walls."""
@@ -571,8 +583,10 @@ class Scene(contents.Elsewhere):
         problem: Callable[[], Problem],
         also: Callable[[Accepted], Callable[[float], None]] | None = None,
         time: float = np.nan,
+        done: Callable[[], None] = lambda: None,
     ) -> Solution:
-        """One step: find it, store it in the particles, move them where strains are finite.
+        """One step: find it, store it in the particles, move them where strains are finite. Ctrl-C ends
+        it before anything is stored, or after all of it is.
 
         Args:
             problem: Makes the problem for the present states of the walls.
@@ -580,12 +594,15 @@ class Scene(contents.Elsewhere):
                 dissipate [J per metre depth] after the particles have their stress and before they
                 move; what may fail comes first.
             time: At its end [s].
+            done: What else belongs to a step that is stored.
         """
+        check_process()
         with ranks.together(self.grid.comm):
             self.particles.check()
         for option in self._whole_cells:
             self.attached.warn_of_parts(self.particles.volume, option)
         walls = [copy.deepcopy(wall.state) for wall in self.supports.walls]
+        committed = False
         try:
             step, settled = self._settled(problem)
             u = self.split(step.coefficients)[0].reshape(-1, 2)
@@ -601,15 +618,26 @@ class Scene(contents.Elsewhere):
             a = None if step.acceleration is None else step.acceleration.reshape(-1, 2)
             accepted = Accepted(step, u, a, forces.reshape(-1, 2), smooth.reshape(-1, 2))
             store = also(accepted) if also is not None else None
-            with self.stopwatch("commit"), ranks.together(self.grid.comm):
-                dissipated = self.attached.stage.commit(*self.split(step.coefficients))
-        except Exception:
-            for wall, state in zip(self.supports.walls, walls, strict=True):
-                wall.state = state
+            with interruption.deferred():
+                with self.stopwatch("commit"), ranks.together(self.grid.comm):
+                    dissipated = self.attached.stage.commit(*self.split(step.coefficients))
+                committed = True
+                if store is not None:
+                    store(dissipated)
+                solution = self._stored(settled, step, u, moved, time)
+                done()
+                return solution
+        except BaseException:  # Ctrl-C too
+            if not committed:
+                for wall, state in zip(self.supports.walls, walls, strict=True):
+                    wall.state = state
             raise
+
+    def _stored(
+        self, settled: Problem, step: Converged, u: Array, moved: Array | None, time: float
+    ) -> Solution:
+        """The scene after a step that the laws have accepted: where particles move, they do."""
         self.begun = True
-        if store is not None:
-            store(dissipated)
         if moved is None:
             self._total = self._total + step.coefficients
             return Solution(self, step, settled.reduction, self._total)

@@ -18,6 +18,7 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 
+from tawami import inputs
 from tawami.errors import InputError, OutputError
 from tawami.files import result_folder, whole_file
 
@@ -57,7 +58,7 @@ def write_vtu(path: str | Path, frame: Frame) -> None:
     """
     import meshio  # here: a scene without output does without it
 
-    if Path(path).suffix != ".vtu":
+    if inputs.path("path", path).suffix != ".vtu":
         raise OutputError(f"'{path}': expected a file name ending in .vtu")
     cells = [(frame.kind, frame.cells)]
     on_cells = {name: [values] for name, values in frame.on_cells.items()}

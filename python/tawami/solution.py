@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from tawami import _rust, boundary, contents, ranks
+from tawami import _rust, boundary, contents, inputs, ranks
 from tawami.errors import InputError
 from tawami.grid import EDGES, Edge
 from tawami.newton import Converged, History
 from tawami.reduction import Reduction
+from tawami.unique import Unique
 
 if TYPE_CHECKING:
     from tawami.scene import Scene
@@ -34,7 +35,7 @@ def supported_edge(place: str, edges: set[str]) -> Edge:
         InputError: No such edge, or none with supports.
     """
     if place not in EDGES:
-        raise InputError(f"reaction('{place}'): expected one of {', '.join(EDGES)}")
+        raise InputError(f"reaction({inputs.shown(place)}): expected one of {', '.join(EDGES)}")
     if place not in edges:
         raise InputError(
             f"reaction('{place}'): nothing supports that edge: expected one of "
@@ -43,7 +44,7 @@ def supported_edge(place: str, edges: set[str]) -> Edge:
     return place
 
 
-class Solution(contents.Elsewhere):
+class Solution(contents.Elsewhere, Unique):
     """Equilibrium of a scene, or the end of a step. On several ranks all of it is on every rank, and
     arrays of particles are in the order of their numbers.
 
@@ -146,6 +147,7 @@ class Solution(contents.Elsewhere):
             edge = supported_edge(place, self._edges)
             functions = boundary.edge_functions(self.scene.grid, self.scene.basis, edge)
             return np.asarray(self.on_edges[functions].sum(axis=0))
+        place = inputs.point("reaction(...)", place)
         force, found = np.zeros(2), False
         for places, component, multiplier in self._on_points:
             near = 1e-8 * self.scene.grid.h

@@ -89,8 +89,11 @@ def ramp(
             last equilibrium that was found.
         InputError: A size out of its range, or as `Scene.solve`.
     """
+    inputs.instance("ramp: scene", scene, Scene, "a tawami.Scene")
     size = inputs.number("size", size, low=inputs.LEAST, high=1.0)
+    inputs.number("size", size, low=1e-9)  # more steps than that would never end
     least = size / 1024 if smallest is None else inputs.number("smallest", smallest, low=0.0)
+    each = inputs.function("each", each, "of a solution")
     pace = Pace(0.0, size)
     try:
         with phase(results, "ramp", scene, None, 1.0, "of the load") as watched:
@@ -123,12 +126,13 @@ def settle(
     Raises:
         ConvergenceError: Not within `max_resets` solves.
     """
+    inputs.instance("settle: scene", scene, Scene, "a tawami.Scene")
     tolerance = inputs.number("tolerance", tolerance, low=1e-14, high=0.1)
+    max_resets = inputs.whole_number("max_resets", max_resets, low=1)
     if scene.form.strain != "finite":
         raise InputError(
             "settle(...) resets the grid: expected a scene with a form of finite strain"
         )
-    max_resets = inputs.whole_number("max_resets", max_resets, low=1)
     pace, steps = Pace(0.0, 1.0), list[Step]()
     with (
         scene.tolerance_of(max(0.1 * tolerance, 1e-14)),

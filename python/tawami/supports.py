@@ -104,6 +104,7 @@ class Supports:
     ) -> None:
         """Prescribe a component along an edge."""
         boundary.cells_between(self.grid, edge, between)
+        value = inputs.profile(f"fix(edge='{edge}'): value", value)
         self._add(Support(edge, boundary.component_index(component), value, velocity, between))
 
     def hold(
@@ -114,7 +115,7 @@ class Supports:
         velocity: Velocity | None,
     ) -> None:
         """Prescribe a component at a point."""
-        what = f"hold(point={point})"
+        what = f"hold(point={inputs.shown(point)})"
         boundary.locate_point(self.grid, point, what)
         place = inputs.point(what, point)
         held = inputs.number(f"{what}: value", value)
@@ -131,11 +132,14 @@ class Supports:
     def wall(self, edge: Edge, friction: float, separates: bool) -> None:
         """A wall along an edge."""
         self.grid.edge(edge)
+        what = f"wall(edge='{edge}')"
+        friction = inputs.real(f"{what}: friction", friction)
         if friction != np.inf:
-            friction = inputs.number(f"wall(edge='{edge}'): friction", friction, low=0.0)
+            inputs.number(f"{what}: friction", friction, low=0.0)
+        separates = inputs.switch(f"{what}: separates", separates)
         if any(wall.edge == edge for wall in self.walls):
             raise InputError(f"wall(edge='{edge}'): there is one already; release('{edge}') first")
-        self.walls.append(Wall(self.grid, self.basis, edge, friction, bool(separates)))
+        self.walls.append(Wall(self.grid, self.basis, edge, friction, separates))
 
     def release(self, place: Edge | Sequence[float], component: Component | None) -> None:
         """Take supports away."""
@@ -146,7 +150,8 @@ class Supports:
         if not gone and not walls:
             places = sorted({f"{s.place}" for s in self.all} | {w.edge for w in self.walls})
             raise InputError(
-                f"release({place!r}): no such support: expected one of {', '.join(places) or 'none'}"
+                f"release({inputs.shown(place)}): no such support: expected one of "
+                f"{', '.join(places) or 'none'}"
             )
         self.all = [s for s in self.all if s not in gone]
         self.walls = [w for w in self.walls if w not in walls]

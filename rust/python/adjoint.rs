@@ -1,9 +1,10 @@
 //! Particle data as densities of packed arrays, and sums over functions.
 
 use ndarray::ArrayView2;
-use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray2, ToPyArray};
+use numpy::{PyArray2, ToPyArray};
 use pyo3::prelude::*;
 
+use super::array::{Read1, Read2, Write2};
 use super::grid::PyLocation;
 use super::require;
 use crate::adjoint::{self, Densities};
@@ -33,14 +34,14 @@ pub(super) fn points_per_axis(
 #[allow(clippy::too_many_arguments)]
 pub(super) fn densities(
     location: &PyLocation,
-    volume: PyReadonlyArray1<f64>,
-    data: PyReadonlyArray2<f64>,
+    volume: Read1<f64>,
+    data: Read2<f64>,
     points: Vec<[usize; 2]>,
     vertices: bool,
-    rows: PyReadonlyArray1<u32>,
+    rows: Read1<u32>,
     columns: Vec<usize>,
     offset: usize,
-    mut out: PyReadwriteArray2<f64>,
+    mut out: Write2<f64>,
 ) -> PyResult<()> {
     let location = &location.0;
     let (volume, data, rows) = (volume.as_slice()?, data.as_array(), rows.as_slice()?);
@@ -51,7 +52,8 @@ pub(super) fn densities(
     require(height == rows.len(), "packed array of other cells")?;
     require(rows.iter().all(|&r| (r as usize) < location.active.len()), "row of no active cell")?;
     let length = points.len().max(1) * columns.len();
-    require(offset + length <= width, "packed array too narrow")?;
+    let end = offset.checked_add(length);
+    require(end.is_some_and(|end| end <= width), "packed array too narrow")?;
     if per_axis == 0 {
         adjoint::pack(rows, (offset, length), width, out, |a, row| {
             adjoint::cell_mean(location, a, volume, data, &columns, row);
@@ -72,8 +74,8 @@ pub(super) fn densities(
 pub(super) fn nodal_sums<'py>(
     py: Python<'py>,
     location: &PyLocation,
-    volume: PyReadonlyArray1<f64>,
-    data: PyReadonlyArray2<f64>,
+    volume: Read1<f64>,
+    data: Read2<f64>,
     basis: &str,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (volume, data) = (volume.as_slice()?, data.as_array());

@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1, ToPyArray};
+use numpy::{PyArray1, ToPyArray};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
 use super::adjoint::points_per_axis;
+use super::array::{Read1, Read2, Write1};
 use super::grid::PyLocation;
 use super::{require, view, InputError};
 use crate::adjoint::{Densities, MAX_POINTS};
@@ -16,7 +17,7 @@ use crate::quadrature::Rule;
 
 /// Particle data of one rule, at which points (indices along x and y, or none for cell means), whether
 /// these are the vertices rather than Gauss points, and which columns.
-type Source<'py> = (PyReadonlyArray2<'py, f64>, Vec<[usize; 2]>, bool, Vec<usize>);
+type Source<'py> = (Read2<'py, f64>, Vec<[usize; 2]>, bool, Vec<usize>);
 
 /// Address of an FFCx kernel, its rank, the number of its packed coefficients, these in packed order
 /// (none stands for the fields), and its constants.
@@ -61,7 +62,7 @@ impl PyAssembler {
             .collect()
     }
 
-    fn coefficients<'a>(&self, coefficients: &'a PyReadonlyArray1<f64>) -> PyResult<&'a [f64]> {
+    fn coefficients<'a>(&self, coefficients: &'a Read1<f64>) -> PyResult<&'a [f64]> {
         let coefficients = coefficients.as_slice()?;
         let expected = self.cells.coefficients(self.location.grid.cells);
         require(coefficients.len() == expected, "wrong number of grid coefficients")?;
@@ -70,12 +71,7 @@ impl PyAssembler {
 }
 
 /// Starts, unknowns and weights of the compressed rows of S, and the coefficient of each unknown.
-type SelectionOf<'py> = (
-    PyReadonlyArray1<'py, i32>,
-    PyReadonlyArray1<'py, i32>,
-    PyReadonlyArray1<'py, f64>,
-    PyReadonlyArray1<'py, i64>,
-);
+type SelectionOf<'py> = (Read1<'py, i32>, Read1<'py, i32>, Read1<'py, f64>, Read1<'py, i64>);
 
 #[pymethods]
 impl PyAssembler {
@@ -99,8 +95,8 @@ impl PyAssembler {
         &self,
         py: Python<'py>,
         kernels: Vec<KernelOf>,
-        volume: PyReadonlyArray1<f64>,
-        coefficients: PyReadonlyArray1<f64>,
+        volume: Read1<f64>,
+        coefficients: Read1<f64>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let volume = volume.as_slice()?;
         require(volume.len() == self.location.len(), "volumes of other particles")?;
@@ -138,10 +134,10 @@ impl PyAssembler {
         &self,
         kernels: Vec<KernelOf>,
         couplings: Vec<[KernelOf; 2]>,
-        volume: PyReadonlyArray1<f64>,
-        coefficients: PyReadonlyArray1<f64>,
+        volume: Read1<f64>,
+        coefficients: Read1<f64>,
         pattern: &PyPattern,
-        mut values: PyReadwriteArray1<f64>,
+        mut values: Write1<f64>,
     ) -> PyResult<()> {
         let (volume, values) = (volume.as_slice()?, values.as_slice_mut()?);
         require(volume.len() == self.location.len(), "volumes of other particles")?;
@@ -184,13 +180,13 @@ pub(super) struct PyPattern {
 impl PyPattern {
     /// Start of each row; one more than rows.
     #[getter]
-    fn start<'py>(slf: &Bound<'py, Self>) -> Bound<'py, PyArray1<i32>> {
+    fn start<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<i32>>> {
         view(|p: &Self| &p.pattern.start, slf)
     }
 
     /// Columns of the rows, ascending.
     #[getter]
-    fn columns<'py>(slf: &Bound<'py, Self>) -> Bound<'py, PyArray1<i32>> {
+    fn columns<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<i32>>> {
         view(|p: &Self| &p.pattern.columns, slf)
     }
 }

@@ -2,18 +2,22 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, ToPyArray};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
+use super::array::{Read1, Read2};
 use super::require;
 use crate::active::Active;
 use crate::basis::Basis;
 use crate::error::Error;
-use crate::grid::{Grid, Location};
+use crate::grid::{Grid, Location, MAX_CELLS};
 use crate::interpolation::Field;
 use crate::quadrature::Rule;
+
+/// Points of a Gauss rule beyond which its making, which takes their square, would be waited for.
+const MAX_GAUSS: usize = 1000;
 
 #[pyclass(name = "Grid", frozen)]
 pub(super) struct PyGrid(pub(super) Grid);
@@ -25,7 +29,7 @@ impl PyGrid {
         Ok(Self(Grid::new(origin, h, cells)?))
     }
 
-    fn locate(&self, x: PyReadonlyArray2<f64>) -> PyResult<PyLocation> {
+    fn locate(&self, x: Read2<f64>) -> PyResult<PyLocation> {
         let x = x.as_array().as_standard_layout().into_owned();
         if x.ncols() != 2 {
             let expected = "(points, 2)".to_owned();
@@ -67,7 +71,7 @@ impl PyLocation {
     }
 
     /// Where some of the particles are.
-    fn select(&self, particles: PyReadonlyArray1<u32>) -> PyResult<Self> {
+    fn select(&self, particles: Read1<u32>) -> PyResult<Self> {
         let particles = particles.as_slice()?;
         let inside = particles.iter().all(|&p| (p as usize) < self.0.len());
         require(inside, "a selection of other particles")?;
@@ -88,7 +92,7 @@ impl PyActive {
 #[pymethods]
 impl PyActive {
     #[new]
-    fn new(grid: &PyGrid, cells: PyReadonlyArray1<u32>) -> PyResult<Self> {
+    fn new(grid: &PyGrid, cells: Read1<u32>) -> PyResult<Self> {
         let cells = cells.as_slice()?;
         let inside = cells.iter().all(|&c| (c as usize) < grid.0.num_cells());
         require(inside, "a cell outside the grid")?;
@@ -115,7 +119,7 @@ impl PyActive {
         &self,
         py: Python<'py>,
         basis: &str,
-        of_cells: PyReadonlyArray1<i64>,
+        of_cells: Read1<i64>,
     ) -> PyResult<Bound<'py, PyArray1<i64>>> {
         let of_cells = of_cells.as_slice()?;
         require(of_cells.len() == self.1.num_cells(), "values of other cells")?;
@@ -140,7 +144,7 @@ impl PyActive {
 pub(super) fn field<'a, const C: usize>(
     grid: Grid,
     basis: Basis,
-    coefficients: &'a PyReadonlyArray1<f64>,
+    coefficients: &'a Read1<f64>,
 ) -> PyResult<Field<'a, C>> {
     let coefficients = coefficients.as_slice()?;
     let expected = C * basis.len(grid.cells[0]) * basis.len(grid.cells[1]);
@@ -155,7 +159,7 @@ pub(super) fn interpolate<'py>(
     location: &PyLocation,
     basis: &str,
     components: usize,
-    coefficients: PyReadonlyArray1<f64>,
+    coefficients: Read1<f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (basis, grid) = (basis.parse()?, location.0.grid);
     let values = match components {
@@ -172,7 +176,7 @@ pub(super) fn gradients<'py>(
     py: Python<'py>,
     location: &PyLocation,
     basis: &str,
-    coefficients: PyReadonlyArray1<f64>,
+    coefficients: Read1<f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let location = &location.0;
     let u = field::<2>(location.grid, basis.parse()?, &coefficients)?;
@@ -189,10 +193,11 @@ pub(super) fn basis_1d<'py>(
     py: Python<'py>,
     basis: &str,
     n: usize,
-    cell: PyReadonlyArray1<i64>,
-    t: PyReadonlyArray1<f64>,
+    cell: Read1<i64>,
+    t: Read1<f64>,
 ) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<f64>>)> {
     let basis: Basis = basis.parse()?;
+    require(n <= MAX_CELLS, "a row of more cells than a grid has")?;
     let (cell, t) = (cell.as_array(), t.as_array());
     require(cell.len() == t.len(), "cells and positions differ in number")?;
     require(cell.iter().all(|&c| c >= 0 && (c as usize) < n), "cell outside the row")?;
@@ -209,15 +214,18 @@ pub(super) fn basis_1d<'py>(
 /// Number of functions of a basis on a row of `n` cells.
 #[pyfunction]
 pub(super) fn basis_len(basis: &str, n: usize) -> PyResult<usize> {
+    require(n <= MAX_CELLS, "a row of more cells than a grid has")?;
     Ok(basis.parse::<Basis>()?.len(n))
 }
 
 /// Points on [0, 1] and weights of the Gauss-Legendre rule.
 #[pyfunction]
+#[allow(clippy::type_complexity)]
 pub(super) fn gauss(
     py: Python<'_>,
     n: usize,
-) -> (Bound<'_, PyArray1<f64>>, Bound<'_, PyArray1<f64>>) {
+) -> PyResult<(Bound<'_, PyArray1<f64>>, Bound<'_, PyArray1<f64>>)> {
+    require(n <= MAX_GAUSS, "a rule of very many points")?;
     let rule = Rule::gauss(n);
-    (rule.points.to_pyarray(py), rule.weights.to_pyarray(py))
+    Ok((rule.points.to_pyarray(py), rule.weights.to_pyarray(py)))
 }

@@ -1,6 +1,7 @@
 //! Python bindings: they convert and check shapes at the border, and nothing else.
 
 mod adjoint;
+mod array;
 mod assembly;
 mod grid;
 mod particles;
@@ -46,10 +47,10 @@ fn require(condition: bool, what: &str) -> PyResult<()> {
 fn view<'py, T: Element, D: Dimension, O: PyClass>(
     array: impl Fn(&O) -> &ndarray::Array<T, D>,
     owner: &Bound<'py, O>,
-) -> Bound<'py, PyArray<T, D>> {
-    let object = owner.borrow();
+) -> PyResult<Bound<'py, PyArray<T, D>>> {
+    let object = owner.try_borrow()?;
     // SAFETY: never reallocated, and the view keeps the object.
-    unsafe { PyArray::borrow_from_array(array(&object), owner.clone().into_any()) }
+    Ok(unsafe { PyArray::borrow_from_array(array(&object), owner.clone().into_any()) })
 }
 
 #[pymodule]

@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray2, ToPyArray};
+use numpy::{PyArray2, PyArrayMethods, ToPyArray};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
+use super::array::{Read1, Write2};
 use super::grid::{field, PyLocation};
 use super::particles::{laws, PyMaterial, PyParticles};
 use super::require;
@@ -30,13 +31,13 @@ pub(super) struct PyStage {
 }
 
 /// Stress and tangent that were computed in Python, flat.
-type Given<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>);
+type Given<'py> = (Read1<'py, f64>, Read1<'py, f64>);
 
 impl PyStage {
     fn with<R>(
         &self,
-        u: &PyReadonlyArray1<f64>,
-        volumetric: Option<&PyReadonlyArray1<f64>>,
+        u: &Read1<f64>,
+        volumetric: Option<&Read1<f64>>,
         given: Option<&Given>,
         run: impl FnOnce(&Stage) -> R,
     ) -> PyResult<R> {
@@ -79,13 +80,18 @@ impl PyStage {
         finite: bool,
         basis: &str,
     ) -> PyResult<Self> {
-        require(particles.borrow(py).0.len() == location.0.len(), "location of other particles")?;
         let materials = laws(&materials);
+        {
+            let particles = &particles.try_borrow(py)?.0;
+            require(particles.len() == location.0.len(), "location of other particles")?;
+            let known = |&m: &u32| (m as usize) < materials.len();
+            require(particles.material.iter().all(known), "particles of other materials")?;
+        }
         let mut history = Vec::new();
         for law in &materials {
             let names = law.history();
             require(names.len() <= MAX_HISTORY, "a law with more history than there is room for")?;
-            let places = particles.borrow(py).0.history_of(names);
+            let places = particles.try_borrow(py)?.0.history_of(names);
             require(places.is_some(), "particles without the history of their laws")?;
             history.extend(places);
         }
@@ -105,20 +111,21 @@ impl PyStage {
     fn evaluate(
         &self,
         py: Python,
-        u: PyReadonlyArray1<f64>,
-        volumetric: Option<PyReadonlyArray1<f64>>,
+        u: Read1<f64>,
+        volumetric: Option<Read1<f64>>,
         requests: Vec<(String, String, usize)>,
-        mut data: PyReadwriteArray2<f64>,
+        mut data: Write2<f64>,
         given: Option<Given>,
     ) -> PyResult<()> {
-        let particles = self.particles.borrow(py);
+        let particles = self.particles.try_borrow(py)?;
         let (rows, columns) = (data.as_array().nrows(), data.as_array().ncols());
         let data = data.as_slice_mut()?;
         require(rows == particles.0.len(), "data of other particles")?;
         let requests: Vec<Request> = requests.iter().map(request).collect::<PyResult<_>>()?;
         let fits = |r: &Request| {
             r.operator.finite() == self.finite
-                && r.column + r.operator.components() * r.part.width() <= columns
+                && r.column <= columns
+                && r.operator.components() * r.part.width() <= columns - r.column
         };
         require(requests.iter().all(fits), "a request reaches outside the particle data")?;
         if requests.is_empty() {
@@ -134,23 +141,23 @@ impl PyStage {
     fn commit(
         &self,
         py: Python,
-        u: PyReadonlyArray1<f64>,
-        volumetric: Option<PyReadonlyArray1<f64>>,
+        u: Read1<f64>,
+        volumetric: Option<Read1<f64>>,
         given: Option<Given>,
     ) -> PyResult<f64> {
-        let mut particles = self.particles.borrow_mut(py);
+        let mut particles = self.particles.try_borrow_mut(py)?;
         Ok(self.with(&u, volumetric.as_ref(), given.as_ref(), |s| s.commit(&mut particles.0))??)
     }
 
     /// Energy that the laws store in the particles [J per metre depth].
-    fn elastic_energy(&self, py: Python) -> f64 {
-        let particles = &self.particles.borrow(py).0;
+    fn elastic_energy(&self, py: Python) -> PyResult<f64> {
+        let particles = &self.particles.try_borrow(py)?.0;
         let of = |p: usize| {
             let law = &self.materials[particles.material[p] as usize];
             let stress: Sym = std::array::from_fn(|i| particles.stress[[p, i]]);
             particles.volume[p] * law.elastic_energy(&law.elastic_strain(&(&stress).into()))
         };
-        (0..particles.len()).map(of).sum()
+        Ok((0..particles.len()).map(of).sum())
     }
 
     /// Strain increments at the particles (xx, yy, zz, gamma_xy): n x 4.
@@ -158,8 +165,8 @@ impl PyStage {
     fn strains<'py>(
         &self,
         py: Python<'py>,
-        u: PyReadonlyArray1<f64>,
-        volumetric: Option<PyReadonlyArray1<f64>>,
+        u: Read1<f64>,
+        volumetric: Option<Read1<f64>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let strains: Vec<Sym> = self.with(&u, volumetric.as_ref(), None, |s| {
             (0..self.location.len()).into_par_iter().map(|p| s.strain(p)).collect()
@@ -172,8 +179,8 @@ impl PyStage {
     fn volume_strains<'py>(
         &self,
         py: Python<'py>,
-        u: PyReadonlyArray1<f64>,
-        volumetric: Option<PyReadonlyArray1<f64>>,
+        u: Read1<f64>,
+        volumetric: Option<Read1<f64>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let location = &self.location;
         let of = |s: &Stage, p| [s.volume_change(p), s.increments.volumetric_at(location, p)];

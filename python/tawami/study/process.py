@@ -14,7 +14,8 @@ import subprocess
 import sys
 import tempfile
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter, process_time
@@ -22,8 +23,9 @@ from typing import Any
 
 import numpy as np
 
+from tawami import inputs
 from tawami.environment import peak_memory
-from tawami.errors import InputError, TawamiError
+from tawami.errors import InputError, OutputError, TawamiError
 from tawami.ranks import own_environment
 from tawami.tally import tally
 
@@ -41,7 +43,7 @@ def name_of(run: Run) -> str:
     Raises:
         InputError: It cannot be found by a name.
     """
-    name, module = getattr(run, "__qualname__", repr(run)), getattr(run, "__module__", None)
+    name, module = getattr(run, "__qualname__", inputs.shown(run)), getattr(run, "__module__", None)
     if "<" in name or "." in name or module is None:
         raise InputError(
             f"run = {name}: expected a function at the top level of a file, which a process of its own "
@@ -101,7 +103,7 @@ def measured(name: str, knobs: Mapping[str, Any], limit: float) -> dict[str, Any
     if "threads" in knobs:
         environment["RAYON_NUM_THREADS"] = str(knobs.pop("threads"))
     environment["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
-    with tempfile.TemporaryDirectory() as folder:
+    with _temporary_folder() as folder:
         job, result = Path(folder) / "job.json", Path(folder) / "result.json"
         job.write_text(json.dumps({"name": name, "knobs": knobs}))
         command = [sys.executable, "-m", "tawami.study", str(job), str(result)]
@@ -115,8 +117,31 @@ def measured(name: str, knobs: Mapping[str, Any], limit: float) -> dict[str, Any
         if not result.exists():
             last = (ended.stderr.strip().splitlines() or ["it said nothing"])[-1]
             return {"failure": f"ended with code {ended.returncode}: {last}", "cut": True}
-        outcome: dict[str, Any] = json.loads(result.read_text())
+        try:
+            outcome: dict[str, Any] = json.loads(result.read_text())
+        except ValueError:
+            return {
+                "failure": "its result is cut off: no room in the temporary folder?",
+                "cut": True,
+            }
         return outcome
+
+
+@contextmanager
+def _temporary_folder() -> Iterator[str]:
+    """A folder that goes with the block.
+
+    Raises:
+        OutputError: It cannot be made or written.
+    """
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            yield folder
+    except OSError as error:
+        raise OutputError(
+            f"the temporary folder cannot be written ({error.strerror or error}): expected room there, "
+            "or another one in the environment variable TMPDIR"
+        ) from error
 
 
 def main() -> None:

@@ -9,6 +9,7 @@ import json
 import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -27,6 +28,8 @@ Knobs = Mapping[str, Any]
 Grid = Mapping[str, Sequence[Any]]
 #: Label, setting and fingerprint.
 Key = tuple[str, str, str]
+#: Longest limit of a run [s]: what the system waits for at most.
+LONGEST = 2e6
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,17 @@ class Series:
     label: str
     run: process.Run
     knobs: Grid | Sequence[Grid]
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.label, str):
+            raise InputError(f"label = {inputs.shown(self.label)}: expected the name of a series")
+        grids = self.knobs if _is_list(self.knobs) else [self.knobs]
+        named = (isinstance(g, Mapping) and all(isinstance(n, str) for n in g) for g in grids)
+        if len(grids) == 0 or not all(named):
+            raise InputError(
+                f"series '{self.label}': knobs = {inputs.shown(self.knobs)}: expected a mapping from "
+                "names of knobs to their values, or a list of such"
+            )
 
     @functools.cached_property
     def fingerprint(self) -> str:
@@ -67,11 +81,19 @@ class Series:
 
 
 def _values(name: str, values: Any) -> Sequence[Any]:
-    if isinstance(values, str) or not isinstance(values, Sequence | np.ndarray) or len(values) == 0:
-        raise InputError(f"knob '{name}' = {values!r}: expected a list of its values")
+    if not _is_list(values) or len(values) == 0:
+        raise InputError(f"knob '{name}' = {inputs.shown(values)}: expected a list of its values")
     if not all(isinstance(v, str | bool | int | float | None) for v in values):
-        raise InputError(f"knob '{name}' = {values!r}: expected numbers, names, booleans or None")
+        raise InputError(
+            f"knob '{name}' = {inputs.shown(values)}: expected numbers, names, booleans or None"
+        )
     return list(values)
+
+
+def _is_list(value: Any) -> bool:
+    if isinstance(value, np.ndarray):
+        return value.ndim > 0
+    return isinstance(value, Sequence) and not isinstance(value, inputs.TEXT)
 
 
 def _text(setting: Knobs) -> str:
@@ -108,6 +130,7 @@ class Study:
     folder: str | Path | None = None
 
     def __post_init__(self) -> None:
+        self._check_types()
         own = self.function
         if not isinstance(own, Series):
             own = Series("MPM", own, self.knobs)
@@ -128,7 +151,33 @@ class Study:
                 f"study '{self.name}': no reference for {', '.join(self._of_finest)}: expected a value, "
                 "or the knobs of the finest run as finest=..."
             )
-        self.path = Path(self.folder or Path("results") / "study" / self.name)
+        self.path = inputs.path("folder", self.folder or Path("results") / "study" / self.name)
+
+    def _check_types(self) -> None:
+        name = inputs.shown(self.name)
+        if not isinstance(self.name, str) or inputs.path("name", self.name).name != self.name:
+            raise InputError(f"study: name = {name}: expected text that a file can be named by")
+        for what, kind, expected in (
+            ("reference", Mapping, "a mapping from quantities to values"),
+            ("finest", Mapping | None, "the knobs of a run, or None"),
+            ("colour", str | None, "the name of a knob, or None"),
+            ("folder", str | Path | None, "a path, or None"),
+        ):
+            inputs.instance(f"study {name}: {what}", getattr(self, what), kind, expected)
+        for quantity, value in self.reference.items():
+            if not isinstance(quantity, str):
+                raise InputError(
+                    f"study {name}: reference: {inputs.shown(quantity)}: expected a name"
+                )
+            if value is not None:
+                what = f"study {name}: reference of '{quantity}'"
+                raw = inputs.any_array(what, value)
+                if not np.isfinite(inputs.array(what, raw, raw.ndim)).all():
+                    raise InputError(f"{what} = {inputs.shown(value)}: expected finite numbers")
+        for knob, value in (self.finest or {}).items():
+            _values(knob, [value])
+        if not _is_list(self.beside) or not all(isinstance(s, Series) for s in self.beside):
+            raise InputError(f"study {name}: beside = {inputs.shown(self.beside)}: expected Series")
 
     # -- what has been run -----------------------------------------------------
 
@@ -167,14 +216,19 @@ class Study:
 
     def _runs(self) -> dict[Key, dict[str, Any]]:
         """Kept runs by label, setting and fingerprint; a last line that was cut off does not count."""
-        path, runs = self.path / "runs.jsonl", {}
-        if path.exists():
-            for line in path.read_text().splitlines():
-                try:
-                    run = json.loads(line)
-                except ValueError:
-                    continue
+        path, runs = self.path / "runs.jsonl", dict[Key, dict[str, Any]]()
+        try:
+            lines = path.read_text(errors="replace").splitlines()
+        except FileNotFoundError:
+            return runs
+        except OSError as error:
+            raise InputError(f"study '{self.name}': '{path}': {error.strerror}") from None
+        for line in lines:
+            try:
+                run = json.loads(line)
                 runs[run["label"], _text(run["knobs"]), run["fingerprint"]] = run
+            except (ValueError, TypeError, KeyError):
+                continue
         return runs
 
     # -- running -----------------------------------------------------------------
@@ -205,6 +259,9 @@ class Study:
             InputError: No reference for a quantity, or the finest run failed. Other runs may fail: the
                 table has their sentence.
         """
+        inputs.whole_number("seed", seed, low=0)
+        limit = inputs.number("limit", limit, low=inputs.LEAST, high=LONGEST)
+        quiet = inputs.switch("quiet", quiet)
         if process.MARK in os.environ:
             raise InputError(
                 f"study '{self.name}' was started again by its own run: put study.run() under "
@@ -257,15 +314,20 @@ class Study:
 
 def _append(path: Path, line: str) -> None:
     """One more line; one that was cut off before it is ended first."""
+    size = None
     try:
         with path.open("a+b") as file:
-            if file.tell():
+            size = file.tell()
+            if size:
                 file.seek(-1, os.SEEK_END)
                 line = line if file.read(1) == b"\n" else "\n" + line
             file.write((line + "\n").encode())
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:
+        if size is not None:
+            with suppress(OSError):
+                os.truncate(path, size)
         raise OutputError(f"'{path}' cannot be written: {error.strerror or error}") from error
 
 

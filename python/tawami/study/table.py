@@ -253,13 +253,14 @@ class Table:
         return f"{self.name}, {quantity}: " + " ".join(sentences)
 
     def _check(self, quantity: str, cost: str) -> None:
-        if quantity not in self.quantities:
+        if not inputs.one_of(quantity, self.quantities):
             raise InputError(
-                f"quantity '{quantity}' of study '{self.name}': expected one of "
+                f"quantity {inputs.shown(quantity)} of study '{self.name}': expected one of "
                 f"{', '.join(map(repr, self.quantities))}"
             )
-        if cost not in COSTS:
-            raise InputError(f"cost = '{cost}': expected one of {', '.join(map(repr, COSTS))}")
+        if not inputs.one_of(cost, COSTS):
+            names = ", ".join(map(repr, COSTS))
+            raise InputError(f"cost = {inputs.shown(cost)}: expected one of {names}")
 
     def draw(self, path: str | Path, **options: Any) -> None:
         """The picture; see `tawami.study.figure.picture` for what there is to choose."""
@@ -291,15 +292,20 @@ class Table:
         Raises:
             InputError: No such file, or not that of a study.
         """
-        path = Path(path)
+        path = inputs.path("study", path)
         try:
             with path.open(newline="") as file:
                 lines = list(csv.DictReader(file))
         except OSError as error:
             raise InputError(f"study '{path}': {error.strerror}: expected a CSV file") from None
-        if not lines or "series" not in lines[0] or "failure" not in lines[0]:
+        except (ValueError, csv.Error):
+            lines = []
+        whole = all(None not in line and None not in line.values() for line in lines)
+        named = bool(lines) and {"series", "failure"} <= set(lines[0])
+        rows = [_from_line(line) for line in lines] if whole and named else []
+        if not rows or not all(_is_complete(row) for row in rows):
             raise InputError(f"study '{path}': expected the CSV file that Study.run() writes")
-        return Table(path.stem, [_from_line(line) for line in lines])
+        return Table(path.stem, rows)
 
 
 def _from_line(line: Mapping[str, str]) -> Row:
@@ -312,6 +318,13 @@ def _from_line(line: Mapping[str, str]) -> Row:
 
     knobs, values, errors, costs = map(part, ("knobs", "values", "errors", "costs"))
     return Row(line["series"], knobs, values, errors, costs, line["failure"] or None)
+
+
+def _is_complete(row: Row) -> bool:
+    """Whether it failed, or has all costs, and numbers."""
+    numbers = (*row.values.values(), *row.errors.values(), *row.costs.values())
+    measured = set(COSTS) <= set(row.costs) and all(isinstance(n, int | float) for n in numbers)
+    return row.failure is not None or measured
 
 
 def _value(cell: str) -> Any:
@@ -358,10 +371,16 @@ def recommend(
     if isinstance(study, str | Path):
         table = Table.read(study)
     else:
-        table = study if isinstance(study, Table) else study.table()
+        from tawami.study.study import Study
+
+        expected = "a study, its table, or the path of its CSV file"
+        inputs.instance("recommend: study", study, Study | Table, expected)
+        table = study.table() if isinstance(study, Study) else study
     if not isinstance(tolerance, Mapping):
         tolerance = dict.fromkeys(table.quantities, tolerance)
     limits = {q: inputs.number(f"tolerance of {q}", t, low=0.0) for q, t in tolerance.items()}
+    if not limits:
+        raise InputError("tolerance = {}: expected a number, or one for each of some quantities")
     for quantity in limits:
         table._check(quantity, cost)
     rows = table.of(table.series[0])

@@ -1,0 +1,338 @@
+"""The border of the compiled module: whatever comes, an exception that a driver can catch, no panic.
+
+A panic of Rust reaches Python as pyo3's PanicException, which is no `Exception` and passes by every
+`except Exception`: a test fails on one.
+"""
+
+from __future__ import annotations
+
+import gc
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import grid_of
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import tawami
+from tawami import _rust
+
+N = 6  # particles
+BASIS = "quadratic_spline"
+TERMS = [(i, j) for j in range(2) for i in range(2)]
+NODES = [(i, j) for i in range(3) for j in range(3)]
+SHAPES = st.sampled_from(
+    [(), (0,), (1,), (N,), (N + 1,), (4 * N,), (0, 2), (2, N), (N, 0), (N, 1), (N, 2), (N, 3), (N, 4),
+     (N, 4, 4), (30,), (60,), (80,)]
+)  # fmt: skip
+DTYPES = st.sampled_from(
+    ["f8", ">f8", "f4", "f2", "u4", "i4", "i8", "u8", "i1", "?", "c16", "O", "U3", "S3", "M8[s]",
+     [("a", "i1"), ("b", "f8")]]
+)  # fmt: skip
+NUMBERS = st.sampled_from(
+    [0, 1, 2, -1, -(2**31), 2**31, 2**32, 2**63 - 1, 2**63, 2**64 - 1, 2**64, 2**200, 10**6, 1000, 5,
+     0.5, -0.0, np.nan, np.inf, -np.inf, 5e-324, 1e308]
+)  # fmt: skip
+
+
+@st.composite
+def arrays(draw: st.DrawFn) -> Any:
+    """An array of some shape, type, order and content."""
+    shape, kind = draw(SHAPES), draw(DTYPES)
+    values = np.zeros(shape, dtype=kind)
+    if values.dtype.kind in "fui" and values.size:
+        with np.errstate(all="ignore"):
+            number = draw(NUMBERS)
+            if values.dtype.kind == "f":
+                values[...] = float(number)
+            elif number == number and abs(number) != np.inf:
+                values[...] = int(number) % 2**31 % (np.iinfo(values.dtype).max + 1)
+    how = draw(st.sampled_from(["as it is", "Fortran", "reversed", "every other", "read-only", "masked",
+                                "unaligned", "transposed", "broadcast"]))  # fmt: skip
+    match how:
+        case "Fortran":
+            return np.asfortranarray(values)
+        case "reversed":
+            return np.flip(values)
+        case "every other":
+            return np.repeat(values, 2, axis=0)[::2] if values.ndim else values
+        case "read-only":
+            values.setflags(write=False)
+        case "masked":
+            return np.ma.masked_array(values)
+        case "unaligned":
+            padded = np.zeros(values.shape, dtype=[("a", "i1"), ("b", values.dtype)])
+            return padded["b"]
+        case "transposed":
+            return values.T
+        case "broadcast":
+            return np.broadcast_to(values, (2, *values.shape))
+    return values
+
+
+NASTY = st.one_of(
+    arrays(),
+    NUMBERS,
+    st.sampled_from(
+        [None, True, "", BASIS, "bilinear", "biquadratic", "mixed", "cell", "x\ud800", b"x", 1j, [], (),
+         {}, [[0]], [(0, 0)],
+         [(9, 9)], [(0, 2**63)], [[(0, 0, 0)]], [1, -1], [0] * 9, [(0,)], {1}, range(3),
+         object(), [None], [(0, 1, 0, [], [])], [(1, 7, 0, [], [])], ["sigma"],
+         [("sigma", "value", 0)], [("sigma", "value", 2**64 - 1)], [("ln_J", "strain", 1)],
+         [("no", "value", 0)], [("sigma", "no", 0)]]
+    ),
+    st.lists(st.integers(-1, 2**33), max_size=4),
+)  # fmt: skip
+
+
+class Sample:
+    """Small objects of each kind, new for each example: what a call has changed is gone with it."""
+
+    def __init__(self) -> None:
+        self.grid = _rust.Grid((-1.0, 0.5), 0.5, (4, 3))
+        random = np.random.default_rng(1)
+        self.x = np.array([-1.0, 0.5]) + [2.0, 1.5] * random.random((N, 2))
+        self.volume = np.full(N, 0.1)
+        self.material = np.zeros(N, dtype=np.uint32)
+        self.particles = _rust.Particles(self.x, self.volume, self.material)
+        self.particles.carry("velocity", 2)
+        self.location = self.grid.locate(self.x)
+        self.law = _rust.Material.von_mises(2.0, 1.0, 1e9, 0.0)
+        self.particles.add_history([self.law])
+        self.active = _rust.Active(self.grid, self.location.active)
+        self.stage = _rust.Stage(self.particles, self.location, [self.law], "mixed", False, BASIS)
+        self.assembler = _rust.Assembler(
+            self.location, BASIS, NODES, [(0, 0), (0, 1), (1, 0), (1, 1)], True
+        )
+        self.u, self.v, self.all = np.zeros(60), np.zeros(20), np.zeros(80)
+        self.selection = (
+            np.arange(81, dtype=np.int32), np.arange(80, dtype=np.int32), np.ones(80),
+            np.arange(80, dtype=np.int64),
+        )  # fmt: skip
+        self.pattern = self.assembler.pattern(self.selection)
+        self.values = np.zeros(len(self.pattern.columns))
+        self.data = np.zeros((N, 4))
+        self.rows = np.arange(len(self.location.active), dtype=np.uint32)
+        self.packed = np.zeros((len(self.rows), 12))
+        self.few = np.array([0, 2], dtype=np.uint32)
+        self.given = (np.zeros(4 * N), np.zeros(16 * N))
+
+
+#: What is called, and good arguments; one after the other is replaced.
+CALLS: dict[str, Callable[[Sample], tuple[Any, ...]]] = {
+    "Grid": lambda s: (_rust.Grid, (0.0, 0.0), 1.0, (2, 3)),
+    "Grid.locate": lambda s: (s.grid.locate, s.x),
+    "Location.away_from_sides": lambda s: (s.location.away_from_sides, 1e-5),
+    "Location.select": lambda s: (s.location.select, s.few),
+    "Active": lambda s: (_rust.Active, s.grid, s.location.active),
+    "Active.functions": lambda s: (s.active.functions, BASIS),
+    "Active.parts": lambda s: (s.active.parts, BASIS),
+    "Active.spread": lambda s: (s.active.spread, BASIS, np.zeros(12, dtype=np.int64)),
+    "Active.support": lambda s: (s.active.support, BASIS, 3),
+    "Particles": lambda s: (_rust.Particles, s.x, s.volume, s.material),
+    "Particles.select": lambda s: (s.particles.select, s.few),
+    "Particles.of_rows": lambda s: (s.particles.of_rows, s.particles.rows()),
+    "Particles.carry": lambda s: (s.particles.carry, "acceleration", 2),
+    "Particles.carried": lambda s: (s.particles.carried, "velocity"),
+    "Particles.history": lambda s: (s.particles.history, "plastic_strain"),
+    "Particles.add_history": lambda s: (s.particles.add_history, [s.law]),
+    "Particles.move_to": lambda s: (s.particles.move_to, s.x),
+    "Particles.check_materials": lambda s: (s.particles.check_materials, [s.law], "mixed", False),
+    "Material.linear_elastic_e_nu": lambda s: (_rust.Material.linear_elastic_e_nu, 1.0, 0.3),
+    "Material.linear_elastic_e_one_minus_2nu": lambda s: (
+        _rust.Material.linear_elastic_e_one_minus_2nu, 1.0, 0.3,
+    ),
+    "Material.linear_elastic_k_mu": lambda s: (_rust.Material.linear_elastic_k_mu, 1.0, 0.3),
+    "Material.neo_hookean": lambda s: (_rust.Material.neo_hookean, 1.0, 0.3),
+    "Material.von_mises": lambda s: (_rust.Material.von_mises, 1.0, 0.3, 1.0, 0.0),
+    "Material.drucker_prager": lambda s: (
+        _rust.Material.drucker_prager, (1.0, 0.3), 30.0, 1.0, 0.0, np.inf, False,
+    ),
+    "Material.mohr_coulomb": lambda s: (
+        _rust.Material.mohr_coulomb, (1.0, 0.3), 30.0, 1.0, 0.0, np.inf, False,
+    ),
+    "Assembler": lambda s: (_rust.Assembler, s.location, BASIS, NODES, TERMS, True),
+    "Assembler.vector": lambda s: (s.assembler.vector, [], s.volume, s.all),
+    "Assembler.pattern": lambda s: (s.assembler.pattern, s.selection),
+    "Assembler.matrix": lambda s: (
+        s.assembler.matrix, [], [], s.volume, s.all, s.pattern, s.values,
+    ),
+    "Stage": lambda s: (_rust.Stage, s.particles, s.location, [s.law], "mixed", False, BASIS),
+    "Stage.evaluate": lambda s: (
+        s.stage.evaluate, s.u, s.v, [("sigma", "value", 0)], s.data, s.given,
+    ),
+    "Stage.commit": lambda s: (s.stage.commit, s.u, s.v, s.given),
+    "Stage.strains": lambda s: (s.stage.strains, s.u, s.v),
+    "Stage.volume_strains": lambda s: (s.stage.volume_strains, s.u, s.v),
+    "interpolate": lambda s: (_rust.interpolate, s.location, BASIS, 2, s.u),
+    "gradients": lambda s: (_rust.gradients, s.location, BASIS, s.u),
+    "basis_1d": lambda s: (
+        _rust.basis_1d, BASIS, 4, np.array([0, 3], dtype=np.int64), np.array([0.5, 1.0]),
+    ),
+    "basis_len": lambda s: (_rust.basis_len, BASIS, 4),
+    "gauss": lambda s: (_rust.gauss, 3),
+    "densities": lambda s: (
+        _rust.densities, s.location, s.volume, s.data, TERMS, False, s.rows, [0, 1], 2, s.packed,
+    ),
+    "nodal_sums": lambda s: (_rust.nodal_sums, s.location, s.volume, s.data, BASIS),
+}  # fmt: skip
+
+
+def called(function: Callable[..., Any], *arguments: Any) -> None:
+    """Works, or raises what a driver can catch; pyo3 itself raises OverflowError for whole numbers that
+    no machine word holds.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # NumPy's, of arrays as numbers
+        try:
+            function(*arguments)
+        except (tawami.TawamiError, TypeError, ValueError, OverflowError):
+            pass
+        except RuntimeError as error:
+            assert str(error).startswith("internal: "), error
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_any_argument_works_or_raises(name):
+    function, *arguments = CALLS[name](Sample())
+    function(*arguments)  # the good ones are good
+
+    @settings(max_examples=40)
+    @given(st.integers(0, len(arguments) - 1), NASTY, st.booleans())
+    def replaced(which: int, value: Any, part: bool) -> None:
+        function, *arguments = CALLS[name](Sample())
+        if part and isinstance(arguments[which], tuple):  # one of several in one argument
+            value = (*arguments[which][:-1], value)
+        arguments[which] = value
+        called(function, *arguments)
+
+    replaced()
+
+
+@given(
+    st.lists(st.integers(0, 4), min_size=80, max_size=80),
+    st.integers(0, 80),
+    st.integers(0, 2**31 - 1),
+)
+def test_any_selection_has_a_pattern_inside_or_is_refused(counts, unknowns, seed):
+    """Rows with so many entries each, of unknowns that are any of the coefficients."""
+    s, random = Sample(), np.random.default_rng(seed)
+    start = np.cumsum([0, *counts]).astype(np.int32)
+    unknown = random.integers(0, max(unknowns, 1) + (seed % 3 == 0), start[-1]).astype(np.int32)
+    coefficient = random.integers(0, 80 + (seed % 5 == 0), unknowns)
+    try:
+        pattern = s.assembler.pattern((start, unknown, np.ones(start[-1]), coefficient))
+    except RuntimeError as error:
+        assert str(error).startswith("internal: not a selection")
+        assert unknown.max(initial=0) >= unknowns or coefficient.max(initial=0) >= 80
+    else:
+        assert len(pattern.start) == unknowns + 1
+        assert (pattern.columns < unknowns).all()
+        called(s.assembler.matrix, [], [], s.volume, s.all, pattern, np.zeros(len(pattern.columns)))
+
+
+def test_every_function_and_method_is_in_the_table():
+    """Those that take arguments."""
+    without = {"check", "rows", "add_eps_v", "elastic_energy"}
+    there = set()
+    for name in _rust.__all__:
+        entry = getattr(_rust, name)
+        if isinstance(entry, type) and not issubclass(entry, Exception):
+            if name not in ("Location", "Material", "Pattern"):  # no constructor
+                there.add(name)
+            there |= {
+                f"{name}.{method}"
+                for method in vars(entry)
+                if not method.startswith("_")
+                and method not in without
+                and callable(getattr(entry, method))
+            }
+        elif not isinstance(entry, type):
+            there.add(name)
+    assert there == set(CALLS)
+
+
+def test_an_array_to_write_that_cannot_be_written():
+    s = Sample()
+    s.data.setflags(write=False)
+    with pytest.raises(TypeError, match="not writeable"):
+        s.stage.evaluate(s.u, s.v, [("sigma", "value", 0)], s.data)
+    with pytest.raises(TypeError, match="row by row"):
+        s.stage.evaluate(s.u, s.v, [("sigma", "value", 0)], np.zeros((N, 4), order="F"))
+    with pytest.raises(TypeError, match="already borrowed"):  # read and written at once
+        s.assembler.matrix([], [], s.volume, s.values[:80], s.pattern, s.values)
+
+
+def test_positions_that_are_a_view_of_the_particles_own():
+    s = Sample()
+    s.particles.move_to(s.particles.x)
+    np.testing.assert_array_equal(s.particles.x, s.x)
+    s.particles.move_to(s.particles.x[::-1])
+    np.testing.assert_array_equal(s.particles.x, s.x[::-1])
+
+
+def test_the_particles_own_stress_as_that_of_the_law():
+    s = Sample()
+    s.particles.stress[:] = np.arange(4.0 * N).reshape(N, 4)
+    s.stage.commit(s.u, s.v, (s.particles.stress.ravel(), np.zeros(16 * N)))
+    np.testing.assert_allclose(s.particles.stress.ravel(), np.arange(4.0 * N), atol=1e-12)
+
+
+def test_objects_of_other_particles_or_of_another_grid():
+    s, other = Sample(), Sample()
+    few, elsewhere = s.location.select(s.few), _rust.Grid((-1, 0), 9.0, (2, 2)).locate(s.x)
+    plain = _rust.Particles(s.x, s.volume, s.material)
+    for call, message in (
+        (lambda: _rust.Stage(s.particles, few, [s.law], "mixed", False, BASIS), "other particles"),
+        (lambda: _rust.nodal_sums(few, s.volume, s.data, BASIS), "particle data"),
+        (
+            lambda: _rust.Stage(s.particles, s.location, [], "mixed", False, BASIS),
+            "other materials",
+        ),
+        (
+            lambda: s.assembler.matrix([], [], s.volume, s.all, other.pattern, s.values),
+            "another pattern",
+        ),
+        (lambda: s.particles.of_rows(plain.rows()), "rows of other"),
+        (lambda: _rust.interpolate(elsewhere, BASIS, 2, s.u), "wrong number of grid"),
+    ):
+        with pytest.raises(RuntimeError, match=f"internal: .*{message}"):
+            call()
+
+
+def test_an_index_that_looks_at_the_particles_while_they_are_changed():
+    s = Sample()
+
+    class Width:
+        def __index__(self) -> int:
+            return s.particles.x.shape[1]
+
+    with pytest.raises(RuntimeError, match="borrowed"):
+        s.particles.carry("acceleration", Width())
+
+
+def test_a_view_stays_readable_when_the_storage_is_replaced():
+    """Particles that leave the grid make another storage; a view holds the old one."""
+    grid = grid_of((6, 2))
+    body = tawami.box(grid, (1.0, 0.5), (2.0, 1.5))
+    scene = tawami.Scene(
+        grid, body, tawami.linear_elastic(E=1e3, nu=0.3), form="u_finite", density=1.0,
+        leaving="remove",
+    )  # fmt: skip
+    motion = tawami.Dynamics(scene, velocity=(1.0, 0.0))
+    views = {"x": scene.particles.x, "stress": scene.particles.stress, "velocity": motion.velocity}
+    before = len(scene.particles)
+    for _ in range(4):
+        motion.step(0.1)
+    assert 0 < len(scene.particles) < before
+    kept = {name: view.copy() for name, view in views.items()}
+    del scene, motion
+    gc.collect()
+    _ = [np.full((before, 4), 7.0) for _ in range(100)]  # takes what was free
+    for name, view in views.items():
+        assert len(view) == before
+        np.testing.assert_array_equal(view, kept[name])
+    assert views["x"].max() <= 2.0 + 0.1
