@@ -7,8 +7,10 @@ pass. What was refused has changed nothing.
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 import math
+import shutil
 import tempfile
 import warnings
 from collections.abc import Callable
@@ -17,6 +19,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import meshio
 import numpy as np
 import pytest
 from conftest import grid_of
@@ -26,6 +29,7 @@ from mpi4py import MPI
 
 import tawami
 from tawami.output import result_folder, whole_file, write_grid, write_particles
+from tawami.plot import plot
 
 KINDS = ["?", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f2", "f4", "f8", "g", "c8", "c16", "O",
          "S3", "U3", "M8[s]", "m8[s]", [("a", "f8"), ("b", "i4")]]  # fmt: skip
@@ -191,6 +195,45 @@ def in_folder(write: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
+@functools.cache
+def folder_of_a_run() -> Path:
+    folder = Path(tempfile.mkdtemp()) / "run"
+    results = tawami.Results(folder, tawami.ParticleOutput(), tawami.TableOutput())
+    tawami.ramp(scene_of(), 1.0, results=results)
+    return folder
+
+
+def beside_a_run(read: Callable[..., Any]) -> Callable[..., Any]:
+    """What is given a path in a folder that holds a run."""
+
+    def call(path: Any, **arguments: Any) -> None:
+        shutil.copytree(folder_of_a_run(), "run")
+        read(path, **arguments)
+
+    return in_folder(call)
+
+
+def tabled(path: Any, column: Any, outside: Any) -> None:
+    Path("field.csv").write_text("x,y,value\n0,0,1\n1,0,1\n0,1,1\n")
+    tawami.table(path, column, outside=outside)
+
+
+def resulting(path: Any, **arguments: Any) -> None:
+    """A step with results; Results themselves are made before anything is solved."""
+    results = tawami.Results(path, **arguments)
+    tawami.ramp(scene_of(), 1.0, results=results, each=enough)
+
+
+def observed(kind: Any) -> Callable[..., Any]:
+    """A step that an output looks at; `path` is the name of its files."""
+
+    def call(path: Any, quantity: Any, **arguments: Any) -> None:
+        output = kind(quantity, name=path, **arguments)
+        tawami.ramp(scene_of(), 1.0, results=tawami.Results("run", output))
+
+    return call
+
+
 def whole(path: Any) -> None:
     with whole_file(path) as part:
         part.write_text("x")
@@ -204,8 +247,37 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "box": (lambda **a: tawami.box(**a),
             {"grid": grid_of(), "lower": (-1.0, 0.5), "upper": (0.0, 1.0), "per_axis": 2,
             "gauss": False}),
-    "polygon": (tawami.polygon, {"grid": grid_of(), "vertices": [(-1, 0.5), (0, 0.5), (0, 1.2)],
-                                 "per_axis": 2, "gauss": True}),
+    "polygon": (tawami.polygon, {"grid": grid_of(), "shape": [(-1, 0.5), (0, 0.5), (0, 1.2)],
+                                 "holes": [], "per_axis": 2, "gauss": True}),
+    "disc": (tawami.disc, {"grid": grid_of(), "centre": (0.0, 1.2), "radius": 0.6, "inner": 0.2,
+                           "per_axis": 2, "gauss": True}),
+    "level_set": (tawami.level_set, {
+        "grid": grid_of(), "f": lambda x, y: np.hypot(x, y - 1.2) - 0.6, "ends": (),
+        "tolerance": 1e-3, "samples": 4, "per_axis": 2, "gauss": True}),
+    "mesh": (tawami.mesh, {
+        "grid": grid_of(), "source": meshio.Mesh([(-1, 0.5), (0, 0.5), (0, 1.2)],
+                                                 [("triangle", [[0, 1, 2]])]),
+        "tags": None, "per_axis": 2, "gauss": True}),
+    "table": (in_folder(tabled), {"path": "field.csv", "column": "value", "outside": "stop"}),
+    "earlier": (beside_a_run(tawami.earlier), {"path": "run", "outside": "stop"}),
+    "initial": (on_scene("initial"), {"name": "stress", "source": (1.0, 1.0, 1.0, 0.0),
+                                      "beyond": "stop"}),
+    "Results": (in_folder(resulting), {
+        "path": "run", "checkpoint_steps": 2, "checkpoint_minutes": 1.0, "keep": 2,
+        "existing": "stop", "progress": False}),
+    "ramp, results": (lambda **a: tawami.ramp(scene_of(), 1.0, **a), {"results": None}),
+    **{
+        kind.__name__: (in_folder(observed(kind)), {
+            "path": "output", "quantity": quantity, "every": 0.5, "phases": ["ramp"]} | more)
+        for kind, quantity, more in (
+            (tawami.ParticleOutput, "stress", {"format": "vtu"}),
+            (tawami.GridOutput, "stress", {"format": "xdmf", "projection": "lumped"}),
+            (tawami.TableOutput, "run-out", {}))
+    },
+    "every_steps": (in_folder(observed(tawami.TableOutput)), {
+        "path": "output", "quantity": "run-out", "every_steps": 2}),
+    "check_form": (tawami.check_form, {"form": "u_p", "alpha": 0.1}),
+    "plot": (beside_a_run(plot), {"path": "run", "quantity": "mean stress", "movie": "gif"}),
     "linear_elastic": (tawami.linear_elastic, {"E": 1.0, "nu": 0.3}),
     "neo_hookean": (tawami.neo_hookean, {"K": 1.0, "mu": 0.3}),
     "von_mises": (tawami.von_mises, {"elastic": ELASTIC, "yield_stress": 1.0, "hardening": 0.0}),
@@ -247,7 +319,7 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "ramp": (lambda **a: tawami.ramp(**a),
              {"scene": scene_of(), "size": 0.5, "smallest": 0.1, "each": enough}),
     "settle": (lambda **a: tawami.settle(**a),
-               {"scene": scene_of("u_finite"), "tolerance": 1e-10, "most": 3}),
+               {"scene": scene_of("u_finite"), "tolerance": 1e-10, "max_resets": 3}),
     "Series": (tawami.Series, {"label": "own", "run": run_of, "knobs": {"n": (1, 2)}}),
     "Study": (lambda **a: study_of(**a), {
         "name": "toy", "function": run_of, "knobs": {"n": (1, 2)}, "reference": {"x": 1.0},
@@ -263,16 +335,19 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
 }  # fmt: skip
 #: What a message calls an argument where it does not by its name.
 CALLED = {
-    "place": "release|reaction|edge", "lower": "box", "upper": "box", "vertices": "polygon",
+    "place": "release|reaction|edge", "lower": "box", "upper": "box",
+    "shape": "polygon|vertices", "holes": "hole", "radius": "disc", "centre": "disc", "inner": "disc",
+    "f": "level_set", "ends": "level_set|edge", "source": "mesh|initial|stress", "column": "table",
+    "quantity": "particles|grid|table|Output",
     "coefficients": "residual", "particles": "load", "force": "load", "function": "run|series",
-    "stabilisation": "stabilisation", "label": "series", "main": "run", "path": "'|folder",
+    "stabilisation": "stabilisation", "label": "series", "main": "run", "path": "'|folder|name",
     "acceleration": "gravity", "body": "Body|Scene|particles|volume", "grid": "Grid|grid|mesh",
     "body.x": "x", "value": "fix|traction|hold|Newton", "edge": "edge|wall", "cells": "grid",
     "folder": "folder|'",
     "volume": "volume|particle|body", "x": "particle|body", "material": "elastic|particle|law|form",
     "material_of": "particle", "fields": "field|declare|form", "residual": "form",
     "options": "option|form",
-    "parameters": "parameter|form", "kinematics": "form", "strain": "form", "name": "form",
+    "parameters": "parameter|form", "kinematics": "form", "strain": "form", "name": "form|initial",
     "point": "hold|displacement", "velocity": "velocity|hold|Newton", "tolerance": "within|quantity",
     "knobs": "knob", "finest": "finest|knob",
     "density": "density|mass", "h": "origin|h", "origin": "origin",

@@ -93,7 +93,7 @@ def test_what_a_quantity_may_be(scene, tmp_path):
     }  # fmt: skip
     with pytest.raises(
         tawami.InputError,
-        match=r"quantity = 'strss': the run did not write it: expected one of stress xx, .*mean str",
+        match=r"quantity = 'strss': the run did not write it: expected one of 'stress xx', .*mean str",
     ):
         plot(tmp_path, quantity="strss")
 
@@ -113,7 +113,7 @@ def test_folders_that_cannot_be_drawn(scene, tmp_path):
         tawami.InputError, match="no series of particles: expected a run with tawami"
     ):
         plot(tmp_path)
-    with pytest.raises(tawami.InputError, match="movie = 'avi': expected 'gif', 'mp4' or None"):
+    with pytest.raises(tawami.InputError, match="movie = 'avi': expected 'gif' or 'mp4'"):
         plot(tmp_path, movie="avi")
     run_of(tmp_path, scene, phases=("motion",), frames=2)
     (tmp_path / "motion" / "particles" / "particles-000001.vtu").write_text("no VTU")

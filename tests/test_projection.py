@@ -100,5 +100,5 @@ def test_the_errors_for_bending(capsys):
 
 def test_an_unknown_method():
     grid = grid_of()
-    with pytest.raises(tawami.InputError, match="projection = 'spr': expected one of 'lumped', 'c"):
+    with pytest.raises(tawami.InputError, match="projection = 'spr': expected 'lumped' or 'c"):
         nodal(scene_of(grid, [[0.0, 1.0]]), np.ones(1), "spr")

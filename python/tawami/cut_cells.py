@@ -18,7 +18,7 @@ import numpy.typing as npt
 from tawami import _dolfinx, _rust
 from tawami.errors import InputError
 from tawami.grid import Grid
-from tawami.inputs import room, shown, switch, whole_number
+from tawami.inputs import instance, room, shown, switch, whole_number
 
 Array = npt.NDArray[np.float64]
 Numbers = npt.NDArray[np.int64]
@@ -71,6 +71,16 @@ def along_an_axis(number: int, gauss: bool, cells: int = 1) -> tuple[Array, Arra
     if switch("gauss", gauss):
         return _rust.gauss(whole_number("per_axis", number, low=1, high=MOST_POINTS))
     return (np.arange(number) + 0.5) / number, np.full(number, 1 / number)
+
+
+def check(name: str, grid: Any, per_axis: int, gauss: bool) -> None:
+    """What all shapes are given, before anything is made of it.
+
+    Raises:
+        InputError: No grid, or particles that are no number or too many.
+    """
+    instance(f"{name}: grid", grid, Grid, "a tawami.Grid")
+    along_an_axis(per_axis, gauss)
 
 
 def in_full_cells(cell: Numbers, per_axis: int, gauss: bool) -> Points:

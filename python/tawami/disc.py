@@ -52,7 +52,7 @@ def disc(
     """
     import shapely
 
-    cut_cells.along_an_axis(per_axis, gauss)
+    cut_cells.check("disc", grid, per_axis, gauss)
     x, y = point("centre", centre)
     radius = number("radius", radius, low=LEAST)
     inner = number("inner", inner, low=0.0)

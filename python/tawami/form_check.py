@@ -21,6 +21,7 @@ from tawami import form_scenes as scenes
 from tawami.compilation import compile_form
 from tawami.errors import FormError, InexactSumWarning, InputError, TawamiError
 from tawami.formulation import Form, listed
+from tawami.inputs import shown
 from tawami.symbols import Symbols
 
 Verdict = Literal["ok", "note", "FAILED", "not tried"]
@@ -77,7 +78,7 @@ class FormReport:
             if line.subject == subject:
                 return line
         known = ", ".join(repr(line.subject) for line in self.lines)
-        raise InputError(f"line({subject!r}): expected one of {known}")
+        raise InputError(f"line({shown(subject)}): expected one of {known}")
 
     def __str__(self) -> str:
         notes = sum(line.verdict == "note" for line in self.lines)
@@ -99,7 +100,7 @@ def check_form(form: str | Path | ModuleType | Form, **parameters: Any) -> FormR
     try:
         loaded = Form.load(form)
     except FormError as error:
-        return FormReport(repr(form), (Line("declaration", "FAILED", str(error)),))
+        return FormReport(shown(form), (Line("declaration", "FAILED", str(error)),))
     if parameters:
         loaded.settings(parameters)
     lines = list[Line]()

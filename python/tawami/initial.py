@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import numpy.typing as npt
 
-from tawami import ranks, source
+from tawami import inputs, ranks, source
 from tawami.errors import InputError
 from tawami.source import Earlier, Source
 
@@ -57,16 +57,16 @@ def give(scene: Scene, name: str, given: Source, beyond: Beyond) -> None:
 
 
 def _check(scene: Scene, name: str, beyond: Beyond) -> None:
-    if beyond not in ("stop", "return"):
-        raise InputError(f"beyond = {beyond!r}: expected 'stop' or 'return'")
+    inputs.choice("beyond", beyond, ("stop", "return"))
     known = [*COMPONENTS, *scene.particles.history_names]
     if scene.form.kinematics == "mixed":
         known.append("eps_v")
-    if name not in known:
-        more = "; velocities come in as Dynamics(scene, velocity=...)" if name == "velocity" else ""
+    if not inputs.one_of(name, known):
+        moves = inputs.one_of(name, ("velocity",))
+        more = "; velocities come in as Dynamics(scene, velocity=...)" if moves else ""
         raise InputError(
-            f"initial({name!r}): expected one of {', '.join(map(repr, known))}, which this scene has"
-            f"{more}"
+            f"initial({inputs.shown(name)}): expected one of {', '.join(map(repr, known))}, which this "
+            f"scene has{more}"
         )
     if scene.begun or "velocity" in dict(scene.particles.arrays):
         raise InputError(

@@ -89,6 +89,34 @@ def pair(name: str, value: Any, what: str) -> tuple[Any, Any]:
     return value[0], value[1]
 
 
+def choice(name: str, value: Any, known: Collection[str], wrong: str = "") -> Any:
+    """One of the names that are known.
+
+    Raises:
+        InputError: Anything else; `wrong` says why, where that is not plain.
+    """
+    if not one_of(value, known):
+        *others, last = map(repr, known)
+        listed = (
+            f"one of {', '.join([*others, last])}" if len(others) != 1 else f"{others[0]} or {last}"
+        )
+        raise InputError(f"{name} = {shown(value)}: {wrong}expected {listed}")
+    return value
+
+
+def names(name: str, value: Any, known: Collection[str]) -> tuple[str, ...]:
+    """Some of the names that are known.
+
+    Raises:
+        InputError: Anything else.
+    """
+    some = isinstance(value, list | tuple | set | frozenset)
+    if not some or not all(one_of(given, known) for given in value):
+        listed = ", ".join(map(repr, known))
+        raise InputError(f"{name} = {shown(value)}: expected a list with some of {listed}")
+    return tuple(value)
+
+
 def point(name: str, value: Any) -> tuple[float, float]:
     """A point (x, y) [m].
 
@@ -185,9 +213,9 @@ def any_array(name: str, values: Any) -> npt.NDArray[Any]:
     Raises:
         InputError: It makes none, or entries are masked.
     """
-    if np.ma.is_masked(values):  # type: ignore[no-untyped-call]
-        raise InputError(f"{name} has masked entries: expected an array with all its numbers")
     try:
+        if np.ma.is_masked(values):  # type: ignore[no-untyped-call]
+            raise ValueError("it has masked entries")
         return np.asarray(values)
     except Exception as error:  # ragged lists, objects of others
         raise InputError(f"{name}: expected an array of real numbers: {error}") from None

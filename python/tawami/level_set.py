@@ -14,7 +14,7 @@ from tawami.body import Body
 from tawami.cut_cells import ROUND_OFF, Numbers
 from tawami.errors import InputError
 from tawami.grid import EDGES, Edge, Grid
-from tawami.inputs import number, whole_number
+from tawami.inputs import names, number, shown, whole_number
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -63,7 +63,7 @@ class Function:
 
     def __init__(self, grid: Grid, f: Callable[[Array, Array], npt.ArrayLike]) -> None:
         if not callable(f):
-            raise InputError(f"level_set: f = {f!r}: expected a function f(x, y) on arrays")
+            raise InputError(f"level_set: f = {shown(f)}: expected a function f(x, y) on arrays")
         self.grid, self.f = grid, f
 
     def __call__(self, x: Array) -> npt.NDArray[np.int64]:
@@ -126,8 +126,11 @@ def level_set(
         InputError: f is never negative on the grid, is NaN, or does not return an array; a body that
             another edge of the grid would end; a tolerance that cannot be kept.
     """
-    cut_cells.along_an_axis(per_axis, gauss)
-    tolerance = number("tolerance", tolerance, low=1e-13, high=0.1)
+    cut_cells.check("level_set", grid, per_axis, gauss)
+    tolerance, ends = (
+        number("tolerance", tolerance, low=1e-13, high=0.1),
+        names("ends", ends, EDGES),
+    )
     samples, sign = whole_number("samples", samples, low=2), Function(grid, f)
     nx, ny = (n * samples for n in grid.cells)
     x, y = np.meshgrid(np.arange(nx + 1) / samples, np.arange(ny + 1) / samples)
@@ -138,7 +141,7 @@ def level_set(
             f"{grid.h / samples:g} m apart: a body without particles. Expected f < 0 inside the body; "
             "change its sign, move it into the grid, or take more samples"
         )
-    _check_ends(grid, signs, ends)
+    _check_ends(signs, ended)
     at = np.stack([signs[:-1, :-1], signs[:-1, 1:], signs[1:, :-1], signs[1:, 1:]], axis=-1)
     corner = np.stack([x, y], axis=-1)[:-1, :-1].reshape(-1, 2)
     squares = Squares(corner, 1 / samples, at.reshape(-1, 4))
@@ -148,10 +151,8 @@ def level_set(
     return _filled(grid, inside, triangles, samples, per_axis, gauss)
 
 
-def _check_ends(grid: Grid, signs: Numbers, ends: Sequence[Edge]) -> None:
+def _check_ends(signs: Numbers, ends: Sequence[str]) -> None:
     """Whether only those edges of the grid end the body; signs at the samples, y by x."""
-    for edge in ends:
-        grid.edge(edge)
     along = {"left": signs[:, 0], "right": signs[:, -1], "bottom": signs[0], "top": signs[-1]}
     for edge in EDGES:
         if (along[edge] < 0).any() and edge not in ends:

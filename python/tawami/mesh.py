@@ -14,6 +14,7 @@ from tawami.body import Body
 from tawami.cut_cells import Numbers
 from tawami.errors import GeometryWarning, InputError
 from tawami.grid import Grid
+from tawami.inputs import one_of, shown
 
 if TYPE_CHECKING:
     import meshio
@@ -62,7 +63,7 @@ def mesh(
     Warns:
         GeometryWarning: Quadratic elements with curved sides.
     """
-    cut_cells.along_an_axis(per_axis, gauss)
+    cut_cells.check("mesh", grid, per_axis, gauss)
     read = _read(source)
     x = _plane(read)
     blocks = _blocks(read)
@@ -91,7 +92,7 @@ def _read(source: Any) -> Any:
         return source
     if not isinstance(source, str | Path):
         raise InputError(
-            f"mesh: source = {source!r}: expected the path of a mesh file or a meshio.Mesh"
+            f"mesh: source = {shown(source)}: expected the path of a mesh file or a meshio.Mesh"
         )
     if not Path(source).is_file():
         raise InputError(f"mesh: '{source}' is no file: expected a mesh that meshio reads")
@@ -149,13 +150,13 @@ def _tags(
         used = tags
     if used is None:
         return np.zeros(sum(len(block.data) for _, block in blocks), dtype=np.int64), ()
-    if used == "sets" and "sets" not in read.cell_data:
+    if isinstance(used, str) and used == "sets" and "sets" not in read.cell_data:
         return _of_sets(sets, blocks)
-    if used not in read.cell_data:
+    if not one_of(used, read.cell_data):
         known = ", ".join(repr(name) for name in read.cell_data) or "none"
         raise InputError(
-            f"mesh: tags = {tags!r}: it has no such cell data: expected one of its arrays ({known}), "
-            f"or 'sets' for its cell sets ({', '.join(map(repr, sets)) or 'none'})"
+            f"mesh: tags = {shown(tags)}: it has no such cell data: expected one of its arrays "
+            f"({known}), or 'sets' for its cell sets ({', '.join(map(repr, sets)) or 'none'})"
         )
     values = np.concatenate([np.asarray(read.cell_data[used][k]).ravel() for k, _ in blocks])
     numbers = values.astype(np.int64)

@@ -87,17 +87,15 @@ class Output:
         phases: Sequence[str] | None = None,
     ) -> None:
         if not all(isinstance(given, str) for given in names):
-            raise InputError(f"{type(self).__name__}{tuple(names)!r}: expected names of quantities")
+            raise InputError(f"{type(self).__name__}{inputs.shown(names)}: expected names of quantities")
         if every is not None and every_steps is not None:
             raise InputError("every and every_steps are both given: expected one of them")
-        if Path(name).name != name or not name:
-            raise InputError(f"name = {name!r}: expected the name of a file without its ending")
-        if isinstance(phases, str) or not set(phases or ()) <= set(PHASES):
+        if not isinstance(name, str) or inputs.path("name", name).name != name or not name:
             raise InputError(
-                f"phases = {phases!r}: expected some of {', '.join(PHASES)}, as a list"
+                f"name = {inputs.shown(name)}: expected the name of a file without its ending"
             )
         self.names, self.name = tuple(names), name
-        self.phases = None if phases is None else tuple(phases)
+        self.phases = None if phases is None else inputs.names("phases", phases, PHASES)
         self._every = None if every is None else inputs.number("every", every, low=inputs.LEAST)
         self._steps = inputs.whole_number(
             "every_steps", 1 if every_steps is None else every_steps, low=1

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from tawami import inputs
 from tawami.errors import InputError, MissingDependencyError, OutputError
 from tawami.figure import new_figure, save
 from tawami.files import result_folder, whole_file
@@ -52,9 +53,10 @@ def plot(
         OutputError: A file of the run cannot be read, or a picture not written.
         MissingDependencyError: matplotlib is not installed, or ffmpeg for an mp4.
     """
-    home, grid = Path(folder), _grid(Path(folder))
-    if movie not in ("gif", "mp4", None):
-        raise InputError(f"movie = {movie!r}: expected 'gif', 'mp4' or None")
+    home = inputs.path("plot: folder", folder)
+    grid = _grid(home)
+    if movie is not None:
+        inputs.choice("movie", movie, ("gif", "mp4"))
     if movie == "mp4" and shutil.which("ffmpeg") is None:
         raise MissingDependencyError("movie = 'mp4' needs ffmpeg: install it, or take movie='gif'")
     found = [(path.name, _particles(path)) for path in _phases(home)]
@@ -64,10 +66,7 @@ def plot(
             f"'{home}' holds no series of particles: expected a run with tawami.ParticleOutput(...)"
         )
     known = list(dict.fromkeys(k for _, times in series for k in _fields(times[-1][1]())))
-    if quantity not in known:
-        raise InputError(
-            f"quantity = {quantity!r}: the run did not write it: expected one of {', '.join(known)}"
-        )
+    inputs.choice("quantity", quantity, known, "the run did not write it: ")
     pictures, stem = result_folder(home / "figures"), quantity.replace(" ", "-")
     written = []
     for phase, times in series:

@@ -11,9 +11,10 @@ import numpy.typing as npt
 from tawami import cut_cells
 from tawami.body import Body
 from tawami.cut_cells import ON_LINE, ROUND_OFF
+from tawami.deprecation import renamed_parameter
 from tawami.errors import InputError
 from tawami.grid import Grid
-from tawami.inputs import array
+from tawami.inputs import array, shown
 
 if TYPE_CHECKING:
     import shapely
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 
+@renamed_parameter("vertices", "shape", goes_in="0.3")
 def polygon(
     grid: Grid,
     shape: npt.ArrayLike | shapely.Polygon | shapely.MultiPolygon,
@@ -49,7 +51,7 @@ def polygon(
         InputError: Fewer than three vertices, all on a line, sides that cross or touch, a hole outside
             the polygon, a vertex outside the grid, or a geometry without an area.
     """
-    cut_cells.along_an_axis(per_axis, gauss)
+    cut_cells.check("polygon", grid, per_axis, gauss)
     found = _valid(grid, _geometry(grid, shape, holes))
     full, triangles, cell = cut_cells.clipped(found)
     cut = cut_cells.in_triangles(triangles, cell)
@@ -60,6 +62,10 @@ def _geometry(grid: Grid, shape: Any, holes: Sequence[npt.ArrayLike]) -> Any:
     """In cells from the origin; round-off must not leave slivers beyond a line."""
     import shapely
 
+    if not isinstance(holes, list | tuple | np.ndarray) or np.ndim(holes) == 0:
+        raise InputError(
+            f"polygon: holes = {shown(holes)}: expected a list with the corners of each hole"
+        )
     inner = [_ring(grid, corners, f"holes[{k}]") for k, corners in enumerate(holes)]
     if not isinstance(shape, shapely.Geometry):
         return shapely.Polygon(_ring(grid, shape, "vertices"), inner)

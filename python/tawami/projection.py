@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from tawami import _rust
-from tawami.errors import InputError
+from tawami import _rust, inputs
 
 if TYPE_CHECKING:
     from tawami.scene import Scene
@@ -35,12 +34,7 @@ def check_projection(method: str) -> Projection:
     Raises:
         InputError: Anything else.
     """
-    for known in get_args(Projection):
-        if method == known:
-            return known  # type: ignore[no-any-return]
-    raise InputError(
-        f"projection = {method!r}: expected one of {', '.join(map(repr, get_args(Projection)))}"
-    )
+    return inputs.choice("projection", method, get_args(Projection))  # type: ignore[no-any-return]
 
 
 def vertices(scene: Scene) -> Array:

@@ -79,13 +79,11 @@ class Results:
         existing: Existing = "stop",
         progress: bool | None = None,
     ) -> None:
-        if not isinstance(folder, str | os.PathLike):
-            raise InputError(f"folder = {folder!r}: expected the path of a folder")
         for output in outputs:
             if not isinstance(output, Output):
                 raise InputError(
-                    f"Results(..., {output!r}): expected ParticleOutput(...), GridOutput(...) or "
-                    "TableOutput(...)"
+                    f"Results(..., {inputs.shown(output)}): expected ParticleOutput(...), "
+                    "GridOutput(...) or TableOutput(...)"
                 )
         names = [output.name for output in outputs]
         twice = sorted({name for name in names if names.count(name) > 1})
@@ -94,7 +92,7 @@ class Results:
                 f"Results: {names.count(twice[0])} outputs are called '{twice[0]}', and their files "
                 "would be the same: expected another name for one, as ParticleOutput(..., name='fine')"
             )
-        self.folder, self.outputs = Path(folder), outputs
+        self.folder, self.outputs = inputs.path("folder", folder), outputs
         self.checkpoint_steps = (
             None
             if checkpoint_steps is None
@@ -108,10 +106,9 @@ class Results:
         self.keep = inputs.whole_number("keep", keep, low=1)
         variable = os.environ.get(VARIABLE)
         self.existing = existing if variable is None else variable
-        if self.existing not in get_args(Existing):
-            name = "existing" if variable is None else VARIABLE
-            raise InputError(f"{name} = {self.existing!r}: expected 'stop', 'replace' or 'resume'")
-        self.progress = progress
+        name = "existing" if variable is None else VARIABLE
+        inputs.choice(name, self.existing, get_args(Existing))
+        self.progress = None if progress is None else inputs.switch("progress", progress)
         self._phases: list[str] = []
         #: Whether the run goes on from where an earlier one was.
         self.resumes = False
@@ -237,7 +234,9 @@ def phase(
     if results is None:
         return Unwatched(unit)
     if not isinstance(results, Results):
-        raise InputError(f"results = {results!r}: expected tawami.Results(folder, ...), or None")
+        raise InputError(
+            f"results = {inputs.shown(results)}: expected tawami.Results(folder, ...), or None"
+        )
     return results.phase(kind, scene, motion, end, unit)
 
 

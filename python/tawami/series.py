@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami import inputs
-from tawami.errors import InputError, OutputError
+from tawami.errors import OutputError
 from tawami.files import result_folder, whole_file
 
 Array = npt.NDArray[Any]
@@ -161,10 +161,7 @@ def check_format(kind: str) -> Format:
     Raises:
         InputError: Anything else.
     """
-    for known in get_args(Format):
-        if kind == known:
-            return known  # type: ignore[no-any-return]
-    raise InputError(f"format = {kind!r}: expected one of {', '.join(map(repr, get_args(Format)))}")
+    return inputs.choice("format", kind, get_args(Format))  # type: ignore[no-any-return]
 
 
 def components(label: str, values: Array) -> dict[str, Array]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from tawami import checkpoint
+from tawami import checkpoint, inputs
 from tawami.body import Body
 from tawami.errors import InputError
 
@@ -121,8 +121,10 @@ def table(path: str | Path, *columns: str, outside: Outside = "stop") -> Table:
         InputError: A file that is not there, columns that are not, fewer than three points, what is no
             number, or two values for one point.
     """
-    name = f"'{path}'"
     _check_outside(outside)
+    name = f"'{inputs.path('table: path', path)}'"
+    if not all(isinstance(column, str) for column in columns):
+        raise InputError(f"table: columns = {inputs.shown(columns)}: expected their names")
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
             rows = [row for row in csv.reader(file) if row]
@@ -174,9 +176,9 @@ def earlier(path: str | Path, *, outside: Outside = "stop") -> Earlier:
         InputError: A file that is not there or cannot be read.
         CheckpointError: A checkpoint that is damaged.
     """
-    name = f"'{path}'"
     _check_outside(outside)
-    file = Path(path)
+    file = inputs.path("earlier: path", path)
+    name = f"'{file}'"
     if file.is_dir():
         file = max((file / checkpoint.FOLDER).glob("*.npz"), default=file)
     if file.suffix not in (".vtu", ".npz") or not file.is_file():
@@ -203,8 +205,7 @@ def earlier(path: str | Path, *, outside: Outside = "stop") -> Earlier:
 
 
 def _check_outside(outside: Any) -> None:
-    if outside not in get_args(Outside):
-        raise InputError(f"outside = {outside!r}: expected 'stop' or 'nearest'")
+    inputs.choice("outside", outside, get_args(Outside))
 
 
 def values(scene: Scene, name: str, source: Any, components: str, unit: str) -> Array:
@@ -271,7 +272,7 @@ def _shape(source: Any) -> str:
     except (TypeError, ValueError):
         if isinstance(source, tuple | list):
             return f"parts of shape {', '.join(str(np.shape(part)) for part in source)}"
-        return f"the value {source!r}"
+        return f"the value {inputs.shown(source)}"
 
 
 def _of_function(f: Callable[[Array, Array], Any], x: Array, name: str, components: str) -> Array:
@@ -280,8 +281,8 @@ def _of_function(f: Callable[[Array, Array], Any], x: Array, name: str, componen
         result = f(x[:, 0].copy(), x[:, 1].copy())
     except Exception as error:
         raise InputError(
-            f"{name}: the function failed on arrays of {n} positions ({error!r}): expected f(x, y) on "
-            "arrays"
+            f"{name}: the function failed on arrays of {n} positions ({inputs.shown(error)}): expected "
+            "f(x, y) on arrays"
         ) from error
     try:
         if isinstance(result, tuple | list) and width > 1:
