@@ -34,7 +34,7 @@ BLOCK = re.compile(r"^```\{run\} *(\w*)\n(.*?)^```\n", flags=re.DOTALL | re.MULT
 SHARED = ("python/tawami/**/*.py", "forms/*.py", "rust/**/*.rs", "Cargo.lock")
 MINUTES = 60
 #: Options of cases that run for more than three minutes without.
-SHORTER = {"elastica": ("--steps", "40")}
+SHORTER = {"elastica": ("--steps", "40"), "footing": ("--cells", "8")}
 
 
 class RunError(Exception):
