@@ -127,10 +127,8 @@ def level_set(
             another edge of the grid would end; a tolerance that cannot be kept.
     """
     cut_cells.check("level_set", grid, per_axis, gauss)
-    tolerance, ends = (
-        number("tolerance", tolerance, low=1e-13, high=0.1),
-        names("ends", ends, EDGES),
-    )
+    tolerance = number("tolerance", tolerance, low=1e-13, high=0.1)
+    ended = names("ends", ends, EDGES)
     samples, sign = whole_number("samples", samples, low=2), Function(grid, f)
     nx, ny = (n * samples for n in grid.cells)
     x, y = np.meshgrid(np.arange(nx + 1) / samples, np.arange(ny + 1) / samples)

@@ -87,7 +87,9 @@ class Output:
         phases: Sequence[str] | None = None,
     ) -> None:
         if not all(isinstance(given, str) for given in names):
-            raise InputError(f"{type(self).__name__}{inputs.shown(names)}: expected names of quantities")
+            raise InputError(
+                f"{type(self).__name__}{inputs.shown(names)}: expected names of quantities"
+            )
         if every is not None and every_steps is not None:
             raise InputError("every and every_steps are both given: expected one of them")
         if not isinstance(name, str) or inputs.path("name", name).name != name or not name:
