@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 import types
 from pathlib import Path
 
@@ -323,6 +324,36 @@ def test_the_new_script_of_statics_runs(tmp_path):
     assert float(tip.split()[-1]) == pytest.approx(0.009684, rel=0.01)  # clamped: its limit
     written = {path.name for path in (tmp_path / "results" / "beam").iterdir()}
     assert written == {"particles.vtu", "grid.vtu"}
+
+
+def test_a_day_with_the_new_script_of_dynamics(tmp_path):
+    """Begun, stopped, resumed on two ranks, refused, drawn."""
+    assert command_line.main(["new", str(tmp_path / "slump"), "--dynamics"]) == 0
+    start = [sys.executable, "-m", "tawami", "run", "slump.py"]
+    process = subprocess.Popen(start, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    folder = tmp_path / "results" / "slump"
+    for _ in range(600):
+        if list(folder.glob("checkpoints/02-motion-*")):
+            break
+        time.sleep(0.1)
+    process.terminate()
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 143, errors
+    assert "go on with: tawami resume results/slump" in errors
+    again = command("run", "slump.py", cwd=tmp_path)
+    assert again.returncode == 1
+    assert "the folder holds a run" in again.stderr
+    resumed = command("resume", "results/slump", "--ranks", "2", cwd=tmp_path)
+    assert resumed.returncode == 0, resumed.stderr
+    assert "run-out [m]: 0.56" in resumed.stdout
+    assert "goes on" in (folder / "log.txt").read_text()
+    drawn = command("plot", "results/slump", "--quantity", "plastic_strain", cwd=tmp_path)
+    assert drawn.returncode == 0, drawn.stderr
+    pictures = [tmp_path / line for line in drawn.stdout.splitlines()]
+    assert {path.name for path in pictures} >= {
+        "motion-plastic_strain.png", "motion-plastic_strain.gif", "motion-table.png"
+    }  # fmt: skip
+    assert all(path.stat().st_size > 1000 for path in pictures)
 
 
 def test_form_check(capsys, tmp_path):

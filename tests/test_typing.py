@@ -49,5 +49,6 @@ def test_a_driver_passes_and_every_mistake_is_refused(found):
     assert all(codes <= expected[line] for line, codes in refused.items()), refused
 
 
-def test_the_template_of_statics_is_typed(found):
-    assert not [place for place in found if place[0] == "statics.py"]
+def test_the_templates_are_typed(found):
+    assert {path.name for path in TEMPLATES.glob("*.py")} == {"statics.py", "dynamics.py"}
+    assert {name for name, _ in found} == {DRIVER.name}

@@ -77,6 +77,28 @@ def dynamics(comm: MPI.Comm) -> None:
     tawami.settle(scene, tolerance=1e-9, max_resets=10)
     motion = tawami.Dynamics(scene, velocity=(0.0, -1.0), transfer="apic", gamma=0.6)
     motion.run(end=1.0, dt=1e-3, smallest=1e-6)
+    results = tawami.Results(
+        Path("results") / "block",
+        tawami.ParticleOutput("stress", every=0.1, format="xdmf"),
+        tawami.GridOutput("mean stress", every_steps=10, projection="consistent"),
+        tawami.TableOutput("energies", phases=["motion"]),
+        checkpoint_steps=100,
+        existing="resume",
+    )
+    motion.run(end=2.0, dt=1e-3, results=results)
+    tawami.ramp(scene, 0.1, results="results")  # wrong: arg-type
+    tawami.Results("results", "stress")  # wrong: arg-type
+    tawami.Results("results", existing="append")  # wrong: arg-type
+    tawami.ParticleOutput("stress", format="csv")  # wrong: arg-type
+    ring: tawami.Body = tawami.disc(grid, (0.5, 0.5), 0.4, inner=0.1, gauss=True)
+    tawami.level_set(grid, lambda x, y: np.hypot(x, y) - 0.4, ends=["left", "bottom"])
+    tawami.level_set(grid, lambda x, y: x, ends=["north"])  # wrong: list-item
+    layers = tawami.mesh(grid, "pile.msh", tags="gmsh:physical")
+    whole = tawami.Scene(grid, layers, {"clay": materials()[0]}, density={"clay": 1800.0})
+    whole.initial("stress", lambda x, y: (0 * x, y, 0 * x, 0 * x))
+    whole.initial("stress", tawami.earlier("results/block"), beyond="return")
+    whole.initial("stress", tawami.table("k0.csv"), beyond="ignore")  # wrong: arg-type
+    tawami.Dynamics(whole, velocity=lambda x, y: (0 * x, y)).run(ring.volume.sum(), 1e-3)
     energy: float = motion.energies.kinetic + motion.kinetic_energy
     print(energy, motion.angular_momentum(), motion.time, steps[-1].size, len(scene.left))
 
