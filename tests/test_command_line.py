@@ -327,7 +327,7 @@ def test_the_new_script_of_statics_runs(tmp_path):
 
 
 def test_a_day_with_the_new_script_of_dynamics(tmp_path):
-    """Begun, stopped, resumed on two ranks, refused, drawn."""
+    """Begun, stopped, refused, resumed, drawn."""
     assert command_line.main(["new", str(tmp_path / "slump"), "--dynamics"]) == 0
     start = [sys.executable, "-m", "tawami", "run", "slump.py"]
     process = subprocess.Popen(start, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
@@ -343,7 +343,7 @@ def test_a_day_with_the_new_script_of_dynamics(tmp_path):
     again = command("run", "slump.py", cwd=tmp_path)
     assert again.returncode == 1
     assert "the folder holds a run" in again.stderr
-    resumed = command("resume", "results/slump", "--ranks", "2", cwd=tmp_path)
+    resumed = command("resume", "results/slump", cwd=tmp_path)
     assert resumed.returncode == 0, resumed.stderr
     assert "run-out [m]: 0.56" in resumed.stdout
     assert "goes on" in (folder / "log.txt").read_text()
