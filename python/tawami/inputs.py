@@ -214,11 +214,13 @@ def any_array(name: str, values: Any) -> npt.NDArray[Any]:
         InputError: It makes none, or entries are masked.
     """
     try:
-        if np.ma.is_masked(values):  # type: ignore[no-untyped-call]
-            raise ValueError("it has masked entries")
-        return np.asarray(values)
+        masked = np.ma.is_masked(values)  # type: ignore[no-untyped-call]
+        made = np.asarray(values)
     except Exception as error:  # ragged lists, objects of others
         raise InputError(f"{name}: expected an array of real numbers: {error}") from None
+    if masked:
+        raise InputError(f"{name} has masked entries: expected an array with all its numbers")
+    return made
 
 
 def numbering(name: str, values: Any, length: int) -> npt.NDArray[np.uint32]:

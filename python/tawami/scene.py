@@ -389,7 +389,7 @@ class Scene(contents.Elsewhere, Unique):
                 "- dot(t, w) * ds to its residual"
             )
         t_x, t_y = inputs.pair(what, value, "components (t_x, t_y)")
-        components = inputs.profile(f"{what}[0]", t_x), inputs.profile(f"{what}[1]", t_y)
+        components = inputs.profile(f"{what}: t_x", t_x), inputs.profile(f"{what}: t_y", t_y)
         cells_between(self.grid, edge, between)
         self.loads.tractions.append(Traction(edge, components, between))
 

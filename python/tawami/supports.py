@@ -133,13 +133,13 @@ class Supports:
         """A wall along an edge."""
         self.grid.edge(edge)
         what = f"wall(edge='{edge}')"
-        friction = inputs.real(f"{what}: friction", friction)
-        if friction != np.inf:
+        mu = inputs.real(f"{what}: friction", friction)
+        if mu != np.inf:
             inputs.number(f"{what}: friction", friction, low=0.0)
         separates = inputs.switch(f"{what}: separates", separates)
         if any(wall.edge == edge for wall in self.walls):
             raise InputError(f"wall(edge='{edge}'): there is one already; release('{edge}') first")
-        self.walls.append(Wall(self.grid, self.basis, edge, friction, separates))
+        self.walls.append(Wall(self.grid, self.basis, edge, mu, separates))
 
     def release(self, place: Edge | Sequence[float], component: Component | None) -> None:
         """Take supports away."""
