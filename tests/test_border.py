@@ -135,6 +135,7 @@ CALLS: dict[str, Callable[[Sample], tuple[Any, ...]]] = {
     "Particles": lambda s: (_rust.Particles, s.x, s.volume, s.material),
     "Particles.select": lambda s: (s.particles.select, s.few),
     "Particles.of_rows": lambda s: (s.particles.of_rows, s.particles.rows()),
+    "Particles.assign": lambda s: (s.particles.assign, _rust.Particles(s.x, s.volume, s.material)),
     "Particles.carry": lambda s: (s.particles.carry, "acceleration", 2),
     "Particles.carried": lambda s: (s.particles.carried, "velocity"),
     "Particles.history": lambda s: (s.particles.history, "plastic_strain"),

@@ -138,7 +138,7 @@ def test_messages_are_found_where_they_stand():
     """Some of each way to raise: with a name, through a helper, as a warning, from Rust."""
     found = {(message.kind, message.says) for message in messages.collected()}
     for kind, says in (
-        ("InputError", "edge '<name>': expected 'left', 'right', 'bottom' or 'top'"),
+        ("InputError", "edge <shown(name)>: expected 'left', 'right', 'bottom' or 'top'"),
         ("FormError", "field '<name>' is of kind '<kind>': expected one of <listed(KINDS)>"),
         ("InputError", "volume of particle <index> is <value> m2: expected a positive number"),
         ("InputError", "phi = <value>: expected a friction angle in degrees, 0 <= phi < 90"),
