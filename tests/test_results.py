@@ -22,7 +22,7 @@ from mpi4py import MPI
 
 import tawami
 from tawami import checkpoint, progress
-from tawami import results as results_module
+from tawami import phase as phase_module
 from tawami.output import Output
 from tawami.ranks import mpirun
 
@@ -336,10 +336,10 @@ def test_a_ramp_that_failed_goes_on_where_it_was(tmp_path):
 def test_checkpoints_by_the_clock(tmp_path, monkeypatch):
     """Three seconds a step on this clock: every five steps a quarter of a minute has gone by."""
     clock = iter(np.arange(0.0, 1e4, 1.5))
-    monkeypatch.setattr(results_module, "monotonic", lambda: next(clock))
+    monkeypatch.setattr(phase_module, "monotonic", lambda: next(clock))
     written = []
     monkeypatch.setattr(
-        results_module.checkpoint, "write", lambda path, *_: written.append(path.name)
+        phase_module.checkpoint, "write", lambda path, *_: written.append(path.name)
     )
     run(tmp_path / "run", checkpoint_steps=None, checkpoint_minutes=0.2)
     assert 2 <= len(written) <= 5

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 import tawami
 from tawami.pace import Pace
-from tawami.results import Unwatched
+from tawami.phase import Unwatched
 from tawami.stepping import march
 
 ELASTIC = tawami.linear_elastic(E=100.0, nu=0.3)

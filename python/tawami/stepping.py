@@ -8,7 +8,8 @@ from tawami import inputs
 from tawami.deprecation import renamed_parameter
 from tawami.errors import ConvergenceError, InputError, SingularError
 from tawami.pace import Pace, Step
-from tawami.results import Results, Unwatched, phase
+from tawami.phase import Unwatched
+from tawami.results import Results, phase
 from tawami.scene import Scene
 from tawami.solution import Solution
 
