@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
-from collections.abc import Callable
+import resource
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -63,6 +65,17 @@ def linear_field(grid: tawami.Grid, basis: str, a: np.ndarray, gradient: np.ndar
     x, y = (grid.h * greville(basis, n) for n in grid.cells)
     points = np.stack([np.tile(x, len(y)), np.repeat(y, len(x))], axis=1)
     return (a + points @ np.asarray(gradient).T).ravel()
+
+
+@contextlib.contextmanager
+def small_files(most: int) -> Iterator[None]:
+    """Files of this process cannot grow beyond that [bytes]: a full disk, but for the error's number."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 @pytest.fixture(params=FORMS)

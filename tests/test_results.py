@@ -7,7 +7,6 @@ import io
 import json
 import logging
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -16,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import small_files
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
@@ -346,16 +346,6 @@ def test_checkpoints_by_the_clock(tmp_path, monkeypatch):
     assert written[-1] == "01-motion-end.npz"
 
 
-def limited(size, what):
-    """Call something where no file may be larger than so many bytes, as on a disk that is full."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    try:
-        return what()
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-
 def test_a_full_disk_does_not_end_a_run(tmp_path):
     """The checkpoint before it stays; at the end, where nothing could make up for it, it is an error."""
     with pytest.raises(Killed):
@@ -363,8 +353,9 @@ def test_a_full_disk_does_not_end_a_run(tmp_path):
     with (
         pytest.warns(tawami.CheckpointWarning, match="no checkpoint: .*The run goes on"),
         pytest.raises(tawami.OutputError, match=os.strerror(errno.EFBIG)),
+        small_files(9000),
     ):
-        limited(9000, lambda: run(tmp_path / "run"))
+        run(tmp_path / "run")
     names = [path.name for path in (tmp_path / "run" / "checkpoints").iterdir()]
     assert sorted(names) == ["01-motion-00000002.npz", "01-motion-00000004.npz"]
     kill = Kill()

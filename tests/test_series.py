@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
-import resource
-from contextlib import contextmanager
 from pathlib import Path
 from xml.etree import ElementTree
 
 import meshio
 import numpy as np
 import pytest
+from conftest import small_files
 from hypothesis import given
 from hypothesis import strategies as st
 from mpi4py import MPI
@@ -491,17 +490,6 @@ def test_an_index_that_is_none(tmp_path):
         P("velocity").begin(tmp_path, motion.scene, motion, {"seen": 3, "written": 3, "time": 0.1})
 
 
-@contextmanager
-def room_for(size: int):
-    """No file may grow beyond so many bytes: what a full disk does to a write."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-
 @pytest.mark.parametrize(
     ("output", "room"),
     [
@@ -524,7 +512,10 @@ def test_a_full_disk_stops_with_a_sentence_and_keeps_the_series(output, room, tm
             solution = motion.step(0.004)
             writer.look(Moment(motion.scene, motion, solution, motion.time, step, last=False))
 
-    with room_for(room), pytest.raises(tawami.OutputError, match=r"cannot be written: File too la"):
+    with (
+        small_files(room),
+        pytest.raises(tawami.OutputError, match=r"cannot be written: File too la"),
+    ):
         on()
     after = contents(tmp_path)
     if (tmp_path / "table.csv").exists():

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import resource
 import shutil
 import signal
 import subprocess
@@ -17,7 +16,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import pytest
-from conftest import grid_of
+from conftest import grid_of, small_files
 
 import tawami
 from cases import figure
@@ -66,17 +65,6 @@ WRITERS = {
     "study.png": lambda path, _: table().draw(path),
     "study.csv": lambda path, _: csv(path),
 }
-
-
-@contextlib.contextmanager
-def small_files(most: int) -> Iterator[None]:
-    """Files of this process cannot become larger: like a full disk, but for the number of the error."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (most, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 @contextlib.contextmanager
