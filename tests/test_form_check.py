@@ -151,7 +151,7 @@ right = symbols.Symbols._direction
                 ALONE, "displacement", lambda w: 0, parameters={"a": {"default": -1, "minimum": 0}}
             ),
             "parameters",
-            "a = -1: expected",
+            "a = -1.0: expected",
         ),
         (
             tawami.Form(ALONE, "displacement", lambda w, t, ds, dx: dot(t, w) * ds),

@@ -71,7 +71,7 @@ class Function:
         points = (self.grid.origin + self.grid.h * x).reshape(-1, 2)
         try:
             values = np.asarray(self.f(points[:, 0], points[:, 1]), dtype=float)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise InputError(
                 f"level_set: f failed on arrays ({error}): expected f(x, y) on arrays of positions, "
                 "with np.where and np.minimum in place of if and min"

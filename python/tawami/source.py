@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -257,7 +258,7 @@ def _of_numbers(source: Any, n: int, width: int, name: str) -> Array:
         if array.shape not in (shape, shape[1:]):
             raise ValueError
         given = np.broadcast_to(array, shape)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         more = f"{n} x {width}" if width > 1 else f"{n} of them"
         raise InputError(
             f"{name} has {_shape(source)}: expected {few}, {more}, a function f(x, y) on arrays, "
@@ -269,9 +270,10 @@ def _of_numbers(source: Any, n: int, width: int, name: str) -> Array:
 def _shape(source: Any) -> str:
     try:
         return f"shape {np.asarray(source, dtype=float).shape}"
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         if isinstance(source, tuple | list):
-            return f"parts of shape {', '.join(str(np.shape(part)) for part in source)}"
+            with suppress(ValueError):
+                return f"parts of shape {', '.join(str(np.shape(part)) for part in source)}"
         return f"the value {inputs.shown(source)}"
 
 
@@ -296,7 +298,7 @@ def _of_function(f: Callable[[Array, Array], Any], x: Array, name: str, componen
         if array.shape not in ((n, width), (width,)):
             raise ValueError
         return np.broadcast_to(array, (n, width))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(
             f"{name}: the function returned {_shape(result)} for {n} positions: expected "
             + ("an array of that length" if width == 1 else f"{width} such arrays ({components})")
