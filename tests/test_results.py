@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -197,6 +198,203 @@ def test_a_later_end_goes_on_from_the_old_one(tmp_path):
     assert motion.scene.particles.x == pytest.approx(np.array(whole.scene.particles.x), abs=1e-12)
 
 
+def test_an_extended_run_that_is_killed_goes_on_from_its_newest_state(tmp_path):
+    run(tmp_path / "run", end=0.02)
+    with pytest.raises(Killed):
+        run(tmp_path / "run", end=0.05, each=Kill(5))  # in the ninth step of all
+    kill = Kill()
+    run(tmp_path / "run", end=0.05, each=kill)
+    assert kill.count == 2
+    assert np.array_equal(
+        tawami.earlier(tmp_path / "run").x, run(tmp_path / "run")[0].scene.particles.x
+    )
+
+
+def test_an_error_before_the_first_step_changes_nothing(stopped):
+    before = {path: path.read_bytes() for path in stopped.rglob("*.npz")}
+    with pytest.raises(tawami.InputError, match="'pressure' is unknown"):
+        run(stopped, outputs=[tawami.ParticleOutput("pressure")])
+    assert {path: path.read_bytes() for path in stopped.rglob("*.npz")} == before
+    kill = Kill()
+    run(stopped, each=kill)
+    assert kill.count == 4
+
+
+def test_other_outputs_begin_where_the_run_goes_on(tmp_path):
+    """Outputs find their own state by their names."""
+    first = [tawami.TableOutput("energies"), tawami.ParticleOutput("velocity")]
+    with pytest.raises(Killed):
+        run(tmp_path / "run", outputs=first, each=Kill(6))
+    then = [tawami.ParticleOutput("velocity"), tawami.TableOutput("energies"),
+            tawami.TableOutput("run-out", name="front")]  # fmt: skip
+    run(tmp_path / "run", outputs=then)
+    folder = tmp_path / "run" / "motion"
+    assert steps_in(folder / "table.csv") == list(range(11))
+    assert steps_in(folder / "front.csv") == list(range(5, 11))
+    assert len(list((folder / "particles").glob("*.vtu"))) == 11
+
+
+def steps_in(path):
+    return [int(line.split(",")[0]) for line in path.read_text().splitlines()[1:]]
+
+
+def test_what_a_driver_raises_leaves_no_hole_in_the_outputs(tmp_path):
+    table = tawami.TableOutput("energies")
+    for number in (3, 10):
+        kill = Kill(number, error=tawami.InputError("no"))
+        with pytest.raises(tawami.InputError):
+            run(tmp_path / str(number), outputs=[table], each=kill)
+        run(tmp_path / str(number), outputs=[tawami.TableOutput("energies")])
+        folder = tmp_path / str(number) / "motion"
+        assert steps_in(folder / "table.csv") == list(range(11))
+
+
+def test_an_output_that_fails_leaves_no_hole(tmp_path):
+    class Failing(Recorder):
+        def look(self, moment):
+            if moment.step == 5:
+                raise tawami.OutputError("full")
+            super().look(moment)
+
+    with pytest.raises(tawami.OutputError):
+        run(tmp_path / "run", outputs=[tawami.TableOutput("energies"), Failing()])
+    run(tmp_path / "run", outputs=[tawami.TableOutput("energies"), Recorder()])
+    assert steps_in(tmp_path / "run" / "motion" / "table.csv") == list(range(11))
+
+
+def test_replacing_removes_nothing_but_what_a_run_wrote(stopped, tmp_path):
+    for name in ("motion-analysis", "ramps"):
+        (stopped / name).mkdir()
+    (stopped / "motion-energy.png").write_text("")
+    run(stopped, existing="replace")
+    assert (stopped / "motion-energy.png").exists()
+    assert (stopped / "motion-analysis").is_dir()
+    other = tmp_path / "mine"
+    other.mkdir()
+    (other / "script.py").write_text("mine")
+    with pytest.raises(tawami.InputError, match="holds 'script.py', which is of no run"):
+        run(other, existing="replace")
+    assert (other / "script.py").read_text() == "mine"
+
+
+def test_a_finished_run_without_checkpoints_is_not_begun_anew(tmp_path):
+    run(tmp_path / "run", outputs=[tawami.TableOutput("energies")])
+    for path in results_of(tmp_path / "run").checkpoints:
+        path.unlink()
+    with pytest.raises(tawami.InputError, match="finished motion, and no checkpoint to go on from"):
+        run(tmp_path / "run")
+    assert steps_in(tmp_path / "run" / "motion" / "table.csv") == list(range(11))
+
+
+def test_gravity_that_changes_on_the_way_is_part_of_the_state(tmp_path):
+    def driven(folder, each):
+        scene = block()
+        motion = tawami.Dynamics(scene, velocity=(1.0, 0.0))
+
+        def turned(solution):
+            if motion.steps == 3:
+                scene.gravity((0.0, 5.0))
+            if each is not None:
+                each(solution)
+
+        motion.run(0.05, 0.005, results=results_of(folder), each=turned)
+        return scene.particles.rows()
+
+    with pytest.raises(Killed):
+        driven(tmp_path / "run", Kill(6))
+    whole = driven(tmp_path / "whole", None)
+    assert driven(tmp_path / "run", None).tobytes() == whole.tobytes()
+
+
+def test_loads_that_come_on_the_way_are_refused_in_a_sentence(tmp_path):
+    def driven(each):
+        scene = block()
+        motion = tawami.Dynamics(scene)
+
+        def loaded(solution):
+            if motion.steps == 3:
+                scene.load([0], (0.0, -1.0))
+            each(solution)
+
+        motion.run(0.05, 0.005, results=results_of(tmp_path / "run"), each=loaded)
+
+    with pytest.raises(Killed):
+        driven(Kill(6))
+    with pytest.raises(tawami.CheckpointError, match="1 loads of a kind .* the script has made 0"):
+        driven(Kill())
+
+
+def test_a_failure_that_the_script_expects_does_not_cost_what_comes_after(tmp_path):
+    """A limit load: the ramp fails, the motion begins from there and is killed."""
+
+    def driven(each):
+        scene = block()
+        scene.fix("bottom", "x")
+        scene.load([0], (0.0, -4e4))
+        results = results_of(tmp_path / "run")
+        with pytest.raises(tawami.ConvergenceError):
+            tawami.ramp(scene, 0.1, smallest=0.03, results=results)
+        motion = tawami.Dynamics(scene)
+        motion.run(0.005, 0.0005, results=results, each=each)
+
+    with pytest.raises(Killed):
+        driven(Kill(8))
+    kill = Kill()
+    driven(kill)
+    assert kill.count == 4
+
+
+def test_a_shorter_step_is_taken_where_the_run_goes_on(stopped):
+    motion = tawami.Dynamics(block(), velocity=(1.0, 0.0))
+    steps = motion.run(0.05, 0.0025, results=results_of(stopped))
+    assert [step.size for step in steps[6:]] == pytest.approx([0.0025] * 8)
+
+
+def test_a_signal_in_the_end_of_a_phase_is_not_lost(tmp_path, monkeypatch):
+    write = checkpoint.write
+
+    def signalled(*arguments):
+        write(*arguments)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(phase_module.checkpoint, "write", signalled)
+    with pytest.raises(KeyboardInterrupt):
+        run(tmp_path / "run", checkpoint_steps=None)
+
+
+def test_iterations_may_be_more_in_a_run_that_goes_on(stopped):
+    scene = block()
+    scene.numerics = replace(scene.numerics, max_iterations=30, factorise="always")
+    kill = Kill()
+    run(stopped, scene=scene, each=kill)
+    assert kill.count == 4
+
+
+def test_a_terminal_that_is_gone_does_not_end_a_run(tmp_path, monkeypatch):
+    class Gone(Terminal):
+        def write(self, text):
+            raise OSError(errno.EIO, "gone")
+
+    monkeypatch.setattr(sys, "stderr", Gone())
+    motion, _ = run(tmp_path / "run")
+    assert motion.time == pytest.approx(0.05)
+
+
+def test_settling_that_takes_too_long_can_be_gone_on_with(tmp_path):
+    def settled(most):
+        return tawami.settle(block_held(), max_resets=most, results=results_of(tmp_path / "run"))
+
+    with pytest.raises(tawami.ConvergenceError):
+        settled(2)
+    assert len(settled(50)) == len(tawami.settle(block_held(), max_resets=50))
+
+
+def block_held():
+    scene = block()
+    scene.fix("bottom", "x")
+    return scene
+
+
 def test_a_damaged_checkpoint_is_refused_and_the_one_before_it_used(stopped):
     newest = results_of(stopped).checkpoints[-1]
     newest.write_bytes(newest.read_bytes()[:-300])  # half written
@@ -343,7 +541,7 @@ def test_checkpoints_by_the_clock(tmp_path, monkeypatch):
     )
     run(tmp_path / "run", checkpoint_steps=None, checkpoint_minutes=0.2)
     assert 2 <= len(written) <= 5
-    assert written[-1] == "01-motion-end.npz"
+    assert written[-1] == "01-motion-00000010.npz"
 
 
 def test_a_full_disk_does_not_end_a_run(tmp_path):
@@ -463,7 +661,7 @@ def test_the_log_has_the_whole_history(tmp_path):
     run(tmp_path / "run")
     lines = (tmp_path / "run" / "log.txt").read_text().splitlines()
     steps = [line for line in lines if ": step " in line]
-    assert len(steps) == 7 + 4  # that which was killed said nothing
+    assert len(steps) == 8 + 4
     assert "motion: step 10 to 0.05 s, size 0.005, " in steps[-1]
     assert "Newton iterations to " in steps[-1]
     assert steps[-1].endswith("16 particles")
@@ -543,6 +741,7 @@ def child(folder, **variables):
 
 def main(folder: str) -> None:
     """Slow enough to be stopped; where the particles are in the end, into a file."""
+    logging.disable(logging.NOTSET)
     results = results_of(folder, checkpoint_steps=5)
     motion = tawami.Dynamics(block(), velocity=(1.0, 0.0))
     motion.run(0.3, 0.002, results=results, each=lambda _: time.sleep(0.01))

@@ -10,6 +10,7 @@ import io
 import json
 import math
 import os
+import re
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -23,8 +24,23 @@ from tawami.files import whole_file
 #: Changes with what a state holds.
 FORMAT = 1
 ABOUT = "about.json"
+#: Numbers that tell a run from another are compared to this share of them.
+ALIKE = 1e-9
 #: In the folder of results.
 FOLDER = "checkpoints"
+
+
+def files(folder: Path) -> list[Path]:
+    """The checkpoints of a folder of results, oldest first: in the order of phases, then of steps."""
+    named = (
+        (re.fullmatch(r"(\d+)-.*-(\d+)\.npz", p.name), p) for p in (folder / FOLDER).glob("*.npz")
+    )
+    return [path for _, _, path in sorted((int(m[1]), int(m[2]), path) for m, path in named if m)]
+
+
+def phase_of(path: Path) -> int:
+    """Number of the phase that a checkpoint belongs to."""
+    return int(path.name.partition("-")[0])
 
 
 def write(path: Path, identity: Mapping[str, Any], state: Mapping[str, Any]) -> None:
@@ -117,7 +133,7 @@ def _unpacked(value: Any, arrays: Mapping[str, Any]) -> Any:
 def _same(one: Any, other: Any) -> bool:
     """Whether two values are alike; numbers to the round-off of a run on several ranks."""
     if isinstance(one, float) and isinstance(other, float):
-        return math.isclose(one, other, rel_tol=1e-9) or (math.isnan(one) and math.isnan(other))
+        return math.isclose(one, other, rel_tol=ALIKE) or (math.isnan(one) and math.isnan(other))
     if isinstance(one, list) and isinstance(other, list):
         return len(one) == len(other) and all(map(_same, one, other))
     if isinstance(one, dict) and isinstance(other, dict):

@@ -248,7 +248,7 @@ class Dynamics(Unique):
 
     def state(self) -> dict[str, Any]:
         """As `Scene.state`, of the motion; what the particles carry is in that of the scene."""
-        kept = self._grid_has
+        kept = self.on_grid
         return {
             "time": self.time,
             "steps": self.steps,
@@ -270,7 +270,7 @@ class Dynamics(Unique):
         self._particles_have = state["particles_have"]
 
     @property
-    def _grid_has(self) -> tuple[Array, Array] | None:
+    def on_grid(self) -> tuple[Array, Array] | None:
         """v and a of a grid that stays, functions x 2; None once velocities were written."""
         if self._kept is None:
             return None
@@ -280,7 +280,7 @@ class Dynamics(Unique):
 
     def _from_particles(self, mass: Array) -> tuple[Array, Array]:
         """v and a of the grid, functions x 2."""
-        kept = self._grid_has
+        kept = self.on_grid
         if kept is not None:
             return kept
         attached = self.scene.attached

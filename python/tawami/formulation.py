@@ -189,11 +189,8 @@ class Form:
 
     @property
     def source(self) -> str:
-        """Text of the residual; its byte code where there is no text."""
-        try:
-            return inspect.getsource(self.residual)
-        except (OSError, TypeError):
-            return repr(getattr(self.residual, "__code__", self.residual))
+        """Text of the residual."""
+        return source_of(self.residual)
 
     def settings(self, given: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, str]]:
         """Parameters and options of this form, defaults filled in.
@@ -261,6 +258,15 @@ def _is_there(path: Path) -> bool:
         return path.exists()
     except OSError:  # a name too long, a folder without permission
         return False
+
+
+def source_of(function: Callable[..., Any]) -> str:
+    """Text of a function; its byte code where there is no text."""
+    try:
+        return inspect.getsource(function)
+    except (OSError, TypeError):
+        code = getattr(function, "__code__", None)
+        return type(function).__name__ if code is None else code.co_code.hex()
 
 
 def shipped() -> list[str]:

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tawami import placement
+from tawami import checkpoint, placement
 
 if TYPE_CHECKING:
     from tawami.dynamics import Dynamics
     from tawami.scene import Scene
+
+#: Arrays of lengths, and of what is one per second.
+LENGTHS = ("x", "displacement", "velocity", "acceleration")
+#: Of values of size one.
+ROUND_OFF = 1e-12
 
 
 def identity(scene: Scene, motion: Dynamics | None, name: str) -> dict[str, Any]:
@@ -28,7 +32,7 @@ def identity(scene: Scene, motion: Dynamics | None, name: str) -> dict[str, Any]
         "parameters": scene.parameters | scene.options,
         "laws": scene.law_texts,
         "density": scene.densities,
-        "numerics": asdict(scene.numerics) | {"assembly": ""},
+        "tolerance": scene.numerics.tolerance,
         "number of particles": scene.num_particles,
         "supports": [
             [str(s.given), s.component, _text(s.value), _text(s.velocity), _text(s.between)]
@@ -44,18 +48,21 @@ def identity(scene: Scene, motion: Dynamics | None, name: str) -> dict[str, Any]
         if motion is None
         else [motion.gamma, _text(motion.damping), str(motion.transfer)],
     }
+    sizes = {"stress": scene.attached.newton.stiffest} | dict.fromkeys(LENGTHS, grid.h)
     for array, values in placement.gathered(grid, scene.particles).items():
-        facts[f"'{array}' of the particles at its start"] = _fingerprint(values)
+        size = sizes.get(array, 1.0)
+        facts[f"'{array}' of the particles at its start"] = _fingerprint(values, size)
     known: dict[str, Any] = json.loads(json.dumps(facts))
     return known
 
 
-def _fingerprint(values: Any) -> float:
-    """A number that others than these values hardly have, of no less than half the sum of their sizes,
-    so that round-off in them changes it by as little.
+def _fingerprint(values: Any, size: float) -> float:
+    """A number that others than these values hardly have. It is compared to `checkpoint.ALIKE` of
+    itself: round-off in them, and in values that are nothing but round-off of `size`, is no more.
     """
     weights = np.random.default_rng(0).uniform(0.5, 1.5, values.shape)
-    return float((weights * values + 2 * np.abs(values)).sum())
+    least = values.size * ROUND_OFF * size / checkpoint.ALIKE
+    return float((weights * values + 2 * np.abs(values)).sum() + least)
 
 
 def _text(value: Any) -> str:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from tawami import _rust, boundary, inputs
 from tawami.attached import Attached
 from tawami.boundary import Interval, Profile
-from tawami.errors import InputError, SupportError
+from tawami.errors import CheckpointError, InputError, SupportError
 from tawami.grid import Edge, Grid
 
 Array = npt.NDArray[np.float64]
@@ -38,6 +38,19 @@ class Forces:
 
     force: Array
     carried: float = 0.0
+
+
+def check_alike(what: str, there: int, here: int) -> None:
+    """Whether a stored state has as many loads or supports as the script has made.
+
+    Raises:
+        CheckpointError: It has not.
+    """
+    if there != here:
+        raise CheckpointError(
+            f"the run had {there} {what}s of a kind when it was stored, and the script has made {here}: "
+            f"they were changed while it ran (each=). Expected {what}s to change between two phases"
+        )
 
 
 class Loads:
@@ -63,13 +76,16 @@ class Loads:
         """What of them the body bears already."""
         return {
             "gravity": self._carried_gravity,
+            "target": self.gravity,
             "tractions": [traction.carried for traction in self.tractions],
             "forces": [forces.carried for forces in self.forces],
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`state`, of the same loads."""
-        self._carried_gravity = state["gravity"]
+        check_alike("load", len(state["tractions"]), len(self.tractions))
+        check_alike("load", len(state["forces"]), len(self.forces))
+        self._carried_gravity, self.gravity = state["gravity"], state["target"]
         for traction, carried in zip(self.tractions, state["tractions"], strict=True):
             traction.carried = carried
         for forces, carried in zip(self.forces, state["forces"], strict=True):

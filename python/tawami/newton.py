@@ -121,7 +121,7 @@ class Newton:
             self._linear = LinearSolver(self._comm, stopwatch, always=always)
         softer = np.minimum(constants["K"], 1e4 * constants["mu"])
         #: Largest moduli of the body [Pa].
-        self._stiffest, self._largest_mu = (
+        self.stiffest, self._largest_mu = (
             self._comm.allreduce(float(modulus.max(initial=0.0)), op=MPI.MAX)
             for modulus in (softer, constants["mu"])
         )
@@ -210,7 +210,7 @@ class Newton:
                 way = max(moved, float(np.abs(inertia.course).max(initial=0.0)))
             way = 10 * min(way, float(np.abs(coefficients[:n]).max())) + self.field.grid.h
             # all ranks take the same way
-            at_rest = self._comm.bcast(scale <= 1e-14 * self._stiffest * way * np.sqrt(n))
+            at_rest = self._comm.bcast(scale <= 1e-14 * self.stiffest * way * np.sqrt(n))
             if at_rest and inertia is None:
                 at_rest = self._moves_rigidly(coefficients[:n], moved)
         momentum = 0.0 if at_rest or scale == 0 else float(np.linalg.norm(free[of_u])) / scale

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from tawami import _rust, inputs
 from tawami.errors import InputError
+from tawami.formulation import source_of
 
 Array = npt.NDArray[np.float64]
 
@@ -42,6 +43,11 @@ class NumpyLaw:
                 "stress"
             )
         self.elastic()
+
+    @property
+    def source(self) -> str:
+        """Text of its function."""
+        return source_of(self.respond)
 
     def elastic(self) -> _rust.Material:
         """The elastic law of K and mu, which stands for this one where only these matter."""

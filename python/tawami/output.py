@@ -123,6 +123,8 @@ class Output:
         state = state or {}
         self._seen, self._written = state.get("seen", -1), state.get("written", -1)
         self._multiple = state.get("multiple", -math.inf)
+        if self._every is not None and state.get("every") not in (None, self._every):
+            self._multiple = self._whole(state["time"])
         self._time = state.get("time", math.nan)
         self._resolve(scene, motion)
         with ranks.together(scene.grid.comm):
@@ -148,16 +150,24 @@ class Output:
         if self._seen < 0:
             return {}
         known = {"seen": self._seen, "written": self._written, "time": self._time}
-        return known | ({"multiple": self._multiple} if math.isfinite(self._multiple) else {})
+        if math.isfinite(self._multiple):
+            known |= {"multiple": self._multiple, "every": self._every}
+        return known
 
     def _due(self, moment: Moment) -> bool:
         if self._every is None:
             return moment.step % self._steps == 0
-        # of times that are sums of steps, 3 * 0.1 = 0.30000000000000004 and its like
-        multiple = math.floor(moment.time / self._every * (1 + 1e-12) + 1e-9)
+        multiple = self._whole(moment.time)
         due = multiple > self._multiple
         self._multiple = max(multiple, self._multiple)
         return due
+
+    def _whole(self, time: float) -> int:
+        """Multiples of `every` up to a time; of times that are sums of steps, 3 * 0.1 =
+        0.30000000000000004 and its like.
+        """
+        assert self._every is not None
+        return math.floor(time / self._every * (1 + 1e-12) + 1e-9)
 
     def _resolve(self, scene: Scene, motion: Dynamics | None) -> None:
         """Find what the names stand for in this scene."""
@@ -233,10 +243,11 @@ class GridOutput(_SeriesOutput):
     """The cells of the grid.
 
     Args:
-        names: 'displacement' (of the last step where strains are finite), 'velocity', 'eps_v' or 'p',
-            'particles' (in each cell), 'reaction' (of supports and walls, shared out to the vertices,
-            with their sum and moment), or, projected from the particles, 'stress', 'mean stress',
-            'deviatoric stress q', or a history variable.
+        names: 'displacement' (of the last step where strains are finite), 'velocity', 'eps_v' or 'p'
+            (since the start, without an initial stress), 'particles' (in each cell), 'reaction' (of
+            supports and walls, shared out to the vertices, with their sum and moment), or, projected
+            from the particles, 'stress', 'mean stress', 'deviatoric stress q', or a history variable;
+            'eps_v' too where strains are finite.
         every, every_steps, format, name, phases: As in `ParticleOutput`.
         projection: 'lumped' or 'consistent': see `tawami.projection`.
     """
@@ -318,8 +329,10 @@ def _line(values: Sequence[object]) -> str:
     return text.getvalue()
 
 
-def _step(row: str) -> int:
-    return int(row.partition(",")[0])
+def _step(row: str) -> float:
+    """Number of the step of a row; infinite where the row is damaged."""
+    number = row.partition(",")[0]
+    return int(number) if number.isdecimal() else math.inf
 
 
 def _append(path: Path, line: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import warnings
 from collections.abc import Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import asdict
 from datetime import UTC, datetime
 from time import monotonic
@@ -62,7 +62,10 @@ class Unwatched:
         """Before the first step; a run that is gone on with gets its pace and its steps."""
 
     def accepted(self, solution: Solution, pace: Pace, steps: list[Step], *, last: bool) -> None:
-        """After an accepted step."""
+        """After an accepted step, before the driver script looks at it."""
+
+    def keep(self) -> None:
+        """After that."""
 
     def halved(self, error: Exception, pace: Pace) -> None:
         """After a step that failed."""
@@ -94,6 +97,9 @@ class Phase(Unwatched):
         self._pace, self._steps = Pace(0.0, 0.0), list[Step]()
         self._identity: dict[str, Any] = {}
         self._stored, self._since, self._began = 0, monotonic(), monotonic()
+        #: Steps that all outputs have seen, whether the last one of the phase is among them, and whether
+        #: a signal was acted on.
+        self._seen, self._last, self._stopped = 0, False, False
 
     def __enter__(self) -> Self:
         with together(self._comm):
@@ -110,8 +116,8 @@ class Phase(Unwatched):
                 assert error is not None
                 self._line.end()
                 log.error("%s ended by %s: %s", self.name, type(error).__name__, error)
-                if len(self._steps) > self._stored:
-                    self._write_or_warn(finished=False)
+                if len(self._steps) == self._seen > self._stored:
+                    self._write_or_warn()
                     error.add_note(
                         f"the state after the last accepted step, at {self._at}, is in "
                         f"'{self.results.folder / checkpoint.FOLDER}'"
@@ -119,6 +125,8 @@ class Phase(Unwatched):
         finally:
             self._line.end()
             self._open.close()
+        if error is None and not self._stopped and self._asked_to_stop():
+            self._stop()
 
     @property
     def _at(self) -> str:
@@ -128,12 +136,17 @@ class Phase(Unwatched):
 
     def begin(self, pace: Pace, steps: list[Step]) -> None:
         """Go on from the newest checkpoint of the phase, or begin it."""
-        self._pace, self._steps = pace, steps
+        self._pace, self._steps, asked = pace, steps, pace.size
+        self._asked = asked
         self._identity = identity(self.scene, self.motion, self.name)
         self.scene.attached.newton.keep()
         folder, state = self.results.folder / self.name, self._found()
         if state is not None:
             self._restore(state)
+            if state["asked"] != asked:
+                pace.size = min(pace.size, asked)
+                log.info("%s: steps of at most %g, no longer %g", self.name, asked, state["asked"])
+        self._stored = self._seen = len(steps)
         if self.finished and not self._pace.at < self.end * (1 - 1e-12):
             log.info("%s had come to its end at %s", self.name, self._at)
             return
@@ -141,12 +154,9 @@ class Phase(Unwatched):
         with together(self._comm):
             if self._writes:
                 result_folder(folder)
-                for path in self.results.checkpoints:
-                    if int(path.name[:2]) > self.number:
-                        path.unlink()
-        told = [None] * len(self._outputs) if state is None else state["outputs"]
-        for output, known in zip(self._outputs, told, strict=True):
-            output.begin(folder, self.scene, self.motion, known)
+        told = {} if state is None else state["outputs"]
+        for output in self._outputs:
+            output.begin(folder, self.scene, self.motion, told.get(output.name))
         verb = "begins" if state is None else "goes on"
         log.info(
             "%s %s at %s, to %g: tawami on %d ranks",
@@ -158,7 +168,6 @@ class Phase(Unwatched):
                 if self._writes:
                     self.results.note(self.name, {"began": _now(), "input": header})
             self._look(None, last=False)
-        self._stored = len(steps)
         self._remaining = progress.Remaining(pace.at, self.end)
         self._since = self._began = monotonic()
 
@@ -167,26 +176,31 @@ class Phase(Unwatched):
         if not self.results.resumes:
             return None
         state: dict[str, Any] | None = None
-        error: CheckpointError | None = None
+        wrong = list[str]()
         if self._writes:
             for path in reversed(self._files()):
                 try:
                     state = checkpoint.read(path, self._identity)
                     break
                 except CheckpointError as problem:
-                    error = error or problem
-                    warnings.warn(
-                        f"{problem}. The one before it is tried", CheckpointWarning, stacklevel=2
-                    )
-        state, error = self._comm.bcast((state, error))
-        if state is None and error is not None:
-            raise CheckpointError(f"{error}. No other checkpoint of '{self.name}' can be used")
+                    wrong.append(str(problem))
+        state, wrong = self._comm.bcast((state, wrong))
+        for sentence in wrong:
+            self._warn(f"{sentence}. The one before it is tried")
+        if state is None and wrong:
+            raise CheckpointError(f"{wrong[0]}. No other checkpoint of '{self.name}' can be used")
         return state
+
+    def _warn(self, sentence: str) -> None:
+        """Once; where warnings are errors, an error on all ranks."""
+        with together(self._comm):
+            if self._writes:
+                warnings.warn(sentence, CheckpointWarning, stacklevel=3)
 
     def _files(self) -> list[Path]:
         """Checkpoints of this phase, oldest first."""
-        start = f"{self.number:02d}-"
-        return [path for path in self.results.checkpoints if path.name.startswith(start)]
+        of = checkpoint.phase_of
+        return [path for path in self.results.checkpoints if of(path) == self.number]
 
     def _restore(self, state: Mapping[str, Any]) -> None:
         self.scene.restore(state["scene"])
@@ -200,8 +214,8 @@ class Phase(Unwatched):
     # -- steps ---------------------------------------------------------------
 
     def accepted(self, solution: Solution, pace: Pace, steps: list[Step], *, last: bool) -> None:
-        """Let the outputs look, write a checkpoint where one is due, end if a signal asks for it."""
-        step = steps[-1]
+        """Say so, and let the outputs look."""
+        step, self._last = steps[-1], last
         momentum, volume = step.history[-1]
         measures = f"{momentum:.1e}" if volume is None else f"{momentum:.1e}, {volume:.1e}"
         count = len(solution.number)
@@ -218,25 +232,35 @@ class Phase(Unwatched):
         )
         self._line.show(" | ".join(part for part in parts if part), now=last)
         self._look(solution, last=last)
-        stop, due = self._comm.allreduce(
-            (self._interruption.signal is not None, self._due()), op=_either
+        self._seen = len(steps)
+
+    def keep(self) -> None:
+        """Write a checkpoint where one is due; end if a signal asks for it."""
+        by_number, by_time = self._due()
+        stop, by_time = self._comm.allreduce(
+            (self._interruption.signal is not None, by_time), op=_either
         )
-        if last:
-            self._write(finished=True)
+        if self._last:
+            self._write()
             self._finish()
         elif stop:
-            self._write(finished=False)
-        elif due:
-            self._write_or_warn(finished=False)
+            self._write()
+        elif by_number or by_time:
+            if by_number:  # the same factorisations then, whoever goes on from here
+                self.scene.attached.newton.keep()
+            self._write_or_warn()
         if stop:
             self._stop()
+
+    def _asked_to_stop(self) -> bool:
+        return bool(self._comm.allreduce(self._interruption.signal is not None, op=_any))
 
     def halved(self, error: Exception, pace: Pace) -> None:
         """Say that a step failed; end if a signal asks for it."""
         log.warning("%s: a step from %s failed, now %g: %s", self.name, self._at, pace.size, error)
-        if self._comm.allreduce(self._interruption.signal is not None, op=_any):
+        if self._asked_to_stop():
             if len(self._steps) > self._stored:
-                self._write(finished=False)
+                self._write()
             self._stop()
 
     def _look(self, solution: Solution | None, *, last: bool) -> None:
@@ -244,16 +268,16 @@ class Phase(Unwatched):
         for output in self._outputs:
             output.look(moment)
 
-    def _due(self) -> bool:
+    def _due(self) -> tuple[bool, bool]:
+        """Whether a checkpoint is due by the number of steps, and, on the first rank, by time."""
         every, minutes = self.results.checkpoint_steps, self.results.checkpoint_minutes
         by_number = every is not None and len(self._steps) % every == 0
-        return by_number or (
-            self._writes and minutes is not None and monotonic() - self._since >= 60 * minutes
-        )
+        passed = monotonic() - self._since
+        return by_number, self._writes and minutes is not None and passed >= 60 * minutes
 
     # -- checkpoints ---------------------------------------------------------
 
-    def _write(self, *, finished: bool) -> None:
+    def _write(self) -> None:
         """Write a checkpoint; a call for all ranks.
 
         Raises:
@@ -264,46 +288,46 @@ class Phase(Unwatched):
             "motion": None if self.motion is None else self.motion.state(),
             "pace": asdict(self._pace),
             "steps": pace.packed(self._steps),
-            "outputs": [output.state() for output in self._outputs],
-            "finished": finished,
+            "asked": self._asked,
+            "outputs": {output.name: output.state() for output in self._outputs},
+            "finished": self._last,
         }
-        name = "end" if finished else f"{len(self._steps):08d}"
-        path = self.results.folder / checkpoint.FOLDER / f"{self.number:02d}-{self.name}-{name}.npz"
+        name = f"{self.number:02d}-{self.name}-{len(self._steps):08d}.npz"
+        path = self.results.folder / checkpoint.FOLDER / name
         with together(self._comm):
             if self._writes:
                 checkpoint.write(path, self._identity, state)
-                for old in self._files()[: -self.results.keep]:
+                later = [
+                    f for f in self.results.checkpoints if checkpoint.phase_of(f) > self.number
+                ]
+                for old in [*self._files()[: -self.results.keep], *later]:
                     old.unlink()
         self._stored, self._since = len(self._steps), monotonic()
         log.info("%s: checkpoint '%s'", self.name, path.name)
 
-    def _write_or_warn(self, *, finished: bool) -> None:
+    def _write_or_warn(self) -> None:
         """As :meth:`_write`; a run need not end because it cannot be kept."""
         try:
-            self._write(finished=finished)
+            self._write()
         except OutputError as error:
             self._since = monotonic()
-            if self._writes:
-                warnings.warn(
-                    f"no checkpoint: {error}. The run goes on; the one before it is still there",
-                    CheckpointWarning,
-                    stacklevel=3,
-                )
+            self._warn(f"no checkpoint: {error}. The run goes on; the one before it is still there")
 
     def _finish(self) -> None:
         log.info("%s came to its end at %s in %d steps", self.name, self._at, len(self._steps))
-        if self._writes:
-            seconds = monotonic() - self._began
-            facts = {
-                "reached": self._pace.at,
-                "steps": len(self._steps),
-                "seconds": seconds,
-                "finished": _now(),
-            }
-            self.results.note(self.name, facts)
+        facts = {
+            "reached": self._pace.at,
+            "steps": len(self._steps),
+            "seconds": monotonic() - self._began,
+            "finished": _now(),
+        }
+        with together(self._comm):
+            if self._writes:
+                self.results.note(self.name, facts)
 
     def _stop(self) -> None:
         """End as the signal asks for, on all ranks."""
+        self._stopped = True
         self._line.end()
         known = self._comm.allgather(self._interruption.signal)
         self._interruption.signal = next(one for one in known if one is not None)
@@ -311,7 +335,8 @@ class Phase(Unwatched):
         log.warning(text)
         if self._writes:
             advice = f"go on with: tawami resume {self.results.folder}"
-            print(f"{text}; {advice}", file=self._line.stream, flush=True)
+            with suppress(OSError, ValueError):  # a terminal that is gone
+                print(f"{text}; {advice}", file=self._line.stream, flush=True)
         self._interruption.end()
 
 

@@ -42,15 +42,20 @@ class Line:
             return
         self._last, self._written = monotonic(), True
         width = shutil.get_terminal_size().columns - 1
-        self.stream.write(f"\r{text[:width]:{width}}")
-        self.stream.flush()
+        self._write(f"\r{text[:width]:{width}}")
 
     def end(self) -> None:
         """Leave it as it is, what follows stands below."""
         if self._written:
-            self.stream.write("\n")
-            self.stream.flush()
+            self._write("\n")
         self._written = False
+
+    def _write(self, text: str) -> None:
+        try:
+            self.stream.write(text)
+            self.stream.flush()
+        except (OSError, ValueError):  # a terminal that is gone
+            self._shown = False
 
 
 class Remaining:

@@ -217,9 +217,12 @@ def _of_grid(scene: Scene) -> dict[str, GridQuantity]:
             "particles [-]", lambda now: now.scene.particles_per_cell.astype(float), cells=True
         ),
     }
-    for name in list(scene.form.fields)[1:]:
-        unit = "-" if scene.form.kinematics == "mixed" else "Pa"
-        found[name] = GridQuantity(f"{name} [{unit}]", _bilinear)
+    if (
+        scene.form.strain == "small"
+    ):  # else the grid has that of a step, and the particles all of it
+        for name in list(scene.form.fields)[1:]:
+            unit = "-" if scene.form.kinematics == "mixed" else "Pa"
+            found[name] = GridQuantity(f"{name} [{unit}]", _bilinear)
     return found
 
 
@@ -252,6 +255,9 @@ def _velocity(now: Moment) -> Array:
     """That of the particles with its gradient, by their mass; NaN where there are none."""
     motion, attached = now.motion, now.scene.attached
     assert motion is not None
+    kept = motion.on_grid
+    if kept is not None:  # a grid that stays has its own
+        return _at_vertices(now.scene, kept[0])
     momentum = to_grid(attached, motion.mass, motion.velocity, motion.velocity_gradient)
     mass = attached.sums(motion.mass, np.ones((len(motion.mass), 1)))
     v = np.divide(momentum, mass, out=np.zeros_like(momentum), where=mass > 0)

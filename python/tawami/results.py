@@ -8,6 +8,7 @@ not solved again, their end is loaded, and the one that was stopped goes on from
 from __future__ import annotations
 
 import json
+import logging
 import os
 import shutil
 from collections.abc import Mapping
@@ -29,6 +30,9 @@ Existing = Literal["stop", "replace", "resume"]
 #: Takes precedence over `existing`: how `tawami resume` starts a script.
 VARIABLE = "TAWAMI_EXISTING"
 RUN = "run.json"
+#: Of the driver script and of the form.
+COPIES = ("script.py", "form.py")
+log = logging.getLogger("tawami")
 
 
 class Results:
@@ -96,7 +100,7 @@ class Results:
     @property
     def checkpoints(self) -> list[Path]:
         """The checkpoints that there are, oldest first."""
-        return sorted((self.folder / checkpoint.FOLDER).glob("[0-9]*.npz"))
+        return checkpoint.files(self.folder)
 
     def phase(
         self, kind: str, scene: Scene, motion: Dynamics | None, end: float, unit: str
@@ -136,9 +140,37 @@ class Results:
                     "write over it"
                 )
             self.resumes = self.existing == "resume" and bool(self.checkpoints)
+            finished = [one["name"] for one in self._known().get("phases", []) if "finished" in one]
+            if self.existing == "resume" and not self.resumes and finished:
+                raise InputError(
+                    f"Results('{self.folder}'): the folder holds a run that finished {finished[-1]}, "
+                    "and no checkpoint to go on from: expected its checkpoints, or existing='replace' "
+                    "to start anew"
+                )
             if not self.resumes:
                 self._clear()
+        else:
+            others = [name for name in COPIES if self._is_other(self.folder / name)]
+            if others:
+                raise InputError(
+                    f"Results('{self.folder}'): the folder holds '{others[0]}', which is of no run: "
+                    "expected a folder of its own for the results"
+                )
         result_folder(self.folder / checkpoint.FOLDER)
+
+    @staticmethod
+    def _is_other(path: Path) -> bool:
+        """Whether a file is there, and not the script that runs."""
+        script, _ = provenance.driver()
+        return path.exists() and not (script is not None and path.resolve() == script)
+
+    def _known(self) -> dict[str, Any]:
+        """What run.json holds; nothing where it cannot be read."""
+        try:
+            known = json.loads((self.folder / RUN).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return known if isinstance(known, dict) else {}
 
     def _reached(self) -> str:
         """How far the run in the folder has come, for a message."""
@@ -148,10 +180,13 @@ class Results:
     def _clear(self) -> None:
         """Remove what a run wrote here, and nothing else."""
         try:
-            for name in (RUN, LOG, "form.py", "script.py"):
-                (self.folder / name).unlink(missing_ok=True)
+            for path in (self.folder / name for name in (RUN, LOG, *COPIES)):
+                if self._is_other(path):
+                    path.unlink()
             for place in self.folder.iterdir():
-                if place.name == checkpoint.FOLDER or place.name.partition("-")[0] in PHASES:
+                kind, _, number = place.name.partition("-")
+                own = kind in PHASES and (number.isdigit() or place.name == kind)
+                if place.is_dir() and (own or place.name == checkpoint.FOLDER):
                     shutil.rmtree(place)
         except OSError as error:
             raise OutputError(
@@ -161,11 +196,10 @@ class Results:
 
     def note(self, phase: str, facts: Mapping[str, Any]) -> None:
         """Add to what run.json knows of a phase; a call for the first rank."""
-        run = self.folder / RUN
-        try:
-            known = json.loads(run.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            known = {}
+        run, known = self.folder / RUN, self._known()
+        if not known:
+            log.warning("'%s' cannot be read, and does not tell of %s", run, phase)
+            return
         phases = {one["name"]: one for one in known.get("phases", [])}
         phases[phase] = phases.get(phase, {"name": phase}) | facts
         known["phases"] = list(phases.values())

@@ -249,7 +249,9 @@ class Scene(contents.Elsewhere, Unique):
     @property
     def law_texts(self) -> list[str]:
         """The laws with their parameters."""
-        return ["NumpyLaw"] if self._law is not None else [repr(law) for law in self._materials]
+        return [repr(law) for law in self._materials] + (
+            [] if self._law is None else [self._law.source]
+        )
 
     @property
     def constants(self) -> dict[str, Array]:

@@ -181,7 +181,7 @@ def earlier(path: str | Path, *, outside: Outside = "stop") -> Earlier:
     file = inputs.path("earlier: path", path)
     name = f"'{file}'"
     if file.is_dir():
-        file = max((file / checkpoint.FOLDER).glob("*.npz"), default=file)
+        file = (checkpoint.files(file) or [file])[-1]
     if file.suffix not in (".vtu", ".npz") or not file.is_file():
         raise InputError(
             f"earlier({name}) is no such file: expected particles of an earlier run, ending in .vtu, a "

@@ -57,9 +57,10 @@ def march(
         pace.good += 1
         if pace.good >= 3 and pace.size < largest:
             pace.size, pace.good = min(2 * pace.size, largest), 0
+        watched.accepted(solution, pace, steps, last=end - pace.at <= 1e-9 * largest)
         if each is not None:
             each(solution)
-        watched.accepted(solution, pace, steps, last=end - pace.at <= 1e-9 * largest)
+        watched.keep()
     return steps
 
 
@@ -146,13 +147,14 @@ def settle(
             pace.at += 1.0
             settled = solution.history[0][0] < tolerance
             watched.accepted(solution, pace, steps, last=settled)
+            watched.keep()
             if settled:
                 return steps
         if watched.finished:
             return steps
-    raise ConvergenceError(
-        f"settle: {steps[-1].history[0][0]:.1e} of the forces are out of balance after {max_resets} "
-        f"resets of the grid: expected less than {tolerance:g}; allow more resets, or a larger "
-        "tolerance",
-        steps[-1].history,
-    )
+        raise ConvergenceError(
+            f"settle: {steps[-1].history[0][0]:.1e} of the forces are out of balance after {max_resets} "
+            f"resets of the grid: expected less than {tolerance:g}; allow more resets, or a larger "
+            "tolerance",
+            steps[-1].history,
+        )

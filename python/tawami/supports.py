@@ -15,6 +15,7 @@ from tawami.basis import Basis
 from tawami.boundary import Component, Interval, Profile
 from tawami.errors import InputError
 from tawami.grid import Edge, Grid
+from tawami.loads import check_alike
 from tawami.reduction import Reduction
 from tawami.wall import Contact, Wall
 
@@ -261,6 +262,8 @@ class Supports:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`state`, of the same supports."""
+        check_alike("support", len(state["supports"]), len(self.all))
+        check_alike("wall", len(state["walls"]), len(self.walls))
         for support, values in zip(self.all, state["supports"], strict=True):
             if not isinstance(support.place, str):
                 x, y = values["place"]
