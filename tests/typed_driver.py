@@ -40,7 +40,7 @@ def materials() -> list[tawami.Material]:
 def statics(comm: MPI.Comm) -> float:
     """A scene, its supports and loads."""
     grid = tawami.Grid(comm, origin=(0, -0.5), h=1 / 16, cells=(32, 16))
-    body = tawami.box(grid, (0, -0.5), np.array([2.0, 0.5]).tolist(), per_axis=3, gauss=True)
+    body = tawami.box(grid, (0, -0.5), [2.0, 0.5], per_axis=3, gauss=True)
     tawami.polygon(grid, [(0, 0), (1, 0), (0, 0.4)])
     mine = tawami.Body(np.zeros((1, 2)), np.ones(1))
     scene = tawami.Scene(

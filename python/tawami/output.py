@@ -149,7 +149,7 @@ class Output:
         """What a checkpoint keeps: plain numbers."""
         if self._seen < 0:
             return {}
-        known = {"seen": self._seen, "written": self._written, "time": self._time}
+        known: dict[str, Any] = {"seen": self._seen, "written": self._written, "time": self._time}
         if math.isfinite(self._multiple):
             known |= {"multiple": self._multiple, "every": self._every}
         return known

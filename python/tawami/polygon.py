@@ -62,7 +62,8 @@ def _geometry(grid: Grid, shape: Any, holes: Sequence[npt.ArrayLike]) -> Any:
     """In cells from the origin; round-off must not leave slivers beyond a line."""
     import shapely
 
-    if not isinstance(holes, list | tuple | np.ndarray) or np.ndim(holes) == 0:
+    listed = isinstance(holes, list | tuple) or (isinstance(holes, np.ndarray) and holes.ndim > 0)
+    if not listed:
         raise InputError(
             f"polygon: holes = {shown(holes)}: expected a list with the corners of each hole"
         )
