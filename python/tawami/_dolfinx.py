@@ -13,6 +13,7 @@ import hashlib
 import logging
 import platform
 import sys
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -32,6 +33,8 @@ if "petsc4py" not in sys.modules:
 
         petsc4py.init(["tawami", "-no_signal_handler"])
 
+_shows = warnings.showwarning
+
 try:
     import basix
     import dolfinx
@@ -45,6 +48,10 @@ except ImportError as error:  # pragma: no cover - exercised in a subprocess by 
         "Ubuntu: apt install python3-dolfinx-real python3-petsc4py-real python3-mpi4py, and run "
         "Python from a virtual environment made by /usr/bin/python3 -m venv --system-site-packages"
     ) from error
+
+if warnings.showwarning is not _shows:
+    # FFCx from 0.9 on sends all warnings of the process, ours too, to a log that nobody reads
+    logging.captureWarnings(False)
 
 if np.dtype(PETSc.ScalarType) != np.float64:
     raise MissingDependencyError(

@@ -211,7 +211,7 @@ def _of_cell(x: Array, weight: Array, kept: Any) -> tuple[Array, Array]:
 
 
 def _fitted(functions: Array, moments: Array, weight: Array) -> tuple[Array, float]:
-    """Non-negative weights with these moments, and how far they are off; `weight` where there are none."""
+    """Non-negative weights with these moments, and how far they are off; `weight` if there are none."""
     from scipy.optimize import nnls  # here: a scene without cut cells does without it
 
     found, rest = weight, np.inf
@@ -233,7 +233,8 @@ def _active_set(functions: Array, moments: Array) -> Array:
     for _ in range(3 * n):
         rest = moments - functions @ found
         gain = np.where(free, -np.inf, functions.T @ rest)
-        if np.linalg.norm(rest) <= 1e-15 * np.linalg.norm(moments) or gain.max() <= 0:
+        enough = np.linalg.norm(rest) <= 0.01 * MOMENT_ERROR * np.linalg.norm(moments)
+        if enough or gain.max() <= 0 or free.sum() == len(moments):
             break
         free[gain.argmax()] = True
         while free.any():
