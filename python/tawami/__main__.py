@@ -2,6 +2,6 @@
 
 import sys
 
-from tawami.command_line import main
+from tawami.command_line import run
 
-sys.exit(main())
+sys.exit(run())

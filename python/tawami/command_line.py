@@ -46,6 +46,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
 
 
+def run() -> int:
+    """As :func:`main`, for the command itself: what Ctrl-C ended ends at once. Open MPI's own processes got
+    it too, and the end of MPI would wait for them.
+    """
+    code = main()
+    if code == launch.INTERRUPTED:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    return code
+
+
 def _parsed(given: list[str]) -> argparse.Namespace:
     """Arguments of tawami, and after -- those of the script."""
     own, rest = given, list[str]()
