@@ -47,8 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def run() -> int:
-    """As :func:`main`, for the command itself: what Ctrl-C ended ends at once. Open MPI's own processes got
-    it too, and the end of MPI would wait for them.
+    """As :func:`main`, for the command itself: what Ctrl-C ended ends at once. Open MPI's own processes
+    got it too, and the end of MPI would wait for them.
     """
     code = main()
     if code == launch.INTERRUPTED:
