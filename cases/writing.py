@@ -4,7 +4,7 @@ python -m cases.writing [--cells 128] [--repeat 5]
 
 A dynamic scene of cells^2 x 4 particles with stresses at random, nothing solved: displacement, stress,
 mean stress, eps_v and velocity of the particles; displacement, mean stress (projected) and particles of
-the grid; a row of a table. `zlib` is what meshio does unless it is told not to.
+the grid; a row of a table; a checkpoint. `zlib` is what meshio does unless it is told not to.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from mpi4py import MPI
 
 import tawami
 from cases.table import as_text
+from tawami import checkpoint
 from tawami.moment import Moment
 from tawami.output import Output
 from tawami.series import Format
@@ -90,7 +91,14 @@ def rows_of(cells: int, repeat: int, folder: Path) -> list[Row]:
         rows.append(measure(f"grid, {kind}", motion, output_of_grid, folder / kind, repeat)[0])
     table = tawami.TableOutput("momentum", "run-out", "step size")
     rows.append(measure("table, a row", motion, table, folder, repeat)[0])
+    kept = folder / "checkpoint.npz"
+    seconds = min(_timed(lambda: _keep(motion, kept)) for _ in range(repeat))
+    rows.append(_row("checkpoint", scene, seconds, kept))
     return rows
+
+
+def _keep(motion: tawami.Dynamics, path: Path) -> None:
+    checkpoint.write(path, {}, {"scene": motion.scene.state(), "motion": motion.state()})
 
 
 def _timed(action: Callable[[], object]) -> float:
