@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import resource
+import signal
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -16,6 +17,8 @@ from mpi4py import MPI
 
 import tawami
 
+# a shell that starts this in the background has Ctrl-C ignored, here and in the processes of the tests
+signal.signal(signal.SIGINT, signal.default_int_handler)
 logging.disable(logging.INFO)  # the compilation of forms is talkative
 # the first example of a test may compile a form
 settings.register_profile("tawami", deadline=None)
