@@ -208,7 +208,13 @@ class Symbols:
         """The residual as the form file states it, with some names standing for something else."""
         form = self.form
         names = {**self.names, **other}
-        wanted = inspect.signature(form.residual).parameters
+        try:
+            wanted = inspect.signature(form.residual).parameters
+        except (TypeError, ValueError) as error:
+            raise FormError(
+                f"form {form.name}: the arguments of its residual cannot be read ({error}): expected a "
+                "function written in Python"
+            ) from None
         unknown = [name for name in wanted if name not in names]
         if unknown:
             raise FormError(
