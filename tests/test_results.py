@@ -220,6 +220,19 @@ def test_an_error_before_the_first_step_changes_nothing(stopped):
     assert kill.count == 4
 
 
+def test_a_mistake_in_the_outputs_can_be_mended_and_the_script_run_again(tmp_path):
+    with pytest.raises(tawami.InputError, match="'velocty' is unknown"):
+        run(tmp_path / "run", outputs=[tawami.ParticleOutput("velocty")], existing="stop")
+    kill = Kill()
+    run(
+        tmp_path / "run",
+        outputs=[tawami.ParticleOutput("velocity")],
+        existing="stop",
+        each=kill,
+    )
+    assert kill.count == 10
+
+
 def test_other_outputs_begin_where_the_run_goes_on(tmp_path):
     """Outputs find their own state by their names."""
     first = [tawami.TableOutput("energies"), tawami.ParticleOutput("velocity")]

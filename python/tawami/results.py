@@ -131,8 +131,11 @@ class Results:
 
     def _open(self) -> None:
         result_folder(self.folder)
-        run = self.folder / RUN
-        if run.exists() or self.checkpoints:
+        run, known = self.folder / RUN, self._known()
+        nothing = known and not known.get(
+            "phases"
+        )  # an attempt that was refused before its first step
+        if self.checkpoints or (run.exists() and not nothing):
             if self.existing == "stop":
                 raise InputError(
                     f"Results('{self.folder}'): the folder holds a run{self._reached()}. Expected "
@@ -140,7 +143,7 @@ class Results:
                     "write over it"
                 )
             self.resumes = self.existing == "resume" and bool(self.checkpoints)
-            finished = [one["name"] for one in self._known().get("phases", []) if "finished" in one]
+            finished = [one["name"] for one in known.get("phases", []) if "finished" in one]
             if self.existing == "resume" and not self.resumes and finished:
                 raise InputError(
                     f"Results('{self.folder}'): the folder holds a run that finished {finished[-1]}, "
@@ -149,7 +152,7 @@ class Results:
                 )
             if not self.resumes:
                 self._clear()
-        else:
+        elif not run.exists():
             others = [name for name in COPIES if self._is_other(self.folder / name)]
             if others:
                 raise InputError(
