@@ -81,8 +81,10 @@ def test_extremes(subject):
 
 def test_objects_of_petsc_are_counted():
     before = endurance.objects()
+    hidden = before == endurance.HIDDEN
+    assert not hidden or PETSc.Sys.getVersion() >= (3, 23)
     vectors = [PETSc.Vec().createMPI((3, PETSc.DETERMINE)) for _ in range(3)]
-    assert endurance.objects() == before + 3
+    assert endurance.objects() == (before if hidden else before + 3)
     for vector in vectors:
         vector.destroy()
     assert endurance.objects() == before
