@@ -14,7 +14,7 @@ from tawami.body import Body
 from tawami.cut_cells import ROUND_OFF, Numbers
 from tawami.errors import InputError
 from tawami.grid import EDGES, Edge, Grid
-from tawami.inputs import names, number, shown, whole_number
+from tawami.inputs import names, number, room, shown, whole_number
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -25,6 +25,8 @@ MANY = 20_000
 #: Corners of a square, and its two triangles by one diagonal or the other, counter-clockwise.
 LATTICE = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 HALVES = np.array([[[0, 1, 3], [0, 3, 2]], [[0, 1, 2], [1, 3, 2]]])
+#: Memory that a sample takes while f is taken [bytes].
+SAMPLE = 64.0
 
 
 @dataclass(frozen=True)
@@ -131,6 +133,8 @@ def level_set(
     ended = names("ends", ends, EDGES)
     samples, sign = whole_number("samples", samples, low=2), Function(grid, f)
     nx, ny = (n * samples for n in grid.cells)
+    what = f"level_set: samples = {shown(samples)} in {grid.cells[0]} x {grid.cells[1]} cells"
+    room(what, (nx + 1) * (ny + 1), SAMPLE, "expected fewer samples")
     x, y = np.meshgrid(np.arange(nx + 1) / samples, np.arange(ny + 1) / samples)
     signs = sign(np.stack([x, y], axis=-1))
     if not (signs < 0).any():
