@@ -172,4 +172,4 @@ def test_what_writing_costs(capsys):
     assert lines[0] == "256 particles"
     (raw,) = (line for line in lines if "particles, xdmf" in line)
     assert float(raw.split()[-1]) == 3 * 24 + 32 + 2 * 8 + 4
-    assert len(lines) == 8
+    assert len(lines) == 9

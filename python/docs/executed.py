@@ -33,6 +33,8 @@ BLOCK = re.compile(r"^```\{run\} *(\w*)\n(.*?)^```\n", flags=re.DOTALL | re.MULT
 #: What every run reads.
 SHARED = ("python/tawami/**/*.py", "forms/*.py", "rust/**/*.rs", "Cargo.lock")
 MINUTES = 60
+#: Cases that only print.
+WITHOUT_FILES = ("self_weight", "projection", "writing")
 #: Options of cases that run for more than three minutes without.
 SHORTER = {"elastica": ("--steps", "40"), "footing": ("--cells", "8")}
 
@@ -101,7 +103,7 @@ def case(name: str) -> Output:
     """A case as `python -m cases.NAME` runs it."""
     folder = RESULTS / "cases" / name
     own = (f"cases/{name}.py", f"cases/{name}/*.py", "cases/*.py")
-    options = [] if name == "self_weight" else ["--results", str(folder)]
+    options = [] if name in WITHOUT_FILES else ["--results", str(folder)]
     words = [sys.executable, "-m", f"cases.{name}", *SHORTER.get(name, ()), *options]
     mark = fingerprint((*SHARED, *own), *SHORTER.get(name, ()))
     output = kept(folder, mark, lambda: command(words, ROOT, f"python -m cases.{name}"))
