@@ -94,16 +94,17 @@ def header(scene: Scene, motion: Dynamics | None = None) -> str:
         "solver": _solver(scene),
         "not modelled": "; ".join(_not_modelled(scene, motion)),
     }
-    return "\n".join(
-        textwrap.fill(
-            f"{label:{LABEL}} {text}",
-            WIDTH,
-            subsequent_indent=" " * (LABEL + 1),
-            break_long_words=False,
-            break_on_hyphens=False,
-        )
-        for label, text in lines.items()
-        if text
+    return "\n".join(labelled(label, text) for label, text in lines.items() if text)
+
+
+def labelled(label: str, text: str) -> str:
+    """A text beside its label, in as many lines as it takes."""
+    return textwrap.fill(
+        f"{label:{LABEL}} {text}",
+        WIDTH,
+        subsequent_indent=" " * (LABEL + 1),
+        break_long_words=False,
+        break_on_hyphens=False,
     )
 
 

@@ -96,15 +96,25 @@ def in_full_cells(cell: Numbers, per_axis: int, gauss: bool) -> Points:
     )
 
 
+def areas(triangles: Array) -> Array:
+    """Of triangles (n x 3 x 2), positive where their corners are counter-clockwise."""
+    a, b = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    return np.asarray(0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]))
+
+
+def on_lines(scaled: Array) -> Array:
+    """Positions in cells, those within ON_LINE of a line of the grid put on it."""
+    near = np.isclose(scaled, np.rint(scaled), rtol=0, atol=ON_LINE)
+    return np.where(near, np.rint(scaled), scaled)
+
+
 def in_triangles(corners: Array, cell: Numbers) -> Points:
     """The Gauss points of triangles (n x 3 x 2), either way round, each in one cell."""
-    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = 0.5 * np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
     points, weights = _dolfinx.triangle_rule(DEGREE)
     barycentric = np.column_stack([1 - points.sum(axis=1), points])
     return Points(
         (barycentric @ corners).reshape(-1, 2),
-        np.outer(area, 2 * weights).ravel(),
+        np.outer(np.abs(areas(corners)), 2 * weights).ravel(),
         np.repeat(cell, len(weights), axis=0),
     )
 

@@ -13,7 +13,6 @@ from tawami.cut_cells import ON_LINE, ROUND_OFF, Numbers, Points
 from tawami.errors import InputError
 from tawami.grid import Grid
 from tawami.inputs import LEAST, number, point
-from tawami.polygon import extent
 
 Array = npt.NDArray[np.float64]
 #: Chords around a circle, at least; and Gauss points along an arc and between arc and chord, with
@@ -62,7 +61,7 @@ def disc(
     if (middle - r < -ON_LINE).any() or (middle + r > np.add(grid.cells, ON_LINE)).any():
         raise InputError(
             f"disc: the circle around ({x:g}, {y:g}) m with a radius of {radius:g} m leaves the grid, "
-            f"{extent(grid)}; enlarge the grid or move the disc"
+            f"{grid.extent}; enlarge the grid or move the disc"
         )
     # a hole that is round-off is none
     hole = inner / grid.h if inner > ROUND_OFF * radius else 0.0

@@ -9,11 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami import cut_cells
-from tawami.cut_cells import ROUND_OFF, Numbers, Points
+from tawami.cut_cells import ROUND_OFF, Numbers, Points, areas, on_lines
 from tawami.errors import InputError
 from tawami.grid import Grid
-from tawami.level_set import areas
-from tawami.polygon import extent, on_lines
 
 Array = npt.NDArray[np.float64]
 #: A cell covered but for this share is full; one covered by this share more has an overlap.
@@ -79,7 +77,7 @@ def _check_nodes(grid: Grid, x: Array, scaled: Array, block: Numbers, first: int
         px, py = x[block[element, corner]]
         raise InputError(
             f"mesh: element {first + element} has a node at ({px:g}, {py:g}) m, outside the grid, "
-            f"{extent(grid)}; enlarge the grid or move the mesh (lengths are metres)"
+            f"{grid.extent}; enlarge the grid or move the mesh (lengths are metres)"
         )
 
 

@@ -100,9 +100,7 @@ def rigid_motion(form: Form, given: Settings) -> float:
     stretch of the same size.
     """
     scene = cloud(form, given)
-    grid = scene.grid
-    x, y = (grid.h * np.array([0.0, *(np.arange(n) + 0.5), n]) for n in grid.cells)
-    points = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
+    points = scene.attached.layout.greville - np.array(scene.grid.origin)
     c, s = np.cos(1.0), np.sin(1.0)
     turn = np.array([[c - 1, -s], [s, c - 1]])
     if form.strain == "small":

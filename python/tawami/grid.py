@@ -72,6 +72,12 @@ class Grid(Unique):
         return (x + self.h * nx, y + self.h * ny)
 
     @property
+    def extent(self) -> str:
+        """Its range in words [m]."""
+        (x, y), (x1, y1) = self.origin, self.upper
+        return f"[{x:g}, {x1:g}] x [{y:g}, {y1:g}]"
+
+    @property
     def rectangle(self) -> _dolfinx.Rectangle:
         """The dolfinx mesh, made when it is first needed."""
         if self._rectangle is None:

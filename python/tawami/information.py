@@ -11,7 +11,6 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 from time import perf_counter
@@ -19,10 +18,10 @@ from time import perf_counter
 from mpi4py import MPI
 
 from tawami import _dolfinx, environment, form_scenes
+from tawami.contents import labelled
 from tawami.errors import TawamiError
 from tawami.formulation import Form
 
-WIDTH, LABEL = 100, 13
 MEMORY = Path("/proc/meminfo")
 #: Packages that only some things need: name, what for.
 OPTIONAL = (("matplotlib", "figures, tawami plot"), ("tqdm", "progress of the cases"))
@@ -47,20 +46,10 @@ def lines() -> Iterator[tuple[str, str]]:
 def show() -> int:
     """Print all of them and the self test; the exit code."""
     for label, text in lines():
-        print(_line(label, text))
+        print(labelled(label, text))
     good, text = self_test()
-    print(_line("self test", text))
+    print(labelled("self test", text))
     return 0 if good else 1
-
-
-def _line(label: str, text: str) -> str:
-    return textwrap.fill(
-        f"{label:{LABEL}} {text}",
-        WIDTH,
-        subsequent_indent=" " * (LABEL + 1),
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
 
 
 def _threads() -> str:

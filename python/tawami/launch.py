@@ -24,9 +24,9 @@ from mpi4py import MPI
 
 from tawami import ranks
 from tawami.errors import InputError
+from tawami.provenance import RUN, SCRIPT
+from tawami.results import EXISTING
 
-#: What results read: what to do where their folder holds a run, and how much is told.
-EXISTING, LOG_LEVEL = "TAWAMI_EXISTING", "TAWAMI_LOG_LEVEL"
 #: Exit code of what Ctrl-C ended, as of a shell.
 INTERRUPTED = 130
 
@@ -207,7 +207,7 @@ class Run:
         Raises:
             InputError: There is none, or it does not say what is needed.
         """
-        file = folder / "run.json"
+        file = folder / RUN
         advice = "run the script itself, with tawami run SCRIPT --resume"
         try:
             told = json.loads(file.read_text(encoding="utf-8"))
@@ -244,7 +244,7 @@ class Run:
                 f"the run in '{self.folder}' stood in '{self.directory}', which is gone: expected that "
                 "folder; make it, or run the script itself elsewhere"
             )
-        path, copy = self.script.path, (self.folder / "script.py").resolve()
+        path, copy = self.script.path, (self.folder / SCRIPT).resolve()
         if path is not None and not path.is_file():
             instead = "expected it there"
             if copy.is_file():

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from tawami import cut_cells
 from tawami.body import Body
-from tawami.cut_cells import ROUND_OFF, Numbers
+from tawami.cut_cells import ROUND_OFF, Numbers, areas
 from tawami.errors import InputError
 from tawami.grid import EDGES, Edge, Grid
 from tawami.inputs import names, number, room, shown, whole_number
@@ -193,12 +193,6 @@ def _filled(
     full = np.flatnonzero(whole)
     cell = np.column_stack([full % nx, full // nx])
     return Body(*cut_cells.to_body(grid, cell, points, per_axis, gauss))
-
-
-def areas(triangles: Array) -> Array:
-    """Of triangles (n x 3 x 2), positive where their corners are counter-clockwise."""
-    a, b = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    return np.asarray(0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]))
 
 
 def _refined(sign: Function, squares: Squares, inside: float, tolerance: float) -> Array:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from tawami import inputs
-from tawami.errors import InputError
 
 Assembly = Literal["fast", "reference"]
 TangentRule = Literal["full", "reduced"]
@@ -54,6 +53,4 @@ class Numerics:
             "linear_solver": SolverName,
         }
         for name, possible in choices.items():
-            if not inputs.one_of(getattr(self, name), get_args(possible)):
-                listed = " or ".join(map(repr, get_args(possible)))
-                raise InputError(f"{name} = {inputs.shown(getattr(self, name))}: expected {listed}")
+            inputs.choice(name, getattr(self, name), get_args(possible))

@@ -7,9 +7,10 @@ import warnings
 from collections.abc import Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import asdict
-from datetime import UTC, datetime
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
 
 from tawami import checkpoint, pace, progress
 from tawami.errors import (
@@ -24,7 +25,8 @@ from tawami.identity import identity
 from tawami.interruption import Interruption
 from tawami.moment import Moment
 from tawami.pace import Pace, Step
-from tawami.ranks import together
+from tawami.provenance import now
+from tawami.ranks import any_of, together
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -136,16 +138,16 @@ class Phase(Unwatched):
 
     def begin(self, pace: Pace, steps: list[Step]) -> None:
         """Go on from the newest checkpoint of the phase, or begin it."""
-        self._pace, self._steps, asked = pace, steps, pace.size
-        self._asked = asked
+        self._pace, self._steps, self._asked = pace, steps, pace.size
         self._identity = identity(self.scene, self.motion, self.name)
         self.scene.attached.newton.keep()
         folder, state = self.results.folder / self.name, self._found()
         if state is not None:
             self._restore(state)
-            if state["asked"] != asked:
+            before, asked = state["asked"], self._asked
+            if before != asked:
                 pace.size = min(pace.size, asked)
-                log.info("%s: steps of at most %g, no longer %g", self.name, asked, state["asked"])
+                log.info("%s: steps of at most %g, no longer %g", self.name, asked, before)
         self._stored = self._seen = len(steps)
         if self.finished and not self._pace.at < self.end * (1 - 1e-12):
             log.info("%s had come to its end at %s", self.name, self._at)
@@ -166,7 +168,7 @@ class Phase(Unwatched):
             header = (self.motion or self.scene).header().splitlines()
             with together(self._comm):
                 if self._writes:
-                    self.results.note(self.name, {"began": _now(), "input": header})
+                    self.results.note(self.name, {"began": now(), "input": header})
             self._look(None, last=False)
         self._remaining = progress.Remaining(pace.at, self.end)
         self._since = self._began = monotonic()
@@ -178,7 +180,7 @@ class Phase(Unwatched):
         state: dict[str, Any] | None = None
         wrong = list[str]()
         if self._writes:
-            for path in reversed(self._files()):
+            for path in reversed(self._files()[0]):
                 try:
                     state = checkpoint.read(path, self._identity)
                     break
@@ -197,10 +199,11 @@ class Phase(Unwatched):
             if self._writes:
                 warnings.warn(sentence, CheckpointWarning, stacklevel=3)
 
-    def _files(self) -> list[Path]:
-        """Checkpoints of this phase, oldest first."""
-        of = checkpoint.phase_of
-        return [path for path in self.results.checkpoints if of(path) == self.number]
+    def _files(self) -> tuple[list[Path], list[Path]]:
+        """Checkpoints of this phase and of later ones, oldest first."""
+        of, there = checkpoint.phase_of, self.results.checkpoints
+        own = [path for path in there if of(path) == self.number]
+        return own, [path for path in there if of(path) > self.number]
 
     def _restore(self, state: Mapping[str, Any]) -> None:
         self.scene.restore(state["scene"])
@@ -237,9 +240,8 @@ class Phase(Unwatched):
     def keep(self) -> None:
         """Write a checkpoint where one is due; end if a signal asks for it."""
         by_number, by_time = self._due()
-        stop, by_time = self._comm.allreduce(
-            (self._interruption.signal is not None, by_time), op=_either
-        )
+        asked = np.array([self._interruption.signal is not None, by_time])
+        stop, by_time = any_of(self._comm, asked)
         if self._last:
             self._write()
             self._finish()
@@ -253,7 +255,7 @@ class Phase(Unwatched):
             self._stop()
 
     def _asked_to_stop(self) -> bool:
-        return bool(self._comm.allreduce(self._interruption.signal is not None, op=_any))
+        return bool(any_of(self._comm, np.array([self._interruption.signal is not None]))[0])
 
     def halved(self, error: Exception, pace: Pace) -> None:
         """Say that a step failed; end if a signal asks for it."""
@@ -297,10 +299,8 @@ class Phase(Unwatched):
         with together(self._comm):
             if self._writes:
                 checkpoint.write(path, self._identity, state)
-                later = [
-                    f for f in self.results.checkpoints if checkpoint.phase_of(f) > self.number
-                ]
-                for old in [*self._files()[: -self.results.keep], *later]:
+                own, later = self._files()
+                for old in [*own[: -self.results.keep], *later]:
                     old.unlink()
         self._stored, self._since = len(self._steps), monotonic()
         log.info("%s: checkpoint '%s'", self.name, path.name)
@@ -319,7 +319,7 @@ class Phase(Unwatched):
             "reached": self._pace.at,
             "steps": len(self._steps),
             "seconds": monotonic() - self._began,
-            "finished": _now(),
+            "finished": now(),
         }
         with together(self._comm):
             if self._writes:
@@ -338,15 +338,3 @@ class Phase(Unwatched):
             with suppress(OSError, ValueError):  # a terminal that is gone
                 print(f"{text}; {advice}", file=self._line.stream, flush=True)
         self._interruption.end()
-
-
-def _either(a: tuple[bool, bool], b: tuple[bool, bool]) -> tuple[bool, bool]:
-    return a[0] or b[0], a[1] or b[1]
-
-
-def _any(a: bool, b: bool) -> bool:
-    return a or b
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="seconds")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -60,13 +61,20 @@ def columns(particles: _rust.Particles) -> list[tuple[str, int]]:
     return [(name, max(1, size // double)) for name, size in particles.arrays]
 
 
+def in_order(comm: Any, number: npt.NDArray[Any]) -> Callable[[npt.ArrayLike], Any]:
+    """What makes of an array of each rank's particles that of all of them, in the order of their
+    numbers; on every rank, as a call for all.
+    """
+    order = np.argsort(ranks.joined(comm, np.asarray(number)), kind="stable")
+    return lambda values: ranks.joined(comm, np.asarray(values))[order]
+
+
 def gathered(grid: Grid, particles: _rust.Particles) -> dict[str, Array]:
     """The arrays of all ranks' particles by name, in the order of their numbers; on every rank."""
-    rows = ranks.joined(grid.comm, particles.rows())
+    rows = in_order(grid.comm, particles.number)(particles.rows())
     names, widths = zip(*columns(particles), strict=True)
-    parts = dict(zip(names, np.split(rows, np.cumsum(widths)[:-1], axis=1), strict=True))
-    order = np.argsort(parts["number"][:, 0], kind="stable")
-    return {name: np.ascontiguousarray(part[order]) for name, part in parts.items()}
+    parts = np.split(rows, np.cumsum(widths)[:-1], axis=1)
+    return dict(zip(names, map(np.ascontiguousarray, parts), strict=True))
 
 
 def scattered(

@@ -18,6 +18,7 @@ from tawami import inputs
 from tawami.errors import InputError, MissingDependencyError, OutputError
 from tawami.figure import new_figure, save
 from tawami.files import result_folder, whole_file
+from tawami.provenance import RUN
 from tawami.series import Frame, components, frames
 
 if TYPE_CHECKING:
@@ -96,16 +97,16 @@ class _Grid:
 
 def _grid(home: Path) -> _Grid:
     try:
-        known = json.loads((home / "run.json").read_text())["grid"]
+        known = json.loads((home / RUN).read_text())["grid"]
         lower = np.array(known["origin"], dtype=float)
         return _Grid(lower, lower + known["h"] * np.array(known["cells"]))
     except FileNotFoundError:
         raise InputError(
-            f"'{home}' holds no run.json: expected the folder of a run, as "
+            f"'{home}' holds no {RUN}: expected the folder of a run, as "
             "tawami.Results('results/pile', ...) makes it"
         ) from None
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise OutputError(f"'{home / 'run.json'}' cannot be read: {error!r}") from error
+        raise OutputError(f"'{home / RUN}' cannot be read: {error!r}") from error
 
 
 def _phases(home: Path) -> list[Path]:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from tawami import cut_cells
 from tawami.body import Body
-from tawami.cut_cells import ON_LINE, ROUND_OFF
+from tawami.cut_cells import ROUND_OFF, on_lines
 from tawami.deprecation import renamed_parameter
 from tawami.errors import InputError
 from tawami.grid import Grid
@@ -95,7 +95,7 @@ def _in_cells(grid: Grid, corners: Array, of: str = "") -> Array:
         x, y = corners[outside[0]]
         raise InputError(
             f"polygon: vertex {outside[0]}{of} at ({x:g}, {y:g}) m lies outside the grid, "
-            f"{extent(grid)}; enlarge the grid or move the vertex"
+            f"{grid.extent}; enlarge the grid or move the vertex"
         )
     return scaled
 
@@ -115,14 +115,3 @@ def _valid(grid: Grid, shape: Any) -> Any:
             "its vertices in order around it, and holes inside of it"
         )
     return shape
-
-
-def on_lines(scaled: Array) -> Array:
-    """Positions in cells, those within ON_LINE of a line of the grid put on it."""
-    near = np.isclose(scaled, np.rint(scaled), rtol=0, atol=ON_LINE)
-    return np.where(near, np.rint(scaled), scaled)
-
-
-def extent(grid: Grid) -> str:
-    """The grid's range in words [m]."""
-    return f"[{grid.origin[0]:g}, {grid.upper[0]:g}] x [{grid.origin[1]:g}, {grid.upper[1]:g}]"

@@ -17,7 +17,7 @@ from tawami.errors import InputError
 
 log = logging.getLogger("tawami")
 #: Level from which the log is shown on standard error too, as in TAWAMI_LOG_LEVEL=INFO.
-VARIABLE = "TAWAMI_LOG_LEVEL"
+LOG_LEVEL = "TAWAMI_LOG_LEVEL"
 FORM = logging.Formatter("%(asctime)s %(levelname)s %(message)s")
 #: Seconds between two states of the live line.
 OFTEN = 0.1
@@ -92,10 +92,10 @@ def level() -> int:
     Raises:
         InputError: The variable names no level.
     """
-    name = os.environ.get(VARIABLE, "WARNING").upper()
+    name = os.environ.get(LOG_LEVEL, "WARNING").upper()
     levels = ("DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL")
     if name not in levels:
-        raise InputError(f"{VARIABLE} = '{name}': expected one of {', '.join(levels)}")
+        raise InputError(f"{LOG_LEVEL} = '{name}': expected one of {', '.join(levels)}")
     return logging.getLevelNamesMapping()[name]
 
 
@@ -111,7 +111,7 @@ def logged(path: Path | None) -> Iterator[None]:
         return
     shown = level()
     handlers: list[logging.Handler] = [logging.FileHandler(path, encoding="utf-8")]
-    if VARIABLE in os.environ:
+    if LOG_LEVEL in os.environ:
         handlers.append(logging.StreamHandler())
         handlers[-1].setLevel(shown)
     before, show = (log.level, log.propagate), warnings.showwarning

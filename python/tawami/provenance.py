@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from tawami.dynamics import Dynamics
     from tawami.scene import Scene
 
+#: What is written: the record, and copies of the driver script and of the form.
+RUN, SCRIPT, FORM = "run.json", "script.py", "form.py"
 #: Seconds that git gets.
 PATIENCE = 10
 
@@ -62,16 +64,21 @@ def write(folder: str | Path, scene: Scene, motion: Dynamics | None = None) -> N
                 "grid": {
                     "origin": scene.grid.origin, "h": scene.grid.h, "cells": scene.grid.cells
                 },
-                "started": datetime.now(UTC).isoformat(timespec="seconds"),
+                "started": now(),
                 "phases": [],
             }  # fmt: skip
-            _write(home / "form.py", source_of(scene.form))
-            _write(home / "script.py", source)
-            _write(home / "run.json", (json.dumps(known, indent=1) + "\n").encode())
+            _write(home / FORM, source_of(scene.form))
+            _write(home / SCRIPT, source)
+            _write(home / RUN, (json.dumps(known, indent=1) + "\n").encode())
 
 
 #: What says how many threads a process takes.
 THREADS = ("OMP_NUM_THREADS", "RAYON_NUM_THREADS")
+
+
+def now() -> str:
+    """Date and time (UTC), as records have them."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def driver() -> tuple[Path | None, str | None]:

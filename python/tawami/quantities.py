@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from tawami import _rust, boundary, ranks
+from tawami import _rust, boundary, placement
 from tawami.basis import extraction, greville_1d, values_1d
 from tawami.errors import InputError, NotModelledError
 from tawami.moment import Moment
@@ -100,12 +100,12 @@ def local_view(scene: Scene, motion: Dynamics | None) -> View:
 def body_view(scene: Scene, motion: Dynamics | None) -> View:
     """The particles of all ranks in the order of their numbers; calls for all ranks."""
     local, comm = local_view(scene, motion), scene.grid.comm
-    order = np.argsort(ranks.joined(comm, local("number")), kind="stable")
+    whole = placement.in_order(comm, local("number"))
     known: dict[str, Array] = {}
 
     def view(name: str) -> Array:
         if name not in known:
-            known[name] = np.asarray(ranks.joined(comm, np.asarray(local(name)))[order])
+            known[name] = np.asarray(whole(local(name)))
         return known[name]
 
     return view

@@ -20,6 +20,7 @@ from tawami.errors import InputError, OutputError
 from tawami.files import result_folder, whole_file
 from tawami.output import PHASES, Output
 from tawami.phase import LOG, Phase, Unwatched
+from tawami.provenance import FORM, RUN, SCRIPT
 from tawami.ranks import together
 
 if TYPE_CHECKING:
@@ -28,10 +29,8 @@ if TYPE_CHECKING:
 
 Existing = Literal["stop", "replace", "resume"]
 #: Takes precedence over `existing`: how `tawami resume` starts a script.
-VARIABLE = "TAWAMI_EXISTING"
-RUN = "run.json"
-#: Of the driver script and of the form.
-COPIES = ("script.py", "form.py")
+EXISTING = "TAWAMI_EXISTING"
+COPIES = (SCRIPT, FORM)
 log = logging.getLogger("tawami")
 
 
@@ -88,9 +87,9 @@ class Results:
             else inputs.number("checkpoint_minutes", checkpoint_minutes, low=0.0)
         )
         self.keep = inputs.whole_number("keep", keep, low=1)
-        variable = os.environ.get(VARIABLE)
+        variable = os.environ.get(EXISTING)
         self.existing = existing if variable is None else variable
-        name = "existing" if variable is None else VARIABLE
+        name = "existing" if variable is None else EXISTING
         inputs.choice(name, self.existing, get_args(Existing))
         self.progress = None if progress is None else inputs.switch("progress", progress)
         self._phases: list[str] = []
@@ -132,9 +131,8 @@ class Results:
     def _open(self) -> None:
         result_folder(self.folder)
         run, known = self.folder / RUN, self._known()
-        nothing = known and not known.get(
-            "phases"
-        )  # an attempt that was refused before its first step
+        # an attempt that was refused before its first step is no run
+        nothing = known and not known.get("phases")
         if self.checkpoints or (run.exists() and not nothing):
             if self.existing == "stop":
                 raise InputError(
@@ -142,9 +140,10 @@ class Results:
                     "another folder, existing='resume' to go on with it, or existing='replace' to "
                     "write over it"
                 )
-            self.resumes = self.existing == "resume" and bool(self.checkpoints)
+            wanted = self.existing == "resume"
+            self.resumes = wanted and bool(self.checkpoints)
             finished = [one["name"] for one in known.get("phases", []) if "finished" in one]
-            if self.existing == "resume" and not self.resumes and finished:
+            if wanted and not self.resumes and finished:
                 raise InputError(
                     f"Results('{self.folder}'): the folder holds a run that finished {finished[-1]}, "
                     "and no checkpoint to go on from: expected its checkpoints, or existing='replace' "

@@ -159,8 +159,7 @@ class Scene(contents.Elsewhere, Unique):
         if not inputs.one_of(basis, BASES):
             names = ", ".join(map(repr, BASES))
             raise InputError(f"basis {inputs.shown(basis)}: expected one of {names}")
-        if not inputs.one_of(leaving, ("stop", "remove")):
-            raise InputError(f"leaving = {inputs.shown(leaving)}: expected 'stop' or 'remove'")
+        inputs.choice("leaving", leaving, ("stop", "remove"))
         if not isinstance(grid, Grid) or not isinstance(body, Body):
             raise InputError(
                 f"Scene({type(grid).__name__}, {type(body).__name__}, ...): expected a tawami.Grid and "

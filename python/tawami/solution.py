@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from tawami import _rust, boundary, contents, inputs, ranks
+from tawami import _rust, boundary, contents, inputs, placement
 from tawami.errors import InputError
 from tawami.grid import EDGES, Edge
 from tawami.newton import Converged, History
@@ -81,13 +81,8 @@ class Solution(contents.Elsewhere, Unique):
         self._on_points: list[tuple[tuple[Any, ...], int, float]] = []
         self._reactions(step.forces, reduction)
         particles, comm = scene.particles, scene.grid.comm
-        number = ranks.joined(comm, particles.number)
-        order = np.argsort(number)
-        self.number = number[order]
-
-        def whole(values: Any) -> Array:
-            return np.asarray(ranks.joined(comm, np.asarray(values))[order])
-
+        whole = placement.in_order(comm, particles.number)
+        self.number = whole(particles.number)
         self.x, self.volume = whole(particles.x), whole(particles.volume)
         self.stress = whole(particles.stress)
         self.displacement_of_particles = whole(particles.displacement)

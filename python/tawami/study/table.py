@@ -258,9 +258,7 @@ class Table:
                 f"quantity {inputs.shown(quantity)} of study '{self.name}': expected one of "
                 f"{', '.join(map(repr, self.quantities))}"
             )
-        if not inputs.one_of(cost, COSTS):
-            names = ", ".join(map(repr, COSTS))
-            raise InputError(f"cost = {inputs.shown(cost)}: expected one of {names}")
+        inputs.choice("cost", cost, COSTS)
 
     def draw(self, path: str | Path, **options: Any) -> None:
         """The picture; see `tawami.study.figure.picture` for what there is to choose."""
