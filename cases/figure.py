@@ -6,7 +6,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-from tawami import figure as pictures
+from tawami.results import figure as pictures
 
 
 def save(figure: plt.Figure, path: Path, *, dpi: int = 160) -> None:

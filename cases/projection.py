@@ -22,7 +22,7 @@ from mpi4py import MPI
 
 import tawami
 from cases.table import as_text
-from tawami.projection import nodal, vertices
+from tawami.results.projection import nodal, vertices
 
 Array = npt.NDArray[np.float64]
 L, D, P = 2.0, 1.0, 1e3  # [m], [m], [N per metre depth]

@@ -38,9 +38,9 @@ from tqdm import tqdm
 
 import tawami
 from cases.figure import save
-from tawami.environment import header
-from tawami.output import result_folder
-from tawami.transfer import TransferName
+from tawami.fem.environment import header
+from tawami.motion.transfer import TransferName
+from tawami.results.output import result_folder
 
 Array = npt.NDArray[np.float64]
 

@@ -23,10 +23,10 @@ from mpi4py import MPI
 
 import tawami
 from cases.table import as_text
-from tawami import checkpoint
-from tawami.moment import Moment
-from tawami.output import Output
-from tawami.series import Format
+from tawami.base import archive
+from tawami.motion.observer import Moment
+from tawami.results.output import Output
+from tawami.results.series import Format
 
 COLUMNS = ("what", "us_per_particle", "bytes_per_particle")
 
@@ -98,7 +98,7 @@ def rows_of(cells: int, repeat: int, folder: Path) -> list[Row]:
 
 
 def _keep(motion: tawami.Dynamics, path: Path) -> None:
-    checkpoint.write(path, {}, {"scene": motion.scene.state(), "motion": motion.state()})
+    archive.write(path, {}, {"scene": motion.scene.state(), "motion": motion.state()})
 
 
 def _timed(action: Callable[[], object]) -> float:

@@ -3,7 +3,7 @@
 #
 #   make matrix                                  bookworm, trixie and sid, all tests
 #   SUITES=sid make matrix                       some of them
-#   MATRIX_TESTS="tests/test_forms.py" ...       some of pytest's files (cargo's tests run always)
+#   MATRIX_TESTS="tests/form/test_forms.py" ...       some of pytest's files (cargo's tests run always)
 #   MATRIX_ROOT=/var/tmp ...                     where the root folders are made
 #   MATRIX_MINUTES=90 ...                        time limit of each `make test`
 #   MATRIX_MIRROR=URL ...                        Debian's mirror; by default that of the host's apt

@@ -28,8 +28,8 @@ from cases.cantilever.beam import (
 )  # fmt: skip
 from cases.cantilever.study import CELLS, runs
 from cases.table import as_csv, as_text
-from tawami.environment import header
-from tawami.output import result_folder, whole_file, write_grid, write_particles
+from tawami.fem.environment import header
+from tawami.results.output import result_folder, whole_file, write_grid, write_particles
 
 FIELDS = {
     "displacement only": ("u", None),

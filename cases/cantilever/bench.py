@@ -29,11 +29,11 @@ from ufl import div, dot, grad, inner
 import tawami
 from cases.cantilever import mpm
 from cases.cantilever.beam import NU, D, E, L, P
-from tawami.compilation import compile_form
-from tawami.environment import header, peak_memory
-from tawami.errors import InexactSumWarning
-from tawami.output import result_folder, whole_file
-from tawami.ranks import mpirun
+from tawami.base.errors import InexactSumWarning
+from tawami.base.ranks import mpirun
+from tawami.fem.environment import header, peak_memory
+from tawami.form.compilation import compile_form
+from tawami.results.output import result_folder, whole_file
 
 #: Stages of a Newton step; not every path has all of them.
 STAGES = {

@@ -20,8 +20,8 @@ import tawami
 from cases.cook import fem, figures, mpm
 from cases.cook.membrane import COLUMNS, LENGTH, REFERENCE, Row
 from cases.table import as_csv, as_text
-from tawami.environment import header
-from tawami.output import result_folder, whole_file
+from tawami.fem.environment import header
+from tawami.results.output import result_folder, whole_file
 
 SHOWN = ("u_epsv_0.1", "u_epsv_0.01", "u_bbar", "u")  # methods whose mean stress is drawn
 

@@ -19,8 +19,8 @@ import tawami
 from cases import table
 from cases.extremes import attempt, stability_map
 from cases.extremes.attempt import Attempt
-from tawami.environment import header
-from tawami.output import result_folder, whole_file
+from tawami.fem.environment import header
+from tawami.results.output import result_folder, whole_file
 
 #: Modules of this package, each with `attempts(short)`.
 SUBJECTS = (

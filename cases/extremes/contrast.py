@@ -57,7 +57,7 @@ def force_error(form: str, basis: str, arrangement: str, contrast: float) -> tup
 def representable(form: str, basis: str, arrangement: str) -> bool:
     """Whether the fields can take the jump that the closed form has at the interface: of the strain in
     series, where p does not jump; of p in parallel, where strains do not, and which B-bar with quadratic
-    functions does not balance (`tests/test_patch.py`).
+    functions does not balance (`tests/field/test_patch.py`).
     """
     if arrangement == "parallel":
         return form != "u_p" and (form != "u_bbar" or basis == "bilinear")

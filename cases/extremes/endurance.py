@@ -22,7 +22,7 @@ from petsc4py import PETSc
 import tawami
 from cases.extremes import block
 from cases.extremes.attempt import Attempt, attempted
-from tawami.environment import MAPS
+from tawami.fem.environment import MAPS
 
 SUBJECT = "endurance"
 #: Bytes that a step may leave behind: a leaked vector of the grid has 5 kB, the smallest object of

@@ -133,7 +133,7 @@ def attempts(short: bool) -> Iterator[Attempt]:
     of limit analysis; that is 50 times the load. A linear body: round-off times a condition number of
     1e6. Hencky's bar by a ramp: a moved body is integrated over cells that it cuts anywhere, which
     costs a spinning disc 0.11 of its mean stress (README, Motion) and B-bar 0.22 in plain tension
-    (`tests/test_patch.py`). Beyond M/e nothing may be borne, but for as much.
+    (`tests/field/test_patch.py`). Beyond M/e nothing may be borne, but for as much.
     """
     for form in FORMS[::2] if short else FORMS:
         yield attempted(SUBJECT, f"elastic, {form}: 1e3", 1e-9, lambda f=form: linear(f, 1e3))

@@ -99,7 +99,7 @@ def midpoint(body: tawami.Body, form: str, basis: str) -> float:
     """Bound in tension: how much too small the midpoint rule with k points along an axis makes the
     integral of the last function at a border, (1 - s)^2 of splines (1/(4 k^2)), (1 - s)(1 - 2 s) of
     biquadratic ones (1/k^2); bilinear ones it has exactly. B-bar misses 0.22 and 0.42 by any rule
-    (`tests/test_patch.py`).
+    (`tests/field/test_patch.py`).
     """
     k = np.sqrt(len(body.x) / (CELLS[0] * CELLS[1]))
     of_rule = {"quadratic_spline": 1 / (4 * k**2), "biquadratic": 1 / k**2, "bilinear": 1e-9}

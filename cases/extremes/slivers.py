@@ -67,7 +67,7 @@ def attempts(short: bool) -> Iterator[Attempt]:
     The sliver's share of the load is spread over its last cell instead of its end. That is `width` of
     the load of a cell, misplaced within a cell, and by Saint-Venant does no more than a few times as
     much to the cell beside it: 5 times is allowed, and round-off. B-bar misses tension by 0.22 and 0.43
-    with splines and biquadratic functions whatever the width (`tests/test_patch.py`).
+    with splines and biquadratic functions whatever the width (`tests/field/test_patch.py`).
     """
     for basis in BASES[:1] if short else BASES:
         for form in list(FORMS)[::3] if short else FORMS:

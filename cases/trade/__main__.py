@@ -12,8 +12,8 @@ from pathlib import Path
 
 import tawami
 from cases.trade import cantilever, collapse, cook, self_weight, spinning_disc
-from tawami.environment import header
-from tawami.output import whole_file
+from tawami.fem.environment import header
+from tawami.results.output import whole_file
 from tawami.study import Table
 
 CASES = (cantilever, cook, collapse, self_weight, spinning_disc)

@@ -20,7 +20,7 @@ from mpi4py import MPI
 
 import tawami
 from cases.vibrating_beam.beam import AMPLITUDE, RHO, D, E, L, first_bending, mode
-from tawami.transfer import TransferName
+from tawami.motion.transfer import TransferName
 
 Array = npt.NDArray[np.float64]
 

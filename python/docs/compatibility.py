@@ -21,7 +21,7 @@ import numpy as np
 from mpi4py import MPI
 
 import tawami
-from tawami.formulation import Form
+from tawami.form.form import Form
 
 E, NU, RHO, G = 1e6, 0.3, 1000.0, -9.81  # [Pa], [-], [kg/m3], [m/s2]
 PRESSED, CELL = 0.01, 0.25  # [m], [m]

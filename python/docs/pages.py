@@ -20,7 +20,7 @@ import executed
 import messages
 from sources import ROOT
 
-from tawami import errors, ranks
+from tawami.base import errors, ranks
 
 SOURCE = Path(__file__).parent
 #: Cases with their titles, and modules that state the problem beside the one that runs.

@@ -1,10 +1,7 @@
 """tawami: implicit material point method with the mixed displacement - volumetric strain form."""
 
 from tawami._rust import Material
-from tawami.body import Body, box
-from tawami.disc import disc
-from tawami.dynamics import Dynamics
-from tawami.errors import (
+from tawami.base.errors import (
     CheckpointError,
     CheckpointWarning,
     ConvergenceError,
@@ -22,31 +19,33 @@ from tawami.errors import (
     QuadratureWarning,
     SingularError,
     SupportError,
-    TawamiDeprecationWarning,
     TawamiError,
     TawamiWarning,
 )
-from tawami.form_check import FormReport, check_form
-from tawami.formulation import Form
-from tawami.grid import Grid
-from tawami.level_set import level_set
-from tawami.materials import (
+from tawami.base.ranks import run
+from tawami.body.body import Body, box
+from tawami.body.disc import disc
+from tawami.body.level_set import level_set
+from tawami.body.mesh import mesh
+from tawami.body.polygon import polygon
+from tawami.check.form_check import FormReport, check_form
+from tawami.form.form import Form
+from tawami.grid.grid import Grid
+from tawami.motion.dynamics import Dynamics
+from tawami.motion.stepping import ramp, settle
+from tawami.particles.laws import (
     drucker_prager,
     linear_elastic,
     mohr_coulomb,
     neo_hookean,
     von_mises,
 )
-from tawami.mesh import mesh
-from tawami.numpy_law import NumpyLaw
-from tawami.output import GridOutput, ParticleOutput, TableOutput
-from tawami.polygon import polygon
-from tawami.ranks import run
-from tawami.results import Results
-from tawami.scene import Scene
-from tawami.solution import Solution
-from tawami.source import earlier, table
-from tawami.stepping import ramp, settle
+from tawami.particles.numpy_law import NumpyLaw
+from tawami.results.output import GridOutput, ParticleOutput, TableOutput
+from tawami.results.results import Results
+from tawami.scene.scene import Scene
+from tawami.scene.solution import Solution
+from tawami.scene.sources import earlier, table
 from tawami.study import Series, Study, recommend
 
 __all__ = [
@@ -82,7 +81,6 @@ __all__ = [
     "Study",
     "SupportError",
     "TableOutput",
-    "TawamiDeprecationWarning",
     "TawamiError",
     "TawamiWarning",
     "box",

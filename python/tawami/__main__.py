@@ -2,6 +2,6 @@
 
 import sys
 
-from tawami.command_line import run
+from tawami.command.main import run
 
 sys.exit(run())

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tawami.figure import new_figure, save
+from tawami.results.figure import new_figure, save
 from tawami.study.table import Row, Table, text_of
 
 if TYPE_CHECKING:

@@ -23,11 +23,11 @@ from typing import Any
 
 import numpy as np
 
-from tawami import inputs
-from tawami.environment import peak_memory
-from tawami.errors import InputError, OutputError, TawamiError
-from tawami.ranks import own_environment
-from tawami.tally import tally
+from tawami.base import checks
+from tawami.base.errors import InputError, OutputError, TawamiError
+from tawami.base.ranks import own_environment
+from tawami.base.timing import tally
+from tawami.fem.environment import peak_memory
 
 #: A run that takes less than this is repeated, so often at most, and the fastest counts [s].
 SHORT, REPEATS = 2.0, 3
@@ -43,7 +43,7 @@ def name_of(run: Run) -> str:
     Raises:
         InputError: It cannot be found by a name.
     """
-    name, module = getattr(run, "__qualname__", inputs.shown(run)), getattr(run, "__module__", None)
+    name, module = getattr(run, "__qualname__", checks.shown(run)), getattr(run, "__module__", None)
     if "<" in name or "." in name or module is None:
         raise InputError(
             f"run = {name}: expected a function at the top level of a file, which a process of its own "

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from tawami import inputs
-from tawami.errors import InputError, OutputError
-from tawami.output import result_folder, whole_file
+from tawami.base import checks
+from tawami.base.errors import InputError, OutputError
+from tawami.results.output import result_folder, whole_file
 from tawami.study import process
 from tawami.study.table import COSTS, Row, Table, error_of, text_of
 
@@ -50,12 +50,12 @@ class Series:
 
     def __post_init__(self) -> None:
         if not isinstance(self.label, str):
-            raise InputError(f"label = {inputs.shown(self.label)}: expected the name of a series")
+            raise InputError(f"label = {checks.shown(self.label)}: expected the name of a series")
         grids = self.knobs if _is_list(self.knobs) else [self.knobs]
         named = (isinstance(g, Mapping) and all(isinstance(n, str) for n in g) for g in grids)
         if len(grids) == 0 or not all(named):
             raise InputError(
-                f"series '{self.label}': knobs = {inputs.shown(self.knobs)}: expected a mapping from "
+                f"series '{self.label}': knobs = {checks.shown(self.knobs)}: expected a mapping from "
                 "names of knobs to their values, or a list of such"
             )
 
@@ -82,10 +82,10 @@ class Series:
 
 def _values(name: str, values: Any) -> Sequence[Any]:
     if not _is_list(values) or len(values) == 0:
-        raise InputError(f"knob '{name}' = {inputs.shown(values)}: expected a list of its values")
+        raise InputError(f"knob '{name}' = {checks.shown(values)}: expected a list of its values")
     if not all(isinstance(v, str | bool | int | float | None) for v in values):
         raise InputError(
-            f"knob '{name}' = {inputs.shown(values)}: expected numbers, names, booleans or None"
+            f"knob '{name}' = {checks.shown(values)}: expected numbers, names, booleans or None"
         )
     return list(values)
 
@@ -93,7 +93,7 @@ def _values(name: str, values: Any) -> Sequence[Any]:
 def _is_list(value: Any) -> bool:
     if isinstance(value, np.ndarray):
         return value.ndim > 0
-    return isinstance(value, Sequence) and not isinstance(value, inputs.TEXT)
+    return isinstance(value, Sequence) and not isinstance(value, checks.TEXT)
 
 
 def _text(setting: Knobs) -> str:
@@ -151,11 +151,11 @@ class Study:
                 f"study '{self.name}': no reference for {', '.join(self._of_finest)}: expected a value, "
                 "or the knobs of the finest run as finest=..."
             )
-        self.path = inputs.path("folder", self.folder or Path("results") / "study" / self.name)
+        self.path = checks.path("folder", self.folder or Path("results") / "study" / self.name)
 
     def _check_types(self) -> None:
-        name = inputs.shown(self.name)
-        if not isinstance(self.name, str) or inputs.path("name", self.name).name != self.name:
+        name = checks.shown(self.name)
+        if not isinstance(self.name, str) or checks.path("name", self.name).name != self.name:
             raise InputError(f"study: name = {name}: expected text that a file can be named by")
         for what, kind, expected in (
             ("reference", Mapping, "a mapping from quantities to values"),
@@ -163,21 +163,21 @@ class Study:
             ("colour", str | None, "the name of a knob, or None"),
             ("folder", str | Path | None, "a path, or None"),
         ):
-            inputs.instance(f"study {name}: {what}", getattr(self, what), kind, expected)
+            checks.instance(f"study {name}: {what}", getattr(self, what), kind, expected)
         for quantity, value in self.reference.items():
             if not isinstance(quantity, str):
                 raise InputError(
-                    f"study {name}: reference: {inputs.shown(quantity)}: expected a name"
+                    f"study {name}: reference: {checks.shown(quantity)}: expected a name"
                 )
             if value is not None:
                 what = f"study {name}: reference of '{quantity}'"
-                raw = inputs.any_array(what, value)
-                if not np.isfinite(inputs.array(what, raw, raw.ndim)).all():
-                    raise InputError(f"{what} = {inputs.shown(value)}: expected finite numbers")
+                raw = checks.any_array(what, value)
+                if not np.isfinite(checks.array(what, raw, raw.ndim)).all():
+                    raise InputError(f"{what} = {checks.shown(value)}: expected finite numbers")
         for knob, value in (self.finest or {}).items():
             _values(knob, [value])
         if not _is_list(self.beside) or not all(isinstance(s, Series) for s in self.beside):
-            raise InputError(f"study {name}: beside = {inputs.shown(self.beside)}: expected Series")
+            raise InputError(f"study {name}: beside = {checks.shown(self.beside)}: expected Series")
 
     # -- what has been run -----------------------------------------------------
 
@@ -259,9 +259,9 @@ class Study:
             InputError: No reference for a quantity, or the finest run failed. Other runs may fail: the
                 table has their sentence.
         """
-        inputs.whole_number("seed", seed, low=0)
-        limit = inputs.number("limit", limit, low=inputs.LEAST, high=LONGEST)
-        quiet = inputs.switch("quiet", quiet)
+        checks.whole_number("seed", seed, low=0)
+        limit = checks.number("limit", limit, low=checks.LEAST, high=LONGEST)
+        quiet = checks.switch("quiet", quiet)
         if process.MARK in os.environ:
             raise InputError(
                 f"study '{self.name}' was started again by its own run: put study.run() under "
@@ -302,7 +302,7 @@ class Study:
     def _work(self, sample: int | None, seed: int) -> list[tuple[Series, dict[str, Any]]]:
         work = [(series, setting) for series in self.series for setting in series.settings()]
         if sample is not None:
-            count = min(inputs.whole_number("sample", sample, low=1), len(work))
+            count = min(checks.whole_number("sample", sample, low=1), len(work))
             chosen = np.random.default_rng(seed).choice(len(work), count, replace=False)
             work = [work[k] for k in sorted(chosen)]
         if self._of_finest:

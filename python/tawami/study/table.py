@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tawami import inputs
-from tawami.errors import InputError
+from tawami.base import checks
+from tawami.base.errors import InputError
 
 if TYPE_CHECKING:
     from tawami.study.study import Study
@@ -253,12 +253,12 @@ class Table:
         return f"{self.name}, {quantity}: " + " ".join(sentences)
 
     def _check(self, quantity: str, cost: str) -> None:
-        if not inputs.one_of(quantity, self.quantities):
+        if not checks.one_of(quantity, self.quantities):
             raise InputError(
-                f"quantity {inputs.shown(quantity)} of study '{self.name}': expected one of "
+                f"quantity {checks.shown(quantity)} of study '{self.name}': expected one of "
                 f"{', '.join(map(repr, self.quantities))}"
             )
-        inputs.choice("cost", cost, COSTS)
+        checks.choice("cost", cost, COSTS)
 
     def draw(self, path: str | Path, **options: Any) -> None:
         """The picture; see `tawami.study.figure.picture` for what there is to choose."""
@@ -290,7 +290,7 @@ class Table:
         Raises:
             InputError: No such file, or not that of a study.
         """
-        path = inputs.path("study", path)
+        path = checks.path("study", path)
         try:
             with path.open(newline="") as file:
                 lines = list(csv.DictReader(file))
@@ -372,11 +372,11 @@ def recommend(
         from tawami.study.study import Study
 
         expected = "a study, its table, or the path of its CSV file"
-        inputs.instance("recommend: study", study, Study | Table, expected)
+        checks.instance("recommend: study", study, Study | Table, expected)
         table = study.table() if isinstance(study, Study) else study
     if not isinstance(tolerance, Mapping):
         tolerance = dict.fromkeys(table.quantities, tolerance)
-    limits = {q: inputs.number(f"tolerance of {q}", t, low=0.0) for q, t in tolerance.items()}
+    limits = {q: checks.number(f"tolerance of {q}", t, low=0.0) for q, t in tolerance.items()}
     if not limits:
         raise InputError("tolerance = {}: expected a number, or one for each of some quantities")
     for quantity in limits:

@@ -1,0 +1,263 @@
+"""Checks of what a driver script passes: each returns the value in its proper type, or raises."""
+
+from __future__ import annotations
+
+import math
+import os
+import resource
+import sys
+from collections.abc import Callable, Collection, Sequence
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami.base.errors import InputError
+
+Array = npt.NDArray[np.float64]
+#: The least number above 0.
+LEAST = sys.float_info.min
+#: Characters of a value that a message shows.
+SHOWN = 200
+#: What is no sequence of numbers though Python calls it one.
+TEXT = (str, bytes, bytearray, memoryview)
+
+
+def shown(value: Any) -> str:
+    """A value in a message: its beginning where it is long, its type where it cannot be shown."""
+    try:
+        text = repr(value)
+    except Exception:  # whole numbers of thousands of digits, objects of others
+        return f"<{type(value).__name__}>"
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
+
+
+def real(name: str, value: Any, expected: str = "a number") -> float:
+    """A real number, which may be infinite or NaN.
+
+    Raises:
+        InputError: Anything else.
+    """
+    if not isinstance(value, Real) or isinstance(value, np.timedelta64):
+        raise InputError(f"{name} = {shown(value)}: expected {expected}")
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf  # type: ignore[operator]
+
+
+def number(name: str, value: Any, *, low: float = -math.inf, high: float = math.inf) -> float:
+    """A finite number within limits.
+
+    Raises:
+        InputError: Anything else.
+    """
+    given = real(name, value)
+    if not (math.isfinite(given) and low <= given <= high):
+        least = "above 0" if low == LEAST else f"of at least {low:g}"
+        within = f" {least}" if math.isinf(high) else f" {least} and at most {high:g}"
+        if math.isinf(low):
+            within = "" if math.isinf(high) else f" of at most {high:g}"
+        raise InputError(f"{name} = {shown(value)}: expected a finite number{within}")
+    return given
+
+
+def whole_number(name: str, value: Any, *, low: int, high: float = math.inf) -> int:
+    """A whole number, at least `low`.
+
+    Raises:
+        InputError: Anything else.
+    """
+    whole = isinstance(value, Integral) and not isinstance(value, np.timedelta64)
+    if not whole or not low <= int(value) <= high:
+        most = "" if math.isinf(high) else f" and at most {high:g}"
+        raise InputError(f"{name} = {shown(value)}: expected a whole number, at least {low}{most}")
+    return int(value)
+
+
+def pair(name: str, value: Any, what: str) -> tuple[Any, Any]:
+    """A sequence of two.
+
+    Raises:
+        InputError: Anything else; `what` says what the two are.
+    """
+    sequence = isinstance(value, Sequence) or (isinstance(value, np.ndarray) and value.ndim > 0)
+    if isinstance(value, TEXT) or not sequence or len(value) != 2:
+        raise InputError(f"{name} = {shown(value)}: expected two {what}")
+    return value[0], value[1]
+
+
+def choice(name: str, value: Any, known: Collection[str], wrong: str = "") -> Any:
+    """One of the names that are known.
+
+    Raises:
+        InputError: Anything else; `wrong` says why, where that is not plain.
+    """
+    if not one_of(value, known):
+        *others, last = map(repr, known)
+        listed = (
+            f"one of {', '.join([*others, last])}" if len(others) != 1 else f"{others[0]} or {last}"
+        )
+        raise InputError(f"{name} = {shown(value)}: {wrong}expected {listed}")
+    return value
+
+
+def names(name: str, value: Any, known: Collection[str]) -> tuple[str, ...]:
+    """Some of the names that are known.
+
+    Raises:
+        InputError: Anything else.
+    """
+    some = isinstance(value, list | tuple | set | frozenset)
+    if not some or not all(one_of(given, known) for given in value):
+        listed = ", ".join(map(repr, known))
+        raise InputError(f"{name} = {shown(value)}: expected a list with some of {listed}")
+    return tuple(value)
+
+
+def point(name: str, value: Any) -> tuple[float, float]:
+    """A point (x, y) [m].
+
+    Raises:
+        InputError: Anything but two finite numbers.
+    """
+    x, y = pair(name, value, "numbers, a point (x, y)")
+    return number(f"{name}[0]", x), number(f"{name}[1]", y)
+
+
+def one_of(value: Any, names: Collection[Any]) -> bool:
+    """Whether it is one of some names; anything else than a name is not."""
+    return isinstance(value, str) and value in names
+
+
+def switch(name: str, value: Any) -> bool:
+    """True or False.
+
+    Raises:
+        InputError: Anything else.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"{name} = {shown(value)}: expected True or False")
+    return bool(value)
+
+
+def function(name: str, value: Any, what: str) -> Any:
+    """Something to call, or None.
+
+    Raises:
+        InputError: Anything else; `what` says what it is called with.
+    """
+    if value is not None and not callable(value):
+        raise InputError(f"{name} = {shown(value)}: expected a function {what}")
+    return value
+
+
+def profile(name: str, value: Any) -> float | Callable[..., Any]:
+    """A number, or a function of position, whose values are looked at where it is called.
+
+    Raises:
+        InputError: Anything else.
+    """
+    if callable(value):
+        return value  # type: ignore[no-any-return]
+    if not isinstance(value, Real):
+        raise InputError(f"{name} = {shown(value)}: expected a number or a function f(x, y)")
+    return number(name, value)
+
+
+def instance(name: str, value: Any, kind: Any, expected: str) -> None:
+    """Whether an object is of a class.
+
+    Raises:
+        InputError: It is not.
+    """
+    if not isinstance(value, kind):
+        raise InputError(f"{name} = {shown(value)}: expected {expected}")
+
+
+def path(name: str, value: Any) -> Path:
+    """A path that the system can take.
+
+    Raises:
+        InputError: Anything else.
+    """
+    try:
+        if isinstance(value, TEXT[1:]) or "\0" in os.fspath(value):
+            raise TypeError
+        os.fsencode(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} = {shown(value)}: expected a path, as text or Path") from None
+    return Path(value)
+
+
+def array(name: str, values: Any, dimensions: int) -> Array:
+    """A contiguous array of real numbers.
+
+    Raises:
+        InputError: Not numbers, not real, masked, or another number of dimensions.
+    """
+    raw = any_array(name, values)
+    if raw.dtype.kind not in "fiu":
+        raise InputError(f"{name}: expected an array of real numbers: it holds {raw.dtype}")
+    if raw.ndim != dimensions:
+        raise InputError(f"{name} has shape {raw.shape}: expected {dimensions} dimensions")
+    with np.errstate(over="ignore"):  # of longer floating-point numbers: infinite, and said so
+        return np.ascontiguousarray(raw, dtype=np.float64)
+
+
+def any_array(name: str, values: Any) -> npt.NDArray[Any]:
+    """What NumPy makes an array of.
+
+    Raises:
+        InputError: It makes none, or entries are masked.
+    """
+    try:
+        masked = np.ma.is_masked(values)  # type: ignore[no-untyped-call]
+        made = np.asarray(values)
+    except Exception as error:  # ragged lists, objects of others
+        raise InputError(f"{name}: expected an array of real numbers: {error}") from None
+    if masked:
+        raise InputError(f"{name} has masked entries: expected an array with all its numbers")
+    return made
+
+
+def numbering(name: str, values: Any, length: int) -> npt.NDArray[np.uint32]:
+    """Whole numbers from 0, one per particle.
+
+    Raises:
+        InputError: Another length, a fraction, or a negative number.
+    """
+    raw = array(name, values, 1)
+    if len(raw) != length:
+        raise InputError(f"{name} has {len(raw)} entries: expected {length}, one per particle")
+    wrong = np.flatnonzero(~((raw >= 0) & (raw == np.floor(raw)) & (raw < 2**32)))
+    if len(wrong):
+        raise InputError(
+            f"{name}[{wrong[0]}] = {raw[wrong[0]]:g}: expected the number of a material, from 0"
+        )
+    return raw.astype(np.uint32)
+
+
+def room(what: str, count: int, each: float, advice: str) -> None:
+    """Whether this machine has the memory for so many of something, before it is taken.
+
+    Args:
+        what: What there is to be.
+        count: How many.
+        each: Memory that one takes [bytes].
+        advice: What to do.
+
+    Raises:
+        InputError: It has not; the message says how much that would be.
+    """
+    there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    there = there if limit == resource.RLIM_INFINITY else min(there, limit)
+    size = float(min(count, 10**300)) * each
+    if size > there:
+        raise InputError(
+            f"{what} would take about {size / 2**30:.3g} GB of memory, and there are "
+            f"{there / 2**30:.3g} GB: {advice}"
+        )

@@ -1,0 +1,79 @@
+"""Times and counts: seconds per stage of a solve, and totals of the process for studies of cost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from time import perf_counter, process_time
+
+
+class Stopwatch:
+    """Seconds per named stage, on this rank.
+
+    Attributes:
+        seconds: Wall time of each stage so far.
+        cpu: Processor time of each stage so far, of all threads.
+        laps: What `seconds` was at the start of the last step and after each of its Newton iterations.
+    """
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self.cpu: dict[str, float] = {}
+        self.laps: list[dict[str, float]] = []
+
+    @contextmanager
+    def __call__(self, stage: str) -> Iterator[None]:
+        """Add the time of the block to a stage."""
+        start, busy = perf_counter(), process_time()
+        try:
+            yield
+        finally:
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + perf_counter() - start
+            self.cpu[stage] = self.cpu.get(stage, 0.0) + process_time() - busy
+
+    def start(self) -> None:
+        """A step begins."""
+        self.laps = [dict(self.seconds)]
+
+    def lap(self) -> None:
+        """A Newton iteration ends."""
+        self.laps.append(dict(self.seconds))
+
+
+@dataclass
+class Tally:
+    """Counts since the start or the last :meth:`reset`.
+
+    Attributes:
+        steps: Converged steps.
+        newton_iterations: Linear solves, those of steps that failed too.
+        unknowns: Reduced unknowns, the most that were solved for.
+        compiling_s: Seconds of turning forms into kernels, which later runs find on disk.
+        compiling_cpu_s: Processor time of the same.
+    """
+
+    steps: int = 0
+    newton_iterations: int = 0
+    unknowns: int = 0
+    compiling_s: float = 0.0
+    compiling_cpu_s: float = 0.0
+
+    def reset(self) -> None:
+        """Begin anew."""
+        for field in fields(self):
+            setattr(self, field.name, field.default)
+
+    @contextmanager
+    def compiling(self) -> Iterator[None]:
+        """The block turns a form into kernels."""
+        start, busy = perf_counter(), process_time()
+        try:
+            yield
+        finally:
+            self.compiling_s += perf_counter() - start
+            self.compiling_cpu_s += process_time() - busy
+
+
+#: Of this process.
+tally = Tally()

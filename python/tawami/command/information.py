@@ -1,0 +1,114 @@
+"""What `tawami info` says: versions, BLAS, threads, memory, ranks, compiler, kernels, what is missing,
+and whether a small scene is solved rightly.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Iterator
+from pathlib import Path
+from time import perf_counter
+
+from mpi4py import MPI
+
+from tawami.base.errors import TawamiError
+from tawami.check import scenes
+from tawami.fem import dolfinx, environment
+from tawami.form.form import Form
+from tawami.scene.description import labelled
+
+MEMORY = Path("/proc/meminfo")
+#: Packages that only some things need: name, what for.
+OPTIONAL = (("matplotlib", "figures, tawami plot"), ("tqdm", "progress of the cases"))
+
+
+def lines() -> Iterator[tuple[str, str]]:
+    """Label and text of each line but the self test."""
+    versions, *warning = environment.header().splitlines()
+    yield "versions", versions
+    if warning:
+        yield "", warning[0]
+    yield "threads", _threads()
+    yield "memory", _memory()
+    yield "ranks", _ranks()
+    yield "compiler", _compiler()
+    yield "kernels", f"of forms, compiled once, in {dolfinx.cache_directory()}"
+    for name, purpose in OPTIONAL:
+        yield name, _package(name, purpose)
+    yield "ffmpeg", _program("ffmpeg", "movies as MP4")
+
+
+def show() -> int:
+    """Print all of them and the self test; the exit code."""
+    for label, text in lines():
+        print(labelled(label, text))
+    good, text = self_test()
+    print(labelled("self test", text))
+    return 0 if good else 1
+
+
+def _threads() -> str:
+    usable = len(os.sched_getaffinity(0))
+    rayon = os.environ.get("RAYON_NUM_THREADS", f"unset: {usable}, all processors of this process")
+    return (
+        f"OMP_NUM_THREADS {os.environ.get('OMP_NUM_THREADS', 'unset')}, RAYON_NUM_THREADS {rayon}"
+    )
+
+
+def _memory() -> str:
+    """Linux' own figures."""
+    try:
+        told = dict(line.split(":") for line in MEMORY.read_text().splitlines())
+        total, free = (int(told[key].split()[0]) / 2**20 for key in ("MemTotal", "MemAvailable"))
+    except (OSError, KeyError, ValueError):
+        return "unknown"
+    return f"{total:.3g} GB, {free:.3g} GB of it available"
+
+
+def _ranks() -> str:
+    library = MPI.Get_library_version().splitlines()[0].split("\x00")[0].strip().rstrip(",")
+    starts = shutil.which("mpirun") or "no mpirun: apt install openmpi-bin"
+    return f"{MPI.COMM_WORLD.size} now; {library}; {starts}"
+
+
+def _compiler() -> str:
+    """The one that FFCx' code is compiled with."""
+    command = (os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc").split()[0]
+    advice = "apt install g++ python3-dev"
+    try:
+        said = subprocess.run([command, "--version"], capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return f"MISSING: '{command}', which compiles forms: {advice}"
+    if not Path(sysconfig.get_path("include"), "Python.h").exists():
+        return f"{command}, but Python's headers are MISSING: {advice}"
+    return said.stdout.splitlines()[0]
+
+
+def _package(name: str, purpose: str) -> str:
+    if importlib.util.find_spec(name) is None:
+        return f"missing ({purpose}): {sys.executable} -m pip install {name}"
+    return f"{importlib.metadata.version(name)} ({purpose})"
+
+
+def _program(name: str, purpose: str) -> str:
+    return shutil.which(name) or f"missing ({purpose}): apt install {name}"
+
+
+def self_test() -> tuple[bool, str]:
+    """Whether a small scene gives the stress of its closed form."""
+    start = perf_counter()
+    try:
+        error = scenes.compressed(Form.load("u_epsv"), {}, "quadratic_spline")
+    except TawamiError as failure:
+        return False, f"FAILED: {failure}"
+    good = error < 1e-10
+    text = (
+        f"a block under a traction, error of its stress {error:.1e}, {perf_counter() - start:.1f} s"
+    )
+    return good, f"ok: {text}" if good else f"FAILED: {text}: expected below 1e-10"

@@ -1,0 +1,299 @@
+"""The command `tawami`: run and resume driver scripts, begin one, check a weak form, look at the set-up.
+
+A user's mistake is one line and exit code 2, as of any command that cannot be carried out as given; what
+was run and failed is exit code 1.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from tawami.base.errors import InputError, OutputError, TawamiError
+from tawami.command import launch
+from tawami.results.progress import LOG_LEVEL
+from tawami.results.results import EXISTING
+
+CODES = "Exit codes: 0 done; 1 what was run or checked failed; 2 not possible as given; 130 Ctrl-C"
+TEMPLATES = Path(__file__).parent / "templates"
+LEVELS = ("debug", "info", "warning", "error")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Carry out a command; the exit code.
+
+    Args:
+        arguments: Those of the command line by default.
+    """
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    asked = _parsed(given)
+    command: Callable[[argparse.Namespace], int] = asked.command
+    try:
+        code = command(asked)
+        sys.stdout.flush()
+        return code
+    except TawamiError as error:
+        print(f"{asked.name}: {error}", file=sys.stderr)
+        return 2 if isinstance(error, InputError) else 1
+    except KeyboardInterrupt:
+        print(f"{asked.name}: interrupted", file=sys.stderr)
+        return launch.INTERRUPTED
+    except BrokenPipeError:  # | head
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+
+
+def run() -> int:
+    """As :func:`main`, for the command itself: what Ctrl-C ended ends at once. Open MPI's own processes
+    got it too, and the end of MPI would wait for them.
+    """
+    code = main()
+    if code == launch.INTERRUPTED:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    return code
+
+
+def _parsed(given: list[str]) -> argparse.Namespace:
+    """Arguments of tawami, and after -- those of the script."""
+    own, rest = given, list[str]()
+    if "--" in given:
+        own, rest = given[: given.index("--")], given[given.index("--") + 1 :]
+    parser = _parser()
+    asked = parser.parse_args(own)
+    if rest and asked.name != "tawami run":
+        parser.error(f"arguments after -- belong to a script: {asked.name} has none")
+    asked.arguments = rest
+    return asked
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="tawami",
+        description="Implicit material point method with the mixed u-eps_v formulation: runs driver "
+        "scripts, on one rank or several, and what goes with them.",
+        epilog=f"tawami COMMAND --help says more of each. {CODES}.",
+        allow_abbrev=False,
+    )
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    _add_run(commands)
+    _add_resume(commands)
+    _add_plot(commands)
+    _add_new(commands)
+    _add_form(commands)
+    _add(commands, "info", _info, "versions, BLAS, threads, what is missing, a self test", (
+        "Versions of everything, which BLAS is loaded, threads, memory, MPI, the compiler of forms and "
+        "where their kernels are; what is missing and the command that gets it; and a small scene, "
+        "solved and compared with its closed form. Exit code 1 where that is wrong."
+    ))  # fmt: skip
+    return parser
+
+
+def _add(
+    commands: Any,
+    name: str,
+    command: Callable[[argparse.Namespace], int],
+    short: str,
+    description: str,
+    *,
+    under: str = "tawami",
+    epilog: str | None = None,
+) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name,
+        help=short,
+        description=description,
+        epilog=epilog,
+        allow_abbrev=False,
+        formatter_class=argparse.RawDescriptionHelpFormatter if epilog else argparse.HelpFormatter,
+    )
+    parser.set_defaults(command=command, name=f"{under} {name}")
+    return parser
+
+
+def _add_run(commands: Any) -> None:
+    run = _add(commands, "run", _run, "run a driver script, on one rank or several", (
+        "Runs a script as python would. An error of tawami is one line, others keep their\n"
+        "traceback; on several ranks only the first one's prints appear."
+    ), epilog=(
+        "examples:\n"
+        "  tawami run pile.py\n"
+        "  tawami run pile.py --ranks 4 --replace -- --friction 0.3\n"
+        "  tawami run -m cases.collapse"
+    ))  # fmt: skip
+    what = run.add_mutually_exclusive_group(required=True)
+    what.add_argument("script", nargs="?", metavar="SCRIPT", help="a Python file")
+    what.add_argument("-m", "--module", metavar="NAME", help="a module, as after python -m")
+    _add_ranks(run)
+    existing = run.add_mutually_exclusive_group()
+    existing.add_argument(
+        "--replace",
+        dest="existing",
+        action="store_const",
+        const="replace",
+        help="where the folder of results holds a run: replace it",
+    )
+    existing.add_argument(
+        "--resume",
+        dest="existing",
+        action="store_const",
+        const="resume",
+        help="where the folder of results holds a run: go on from it",
+    )
+    _add_log_level(run)
+
+
+def _add_resume(commands: Any) -> None:
+    resume = _add(commands, "resume", _resume, "go on with a run that was stopped", (
+        "Runs the script (or module) that left these results again, with the same arguments, in the "
+        "same directory: finished phases are loaded, the one that was stopped goes on from its newest "
+        "checkpoint."
+    ))  # fmt: skip
+    resume.add_argument("folder", metavar="FOLDER", help="of the results, as results/pile")
+    _add_ranks(resume)
+    _add_log_level(resume)
+
+
+def _add_plot(commands: Any) -> None:
+    plot = _add(commands, "plot", _plot, "pictures and a movie of results", (
+        "Draws what a run wrote, beside it, and says which files these are."
+    ))  # fmt: skip
+    plot.add_argument("folder", metavar="FOLDER", help="of the results, as results/pile")
+    plot.add_argument(
+        "--quantity", default="mean stress", metavar="Q", help="colour (default: mean stress)"
+    )
+    plot.add_argument("--movie", choices=("gif", "mp4", "none"), default="gif", help="default: gif")
+
+
+def _add_new(commands: Any) -> None:
+    new = _add(commands, "new", _new, "begin a driver script", (
+        "Writes NAME.py, a commented script that runs as it is. A file that is there is not touched."
+    ))  # fmt: skip
+    new.add_argument("file", metavar="NAME", help="as mycase, or folder/mycase.py")
+    kind = new.add_mutually_exclusive_group()
+    for name, text in (("statics", "a beam, solved once (default)"), ("dynamics", "a slump")):
+        kind.add_argument(
+            f"--{name}", dest="kind", action="store_const", const=name, default="statics", help=text
+        )
+
+
+def _add_form(commands: Any) -> None:
+    form = commands.add_parser(
+        "form", help="check a weak form", description="What to do with forms."
+    )
+    actions = form.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    check = _add(actions, "check", _form_check, "try a weak form and say what it does wrong", (
+        "Loads a form and tries it: declaration, arguments, symmetry, the tangent against differences,\n"
+        "rigid motions, patch tests, both assemblies, stability and locking. A table with numbers;\n"
+        "FAILED (exit code 1) makes a form useless, a note (0) costs or misleads only."
+    ), under="tawami form", epilog=(
+        "examples:\n"
+        "  tawami form check my_form.py\n"
+        "  tawami form check u_epsv --set alpha=0.1 --set stabilisation=projection"
+    ))  # fmt: skip
+    check.add_argument("form", metavar="FORM", help="a file, or the name of a shipped form")
+    check.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        dest="settings",
+        help="a parameter or option of the form; may be given again",
+    )
+
+
+def _add_ranks(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--ranks", type=_number_of_ranks, metavar="N", help="start so many ranks with mpirun"
+    )
+
+
+def _add_log_level(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--log-level", choices=LEVELS, metavar="L", help=", ".join(LEVELS))
+
+
+def _number_of_ranks(text: str) -> int:
+    try:
+        number = int(text)
+    except ValueError:
+        number = 0
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"'{text}': expected a whole number, at least 1")
+    return number
+
+
+def _environment(asked: argparse.Namespace) -> dict[str, str]:
+    """Variables that the script finds."""
+    level = {LOG_LEVEL: asked.log_level} if asked.log_level else {}
+    existing = getattr(asked, "existing", None)
+    return level | ({EXISTING: existing} if existing else {})
+
+
+def _run(asked: argparse.Namespace) -> int:
+    path = None if asked.script is None else Path(asked.script)
+    script = launch.Script(path, asked.module, tuple(asked.arguments))
+    return launch.start(script, asked.ranks, _environment(asked))
+
+
+def _resume(asked: argparse.Namespace) -> int:
+    return launch.resume(Path(asked.folder), asked.ranks, _environment(asked))
+
+
+def _plot(asked: argparse.Namespace) -> int:
+    plot = importlib.import_module("tawami.results.plot")  # here: it needs matplotlib
+    movie = None if asked.movie == "none" else asked.movie
+    for path in plot.plot(asked.folder, quantity=asked.quantity, movie=movie):
+        print(path)
+    return 0
+
+
+def _new(asked: argparse.Namespace) -> int:
+    path = Path(asked.file)
+    path = path.with_name(path.name + ".py") if path.suffix != ".py" else path
+    if not path.stem.isidentifier():
+        raise InputError(
+            f"'{asked.file}': expected a name of letters, digits and _, as mycase: other Python files "
+            "can then import it"
+        )
+    text = (TEMPLATES / f"{asked.kind}.py").read_text(encoding="utf-8")
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text.replace("SCRIPT.py", path.name).replace("SCRIPT", path.stem))
+    except FileExistsError:
+        raise InputError(
+            f"'{path}' is there already, and was not touched: expected a new name"
+        ) from None
+    except OSError as error:
+        raise OutputError(f"'{path}' cannot be written: {error.strerror}") from error
+    print(f"{path} is written; run it with: tawami run {path}")
+    return 0
+
+
+def _form_check(asked: argparse.Namespace) -> int:
+    from tawami.check.form_check import check_form
+
+    report = check_form(asked.form, **dict(map(_setting, asked.settings)))
+    print(report)
+    return 0 if report.usable else 1
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not (name and equals and value):
+        raise InputError(f"--set {text}: expected NAME=VALUE, as alpha=0.1")
+    try:
+        return name, float(value)
+    except ValueError:
+        return name, value
+
+
+def _info(_: argparse.Namespace) -> int:
+    from tawami.command import information
+
+    return information.show()

@@ -1,0 +1,53 @@
+"""A beam of 2 m x 1 m, clamped on the left, 1 kN per metre depth down on the right.
+
+Run it with `tawami run SCRIPT.py`, on four ranks with `tawami run SCRIPT.py --ranks 4`. Metres, pascals,
+tension positive, plane strain.
+"""
+
+from pathlib import Path
+
+from mpi4py import MPI
+
+import tawami
+from tawami.results.output import result_folder, write_grid, write_particles
+
+RESULTS = Path("results") / Path(__file__).stem
+CELLS_OVER_THE_HEIGHT = 16
+
+
+def main() -> None:
+    """Build the scene, solve it, write and print what came out."""
+    # the grid: squares of side h; the body has to lie within it
+    n = CELLS_OVER_THE_HEIGHT
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, -0.5), h=1 / n, cells=(2 * n, n))
+
+    # the body: 2 x 2 particles in each cell; tawami.polygon(...) for slanted sides
+    beam = tawami.box(grid, (0, -0.5), (2, 0.5), per_axis=2)
+
+    # its material: also von_mises, drucker_prager, mohr_coulomb, NumpyLaw
+    rubber = tawami.linear_elastic(E=3e6, nu=0.4999)
+
+    # the weak form: the mixed u-eps_v one does not lock; or the path of a file of yours
+    scene = tawami.Scene(grid, beam, rubber, form="u_epsv")
+
+    # supports and loads, on edges of the grid: numbers, or functions of (x, y)
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    scene.traction("right", (0.0, -1e3))
+
+    print(scene.header())
+    solution = scene.solve()
+
+    print("tip deflection [m]:", -solution.displacement((2, 0))[1])
+    print("Newton iterations:", solution.iterations)
+    print("what the clamp gives [N/m]:", solution.reaction("left"))
+
+    # for ParaView
+    folder = result_folder(RESULTS)
+    write_particles(folder / "particles.vtu", solution)
+    write_grid(folder / "grid.vtu", solution)
+    print("written to", folder)
+
+
+if __name__ == "__main__":
+    tawami.run(main, Path(__file__).stem)

@@ -1,0 +1,1 @@
+"""Assembly and constraints: (form, particle densities, P) -> reduced residual and tangent."""

@@ -1,0 +1,131 @@
+"""Particle data that a form may name, and the densities it enters the field problem with.
+
+On the points of a fixed rule, particle data D become the volume-weighted densities of
+README, The method: `D_q = (sum_p V_p D_p l_q(x_p)) / (w_q |J|)` (`rust/adjoint.rs`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from tawami.base.errors import FormError
+
+Part = Literal["value", "strain", "gradient", "volume"]
+
+#: Components of the quantities that the material law gives, at small and at finite strain.
+LAW: Mapping[str, Mapping[str, int]] = {
+    "small": {"sigma": 3, "s": 3, "sigma_m": 1},
+    "finite": {"P": 4, "P_s": 4, "tau_m": 1, "ln_J": 1},
+}
+COMPONENTS = {**LAW["small"], **LAW["finite"]}
+#: Numbers per component of the parts of a law quantity: itself, and its derivatives with respect to
+#: the strain (xx, yy, gamma_xy), grad u (xx, xy, yx, yy) and the volumetric strain.
+WIDTH: Mapping[Part, int] = {"value": 1, "strain": 3, "gradient": 4, "volume": 1}
+
+OPERATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
+    "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ParticleScalar:
+    """A constant of the particle, as K or K**2/mu: an expression to be evaluated at the particles.
+
+    Attributes:
+        text: How it was written; two with the same text are the same density.
+        evaluate: From the named arrays (one entry per particle) to its values.
+    """
+
+    text: str
+    evaluate: Callable[[Mapping[str, Any]], Any] = field(compare=False)
+
+    def _binary(self, other: Any, symbol: str, *, swap: bool = False) -> Any:
+        if isinstance(other, LawQuantity) and symbol == "*":
+            return other * self
+        if not isinstance(other, ParticleScalar):
+            if not isinstance(other, (int, float)):
+                raise FormError(
+                    f"'{self.text} {symbol} ...': a particle constant combines with numbers and other "
+                    f"particle constants only, not with {type(other).__name__}. Put it into "
+                    "sum_p(constant, expression) instead"
+                )
+            number = float(other)
+            other = ParticleScalar(repr(other), lambda _: number)
+        a, b = (other, self) if swap else (self, other)
+        operation = OPERATIONS[symbol]
+        return ParticleScalar(
+            f"({a.text} {symbol} {b.text})", lambda v: operation(a.evaluate(v), b.evaluate(v))
+        )
+
+    def __add__(self, other: Any) -> Any:
+        return self._binary(other, "+")
+
+    def __radd__(self, other: Any) -> Any:
+        return self._binary(other, "+", swap=True)
+
+    def __sub__(self, other: Any) -> Any:
+        return self._binary(other, "-")
+
+    def __rsub__(self, other: Any) -> Any:
+        return self._binary(other, "-", swap=True)
+
+    def __mul__(self, other: Any) -> Any:
+        return self._binary(other, "*")
+
+    def __rmul__(self, other: Any) -> Any:
+        return self._binary(other, "*", swap=True)
+
+    def __truediv__(self, other: Any) -> Any:
+        return self._binary(other, "/")
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return self._binary(other, "/", swap=True)
+
+    def __pow__(self, other: Any) -> Any:
+        return self._binary(other, "**")
+
+
+@dataclass(frozen=True)
+class LawQuantity:
+    """A quantity that the material law gives, with its consistent tangent; times a constant of the
+    particle where there is one.
+    """
+
+    name: str
+    factor: ParticleScalar | None = None
+
+    def __mul__(self, other: Any) -> LawQuantity:
+        if not isinstance(other, (int, float, ParticleScalar)):
+            raise FormError(
+                f"'{self.name} * ...': a quantity of the law combines with particle constants only, not "
+                f"with {type(other).__name__}. Put it into sum_p({self.name}, expression) instead"
+            )
+        return LawQuantity(self.name, (self.factor or ONE) * other)
+
+    __rmul__ = __mul__
+
+
+Quantity = ParticleScalar | LawQuantity
+K = ParticleScalar("K", lambda values: values["K"])
+MU = ParticleScalar("mu", lambda values: values["mu"])
+ONE = ParticleScalar("1", lambda values: np.ones_like(values["mu"]))
+
+
+@dataclass(frozen=True)
+class Density:
+    """Particle data on the points of a rule: `part` of `quantity`, with `size` components."""
+
+    rule: Rule
+    quantity: Quantity
+    part: Part = "value"
+
+    @property
+    def size(self) -> int:
+        """Number of components."""
+        if isinstance(self.quantity, ParticleScalar):
+            return 1
+        return COMPONENTS[self.quantity.name] * WIDTH[self.part]

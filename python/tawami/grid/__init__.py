@@ -1,0 +1,1 @@
+"""The background grid: cells, edges and one-dimensional bases, before there are any particles."""

@@ -1,0 +1,1 @@
+"""From step to step: load ramps, settling, Newmark integration, transfers and energy."""

@@ -1,0 +1,158 @@
+"""Steps of a size that adapts: halved where one fails, grown again; loads that come in such steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from tawami.base import checks
+from tawami.base.errors import ConvergenceError, InputError, SingularError
+from tawami.motion.pace import Pace, Step
+from tawami.results.phase import Unwatched
+from tawami.results.results import Results, phase
+from tawami.scene.scene import Scene
+from tawami.scene.solution import Solution
+
+
+def march(
+    pace: Pace,
+    end: float,
+    smallest: float,
+    attempt: Callable[[float, float], Solution],
+    watched: Unwatched,
+    each: Callable[[Solution], None] | None = None,
+) -> list[Step]:
+    """Steps to an end.
+
+    Args:
+        pace: Where they begin, and their largest size; one that fails is halved, after three good ones
+            it doubles.
+        end: Where they end.
+        smallest: Size below which no step is tried again.
+        attempt: Takes a step to a place, of a size; raises and leaves everything as it was if it fails.
+        watched: What observes them.
+        each: Called with each accepted step.
+
+    Raises:
+        ConvergenceError, SingularError: At the smallest size.
+    """
+    largest, steps = pace.size, list[Step]()
+    watched.begin(pace, steps)
+    while end - pace.at > 1e-9 * largest:
+        now = min(pace.size, end - pace.at)
+        # no crumb is left for the last step
+        target = end if end - pace.at - now < 1e-6 * largest else pace.at + now
+        try:
+            solution = attempt(target, target - pace.at)
+        except (ConvergenceError, SingularError) as error:
+            pace.size, pace.good = now / 2, 0
+            if pace.size < smallest:
+                unit = watched.unit
+                error.add_note(f"at {pace.at:g} {unit}, with the smallest step of {now:g} {unit}")
+                raise
+            watched.halved(error, pace)
+            continue
+        steps.append(Step(target, target - pace.at, solution.history, solution.krylov))
+        pace.at = target
+        pace.good += 1
+        if pace.good >= 3 and pace.size < largest:
+            pace.size, pace.good = min(2 * pace.size, largest), 0
+        watched.accepted(solution, pace, steps, last=end - pace.at <= 1e-9 * largest)
+        if each is not None:
+            each(solution)
+        watched.keep()
+    return steps
+
+
+def ramp(
+    scene: Scene,
+    size: float = 0.05,
+    *,
+    smallest: float | None = None,
+    each: Callable[[Solution], None] | None = None,
+    results: Results | None = None,
+) -> list[Step]:
+    """Bring up, without inertia, the loads and prescribed displacements that are new to a scene.
+
+    What it has borne already stays. Loads grow in proportion, from 0 to 1 of what was asked for.
+
+    Args:
+        scene: The scene.
+        size: Largest share of the load in a step, above 0 to 1.
+        smallest: Share below which the run ends; size/1024 by default.
+        each: Called with the solution of each accepted step.
+        results: Where the run writes its results and checkpoints.
+
+    Returns:
+        The accepted steps, with those of a run that is gone on with.
+
+    Raises:
+        ConvergenceError, SingularError: At the smallest step, with its history; the scene is in the
+            last equilibrium that was found.
+        InputError: A size out of its range, or as `Scene.solve`.
+    """
+    checks.instance("ramp: scene", scene, Scene, "a tawami.Scene")
+    size = checks.number("size", size, low=checks.LEAST, high=1.0)
+    checks.number("size", size, low=1e-9)  # more steps than that would never end
+    least = size / 1024 if smallest is None else checks.number("smallest", smallest, low=0.0)
+    each = checks.function("each", each, "of a solution")
+    pace = Pace(0.0, size)
+    try:
+        with phase(results, "ramp", scene, None, 1.0, "of the load") as watched:
+            return march(
+                pace, 1.0, least, lambda part, _size: scene.solve_part(part), watched, each
+            )
+    finally:
+        if pace.at < 1.0:
+            scene.accept(pace.at)
+
+
+def settle(
+    scene: Scene,
+    *,
+    tolerance: float = 1e-10,
+    max_resets: int = 200,
+    results: Results | None = None,
+) -> list[Step]:
+    """Solve under the present loads, the grid reset each time, until nothing is out of balance.
+
+    With each reset the particles meet other functions, and what was in balance is so no longer.
+
+    Args:
+        scene: A scene of finite strain.
+        tolerance: Of the momentum measure right after a reset.
+        max_resets: Number of solves after which it is given up.
+        results: Where the run writes its results and checkpoints.
+
+    Raises:
+        ConvergenceError: Not within `max_resets` solves.
+    """
+    checks.instance("settle: scene", scene, Scene, "a tawami.Scene")
+    tolerance = checks.number("tolerance", tolerance, low=1e-14, high=0.1)
+    max_resets = checks.whole_number("max_resets", max_resets, low=1)
+    if scene.form.strain != "finite":
+        raise InputError(
+            "settle(...) resets the grid: expected a scene with a form of finite strain"
+        )
+    pace, steps = Pace(0.0, 1.0), list[Step]()
+    with (
+        scene.tolerance_of(max(0.1 * tolerance, 1e-14)),
+        phase(results, "settle", scene, None, max_resets, "resets") as watched,
+    ):
+        watched.begin(pace, steps)
+        while pace.at < max_resets and not watched.finished:
+            solution = scene.solve()
+            steps.append(Step(1.0, 0.0, solution.history, solution.krylov))
+            pace.at += 1.0
+            settled = solution.history[0][0] < tolerance
+            watched.accepted(solution, pace, steps, last=settled)
+            watched.keep()
+            if settled:
+                return steps
+        if watched.finished:
+            return steps
+        raise ConvergenceError(
+            f"settle: {steps[-1].history[0][0]:.1e} of the forces are out of balance after {max_resets} "
+            f"resets of the grid: expected less than {tolerance:g}; allow more resets, or a larger "
+            "tolerance",
+            steps[-1].history,
+        )

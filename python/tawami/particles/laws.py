@@ -1,0 +1,185 @@
+"""Material laws: what a driver script passes to a scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from tawami import _rust
+from tawami.base import checks
+from tawami.base.errors import InputError
+
+
+def linear_elastic(
+    *,
+    E: float | None = None,
+    nu: float | None = None,
+    K: float | None = None,
+    mu: float | None = None,
+    one_minus_2nu: float | None = None,
+) -> _rust.Material:
+    """Isotropic linear elasticity: `s = 2 mu dev(eps)`, `sigma_m = K eps_v`.
+
+    Give (E, nu), (K, mu), or (E, one_minus_2nu); the last keeps its digits near nu = 0.5.
+
+    Args:
+        E: Young's modulus [Pa].
+        nu: Poisson's ratio, -1 < nu <= 0.5; 0.5 with form 'u_p' only.
+        K: Bulk modulus [Pa].
+        mu: Shear modulus [Pa].
+        one_minus_2nu: 1 - 2 nu, from 0 (with form 'u_p' only) to below 3.
+
+    Raises:
+        InputError: A parameter out of its range, or another combination.
+    """
+    return _elastic("linear_elastic", E=E, nu=nu, K=K, mu=mu, one_minus_2nu=one_minus_2nu)
+
+
+def neo_hookean(
+    *,
+    E: float | None = None,
+    nu: float | None = None,
+    K: float | None = None,
+    mu: float | None = None,
+    one_minus_2nu: float | None = None,
+) -> _rust.Material:
+    """Neo-Hookean elasticity: `tau = mu dev(be_bar) + K ln J I`, be_bar = J^(-2/3) F F^T.
+
+    At finite strain only. Give its constants at small strain as (E, nu), (K, mu), or
+    (E, one_minus_2nu); the last keeps its digits near nu = 0.5.
+
+    Args:
+        E: Young's modulus [Pa].
+        nu: Poisson's ratio, -1 < nu < 0.5.
+        K: Bulk modulus [Pa].
+        mu: Shear modulus [Pa].
+        one_minus_2nu: 1 - 2 nu, above 0 and below 3.
+
+    Raises:
+        InputError: A parameter out of its range, or another combination.
+    """
+    name = "neo_hookean"
+    elastic = _elastic(name, E=E, nu=nu, K=K, mu=mu, one_minus_2nu=one_minus_2nu)
+    return _made(name, _rust.Material.neo_hookean, elastic.bulk_modulus, elastic.shear_modulus)
+
+
+def von_mises(
+    elastic: _rust.Material, *, yield_stress: float, hardening: float = 0.0
+) -> _rust.Material:
+    """Von Mises plasticity: `q = sqrt(3 J2) <= yield_stress + hardening * plastic_strain`.
+
+    Args:
+        elastic: Elastic part, as linear_elastic(...) makes it; nu < 0.5.
+        yield_stress: In uniaxial tension [Pa].
+        hardening: Hardening modulus [Pa].
+
+    History: `plastic_strain`, the equivalent plastic strain.
+
+    Raises:
+        InputError: A parameter out of its range.
+    """
+    K, mu = _moduli("von_mises", elastic)
+    yield_stress = checks.real("von_mises: yield_stress", yield_stress)
+    hardening = checks.real("von_mises: hardening", hardening)
+    return _made("von_mises", _rust.Material.von_mises, K, mu, yield_stress, hardening)
+
+
+def drucker_prager(
+    elastic: _rust.Material,
+    *,
+    phi: float,
+    c: float = 0.0,
+    psi: float = 0.0,
+    eps_v_max: float = math.inf,
+    tiny_angle: bool = False,
+) -> _rust.Material:
+    """Drucker-Prager plasticity whose limit states in plane strain are those of Mohr-Coulomb.
+
+    Args:
+        elastic: Elastic part, as linear_elastic(...) makes it; nu < 0.5.
+        phi: Friction angle [degrees].
+        c: Cohesion [Pa].
+        psi: Dilatancy angle [degrees], at most phi.
+        eps_v_max: Plastic volumetric strain at which dilatancy ends; the strength stays that of psi.
+        tiny_angle: Take a friction angle between 0 and 1.6 degrees as it is: it is not in radians.
+
+    History: `plastic_strain`, the multiplier of sqrt(J2); `dilatancy`, the plastic volumetric strain.
+
+    Raises:
+        InputError: A parameter out of its range.
+    """
+    make = _rust.Material.drucker_prager
+    return _frictional("drucker_prager", make, elastic, tiny_angle, phi, c, psi, eps_v_max)
+
+
+def mohr_coulomb(
+    elastic: _rust.Material,
+    *,
+    phi: float,
+    c: float = 0.0,
+    psi: float = 0.0,
+    eps_v_max: float = math.inf,
+    tiny_angle: bool = False,
+) -> _rust.Material:
+    """Mohr-Coulomb plasticity: `s1 - s3 + (s1 + s3) sin phi <= 2 c cos phi`, s1 >= s2 >= s3 the
+    principal stresses, tension positive; Tresca where phi = 0.
+
+    Args:
+        elastic: Elastic part, as linear_elastic(...) makes it; nu < 0.5.
+        phi: Friction angle [degrees].
+        c: Cohesion [Pa]; with phi = 0 the undrained strength s_u.
+        psi: Dilatancy angle [degrees], at most phi.
+        eps_v_max: Plastic volumetric strain at which dilatancy ends; the strength stays.
+        tiny_angle: Take a friction angle between 0 and 1.6 degrees as it is: it is not in radians.
+
+    History: `plastic_strain`, the sum over the steps of the greatest plastic shear (gamma: largest less
+    smallest principal value of the step's plastic strain); `dilatancy`, the plastic volumetric strain
+    but for what opens at the apex.
+
+    Raises:
+        InputError: A parameter out of its range.
+    """
+    make = _rust.Material.mohr_coulomb
+    return _frictional("mohr_coulomb", make, elastic, tiny_angle, phi, c, psi, eps_v_max)
+
+
+def _elastic(law: str, **given: float | None) -> _rust.Material:
+    """The linear law of two constants, for what `law` got."""
+    values = {name: value for name, value in given.items() if value is not None}
+    makers: dict[tuple[str, ...], Callable[[float, float], _rust.Material]] = {
+        ("E", "nu"): _rust.Material.linear_elastic_e_nu,
+        ("K", "mu"): _rust.Material.linear_elastic_k_mu,
+        ("E", "one_minus_2nu"): _rust.Material.linear_elastic_e_one_minus_2nu,
+    }
+    if tuple(values) not in makers:
+        raise InputError(
+            f"{law} got {', '.join(values) or 'nothing'}: expected (E, nu), (K, mu) or "
+            "(E, one_minus_2nu)"
+        )
+    first, second = (checks.real(f"{law}: {name}", value) for name, value in values.items())
+    return _made(law, makers[tuple(values)], first, second)
+
+
+def _frictional(
+    law: str, make: Callable[..., _rust.Material], elastic: Any, tiny: Any, *given: Any
+) -> _rust.Material:
+    """A law of phi, c, psi and eps_v_max."""
+    moduli, names = _moduli(law, elastic), ("phi", "c", "psi", "eps_v_max")
+    values = [checks.real(f"{law}: {n}", v) for n, v in zip(names, given, strict=True)]
+    return _made(law, make, moduli, *values, checks.switch(f"{law}: tiny_angle", tiny))
+
+
+def _moduli(name: str, elastic: Any) -> tuple[float, float]:
+    if not isinstance(elastic, _rust.Material) or elastic.finite_only:
+        raise InputError(
+            f"{name}: elastic = {checks.shown(elastic)}: expected a material of linear_elastic(...)"
+        )
+    return elastic.bulk_modulus, elastic.shear_modulus
+
+
+def _made(name: str, make: Callable[..., _rust.Material], *parameters: Any) -> _rust.Material:
+    try:
+        return make(*parameters)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None

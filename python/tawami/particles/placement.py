@@ -1,0 +1,158 @@
+"""Which cell and rank each particle belongs to, and which ones left the grid."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami import _rust
+from tawami.base import ranks
+from tawami.base.errors import CheckpointError, InputError
+from tawami.grid.grid import Grid
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+#: Distance, in cells, to which moving particles approach a side of their cell: one that is alone leaves
+#: functions beyond it without strength and mass. It is as well as on the side, to this distance.
+MARGIN = 1e-5
+
+
+def located(grid: Grid, x: Array, *, moving: bool) -> _rust.Location:
+    """Cells of particles; those that move are kept off the sides of their cells."""
+    location = grid.rust.locate(x)
+    return location.away_from_sides(MARGIN) if moving else location
+
+
+def outside(grid: Grid, x: Array) -> Mask:
+    """Whether each position is outside the grid, by more than Rust takes for round-off."""
+    margin = 1e-9 * grid.h
+    inside = (x >= np.subtract(grid.origin, margin)) & (x <= np.add(grid.upper, margin))
+    return np.asarray(~inside.all(axis=1))
+
+
+def distributed(
+    grid: Grid, body: _rust.Particles, *, moving: bool
+) -> tuple[_rust.Particles, _rust.Location]:
+    """Of a body that every rank has, the particles in this rank's cells.
+
+    Raises:
+        InputError: Particles outside the grid, or a body that is not the same on all ranks.
+    """
+    location = located(grid, body.x, moving=moving)
+    if grid.comm.size == 1:
+        return body, location
+    parts = (body.x, body.volume, body.material)
+    digest = hashlib.sha1(b"".join(part.tobytes() for part in parts)).digest()
+    if len(set(grid.comm.allgather(digest))) > 1:
+        raise InputError(
+            "the body is not the same on all ranks: expected the same positions, volumes and "
+            "materials on each. Give random numbers a seed, or make it on one rank and bcast it"
+        )
+    mine = np.flatnonzero(grid.rank_of_cell[location.cell] == grid.comm.rank).astype(np.uint32)
+    return body.select(mine), location.select(mine)
+
+
+def columns(particles: _rust.Particles) -> list[tuple[str, int]]:
+    """Name and width of the arrays of particles, as they stand in their rows."""
+    double = np.dtype(float).itemsize
+    return [(name, max(1, size // double)) for name, size in particles.arrays]
+
+
+def in_order(comm: Any, number: npt.NDArray[Any]) -> Callable[[npt.ArrayLike], Any]:
+    """What makes of an array of each rank's particles that of all of them, in the order of their
+    numbers; on every rank, as a call for all.
+    """
+    order = np.argsort(ranks.joined(comm, np.asarray(number)), kind="stable")
+    return lambda values: ranks.joined(comm, np.asarray(values))[order]
+
+
+def gathered(grid: Grid, particles: _rust.Particles) -> dict[str, Array]:
+    """The arrays of all ranks' particles by name, in the order of their numbers; on every rank."""
+    rows = in_order(grid.comm, particles.number)(particles.rows())
+    names, widths = zip(*columns(particles), strict=True)
+    parts = np.split(rows, np.cumsum(widths)[:-1], axis=1)
+    return dict(zip(names, map(np.ascontiguousarray, parts), strict=True))
+
+
+def scattered(
+    grid: Grid, particles: _rust.Particles, arrays: Mapping[str, Array], *, moving: bool
+) -> tuple[_rust.Particles, _rust.Location]:
+    """The reverse of :func:`gathered`: this rank's particles, `particles` themselves if they are the
+    same ones, with these values.
+
+    Raises:
+        CheckpointError: Other arrays than those of the particles.
+    """
+    wanted = dict(columns(particles))
+    found = {name: array.shape[1] for name, array in arrays.items()}
+    if wanted != found:
+        differ = sorted(set(wanted.items()) ^ set(found.items()))
+        raise CheckpointError(
+            f"its particles have other arrays than those of the scene: {differ[0][0]} is in one of them "
+            "only, or has another width. Expected the same form, laws and motion"
+        )
+    whole = particles.of_rows(np.hstack([arrays[name] for name in wanted]))
+    mine, location = distributed(grid, whole, moving=moving)
+    return (particles if particles.assign(mine) else mine), location
+
+
+def migrated(grid: Grid, particles: _rust.Particles) -> tuple[_rust.Particles, _rust.Location]:
+    """Moving particles on the rank of their cell, in the order of their numbers."""
+    comm = grid.comm
+    while True:
+        location = located(grid, particles.x, moving=True)
+        if comm.size == 1:
+            return particles, location
+        rank = grid.rank_of_cell[location.cell]
+        if not ranks.any_of(comm, np.array([(rank != comm.rank).any()]))[0]:
+            return particles, location
+        particles = particles.of_rows(ranks.exchanged(comm, particles.rows(), rank))
+        particles = particles.select(np.argsort(particles.number).astype(np.uint32))
+
+
+def check_staying(
+    grid: Grid, particles: _rust.Particles, x: Array, time: float, *, stop: bool
+) -> None:
+    """Whether a step may move the particles to x.
+
+    Args:
+        grid: The grid.
+        particles: Those of this rank.
+        x: Where they would be [m].
+        time: When [s]; not a number in a static scene.
+        stop: Whether a single one that leaves is an error.
+
+    Raises:
+        InputError: One leaves, or the last one does.
+    """
+    gone = outside(grid, x)
+    with ranks.together(grid.comm):
+        if gone.any() and stop:
+            p = np.flatnonzero(gone)[0]
+            when = "" if np.isnan(time) else f" at {time:g} s"
+            raise InputError(
+                f"particle {particles.number[p]} would leave the grid{when}, at ({x[p, 0]:g}, "
+                f"{x[p, 1]:g}) m, and {gone.sum() - 1} others with it: expected a grid that holds the "
+                "motion, or Scene(..., leaving='remove'). Nothing was changed"
+            )
+    staying = ranks.sum_of(grid.comm, np.array([np.sum(~gone)]))
+    if not staying[0]:
+        raise InputError("the last particle would leave the grid: nothing is left to compute")
+
+
+def removed(
+    grid: Grid, particles: _rust.Particles
+) -> tuple[_rust.Particles, list[tuple[int, tuple[float, float]]]]:
+    """The particles inside the grid; number and position [m] of those outside, of all ranks."""
+    gone = outside(grid, particles.x)
+    mine = [
+        (int(particles.number[p]), (float(particles.x[p, 0]), float(particles.x[p, 1])))
+        for p in np.flatnonzero(gone)
+    ]
+    if gone.any():
+        particles = particles.select(np.flatnonzero(~gone).astype(np.uint32))
+    return particles, [one for part in grid.comm.allgather(mine) for one in part]

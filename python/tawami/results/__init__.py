@@ -1,0 +1,1 @@
+"""Observers of a run: files, checkpoints, log and pictures."""

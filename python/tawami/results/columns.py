@@ -1,0 +1,183 @@
+"""Columns of a table, by name: energies, reactions, displacements of points, momentum, iterations."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from tawami import _rust
+from tawami.base import checks
+from tawami.base.errors import InputError, NotModelledError
+from tawami.grid import edges
+from tawami.motion.energy import Energies
+from tawami.motion.observer import Moment
+from tawami.results.quantities import body_view
+from tawami.scene.solution import supported_edge, supported_edges
+
+if TYPE_CHECKING:
+    from tawami.motion.dynamics import Dynamics
+    from tawami.scene.scene import Scene
+
+Array = npt.NDArray[np.float64]
+#: Particles whose displacements a linear fit around a point takes, where strains are finite.
+NEIGHBOURS = 12
+
+
+@dataclass(frozen=True)
+class Columns:
+    """One quantity, in one column or several.
+
+    Attributes:
+        labels: Their names and units.
+        of: Their values; `size` is what lies between a moment and the one before. A call for all ranks.
+    """
+
+    labels: tuple[str, ...]
+    of: Callable[[Moment, float], Sequence[float]]
+
+
+#: What is known, as messages list it.
+KNOWN = (
+    "energies", "momentum", "angular momentum", "reaction EDGE", "reaction (X, Y)",
+    "displacement (X, Y)", "run-out", "particles", "Newton iterations", "step size",
+)  # fmt: skip
+
+
+def columns(names: Iterable[str], scene: Scene, motion: Dynamics | None) -> list[Columns]:
+    """Columns by the names of quantities.
+
+    Raises:
+        NotModelledError: One that the scene does not have; the message names the switch that adds it.
+        InputError: An unknown name, a point outside the grid, an edge that nothing supports.
+    """
+    return [_columns(name, scene, motion) for name in names]
+
+
+def usual_columns(motion: Dynamics | None) -> tuple[str, ...]:
+    """What a table has where nothing is asked for."""
+    return (*(("energies",) if motion is not None else ()), "Newton iterations", "step size")
+
+
+def _columns(name: str, scene: Scene, motion: Dynamics | None) -> Columns:
+    if name == "energies":
+        names = [field.name for field in fields(Energies)]
+        labels = tuple(f"energy {part} [J/m]" for part in names)
+        _ = (motion or scene).energies  # or its sentence
+        return Columns(labels, lambda now, _: [getattr(_moving(now).energies, n) for n in names])
+    if name in ("momentum", "angular momentum"):
+        return _momentum(name, scene, motion)
+    if name == "run-out":
+        return Columns(("run-out [m]",), lambda now, _: [_farthest(now.scene)])
+    if name == "particles":
+        return Columns(("particles [-]",), lambda now, _: [_present(now.scene)])
+    if name == "Newton iterations":
+        return Columns(("Newton iterations [-]",), lambda now, _: [_iterations(now)])
+    if name == "step size":
+        unit = "-" if motion is None else "s"
+        return Columns((f"step size [{unit}]",), lambda _, size: [size])
+    kind, _, rest = name.partition(" ")
+    if kind == "reaction" and rest:
+        return _reaction(name, rest, scene)
+    if kind == "displacement" and rest:
+        return _displacement(name, _point(name, rest), scene)
+    raise InputError(f"table: '{name}' is unknown: expected one of {', '.join(KNOWN)}")
+
+
+def _moving(now: Moment) -> Dynamics:
+    assert now.motion is not None
+    return now.motion
+
+
+def _momentum(name: str, scene: Scene, motion: Dynamics | None) -> Columns:
+    if motion is None:
+        try:
+            _ = scene.velocity
+        except NotModelledError as error:
+            raise NotModelledError(f"{name} needs a {error}") from None
+    if name == "momentum":
+        labels = ("momentum x [kg m/s per m]", "momentum y [kg m/s per m]")
+        return Columns(labels, lambda now, _: list(_moving(now).linear_momentum))
+    label = "angular momentum [kg m2/s per m]"
+    return Columns((label,), lambda now, _: [_moving(now).angular_momentum()])
+
+
+def _farthest(scene: Scene) -> float:
+    """The largest x of a particle [m]."""
+    most = float(np.asarray(scene.particles.x)[:, 0].max(initial=-np.inf))
+    return float(scene.grid.comm.allreduce(most, op=MPI.MAX))
+
+
+def _present(scene: Scene) -> float:
+    return float(scene.num_particles - len(scene.left))
+
+
+def _iterations(now: Moment) -> float:
+    return 0 if now.solution is None else now.solution.iterations
+
+
+def _reaction(name: str, place: str, scene: Scene) -> Columns:
+    at: str | tuple[float, float] = place
+    if place.startswith("("):
+        at = _point(name, place)
+        held = [s for s in scene.supports.all if not isinstance(s.place, str)]
+        if not any(np.allclose(at, known) for s in held for known in (s.place, s.given)):
+            raise InputError(f"{name}: no point is held there: expected hold({at}, ...) before")
+    else:
+        supported_edge(place, supported_edges(scene.supports))
+
+    def of(now: Moment, _: float) -> list[float]:
+        if now.solution is None:
+            return [np.nan, np.nan]  # not known before anything is solved
+        return list(now.solution.reaction(at))
+
+    return Columns((f"{name} x [N/m]", f"{name} y [N/m]"), of)
+
+
+def _point(name: str, text: str) -> tuple[float, float]:
+    try:
+        return checks.point(name, ast.literal_eval(text))
+    except (SyntaxError, ValueError):
+        raise InputError(f"{name}: expected a point as (2, 0) after the name") from None
+
+
+def _displacement(name: str, point: tuple[float, float], scene: Scene) -> Columns:
+    """Of the grid where it stays, of the particles that were around the point where it does not."""
+    location = edges.locate_point(scene.grid, point, name)
+    moves = scene.form.strain == "finite"
+    if moves:
+        displacement_near(scene, point, name)
+
+    def of(now: Moment, _: float) -> list[float]:
+        if moves:
+            return list(displacement_near(now.scene, point, name))
+        u = now.scene.split(now.scene.gap)[0]
+        return list(_rust.interpolate(location, now.scene.basis, 2, u)[0])
+
+    return Columns((f"{name} x [m]", f"{name} y [m]"), of)
+
+
+def displacement_near(scene: Scene, point: tuple[float, float], what: str) -> Array:
+    """Displacement (u_x, u_y) [m] since the start of what was at a point then: of a linear fit to the
+    particles that were around it; a call for all ranks.
+
+    Raises:
+        InputError: No particle was within a cell of it.
+    """
+    view = body_view(scene, None)
+    u = view("displacement")
+    offset = view("x") - u - np.asarray(point)
+    distance = np.linalg.norm(offset, axis=1)
+    if not distance.min(initial=np.inf) <= scene.grid.h:
+        raise InputError(
+            f"{what}: no particle was within a cell of it, {scene.grid.h:g} m: expected a point of the "
+            "body as it was at the start"
+        )
+    near = np.argsort(distance, kind="stable")[:NEIGHBOURS]
+    basis = np.column_stack([np.ones(len(near)), offset[near]])
+    return np.asarray(np.linalg.lstsq(basis, u[near], rcond=None)[0][0])

@@ -1,0 +1,111 @@
+"""Particle fields on the vertices of the grid, for smooth pictures: on the bilinear functions M_i.
+
+    lumped        f_i = sum_p V_p M_i f_p / sum_p V_p M_i
+    consistent    sum_p V_p M_i (sum_j M_j f_j - f_p) = 0
+
+`lumped` stays within the range of the particles around a vertex; at the border of a body, where they
+stand on one side of it, it is off by the slope. `consistent`, the projection in L2, is exact for
+bilinear fields and may overshoot elsewhere. Its matrix is singular where a cell holds fewer than four
+particles; conjugate gradients from `lumped` leave there what no particle sees (`cases/projection.py`:
+errors of both). Vertices without particles in their cells have no value: NaN.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami import _rust
+from tawami.base import checks
+
+if TYPE_CHECKING:
+    from tawami.scene.scene import Scene
+
+Array = npt.NDArray[np.float64]
+Projection = Literal["lumped", "consistent"]
+#: Residual, of the field's own size, at which conjugate gradients end, and the most iterations.
+SMALL, MOST = 1e-10, 200
+
+
+def check_projection(method: str) -> Projection:
+    """'lumped' or 'consistent'.
+
+    Raises:
+        InputError: Anything else.
+    """
+    return checks.choice("projection", method, get_args(Projection))  # type: ignore[no-any-return]
+
+
+def vertices(scene: Scene) -> Array:
+    """Corners of the cells, x fastest [m]: vertices x 2."""
+    grid = scene.grid
+    x, y = (
+        grid.axis_positions(axis, np.arange(number + 1), 0.0)
+        for axis, number in enumerate(grid.cells)
+    )
+    return np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
+
+
+def nodal(scene: Scene, values: Array, method: Projection = "lumped") -> Array:
+    """A field of the particles on the vertices of the grid; a call for all ranks.
+
+    Args:
+        scene: The scene with its particles where they are.
+        values: Of this rank's particles, particles or particles x components.
+        method: 'lumped' or 'consistent'.
+
+    Returns:
+        Vertices (x fastest), by components where there are any; NaN where no particle is near.
+
+    Raises:
+        InputError: An unknown method.
+    """
+    method = check_projection(method)
+    columns = np.asarray(values, dtype=float).reshape(len(scene.particles), -1)
+    sums = _sums(scene, np.column_stack([np.ones(len(columns)), columns]))
+    weight, right = sums[:, :1], sums[:, 1:]
+    near = weight > 0
+    found = np.divide(right, weight, out=np.zeros_like(right), where=near)
+    if method == "consistent":
+        found = _conjugate_gradients(scene, found, weight, right)
+    return np.where(near, found, np.nan).reshape(-1, *np.shape(values)[1:])
+
+
+def _sums(scene: Scene, data: Array) -> Array:
+    """sum_p V_p M_i data_p, vertices x columns."""
+    return scene.attached.sums(np.asarray(scene.particles.volume), data, "bilinear")
+
+
+def _conjugate_gradients(scene: Scene, start: Array, weight: Array, right: Array) -> Array:
+    """The consistent projection, every column by itself, preconditioned by the lumped matrix.
+
+    Every rank has whole vectors and takes the same steps.
+    """
+    location = scene.attached.location
+
+    def product(f: Array) -> Array:
+        at_particles = [
+            _rust.interpolate(location, "bilinear", 1, np.ascontiguousarray(column))
+            for column in f.T
+        ]
+        return _sums(scene, np.column_stack(at_particles))
+
+    def over(top: Array, bottom: Array) -> Array:
+        return np.divide(top, bottom, out=np.zeros_like(top), where=bottom > 0)
+
+    f, r = start.copy(), right - product(start)
+    z = over(r, np.broadcast_to(weight, r.shape))
+    d, rz = z.copy(), (r * z).sum(axis=0)
+    enough = SMALL**2 * (right * start).sum(axis=0)  # round-off must not be followed
+    for _ in range(MOST):
+        if (rz <= enough).all():
+            break
+        q = product(d)
+        step = np.where(rz > enough, over(rz, (d * q).sum(axis=0)), 0.0)
+        f, r = f + step * d, r - step * q
+        z = over(r, np.broadcast_to(weight, r.shape))
+        before, rz = rz, (r * z).sum(axis=0)
+        d = z + over(rz, before) * d
+    return f

@@ -1,0 +1,288 @@
+"""What can be written of the particles and on the grid, by name; columns of a table: `columns`.
+
+Arrays and columns are called "name [unit]", a tensor's "stress xx yy zz xy [Pa]". What a scene does not
+model is an error that says what does; an unknown name lists those that are known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+from tawami import _rust
+from tawami.base.errors import InputError, NotModelledError
+from tawami.grid import edges
+from tawami.grid.basis import extraction, greville_1d, values_1d
+from tawami.motion.observer import Moment
+from tawami.motion.transfer import to_grid
+from tawami.particles import placement
+from tawami.results.projection import Projection, nodal
+from tawami.scene.solution import Solution
+
+if TYPE_CHECKING:
+    from tawami.motion.dynamics import Dynamics
+    from tawami.scene.scene import Scene
+
+Array = npt.NDArray[np.float64]
+#: Arrays of the particles by name.
+View = Callable[[str], Array]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A field of the particles.
+
+    Attributes:
+        label: How files call it.
+        of: Its values, particles or particles x components, from the arrays of the particles.
+        nodal: Whether means of it make sense: it can be projected on the grid.
+    """
+
+    label: str
+    of: Callable[[View], Array]
+    nodal: bool = True
+
+
+def _stored(name: str) -> Callable[[View], Array]:
+    return lambda view: view(name)
+
+
+def _mean_stress(view: View) -> Array:
+    return np.asarray(view("stress")[:, :3].mean(axis=1))
+
+
+def _deviatoric_stress(view: View) -> Array:
+    """q = sqrt(3/2 s : s), three-dimensional."""
+    stress = view("stress")
+    s = stress[:, :3] - _mean_stress(view)[:, None]
+    return np.asarray(np.sqrt(1.5 * ((s**2).sum(axis=1) + 2 * stress[:, 3] ** 2)))
+
+
+#: Fields of the particles; beside them the history variables of the laws, which are strains.
+PARTICLES = {
+    "displacement": Quantity("displacement [m]", _stored("displacement"), nodal=False),
+    "stress": Quantity("stress xx yy zz xy [Pa]", _stored("stress")),
+    "mean stress": Quantity("mean stress [Pa]", _mean_stress),
+    "deviatoric stress q": Quantity("deviatoric stress q [Pa]", _deviatoric_stress),
+    "volume": Quantity("volume [m2 per m]", _stored("volume"), nodal=False),
+    "eps_v": Quantity("eps_v [-]", _stored("eps_v")),
+    "velocity": Quantity("velocity [m/s]", _stored("velocity"), nodal=False),
+    "acceleration": Quantity("acceleration [m/s2]", _stored("acceleration"), nodal=False),
+    "material": Quantity("material [-]", _stored("material"), nodal=False),
+    "number": Quantity("number [-]", _stored("number"), nodal=False),
+}
+#: Of the laws that come with tawami.
+HISTORY = ("plastic_strain", "dilatancy")
+
+
+def _history(name: str) -> Quantity:
+    return Quantity(f"{name} [-]", _stored(name))
+
+
+def local_view(scene: Scene, motion: Dynamics | None) -> View:
+    """The particles of this rank."""
+    particles = scene.particles
+
+    def view(name: str) -> Array:
+        if name in ("velocity", "acceleration"):
+            return np.asarray(getattr(motion or scene, name))
+        if name not in PARTICLES and name != "x":
+            return np.asarray(particles.history(name))
+        return np.asarray(getattr(particles, name))
+
+    return view
+
+
+def body_view(scene: Scene, motion: Dynamics | None) -> View:
+    """The particles of all ranks in the order of their numbers; calls for all ranks."""
+    local, comm = local_view(scene, motion), scene.grid.comm
+    whole = placement.in_order(comm, local("number"))
+    known: dict[str, Array] = {}
+
+    def view(name: str) -> Array:
+        if name not in known:
+            known[name] = np.asarray(whole(local(name)))
+        return known[name]
+
+    return view
+
+
+def solution_view(solution: Solution) -> View:
+    """The particles as they were when this was solved."""
+    other = {"displacement": "displacement_of_particles"}
+    return lambda name: np.asarray(getattr(solution, other.get(name, name)))
+
+
+def of_particles(names: Iterable[str], scene: Scene, motion: Dynamics | None) -> list[Quantity]:
+    """Fields of the particles by their names.
+
+    Raises:
+        NotModelledError: One that the scene does not have; the message names the switch that adds it.
+        InputError: An unknown name.
+    """
+    known = PARTICLES | {name: _history(name) for name in scene.particles.history_names}
+    view, found = local_view(scene, motion), []
+    for name in names:
+        if name not in known and name not in HISTORY:
+            raise InputError(_unknown("particles", name, known))
+        quantity = known.get(name, _history(name))
+        with _not_modelled():
+            quantity.of(view)
+        found.append(quantity)
+    return found
+
+
+def usual_of_particles(scene: Scene, motion: Dynamics | None) -> tuple[str, ...]:
+    """What is written where nothing is asked for."""
+    names = ["displacement", "stress", "mean stress"]
+    names += ["eps_v"] if scene.form.kinematics == "mixed" else []
+    names += ["velocity"] if motion is not None else []
+    return (*names, *scene.particles.history_names)
+
+
+def _unknown(place: str, name: str, known: Iterable[str]) -> str:
+    return f"{place}: '{name}' is unknown: expected one of {', '.join(known)}"
+
+
+@contextmanager
+def _not_modelled() -> Iterator[None]:
+    """The sentence of whatever is asked, as the error that says that a scene does not have it."""
+    try:
+        yield
+    except InputError as error:
+        raise NotModelledError(str(error)) from None
+
+
+# -- on the grid -------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class GridQuantity:
+    """A field of the grid.
+
+    Attributes:
+        label: How files call it.
+        of: Its values at the vertices, or in the cells, x fastest; a call for all ranks.
+        cells: Whether it has one value a cell.
+    """
+
+    label: str
+    of: Callable[[Moment], Array]
+    cells: bool = False
+
+
+def on_grid(
+    names: Iterable[str], scene: Scene, motion: Dynamics | None, projection: Projection = "lumped"
+) -> list[GridQuantity]:
+    """Fields of the grid by their names: its own, or those of particles, projected.
+
+    Raises:
+        NotModelledError, InputError: As `of_particles`.
+    """
+    own = _of_grid(scene)
+    histories = {name: _history(name) for name in scene.particles.history_names}
+    projected = [name for name, quantity in (PARTICLES | histories).items() if quantity.nodal]
+    found = []
+    for name in names:
+        if name == "p" and name not in own:
+            raise NotModelledError(
+                f"p: form {scene.form.name} has no pressure: expected form='u_p'"
+            )
+        if name in own:
+            if name == "velocity":
+                of_particles([name], scene, motion)
+            found.append(own[name])
+        elif name in projected or name in HISTORY:
+            found.append(_projected(of_particles([name], scene, motion)[0], projection))
+        else:
+            raise InputError(_unknown("grid", name, dict.fromkeys([*own, *projected])))
+    return found
+
+
+def usual_on_grid(scene: Scene) -> tuple[str, ...]:
+    """What is written where nothing is asked for."""
+    return ("displacement", *list(scene.form.fields)[1:], "particles")
+
+
+def _of_grid(scene: Scene) -> dict[str, GridQuantity]:
+    found = {
+        "displacement": GridQuantity("displacement [m]", _displacement),
+        "velocity": GridQuantity("velocity [m/s]", _velocity),
+        "reaction": GridQuantity("reaction [N/m]", _reaction),
+        "particles": GridQuantity(
+            "particles [-]", lambda now: now.scene.particles_per_cell.astype(float), cells=True
+        ),
+    }
+    if (
+        scene.form.strain == "small"
+    ):  # else the grid has that of a step, and the particles all of it
+        for name in list(scene.form.fields)[1:]:
+            unit = "-" if scene.form.kinematics == "mixed" else "Pa"
+            found[name] = GridQuantity(f"{name} [{unit}]", _bilinear)
+    return found
+
+
+def _projected(quantity: Quantity, projection: Projection) -> GridQuantity:
+    def of(now: Moment) -> Array:
+        return nodal(now.scene, quantity.of(local_view(now.scene, now.motion)), projection)
+
+    return GridQuantity(quantity.label, of)
+
+
+def _at_vertices(scene: Scene, coefficients: Array) -> Array:
+    matrix = extraction(scene.basis, scene.grid.cells, 1)
+    return np.asarray(matrix @ coefficients.reshape(-1, 2))
+
+
+def _displacement(now: Moment) -> Array:
+    """Since the start, and of the last step where strains are finite."""
+    scene, solution = now.scene, now.solution
+    u = scene.split(scene.gap)[0] if solution is None else solution.u
+    return _at_vertices(scene, u)
+
+
+def _bilinear(now: Moment) -> Array:
+    scene, solution = now.scene, now.solution
+    values = scene.split(scene.gap)[1] if solution is None else solution.volumetric
+    return np.asarray(values)
+
+
+def _velocity(now: Moment) -> Array:
+    """That of the particles with its gradient, by their mass; NaN where there are none."""
+    motion, attached = now.motion, now.scene.attached
+    assert motion is not None
+    kept = motion.on_grid
+    if kept is not None:  # a grid that stays has its own
+        return _at_vertices(now.scene, kept[0])
+    momentum = to_grid(attached, motion.mass, motion.velocity, motion.velocity_gradient)
+    mass = attached.sums(motion.mass, np.ones((len(motion.mass), 1)))
+    v = np.divide(momentum, mass, out=np.zeros_like(momentum), where=mass > 0)
+    near = attached.sums(motion.mass, np.ones((len(motion.mass), 1)), "bilinear") > 0
+    return np.where(near, _at_vertices(now.scene, v), np.nan)
+
+
+def _reaction(now: Moment) -> Array:
+    """Forces of supports and walls [N per metre depth], shared out to the vertices of the cell where
+    they act, with their sum and moment; not known before a solution.
+    """
+    scene, grid = now.scene, now.scene.grid
+    nx, ny = grid.cells
+    if now.solution is None:
+        return np.full(((nx + 1) * (ny + 1), 2), np.nan)
+    along = []
+    for n in grid.cells:
+        place = greville_1d(scene.basis, n)
+        cell = np.minimum(place.astype(np.int64), n - 1)
+        along.append(values_1d("bilinear", n, cell, place - cell))
+    share = sp.kron(along[1], along[0], format="csr")
+    forces = np.asarray(share.T @ now.solution.on_edges)
+    for point, force in now.solution.on_points:
+        location = edges.locate_point(grid, point, "reaction")
+        forces += _rust.nodal_sums(location, np.ones(1), force[None], "bilinear")
+    return forces

@@ -1,0 +1,1 @@
+"""What a driver script builds, and one accepted step of it."""

@@ -1,0 +1,88 @@
+"""Whether particles, as they are given, integrate over the cells that they fill.
+
+A cell is filled where its particles have its area. There they must not crowd on one side or at the
+border, and not differ from cell to cell: sums over them are no integrals then, and stress comes out
+wrong by half of it or by any amount (`python -m cases.extremes --only particles`).
+"""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami.base import ranks
+from tawami.base.errors import QuadratureWarning
+from tawami.scene.domain import Attached
+
+Array = npt.NDArray[np.float64]
+#: Part of a cell by which one that counts as filled may miss its area or go beyond it.
+FILLED = 0.05
+#: Centroid off the centre [cells]; a lattice of 2 x 2 that is moved over the grid comes to 1/4.
+OFF_CENTRE = 0.25 + 1e-6
+#: Mean square of the distance from the centre along an axis [cells^2]; 1/12 is exact, that lattice comes
+#: to 1/8.
+SPREAD = 0.15
+#: Difference of the centroids of two neighbours [cells]; 0 for any lattice.
+UNLIKE = 0.2
+
+
+def warn(attached: Attached, volume: Array) -> None:
+    """Say which cell is filled worst, if one is filled badly; a call for all ranks."""
+    fault = _fault(*_moments(attached, volume))
+    if fault is None or attached.layout.grid.comm.rank:
+        return
+    (j, i), what = fault
+    warnings.warn(
+        f"the particles integrate badly: cell ({i}, {j}) {what}. Stress may be far off; "
+        "expected particles spread over the cells that they fill, as box(...) and polygon(...) put them",
+        QuadratureWarning,
+        stacklevel=4,
+    )
+
+
+def _moments(attached: Attached, volume: Array) -> tuple[Array, Array, Array]:
+    """Area (ny x nx) [cells], first and second moments about the centre (ny x nx x 2) of each cell's
+    particles, the moments over the area; NaN in cells without any.
+    """
+    location, grid = attached.location, attached.layout.grid
+    off = np.asarray(location.xi) - 0.5
+    columns = np.column_stack([np.ones(len(off)), off, off**2]) * np.asarray(volume)[:, None]
+    sums = np.zeros((grid.cells[0] * grid.cells[1], 5))
+    np.add.at(sums, np.asarray(location.cell), columns / grid.h**2)
+    sums = ranks.sum_of(grid.comm, sums).reshape(*grid.cells[::-1], 5)
+    area = sums[..., 0]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return area, sums[..., 1:3] / area[..., None], sums[..., 3:] / area[..., None]
+
+
+def _fault(area: Array, first: Array, second: Array) -> tuple[tuple[int, int], str] | None:
+    """A cell (j, i) and what is wrong with it."""
+    filled = np.abs(area - 1) <= FILLED
+
+    def worst(values: Array) -> tuple[tuple[int, int], float]:
+        place = np.unravel_index(int(values.argmax()), values.shape)
+        return (int(place[0]), int(place[1])), float(values[place])
+
+    place, most = worst(area)
+    if most > 1 + FILLED:
+        return place, f"holds {most:.3g} times its area"
+    place, most = worst(np.where(filled, np.abs(first).max(axis=2), 0.0))
+    if most > OFF_CENTRE:
+        return place, f"has its particles on one side, their centroid {most:.2g} h off the centre"
+    place, most = worst(np.where(filled, second.max(axis=2), 0.0))
+    if most > SPREAD:
+        return place, f"has its particles at its border, {most**0.5:.2g} h (rms) off the centre"
+    for axis in (0, 1):
+        both = np.delete(filled, 0, axis) & np.delete(filled, -1, axis)
+        jump = np.abs(np.diff(first, axis=axis)).max(axis=2)
+        if not jump.size:
+            continue
+        place, most = worst(np.where(both, jump, 0.0))
+        if most > UNLIKE:
+            return (
+                place,
+                f"and its neighbour have their particles in places that differ by {most:.2g} h",
+            )
+    return None

@@ -1,0 +1,160 @@
+"""Walls with Coulomb friction at the edges of the grid.
+
+A function of the wall is apart from it, or in contact; in contact it sticks, or slides against a
+friction of `mu` times its pressure:
+
+    g_n >= 0,  r_n >= 0,  g_n r_n = 0;       |r_t| <= mu r_n,  sliding at |r_t| = mu r_n against it
+
+g_n and r_n are displacement away from the wall and reaction of the function that the wall carries.
+These states are found by an active set: a step is solved with those of the last one, states that
+contradict it are changed, and it is solved again from there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami.grid.basis import Basis
+from tawami.grid.edges import Held, edge_functions
+from tawami.grid.grid import Edge, Grid
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+#: Forces and displacements that count as none, relative to the largest on the wall and to h.
+FORCE, GAP = 1e-6, 1e-12
+#: Times that a function may come back to the wall, or to rest, in one step.
+TURNS = 4
+
+
+@dataclass
+class Contact:
+    """State of the functions along a wall.
+
+    Attributes:
+        touching: Whether each is in contact.
+        slip: Direction (-1 or 1) of the friction on each that slides, 0 for one that sticks.
+    """
+
+    touching: Mask
+    slip: npt.NDArray[np.int8]
+
+
+@dataclass
+class Wall:
+    """A wall along an edge of the grid.
+
+    Args:
+        grid: The grid.
+        basis: Basis of the displacement.
+        edge: Its edge.
+        friction: Coefficient mu; 0 is smooth.
+        separates: Whether the body may leave it.
+
+    Attributes:
+        functions: Displacement functions along it.
+        state: Their state.
+        taken: Whether other supports prescribe their components, functions x 2.
+        turns: How often each came back to the wall or to rest in this step.
+    """
+
+    grid: Grid
+    basis: Basis
+    edge: Edge
+    friction: float
+    separates: bool
+    functions: npt.NDArray[np.int64] = field(init=False)
+    state: Contact = field(init=False)
+    taken: Mask = field(init=False)
+    turns: npt.NDArray[np.int64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.functions = edge_functions(self.grid, self.basis, self.edge)
+        n = len(self.functions)
+        # without friction nothing sticks; the sign does not matter then
+        slip = np.full(n, 1 if self.friction == 0 else 0, dtype=np.int8)
+        self.state = Contact(np.ones(n, dtype=bool), slip)
+        self.taken = np.zeros((n, 2), dtype=bool)
+        self.begin()
+
+    def begin(self) -> None:
+        """A new step."""
+        self.turns = np.zeros(len(self.functions), dtype=np.int64)
+
+    @property
+    def _axes(self) -> tuple[int, int, int]:
+        """Axis across the wall, axis along it, and the sign of the direction into the grid."""
+        axis, end = self.grid.edge(self.edge)
+        return axis, 1 - axis, -1 if end else 1
+
+    @property
+    def stopped(self) -> npt.NDArray[np.int64]:
+        """Coefficients that it stops from passing through."""
+        across, _, _ = self._axes
+        return 2 * self.functions[self.state.touching] + across
+
+    def held(self, active: Mask, fixed: Mask, start: Array, gap: Array) -> list[Held]:
+        """What the wall prescribes in the present states.
+
+        Args:
+            active: Whether each displacement coefficient has particles.
+            fixed: Whether other supports prescribe it; then the wall does not.
+            start: Coefficients that are there already, which the values include.
+            gap: Displacement coefficients since the body touched the wall.
+        """
+        across, along, _ = self._axes
+        self.taken = fixed[2 * self.functions[:, None] + np.arange(2)]
+        touching, supports = self.state.touching, []
+        for axis, mask in ((across, touching), (along, touching & (self.state.slip == 0))):
+            indices = 2 * self.functions[mask & ~self.taken[:, axis]] + axis
+            indices = indices[active[indices]]
+            values = start[indices] - (gap[indices] if axis == across else 0.0)
+            supports.append(Held(indices, values))
+        return supports
+
+    def friction_of(self, forces: Array) -> Array:
+        """Friction on the body (functions x 2), from what the wall has to give to hold it."""
+        across, along, inward = self._axes
+        friction = np.zeros_like(forces)
+        sliding = self.state.touching & (self.state.slip != 0) & ~self.taken[:, along]
+        f = self.functions[sliding]
+        push = np.maximum(inward * forces[f, across], 0.0)
+        friction[f, along] = self.friction * push * self.state.slip[sliding] if self.friction else 0
+        return friction
+
+    def adapt(self, forces: Array, u: Array, gap: Array, active: Mask) -> bool:
+        """Change the states that contradict a solution; whether there were any.
+
+        A function that comes back to the wall, or to rest, too often in one step goes round in
+        circles and is let go.
+
+        Args:
+            forces: Reactions that supports and walls give, functions x 2.
+            u: Displacement increments, functions x 2.
+            gap: Displacement before them since the body touched the wall.
+            active: Whether each function has particles.
+        """
+        across, along, inward = self._axes
+        f, state, nowhere = self.functions, self.state, GAP * self.grid.h
+        here, loose = active[f], ~self.taken
+        push, moved = inward * forces[f, across], u[f, along]
+        none = FORCE * np.abs(forces[f]).max(initial=0.0)
+        below = inward * (gap + u)[f, across] < -nowhere
+        free = here & loose[:, across]
+        leaves = free & state.touching & self.separates & (push < -none)
+        meets = free & ~state.touching & below & (self.turns < TURNS)
+        slides, sticks = np.zeros_like(here), np.zeros_like(here)
+        if self.friction > 0:
+            held = here & state.touching & ~leaves & loose[:, along]
+            bound = self.friction * np.maximum(push, 0.0) if np.isfinite(self.friction) else np.inf
+            slides = held & (state.slip == 0) & (np.abs(forces[f, along]) > bound + none)
+            sticks = held & (state.slip * moved > nowhere) & (self.turns < TURNS)
+        self.turns += meets | sticks
+        state.touching = (state.touching & ~leaves) | meets
+        state.slip[slides] = np.sign(forces[f, along][slides]).astype(np.int8)
+        if self.friction > 0:
+            state.slip[sticks | meets] = 0
+        return bool((leaves | meets | slides | sticks).any())

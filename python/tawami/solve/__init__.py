@@ -1,0 +1,1 @@
+"""One nonlinear step as algebra: Newton iteration, measures, scaling, linear solvers, diagnosis."""

@@ -1,0 +1,229 @@
+"""The fast path gives what plain dolfinx assembly with P^T K P gives, to round-off and to the bit
+whatever the number of threads.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from contextlib import nullcontext
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import BASES, FORMS, clouds, grid_of
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.sparse import csr_matrix, identity
+
+import tawami
+from tawami.base.errors import InexactSumWarning
+from tawami.field.fast import _selection
+from tawami.form.form import Form
+
+SUPPORTS = {
+    "edges": lambda s: (s.fix("left", "x"), s.fix("left", "y", lambda x, y: 1e-3 * y)),
+    "points": lambda s: (
+        s.hold((-1, 0.7), "x"),
+        s.hold((-0.9, 1.9), "x"),
+        s.hold((0.3, 1.1), "y", 1),
+    ),
+    "both": lambda s: (s.fix("bottom", "y"), s.hold((-0.51, 1.2), "x"), s.hold((-0.5, 1.3), "y")),
+}
+
+
+def both(make):
+    """The same scene on both paths."""
+    return [make(assembly=path) for path in ("fast", "reference")]
+
+
+def close(a, b):
+    assert np.abs(a - b).max() < 1e-12 * max(np.abs(b).max(), 1e-300)
+
+
+def reduced(scene, c):
+    """P^T K P as the field side gives it to the solver, at increments c."""
+    reduction = scene.problem().reduction
+    scene.attached.newton.internal(c)
+    field, data = scene.attached.field, scene.attached.newton.data
+    start, columns, values = field.tangent(c, data, reduction).getValuesCSR()
+    return csr_matrix((values, columns, start), shape=(reduction.size,) * 2).toarray()
+
+
+@pytest.mark.parametrize("support", SUPPORTS)
+def test_residual_and_reduced_tangent(random_scene, form, basis, support):
+    scenes = both(lambda **path: random_scene(basis=basis, count=150, **form, **path))
+    for scene in scenes:
+        SUPPORTS[support](scene)
+    c = np.random.default_rng(0).standard_normal(scenes[0].num_coefficients)
+    close(*[scene.residual(c) for scene in scenes])
+    close(*[reduced(scene, c) for scene in scenes])
+    close(*[scene.tangent(c).toarray() for scene in scenes])
+
+
+def test_a_form_nonlinear_in_the_fields(random_scene):
+    """Fields as coefficients of the tangent, two rules, cell means, a constant of the form."""
+    from ufl import div, dot, grad
+
+    def residual(u, w, s, sigma_m, K, cell_mean, sum_p, sum_c, dx, dx_c, beta):
+        extra = beta * cell_mean(K) * div(u) ** 2 * dot(u, w)
+        return sum_p(s, grad(w)) + sum_c(sigma_m, div(w)) + extra * dx + 2 * extra * dx_c
+
+    form = Form(
+        {"u": ("displacement", "w")}, "cell", residual, parameters={"beta": {"default": 0.7}}
+    )
+    scenes = both(lambda **path: random_scene(form=form, **path))
+    for scene in scenes:
+        SUPPORTS["both"](scene)
+    c = np.random.default_rng(1).standard_normal(scenes[0].num_coefficients)
+    close(*[scene.residual(c) for scene in scenes])
+    close(*[reduced(scene, c) for scene in scenes])
+
+
+@settings(max_examples=20)
+@given(data=st.data())
+def test_any_cloud_of_particles(data):
+    grid, x = data.draw(clouds(cells=(7, 7), most=20))
+    options = FORMS[data.draw(st.sampled_from(sorted(FORMS)))]
+    basis = data.draw(st.sampled_from(BASES))
+    body = tawami.Body(x, np.full(len(x), 0.1))
+    material = tawami.linear_elastic(E=2.0, nu=0.3)
+    scenes = both(lambda **p: tawami.Scene(grid, body, material, basis=basis, **options, **p))
+    c = np.random.default_rng(0).standard_normal(scenes[0].num_coefficients)
+    close(*[scene.residual(c) for scene in scenes])
+    close(*[scene.tangent(c).toarray() for scene in scenes])
+
+
+@pytest.mark.parametrize("support", ["paper", "exact", "clamped"])
+def test_the_beam(support):
+    from cases.cantilever import mpm
+
+    rows = [mpm.solve("u_epsv", support, 8, 0.1, assembly=p)[0] for p in ("fast", "reference")]
+    assert rows[0].deflection_m == pytest.approx(rows[1].deflection_m, rel=1e-12)
+    assert rows[0].unknowns == rows[1].unknowns
+
+
+def test_newton_reuses_the_pattern(random_scene):
+    """Several iterations on one pattern: each tangent is that of the reference."""
+    from ufl import div, dot, grad
+
+    def stiff(u, w, sigma, mu, sum_p, t, ds):
+        return sum_p(sigma, grad(w)) + sum_p(3e3 * mu, div(u) ** 3 * div(w)) - dot(t, w) * ds
+
+    form = Form({"u": ("displacement", "w")}, "displacement", stiff)
+    solutions = []
+    for path in ("fast", "reference"):
+        grid = grid_of()
+        body = tawami.box(grid, grid.origin, grid.upper, per_axis=3)
+        material = tawami.linear_elastic(E=1e3, nu=0.2)
+        warning = pytest.warns(InexactSumWarning) if path == "fast" else nullcontext()
+        with warning:  # when it is compiled, the first time
+            scene = tawami.Scene(grid, body, material, form=form, tolerance=1e-12, assembly=path)
+        scene.fix("left", "x")
+        scene.fix("left", "y")
+        scene.traction("right", (120.0, 20.0))
+        solutions.append(scene.solve())
+    assert solutions[0].iterations == solutions[1].iterations > 3
+    close(solutions[0].u, solutions[1].u)
+
+
+def test_the_same_bits_whatever_the_number_of_threads():
+    """Residual, tangent, and a reduced tangent in which many points are held, in every row."""
+    code = """
+import hashlib, logging; logging.disable(logging.INFO)
+import numpy as np
+import tawami
+from mpi4py import MPI
+total = hashlib.sha256()
+for basis in ("quadratic_spline", "bilinear", "biquadratic"):
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.1, cells=(12, 40))
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=3)
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.49), basis=basis)
+    for row in range(40):
+        scene.hold((0.13 + 0.02 * (row % 5), 0.1 * row + 0.04), "x")
+        scene.hold((0.71, 0.1 * row + 0.06), "y")
+    c = np.random.default_rng(0).standard_normal(scene.num_coefficients)
+    total.update(scene.residual(c).tobytes() + scene.tangent(c).data.tobytes())
+    field, reduction = scene.attached.field, scene.problem().reduction
+    for _ in range(3):
+        total.update(field.tangent(c, scene.attached.newton.data, reduction).getValuesCSR()[2].tobytes())
+print(total.hexdigest())
+"""
+    outputs = set()
+    for threads in ("1", "2", "7", "2"):
+        environment = os.environ | {"RAYON_NUM_THREADS": threads}
+        run = subprocess.run(
+            [sys.executable, "-c", code], env=environment, cwd=Path(__file__).parents[2],
+            capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        outputs.add(run.stdout.splitlines()[-1])  # MPI may have had its say before
+    assert len(outputs) == 1
+
+
+def test_one_field_with_several_reductions_in_turn(random_scene):
+    """Another pattern, the first again, and values that the solver scaled in between."""
+    scenes = both(lambda **path: random_scene(count=150, **path))
+    c = np.random.default_rng(0).standard_normal(scenes[0].num_coefficients)
+    for scene in scenes:
+        scene.fix("left", "x")
+        scene.hold((-0.9, 1.9), "y")
+    close(*[reduced(scene, c) for scene in scenes])
+    reductions = [scene.problem().reduction for scene in scenes]
+    for scene in scenes:
+        scene.hold((0.4, 1.3), "y")
+    close(*[reduced(scene, c) for scene in scenes])
+    values = []
+    for scene, reduction in zip(scenes, reductions, strict=True):
+        matrix = scene.attached.field.tangent(c, scene.attached.newton.data, reduction)
+        vector = matrix.createVecLeft()
+        vector.set(3.0)
+        matrix.diagonalScale(vector, vector)
+        again = scene.attached.field.tangent(c, scene.attached.newton.data, reduction)
+        values.append(again.getValuesCSR()[2].sum())
+    assert values[0] == pytest.approx(values[1], rel=1e-9)
+
+
+def test_solving_again_with_other_supports():
+    def run(path):
+        grid = grid_of()
+        body = tawami.box(grid, grid.origin, grid.upper)
+        material = tawami.linear_elastic(E=1e3, nu=0.4999)
+        scene = tawami.Scene(grid, body, material, assembly=path)
+        scene.fix("left", "x")
+        scene.hold((-1.0, 1.25), "y")
+        scene.traction("right", (1.0, -2.0))
+        scene.solve()
+        scene.hold((1.0, 1.25), "y", -1e-3)
+        return scene.solve()
+
+    fast, reference = run("fast"), run("reference")
+    assert np.abs(fast.u - reference.u).max() < 1e-10 * np.abs(reference.u).max()
+
+
+def test_arrays_that_do_not_fit_are_refused_and_never_panic(random_scene):
+    scene = random_scene(form="u")
+    field, c = scene.attached.field, np.zeros(scene.num_coefficients)
+    scene.residual(c)
+    kernels = field._kernels(field.compiled.tangent, scene.attached.newton.data)
+    volume = scene.particles.volume
+    with pytest.raises(RuntimeError, match="a kernel of another rank"):
+        field._assembler.vector(kernels, volume, c)
+    address, rank, width, slots, constants = kernels[0]
+    wrong = [(address, rank, width + 1, slots, constants)]
+    pattern = field._assembler.pattern(
+        _selection(identity(len(c), format="csr"), np.arange(len(c)))
+    )
+    with pytest.raises(RuntimeError, match="a kernel of other coefficients"):
+        field._assembler.matrix(wrong, [], volume, c, pattern, np.zeros(len(pattern.columns)))
+    with pytest.raises(RuntimeError, match="another pattern"):
+        field._assembler.matrix(kernels, [], volume, c, pattern, np.zeros(3))
+    with pytest.raises(RuntimeError, match="not a selection of these coefficients"):
+        field._assembler.pattern(_selection(identity(3, format="csr"), np.arange(3)))
+
+
+def test_an_unknown_path_is_refused(random_scene):
+    with pytest.raises(
+        tawami.InputError, match="assembly = 'quick': expected 'fast' or 'reference'"
+    ):
+        random_scene(assembly="quick")

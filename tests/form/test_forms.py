@@ -1,0 +1,382 @@
+"""The contract of a weak form: written anywhere, checked with a sentence, compiled once."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import textwrap
+import warnings
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from conftest import FINITE, FORMS, grid_of
+from ufl import SpatialCoordinate, div, dot, grad, inner, sym
+
+import tawami
+from tawami.base.errors import InexactSumWarning
+from tawami.form.form import Form, shipped
+from tawami.form.quantities import ParticleScalar
+
+# A form in a driver script: this module is one. It is the shipped u_epsv, written differently.
+fields = {"v": ("displacement", "w"), "theta": ("volumetric_strain", "r")}
+kinematics = "mixed"
+parameters = {"beta": {"default": 0.2, "minimum": 0.0}}
+
+
+def residual(v, theta, w, r, s, sigma_m, K, mu, h, t, ds, sum_p, beta):
+    """As eqs. (1) and (2), stress split into deviator and mean, stabilisation from two constants."""
+    momentum = sum_p(s, grad(w)) + sum_p(sigma_m, div(w)) - dot(t, w) * ds
+    volume = sum_p(K, r * div(v)) - sum_p(K, r * theta)
+    return momentum + volume - beta * h**2 * sum_p(K * K / mu, inner(grad(r), grad(theta)))
+
+
+def test_a_form_in_a_driver_script_works_like_a_shipped_one(random_scene):
+    mine = random_scene(form=sys.modules[__name__], beta=0.3)
+    shipped_one = random_scene(form="u_epsv", alpha=0.3)
+    c = np.random.default_rng(0).standard_normal(mine.num_coefficients)
+    np.testing.assert_allclose(mine.residual(c), shipped_one.residual(c), rtol=1e-11, atol=1e-11)
+    difference = abs(mine.tangent(c) - shipped_one.tangent(c)).max()
+    assert difference < 1e-13 * abs(mine.tangent(c)).max()
+
+
+def test_a_form_in_a_file_works_like_a_shipped_one(random_scene, tmp_path):
+    path = tmp_path / "my_form.py"
+    path.write_text(
+        textwrap.dedent(
+            """
+            from ufl import dot, grad
+            fields = {"u": ("displacement", "w")}
+            kinematics = "displacement"
+            def residual(w, sigma, t, sum_p, ds):
+                return sum_p(sigma, grad(w)) - dot(t, w) * ds
+            """
+        )
+    )
+    scenes = [random_scene(form=f) for f in (path, "u")]
+    c = np.random.default_rng(0).standard_normal(scenes[0].num_coefficients)
+    np.testing.assert_array_equal(*[s.residual(c) for s in scenes])
+
+
+def test_every_shipped_form_is_in_the_tests():
+    tested = [*FORMS.values(), *FINITE.values()]
+    assert {options["form"] for options in tested} == set(shipped())
+
+
+def test_a_quantity_of_the_law_times_constants_of_the_particle(random_scene):
+    def scaled(w, sum_p, sigma, mu):
+        return sum_p(2 * sigma * mu, grad(w))
+
+    def plain(w, sum_p, sigma):
+        return sum_p(sigma, grad(w))
+
+    scenes = [random_scene(form=form_of(function)) for function in (scaled, plain)]
+    mu = scenes[0].constants["mu"]
+    scenes[1].particles.volume[:] *= 2 * mu
+    c = np.random.default_rng(0).standard_normal(scenes[0].num_coefficients)
+    for function in (lambda s: s.residual(c), lambda s: s.tangent(c).toarray()):
+        a, b = map(function, scenes)
+        assert np.abs(a - b).max() < 1e-13 * np.abs(b).max()
+
+
+def test_a_form_nonlinear_in_the_fields_has_the_right_tangent(random_scene):
+    """The derivative is UFL's: a penalty on (div u)^3 added to the displacement form."""
+
+    def cubic(u, w, sigma, K, sum_p, cell_mean, dx, dx_c):
+        extra = cell_mean(K) * div(u) ** 2 * dot(u, w)
+        return (
+            sum_p(sigma, grad(w))
+            + sum_p(K, div(u) ** 3 * div(w))
+            + sum_p(inner(sym(grad(u)), sym(grad(w))) * dot(u, u))
+            + extra * dx
+            + extra * dx_c
+        )
+
+    form = Form({"u": ("displacement", "w")}, "displacement", cubic)
+    with pytest.warns(InexactSumWarning, match=r"degree \d .* up to 4"):
+        scene = random_scene(form=form)
+    random = np.random.default_rng(3)
+    c, d = random.standard_normal((2, scene.num_coefficients))
+    step = 1e-5
+    difference = (scene.residual(c + step * d) - scene.residual(c - step * d)) / (2 * step)
+    predicted = scene.tangent(c) @ d
+    assert np.abs(difference - predicted).max() < 1e-8 * np.abs(predicted).max()
+
+
+def test_terms_under_two_rules_are_those_of_each_rule(random_scene):
+    """FFCx would mix up the values of a field that one kernel evaluates under two rules."""
+
+    def term(u, w, K, cell_mean):
+        return cell_mean(K) * div(u) ** 2 * dot(u, w)
+
+    def both(u, w, K, cell_mean, dx, dx_c):
+        return term(u, w, K, cell_mean) * dx + term(u, w, K, cell_mean) * dx_c
+
+    def full(u, w, K, cell_mean, dx):
+        return term(u, w, K, cell_mean) * dx
+
+    def centre(u, w, K, cell_mean, dx_c):
+        return term(u, w, K, cell_mean) * dx_c
+
+    scenes = [random_scene(form=form_of(function)) for function in (both, full, centre)]
+    c = np.random.default_rng(0).standard_normal(scenes[0].num_coefficients)
+    residuals = [scene.residual(c) for scene in scenes]
+    scale = np.abs(residuals[1]).max()
+    np.testing.assert_allclose(residuals[0], residuals[1] + residuals[2], atol=1e-13 * scale)
+    tangents = [scene.tangent(c) for scene in scenes]
+    difference = abs(tangents[0] - tangents[1] - tangents[2]).max()
+    assert difference < 1e-13 * abs(tangents[0]).max()
+
+
+def test_newton_converges_quadratically_on_a_nonlinear_form():
+    """Stiffening spring on div u: the iterations are more than one and the last ones square."""
+
+    def stiff(u, w, sigma, mu, sum_p, t, ds):
+        return sum_p(sigma, grad(w)) + sum_p(3e3 * mu, div(u) ** 3 * div(w)) - dot(t, w) * ds
+
+    form = Form({"u": ("displacement", "w")}, "displacement", stiff)
+    grid = grid_of()
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=3)
+    material = tawami.linear_elastic(E=1e3, nu=0.2)
+    with pytest.warns(InexactSumWarning):
+        scene = tawami.Scene(grid, body, material, form=form, tolerance=1e-12)
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    scene.traction("right", (120.0, 20.0))
+    solution = scene.solve()
+    measures = [m for m, _ in solution.history]
+    assert 3 < solution.iterations < 12
+    assert measures[-1] < 1e-12
+    quadratic = [b for a, b in pairwise(measures) if a < 1e-2 and b > 1e-11]
+    assert quadratic
+    assert measures[-2] < 1e-5
+
+
+def form_of(function, fields=None, kinematics="displacement", **more):
+    return Form(fields or {"u": ("displacement", "w")}, kinematics, function, **more)
+
+
+@pytest.mark.parametrize("assembly", ["fast", "reference"])
+def test_sums_at_vertices_are_row_sum_lumped(random_scene, assembly):
+    """sum_p V_p K_p M_v(x_p) on the diagonal, M_v written out once more here."""
+
+    def lumped(w, q, eps_v, sigma, K, sum_p, sum_v):
+        return sum_p(sigma, grad(w)) + sum_v(K, q * eps_v)
+
+    form = form_of(lumped, BOTH, "mixed")
+    scene = random_scene(form=form, assembly=assembly)
+    c = np.zeros(scene.num_coefficients)
+    n = scene.attached.field.layout.num_displacement
+    block = scene.tangent(c).toarray()[n:, n:]
+    grid = scene.grid
+    s = (np.array(scene.particles.x) - grid.origin) / grid.h
+    weight = scene.particles.volume * scene.constants["K"]
+    hats = [np.maximum(0, 1 - np.abs(s[:, [k]] - np.arange(grid.cells[k] + 1))) for k in range(2)]
+    expected = np.einsum("p,pj,pi->ji", weight, hats[1], hats[0]).ravel()
+    assert np.abs(block - np.diag(expected)).max() < 1e-12 * expected.max()
+
+
+BOTH = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
+WRONG = [
+    (lambda: Form.load("u_eps"), r"'u_eps' is not shipped: expected one of 'u', 'u_bbar'"),
+    (lambda: Form.load("nowhere.py"), "'nowhere.py' does not exist"),
+    (lambda: Form.load(textwrap), "'textwrap' declares no 'fields', 'kinematics', 'residual'"),
+    (lambda: form_of(None, {"u": ("velocity", "w")}), "kind 'velocity': expected one of"),
+    (lambda: form_of(None, {"u": "displacement"}), r"expected \(kind, test function\)"),
+    (lambda: form_of(None, parameters={"a": {}}), "parameter 'a' has no \"default\""),
+    (lambda: form_of(None, parameters={"h": {"default": 1}}), "'h' stands for two things"),
+    (lambda: form_of(None, {"u": ("displacement", "K")}), "'K' stands for two things"),
+    (lambda: Form.load(3), "form = 3: expected the name of a shipped form"),
+    (lambda: form_of(None, kinematics="large"), "kinematics = 'large': expected one of"),
+    (lambda: form_of(None, kinematics="mixed"), "'mixed' needs fields of the kinds"),
+    (lambda: form_of(None, BOTH), "'displacement' needs fields of the kinds 'displacement'"),
+    (
+        lambda: form_of(None, parameters={"a": {"default": 1, "min": 0}}),
+        "'a' declares 'min': expected among 'default', 'minimum', 'maximum', 'usual'",
+    ),
+]
+
+
+@pytest.mark.parametrize(("make", "message"), WRONG)
+def test_wrong_declarations(make, message):
+    with pytest.raises(tawami.FormError, match=message):
+        make()
+
+
+@pytest.mark.filterwarnings("ignore::tawami.base.errors.InexactSumWarning")
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (lambda w, sigma, porosity: 0, r"asks for 'porosity', which is neither a field nor .* 'K'"),
+        (lambda w, sigma: 3.0, "residual returned float: expected a UFL form"),
+        (lambda u, sum_p, K: sum_p(K, div(u)), "test function 'w' of field 'u' does not appear"),
+        (lambda u, w, sum_p, K: sum_p(K, div(u)), "test function 'w' of field 'u' does not appear"),
+        (
+            lambda w, sum_p, sigma: sum_p(sigma, w),
+            r"shape \(2, 2\) and an expression of shape \(2,\)",
+        ),
+        (lambda w, sum_p: sum_p(1, 2, 3), "not 3 arguments"),
+        (lambda w, sum_p: sum_p(w, div(w)), "takes a particle quantity"),
+        (lambda w, sum_p, t, ds: sum_p(div(w)) - dot(t, t) * w[0] * ds, "linear in the traction t"),
+        (lambda w, sum_p, t, dx: sum_p(div(w)) - dot(t, w) * dx, "t belongs into terms with ds"),
+        (
+            lambda w, sum_p, dx: sum_p(SpatialCoordinate(dx.ufl_domain())[0] * w[0]),
+            "the position x",
+        ),
+        (lambda w, sum_p, ds: sum_p(div(w)) - w[1] * ds, "linear in the traction t"),
+        (lambda w, sum_p, dx: sum_p(div(w)) + w[1] * dx(1), r"as dx\(1\): expected dx"),
+        (lambda w, sum_c, sigma_m: sum_c(sigma_m, div(w)), "needs kinematics 'cell'"),
+        (lambda w, sum_p, sigma: sum_p(sigma + 2, grad(w)), "its residual raised"),
+        (lambda w, sum_v, sigma: sum_v(sigma, grad(w)), r"sum_v\(sigma, ...\): expected constants"),
+        (
+            lambda w, sum_p, sigma: sum_p(sigma * w[0], grad(w)),
+            "a quantity of the law combines with particle constants only",
+        ),
+        (
+            lambda w, sum_p, K: sum_p(K * div(w), div(w)),
+            "a particle constant combines with numbers",
+        ),
+        (
+            lambda w, cell_mean, sigma, dx: cell_mean(sigma) * div(w) * dx,
+            "cell_mean takes constants",
+        ),
+        (lambda u, w, sum_p: sum_p(div(w) ** 2 * div(u)), "linear in one test function"),
+        (
+            lambda u, w, sigma, sum_p, ds: sum_p(sigma, grad(w)) + dot(u, w) * ds,
+            "in nothing else",
+        ),
+        (lambda t, w, ds: dot(t, w) * ds, "expected integrals over particles or cells"),
+    ],
+)
+def test_wrong_residuals(random_scene, function, message):
+    with pytest.raises(tawami.FormError, match=message):
+        random_scene(form=form_of(function))
+
+
+def test_b_bar_takes_the_deviator_at_particles_and_the_mean_at_centres_only(random_scene):
+    for function, message in [
+        (lambda w, sigma, sum_p: sum_p(sigma, grad(w)), r"sum_p\(sigma"),
+        (lambda w, s, sum_c: sum_c(s, grad(w)), r"sum_c\(s,"),
+    ]:
+        with pytest.raises(tawami.FormError, match=message + r".* 'cell': expected sum_p\(s"):
+            random_scene(form=form_of(function, kinematics="cell"))
+
+
+def test_a_module_that_is_edited_and_reloaded_is_another_form(random_scene, tmp_path, monkeypatch):
+    path = tmp_path / "edited_form.py"
+    text = """
+from ufl import grad
+fields = {"u": ("displacement", "w")}
+kinematics = "displacement"
+def residual(w, sigma, sum_p):
+    return FACTOR * sum_p(sigma, grad(w))
+"""
+    monkeypatch.syspath_prepend(tmp_path)
+    path.write_text(text.replace("FACTOR", "1"))
+    module = importlib.import_module("edited_form")
+    c = np.ones(random_scene(form=module).num_coefficients)
+    c[::5] = 0
+    once = random_scene(form=module).residual(c)
+    path.write_text(text.replace("FACTOR", "20"))
+    importlib.invalidate_caches()
+    twenty = random_scene(form=importlib.reload(module)).residual(c)
+    np.testing.assert_allclose(twenty, 20 * once, atol=1e-12 * np.abs(twenty).max())
+
+
+def test_a_forgotten_test_function_of_the_second_field(random_scene):
+    form = form_of(lambda w, q, sigma, sum_p: sum_p(sigma, grad(w)), BOTH, "mixed")
+    with pytest.raises(tawami.FormError, match="'q' of field 'eps_v' does not appear"):
+        random_scene(form=form)
+
+
+def test_a_file_with_a_mistake_is_named(tmp_path):
+    path = tmp_path / "broken.py"
+    path.write_text("fields = {")
+    with pytest.raises(tawami.FormError, match=r"'broken.py' cannot be read: SyntaxError"):
+        Form.load(path)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"alpha": -0.1}, "alpha = -0.1: expected a finite number of at least 0"),
+        ({"alpha": float("nan")}, "alpha = nan"),
+        ({"alpha": "much"}, "alpha = 'much': expected a number"),
+        ({"stabilisation": "pspg"}, "stabilisation = 'pspg': expected one of 'laplacian'"),
+        (
+            {"gamma": 1},
+            "form 'u_epsv' has no parameter 'gamma': it has 'alpha', 'k', 'stabilisation'",
+        ),
+    ],
+)
+def test_wrong_parameters(random_scene, given, message):
+    with pytest.raises(tawami.InputError, match=message):
+        random_scene(form="u_epsv", **given)
+
+
+def test_parameters_change_without_compiling_again(random_scene):
+    a, b = (random_scene(form="u_epsv", alpha=alpha) for alpha in (0.1, 0.7))
+    assert a._compiled is b._compiled
+    c = np.ones(a.num_coefficients)
+    c[::3] = 0
+    assert np.abs(a.residual(c) - b.residual(c)).max() > 1e-3
+
+
+def test_arithmetic_of_particle_constants():
+    values = {"a": np.array([1.0, 2.0]), "b": np.array([4.0, 0.5])}
+    a, b = (ParticleScalar(n, lambda v, n=n: v[n]) for n in "ab")
+    expression = (2 * a + b**2 / a - 1) / (3 - b) + 1 / a
+    x, y = values["a"], values["b"]
+    expected = (2 * x + y**2 / x - 1) / (3 - y) + 1 / x
+    np.testing.assert_allclose(expression.evaluate(values), expected)
+    assert a * b == a * b
+    assert a * b != a / b
+
+
+def test_the_residual_based_stabilisation_has_an_alpha_that_is_too_large():
+    grid = grid_of()
+    body, law = tawami.box(grid, grid.origin, grid.upper), tawami.linear_elastic(E=1.0, nu=0.3)
+    options = {"form": "u_epsv", "stabilisation": "residual_based"}
+    message = "alpha = 0.3 with 'residual_based': expected at most 0.14, .* use a smaller alpha"
+    with pytest.raises(tawami.InputError, match=message):
+        tawami.Scene(grid, body, law, alpha=0.3, **options)
+    with pytest.raises(tawami.InputError, match="alpha = 'much': expected a number"):
+        tawami.Scene(grid, body, law, alpha="much", **options)
+    tawami.Scene(grid, body, law, alpha=0.14, **options)
+    tawami.Scene(grid, body, law, alpha=0.3)
+
+
+@pytest.mark.parametrize("form", ["u_epsv", "u_p", "u_epsv_finite"])
+def test_an_unusual_alpha_gets_a_warning(form):
+    grid = grid_of()
+    body, law = tawami.box(grid, grid.origin, grid.upper), tawami.linear_elastic(E=1.0, nu=0.3)
+    tawami.Scene(grid, body, law, form=form, alpha=1.0)
+    with pytest.warns(tawami.ParameterWarning, match="alpha = 2: expected at most 1, beyond which"):
+        tawami.Scene(grid, body, law, form=form, alpha=2.0)
+
+
+@pytest.mark.parametrize(("form", "nu", "locks"), [
+    ("u", 0.4999, True), ("u_finite", 0.4999, True), ("u", 0.48, False), ("u_bbar", 0.4999, False)
+])  # fmt: skip
+def test_a_form_that_locks_says_so(form, nu, locks):
+    grid = grid_of()
+    body, law = tawami.box(grid, grid.origin, grid.upper), tawami.linear_elastic(E=1.0, nu=nu)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        tawami.Scene(grid, body, law, form=form)
+    said = [str(w.message) for w in caught if w.category is tawami.LockingWarning]
+    assert len(said) == locks
+    assert all("K/mu = 5e+03 at particle 0: it locks" in message for message in said)
+
+
+@pytest.mark.parametrize("form", ["u", "u_bbar"])
+@pytest.mark.parametrize("one_minus_2nu", [1e-10, 1e-14])
+def test_a_stiffness_beyond_all_digits_names_k_over_mu(form, one_minus_2nu):
+    grid = grid_of()
+    law = tawami.linear_elastic(E=1.0, one_minus_2nu=one_minus_2nu)
+    scene = tawami.Scene(grid, tawami.box(grid, grid.origin, grid.upper), law, form=form)
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    scene.traction("right", (0.0, -1e-4))
+    with pytest.raises(tawami.TawamiError, match=r"K/mu is 1.0e\+1[04]: .* use form 'u_epsv'"):
+        scene.solve()

@@ -1,0 +1,174 @@
+"""What test_ranks.py runs on 1, 2 and 4 ranks: results go into one file, from the first rank.
+
+python tests/processes/on_ranks.py FILE
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+from conftest import BASES, FORMS, grid_of
+from mpi4py import MPI
+
+import tawami
+from cases import collapse
+from cases.cantilever import fem, mpm
+from tawami.base.ranks import joined
+from tawami.form.form import Form
+
+
+def beams() -> dict[str, float | np.ndarray]:
+    """The cantilever by every form, support and path."""
+    found: dict[str, float | np.ndarray] = {}
+    for support in ("paper", "exact", "clamped"):
+        for method, alpha in (("u", None), ("u_bbar", None), ("u_epsv", 0.1), ("u_p", 0.1)):
+            for path in ("fast", "reference"):
+                row, solution = mpm.solve(method, support, 4, alpha, assembly=path)
+                name = f"beam {support} {method} {path}"
+                found[f"{name} deflection"] = row.deflection_m
+                found[f"{name} mean stress"] = solution.mean_stress
+                if row.mean_stress_l2 is not None:
+                    found[f"{name} error"] = row.mean_stress_l2
+    for method in fem.METHODS:
+        row = fem.solve(method, "exact", 4)
+        found[f"{method} deflection"], found[f"{method} error"] = (
+            row.deflection_m,
+            row.mean_stress_l2,
+        )
+        found[f"{method} unknowns"] = row.unknowns
+    return found
+
+
+def random_clouds() -> dict[str, np.ndarray]:
+    """Residual and tangent of random particles in one corner: some ranks have none."""
+    found = {}
+    for name, options in FORMS.items():
+        for basis in BASES:
+            for path in ("fast", "reference"):
+                grid, random = grid_of((6, 5)), np.random.default_rng(0)
+                x = grid.origin + grid.h * np.array([3.0, 2.5]) * random.random((40, 2))
+                body = tawami.Body(x, random.uniform(0.01, 0.1, len(x)))
+                materials = [
+                    tawami.linear_elastic(E=2.0, nu=0.3),
+                    tawami.linear_elastic(E=7.0, nu=0.4),
+                ]
+                scene = tawami.Scene(grid, body, materials, basis=basis, assembly=path,
+                                     material_of=random.integers(0, 2, len(x)), **options)  # fmt: skip
+                c = random.standard_normal(scene.num_coefficients)
+                found[f"cloud {name} {basis} {path} residual"] = scene.residual(c)
+                found[f"cloud {name} {basis} {path} tangent"] = scene.tangent(c).toarray()
+    return found
+
+
+def nonlinear() -> dict[str, np.ndarray]:
+    """Several iterations on one factorisation, points held in cells of other ranks, a second step."""
+    from ufl import div, dot, grad
+
+    def stiff(u, w, sigma, mu, sum_p, t, ds):
+        return sum_p(sigma, grad(w)) + sum_p(3e3 * mu, div(u) ** 3 * div(w)) - dot(t, w) * ds
+
+    form = Form({"u": ("displacement", "w")}, "displacement", stiff)
+    found = {}
+    for path in ("fast", "reference"):
+        grid = grid_of()
+        body = tawami.box(grid, grid.origin, grid.upper, per_axis=3)
+        material = tawami.linear_elastic(E=1e3, nu=0.2)
+        scene = tawami.Scene(grid, body, material, form=form, tolerance=1e-12, assembly=path)
+        scene.fix("left", "x")
+        scene.fix("left", "y")
+        scene.hold((0.2, 1.3), "x", 0.02)
+        scene.hold((-0.1, 0.6), "y")
+        scene.traction("right", (120.0, lambda x, y: 20.0 * y))
+        first = scene.solve()
+        found[f"nonlinear {path} first"] = first.u
+        scene.traction("top", (0.0, 10.0))
+        second = scene.solve()
+        found[f"nonlinear {path} second"] = second.u
+        found[f"nonlinear {path} stress"] = second.stress
+        found[f"nonlinear {path} krylov"] = np.array(first.krylov + second.krylov)
+    return found
+
+
+def singular() -> dict[str, np.ndarray]:
+    """A singular tangent is one on any number of ranks, and cells are named."""
+    grid = grid_of((6, 5))
+    body = tawami.box(grid, grid.origin, grid.upper)
+    material = tawami.linear_elastic(E=1.0, nu=0.3)
+    scene = tawami.Scene(grid, body, material, basis="biquadratic")
+    scene.fix("left", "x")
+    scene.hold(grid.origin, "y")
+    scene.traction("right", (0.0, -1.0))
+    try:
+        scene.solve()
+    except tawami.SingularError as error:
+        named = "is singular" in str(error) and "with 4 particles" in str(error)
+        return {"singular": np.array(named)}
+    raise AssertionError("a singular tangent was solved")
+
+
+def motion() -> dict[str, np.ndarray]:
+    """A pile that collapses across the ranks' cells, a block that slides into those of another rank;
+    one that loses particles.
+    """
+    found = {}
+    pile = collapse.build("u_epsv_finite", h=0.02)
+    pile.run(0.1, 1e-3)
+    found["motion pile momentum"] = pile.linear_momentum
+    found["motion pile energy"] = np.array(pile.energies.dissipated)
+    found |= {f"motion pile {k}": v for k, v in whole(pile).items()}
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(16, 8))
+    body = tawami.box(grid, (0.25, 0), (0.75, 0.5))
+    law = tawami.linear_elastic(E=1e5, nu=0.4)
+    for leaving, speed in (("stop", 5.0), ("remove", 9.0)):
+        scene = tawami.Scene(grid, body, law, form="u_epsv_finite", density=1e3, leaving=leaving)
+        scene.gravity((0, -10))
+        scene.wall("bottom", 0.2)
+        scene.load(body.x[:, 1] > 0.4, (10.0, -5.0))
+        block = tawami.Dynamics(scene, velocity=np.column_stack([speed + 0 * body.x[:, 0],
+                                                                 0 * body.x[:, 0]]))  # fmt: skip
+        block.run(0.15, 5e-3)
+        found |= {f"motion {leaving} {k}": v for k, v in whole(block).items()}
+        found[f"motion {leaving} left"] = np.array([len(scene.left)])
+    return found
+
+
+def initial() -> dict[str, np.ndarray]:
+    """A ring in a stress of its own, some of it beyond the yield surface: some ranks have none of it."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(16, 16))
+    ring = tawami.disc(grid, (0.6, 0.7), 0.5, inner=0.2)
+    elastic = tawami.linear_elastic(E=1e6, nu=0.3)
+    steel = tawami.von_mises(elastic, yield_stress=1e3)
+    stress = np.column_stack([4e3 * (ring.x[:, 0] - 0.6), *(3 * [0 * ring.x[:, 0]])])
+    plastic = tawami.Scene(grid, ring, steel)
+    told = "nothing"
+    try:
+        plastic.initial("stress", stress)
+    except tawami.InputError as error:
+        told = str(error)
+    assert "beyond what its law bears" in told
+    plastic.initial("stress", stress, beyond="return")
+    order = np.argsort(joined(grid.comm, plastic.particles.number))
+    found = {"initial stress": joined(grid.comm, np.array(plastic.particles.stress))[order]}
+    scene = tawami.Scene(grid, ring, elastic, density=10.0)
+    scene.initial("stress", lambda x, y: (4e3 * (x - 0.6), 0.0, 0.0, 0.0))
+    for point in ((0.6, 0.3), (0.2, 0.7)):
+        scene.hold(point, "x")
+        scene.hold(point, "y")
+    scene.gravity((0, -1))
+    solution = scene.solve()
+    return found | {"initial solved": solution.stress, "initial eps_v": solution.eps_v}
+
+
+def whole(motion: tawami.Dynamics) -> dict[str, np.ndarray]:
+    """What the particles carry, in the order of their numbers."""
+    particles, comm = motion.scene.particles, motion.scene.grid.comm
+    order = np.argsort(joined(comm, particles.number))
+    arrays = {"x": particles.x, "stress": particles.stress, "velocity": motion.velocity}
+    return {name: joined(comm, np.array(values))[order] for name, values in arrays.items()}
+
+
+if __name__ == "__main__":
+    found = beams() | random_clouds() | nonlinear() | singular() | motion() | initial()
+    if MPI.COMM_WORLD.rank == 0:
+        np.savez(sys.argv[1], **found)

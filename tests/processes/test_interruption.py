@@ -1,0 +1,142 @@
+"""Ctrl-C at any line of a step: the particles are as before the step or as after it, never between."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from types import FrameType
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import grid_of
+
+import tawami
+from tawami.base.signals import deferred
+
+PACKAGE = os.path.dirname(tawami.__file__)
+
+
+def falling(form: str) -> tawami.Dynamics:
+    """A block that spins and falls on a wall, yields, and loses particles at an edge of the grid."""
+    grid = grid_of((6, 4))
+    body = tawami.box(grid, (0.5, 0.5), (2.0, 1.5))
+    law = tawami.von_mises(tawami.linear_elastic(E=1e4, nu=0.3), yield_stress=50.0)
+    scene = tawami.Scene(grid, body, law, form=form, density=1000.0, leaving="remove")
+    scene.gravity((0.0, -9.81))
+    scene.wall("bottom", 0.3)
+    centre = np.array([1.25, 1.0])
+    motion = tawami.Dynamics(scene, velocity=(body.x - centre)[:, ::-1] * [-1, 1] + [8.0, -1.0])
+    motion.step(0.01)
+    return motion
+
+
+def state(motion: tawami.Dynamics) -> dict[str, Any]:
+    """All that a step changes."""
+    scene, particles, energies = motion.scene, motion.scene.particles, motion.energies
+    arrays = {
+        name: getattr(particles, name)
+        for name in ("x", "number", "stress", "displacement", "eps_v")
+    }
+    arrays |= {name: particles.history(name) for name in particles.history_names}
+    arrays |= {
+        name: particles.carried(name)
+        for name in ("velocity", "acceleration", "velocity_gradient", "acceleration_gradient")
+    }
+    (wall,) = scene.supports.walls
+    arrays |= {"touching": wall.state.touching, "slip": wall.state.slip, "total": scene._total}
+    arrays["cell"] = scene.attached.location.cell
+    balance = (energies.kinetic, energies.elastic, energies.dissipated, energies.left)
+    carried = scene.loads._carried_gravity[1]
+    arrays["numbers"] = [motion.time, motion.steps, *balance, len(scene.left), carried]
+    return {name: np.array(values) for name, values in arrays.items()}
+
+
+def same(one: dict[str, Any], other: dict[str, Any]) -> bool:
+    return all(np.array_equal(one[name], other[name]) for name in one)
+
+
+def traced(run: Callable[[], object], at: int) -> int:
+    """Run with Ctrl-C at a line of the package, counted as they are run; how many lines were run."""
+    lines = 0
+
+    def local(frame: FrameType, event: str, _: Any) -> Any:
+        nonlocal lines
+        if event == "line":
+            lines += 1
+            if lines == at:
+                signal.raise_signal(signal.SIGINT)
+        return local
+
+    def tracer(frame: FrameType, *_: Any) -> Any:
+        # what is raised where Python drops an object goes nowhere, in any program
+        name = frame.f_code.co_filename
+        return local if name.startswith(PACKAGE) and not name.endswith("petsc.py") else None
+
+    before = sys.gettrace()
+    sys.settrace(tracer)
+    try:
+        run()
+    finally:
+        sys.settrace(before)
+    return lines
+
+
+@pytest.mark.parametrize("form", ["u_epsv", "u_epsv_finite"])
+def test_an_interrupted_step_is_there_or_not(form):
+    motion = falling(form)
+    before = state(motion)
+    lines = traced(lambda: motion.step(0.01), 0)
+    after = state(motion)
+    assert not same(before, after)
+    if form.endswith("finite"):
+        assert len(after["x"]) < len(before["x"])
+    seen = {"before": 0, "after": 0}
+    # everywhere, and more where a step is stored, which is near its end
+    for at in sorted(
+        {*range(1, lines, lines // 8), *range(lines // 2, lines, max(lines // 30, 1))}
+    ):
+        motion = falling(form)
+        try:
+            traced(lambda motion=motion: motion.step(0.01), at)
+        except KeyboardInterrupt:
+            now = state(motion)
+            which = "before" if same(now, before) else "after"
+            assert same(now, before if which == "before" else after), f"line {at} of {lines}"
+            seen[which] += 1
+            if which == "before":  # and it goes on from there
+                motion.step(0.01)
+                np.testing.assert_allclose(motion.scene.particles.x, after["x"], atol=1e-5)
+    assert min(seen.values()) > 0, seen
+
+
+def test_signals_wait_for_the_end_of_a_block():
+    said = []
+
+    def twice() -> None:
+        with deferred():
+            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
+            said.append("done")
+
+    with pytest.raises(KeyboardInterrupt):
+        twice()
+    assert said == ["done"]
+    with pytest.raises(KeyboardInterrupt):  # the handler is there again
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_other_threads_have_no_signals():
+    handler, seen = signal.getsignal(signal.SIGINT), []
+
+    def look() -> None:
+        with deferred():
+            seen.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=look)
+    thread.start()
+    thread.join()
+    assert seen == [handler]

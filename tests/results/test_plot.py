@@ -1,0 +1,137 @@
+"""Pictures of a run, from its files alone."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from PIL import Image
+
+import tawami
+from tawami.motion.observer import Moment
+from tawami.results import plot as pictures
+from tawami.results import provenance
+from tawami.results.plot import plot
+from tawami.results.series import Frame
+
+
+@pytest.fixture(scope="module")
+def scene():
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(12, 4))
+    body = tawami.box(grid, (0.0, 0.0), (1.0, 1.0))
+    return tawami.Scene(grid, body, tawami.linear_elastic(E=1e3, nu=0.3), form="u_finite")
+
+
+def run_of(folder, scene, *, format="vtu", phases=("ramp", "motion"), frames=5):
+    """A block that moves to the right and is pressed more and more, without any solving."""
+    x = np.array(scene.particles.x)
+    output = tawami.ParticleOutput("stress", "mean stress", "displacement", format=format)
+    table = tawami.TableOutput("run-out", "particles", "Newton iterations")
+    provenance.write(folder, scene)
+    for phase in phases:
+        for writer in (output, table):
+            writer.begin(folder / phase, scene, None, None)
+        for step in range(frames):
+            scene.particles.move_to(x + np.array([0.2 * step, 0.0]))
+            scene.particles.stress[:, :2] = [-1e4 * step, -2e4 * step]
+            scene.particles.stress[:, 3] = 3e4 * x[:, 1]
+            for writer in (output, table):
+                writer.look(Moment(scene, None, None, 0.25 * step, step, step == frames - 1))
+    scene.particles.move_to(x)
+
+
+def test_a_run_is_drawn_from_its_files(scene, tmp_path):
+    run_of(tmp_path, scene, phases=("ramp",), format="xdmf")
+    run_of(tmp_path, scene, phases=("motion",))
+    written = plot(tmp_path)
+    expected = [f"{phase}-{what}" for phase in ("ramp", "motion")
+                for what in ("mean-stress.png", "mean-stress.gif")]  # fmt: skip
+    expected += ["ramp-table.png", "motion-table.png"]
+    assert written == [tmp_path / "figures" / name for name in expected]
+    for name in expected:
+        with Image.open(tmp_path / "figures" / name) as image:
+            assert min(image.size) > 200
+            assert getattr(image, "n_frames", 1) == (5 if name.endswith("gif") else 1)
+
+
+def test_colours_and_view_stay_and_the_body_moves(scene, tmp_path):
+    run_of(tmp_path, scene, phases=("motion",))
+    film = next(path for path in plot(tmp_path) if path.suffix == ".gif")
+    with Image.open(film) as image:
+        frames = []
+        for k in range(image.n_frames):
+            image.seek(k)
+            frames.append(np.asarray(image.convert("RGB"), dtype=int))
+    height = frames[0].shape[0]
+    body, bar = slice(0, int(0.7 * height)), slice(int(0.8 * height), height)
+    for frame in frames[1:]:  # the colour bar and its numbers
+        assert np.abs(frame[bar] - frames[0][bar]).max() < 12
+    middles = [np.mean(np.nonzero(np.ptp(f[body], axis=2) > 40)[1]) for f in frames]
+    steps = np.diff(middles)
+    assert (steps > 0).all()
+    np.testing.assert_allclose(steps, steps.mean(), rtol=0.05)
+
+
+def test_what_a_quantity_may_be(scene, tmp_path):
+    run_of(tmp_path, scene, phases=("motion",), frames=2)
+    drawn = plot(tmp_path, quantity="stress xx", movie=None)
+    assert [path.name for path in drawn] == ["motion-stress-xx.png", "motion-table.png"]
+    frame = Frame(
+        np.zeros((2, 3)), "vertex", np.arange(2)[:, None],
+        {"velocity [m/s]": np.array([[3.0, -4.0, 0.0], [0.0, 1.0, 0.0]]),
+         "stress xx yy zz xy [Pa]": np.arange(8.0).reshape(2, 4), "eps_v [-]": np.ones(2)},
+    )  # fmt: skip
+    found = {name: (unit, list(v)) for name, (unit, v) in pictures._fields(frame).items()}
+    assert found == {
+        "velocity": ("m/s", [5, 1]), "velocity x": ("m/s", [3, 0]), "velocity y": ("m/s", [-4, 1]),
+        "stress xx": ("Pa", [0, 4]), "stress yy": ("Pa", [1, 5]), "stress zz": ("Pa", [2, 6]),
+        "stress xy": ("Pa", [3, 7]), "eps_v": ("-", [1, 1]),
+    }  # fmt: skip
+    with pytest.raises(
+        tawami.InputError,
+        match=r"quantity = 'strss': the run did not write it: expected one of 'stress xx', .*mean str",
+    ):
+        plot(tmp_path, quantity="strss")
+
+
+def test_units_of_the_colours():
+    assert pictures._scaled("Pa", 2.5e4) == ("kPa", 1e3)
+    assert pictures._scaled("Pa", 2.5e6) == ("MPa", 1e6)
+    assert pictures._scaled("Pa", 20.0) == ("Pa", 1.0)
+    assert pictures._scaled("m/s", 2e4) == ("m/s", 1.0)
+
+
+def test_folders_that_cannot_be_drawn(scene, tmp_path):
+    with pytest.raises(tawami.InputError, match=r"holds no run.json: expected the folder of a run"):
+        plot(tmp_path)
+    provenance.write(tmp_path, scene)
+    with pytest.raises(
+        tawami.InputError, match="no series of particles: expected a run with tawami"
+    ):
+        plot(tmp_path)
+    with pytest.raises(tawami.InputError, match="movie = 'avi': expected 'gif' or 'mp4'"):
+        plot(tmp_path, movie="avi")
+    run_of(tmp_path, scene, phases=("motion",), frames=2)
+    (tmp_path / "motion" / "particles" / "particles-000001.vtu").write_text("no VTU")
+    with pytest.raises(tawami.OutputError, match=r"particles-000001.vtu' cannot be read"):
+        plot(tmp_path)
+    (tmp_path / "run.json").write_text(json.dumps({"grid": None}))
+    with pytest.raises(tawami.OutputError, match=r"run.json' cannot be read"):
+        plot(tmp_path)
+
+
+def test_what_is_missing_is_named(scene, tmp_path, monkeypatch):
+    run_of(tmp_path, scene, phases=("motion",), frames=2)
+    code = "import sys; sys.modules['matplotlib'] = None\nfrom tawami.results.plot import plot\n"
+    code += f"plot({str(tmp_path)!r})"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "MissingDependencyError: pictures need matplotlib: pip install" in run.stderr
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(
+        tawami.MissingDependencyError, match="'mp4' needs ffmpeg: install it, or tak"
+    ):
+        plot(tmp_path, movie="mp4")

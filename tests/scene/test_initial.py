@@ -1,0 +1,317 @@
+"""Fields that a scene begins with: where they come from, and what they mean to the laws."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import grid_of
+from mpi4py import MPI
+
+import tawami
+from tawami.results.output import write_particles
+
+RHO, G, HEIGHT, K0 = 2000.0, 9.81, 4.0, 0.5
+SOIL = tawami.linear_elastic(E=1e7, nu=0.3)
+LAWS = {
+    "elastic": SOIL,
+    "mohr_coulomb": tawami.mohr_coulomb(SOIL, phi=30.0),
+    "drucker_prager": tawami.drucker_prager(SOIL, phi=30.0),
+}
+
+
+def k0(x, y, K0=K0):
+    """Stress of a column under its weight."""
+    vertical = RHO * G * (y - HEIGHT)
+    return K0 * vertical, vertical, K0 * vertical, 0.0
+
+
+def column(law="elastic", form="u_epsv", per_axis=2, **options):
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.5, cells=(4, 8))
+    body = tawami.box(grid, (0, 0), (2, HEIGHT), per_axis=per_axis, gauss=True)
+    material = law if isinstance(law, tawami.Material) else LAWS[law]
+    scene = tawami.Scene(grid, body, material, form=form, density=RHO, **options)
+    scene.fix("left", "x")
+    scene.fix("right", "x")
+    scene.fix("bottom", "y")
+    scene.gravity((0, -G))
+    return scene
+
+
+@pytest.mark.parametrize("form", ["u", "u_epsv", "u_epsv_finite", "u_finite"])
+@pytest.mark.parametrize("law", LAWS)
+def test_a_column_in_its_k0_state_is_in_equilibrium_at_once(law, form):
+    scene = column(law, form)
+    scene.initial("stress", k0)
+    before = scene.particles.stress.copy()
+    solution = scene.solve()
+    assert solution.iterations == 0
+    assert np.abs(solution.displacement_of_particles).max() == 0
+    assert solution.stress == pytest.approx(before, rel=1e-11, abs=1e-6)
+    assert solution.reaction("bottom")[1] == pytest.approx(RHO * G * 2 * HEIGHT)
+    assert solution.reaction("left")[0] == pytest.approx(K0 * RHO * G * HEIGHT**2 / 2)
+
+
+def test_at_the_u_p_form_too():
+    scene = column(form="u_p")
+    scene.initial("stress", k0)
+    assert np.abs(scene.solve().displacement_of_particles).max() == 0
+
+
+def test_a_motion_from_a_k0_state_stays_at_rest():
+    scene = column("mohr_coulomb", "u_epsv_finite")
+    scene.initial("stress", k0)
+    motion = tawami.Dynamics(scene)
+    motion.run(end=0.05, dt=0.01)
+    assert np.abs(scene.particles.displacement).max() < 1e-12
+    assert motion.energies.kinetic < 1e-20
+
+
+def test_what_is_missing_to_equilibrium_moves_the_column():
+    """Half of the weight is borne: the other half compresses it by rho g H^2 / (4 M)."""
+    scene = column()
+    scene.initial("stress", lambda x, y: [part * 0.5 for part in k0(x, y, 3 / 7)])
+    M = SOIL.bulk_modulus + 4 / 3 * SOIL.shear_modulus
+    top = scene.solve().displacement((1.0, HEIGHT))[1]
+    assert top == pytest.approx(-RHO * G * HEIGHT**2 / (4 * M), rel=2e-3)
+
+
+@pytest.mark.parametrize("law", ["mohr_coulomb", "drucker_prager"])
+@pytest.mark.parametrize("form", ["u_epsv", "u_epsv_finite"])
+def test_earth_pressure_beyond_rankine_is_refused_or_returned(law, form):
+    """phi = 30 degrees: K between 1/3 and 3. Drucker-Prager matches that in plane strain only, where
+    sigma_zz is that of flow without volume change: the mean of the others.
+    """
+
+    def stress(K):
+        def f(x, y):
+            sxx, syy, _, sxy = k0(x, y, K)
+            return sxx, syy, (sxx + syy) / 2, sxy
+
+        return f
+
+    for allowed in (0.34, 1.0, 2.95):
+        column(law, form).initial("stress", stress(allowed))
+    for beyond in (0.3, 3.2):
+        scene = column(law, form)
+        message = r"stress of particle \d+ at \(.*\) Pa, beyond what its law bears by .* 127 others"
+        with pytest.raises(tawami.InputError, match=message):
+            scene.initial("stress", stress(beyond))
+        assert not scene.particles.stress.any()
+        scene.initial("stress", stress(beyond), beyond="return")
+        sxx, syy = scene.particles.stress[:, 0], scene.particles.stress[:, 1]
+        ratio = np.maximum(sxx / syy, syy / sxx)
+        if law == "mohr_coulomb":
+            assert ratio == pytest.approx(3.0, rel=1e-6)
+        scene.initial("stress", np.array(scene.particles.stress))  # it is on the surface now
+
+
+def test_hardening_is_told_before_the_stress():
+    scene = column(tawami.von_mises(SOIL, yield_stress=1e3, hardening=1e5))
+    stress = np.array([1500.0, 0.0, 0.0, 0.0])
+    with pytest.raises(tawami.InputError, match="beyond what its law bears"):
+        scene.initial("stress", stress)
+    with pytest.raises(tawami.InputError, match="plastic_strain of particle 0 is -1: expected 0"):
+        scene.initial("plastic_strain", -1.0)
+    scene.initial("plastic_strain", 0.006)
+    scene.initial("stress", stress)
+    assert (scene.particles.stress == stress).all()
+    with pytest.raises(tawami.InputError, match="beyond what its law bears"):
+        scene.initial("plastic_strain", lambda x, y: 0 * x)
+    assert (scene.particles.history("plastic_strain") == 0.006).all()
+
+
+def test_eps_v_fits_the_stress_of_an_elastic_law():
+    scene = column()
+    scene.initial("stress", k0)
+    mean = scene.particles.stress[:, :3].mean(axis=1)
+    assert scene.particles.eps_v == pytest.approx(mean / SOIL.bulk_modulus)
+    with pytest.raises(
+        tawami.InputError, match=r"eps_v of particle 0 is 0.01, with which an elastic"
+    ):
+        scene.initial("eps_v", 0.01)
+    scene.initial("eps_v", 0.0)  # counted from this state
+    assert not scene.particles.eps_v.any()
+    plastic = column("mohr_coulomb")
+    plastic.initial("stress", k0)
+    plastic.initial("eps_v", 0.01)
+    assert (plastic.particles.eps_v == 0.01).all()
+
+
+def test_loaded_and_given_are_one_state():
+    """The state that a scene was loaded to, given to another: the same answer to what follows."""
+    first, second = column(), column()
+    first.solve()
+    for name in ("stress", "eps_v", "displacement"):
+        array = np.array(getattr(first.particles, name))
+        second.initial(name, array)
+        assert np.array_equal(getattr(second.particles, name), array)
+    for scene in (first, second):
+        scene.load(np.arange(4), (0.0, -1e4))
+    assert second.solve().stress == pytest.approx(first.solve().stress, rel=1e-9, abs=1.0)
+
+
+def test_numbers_and_functions_in_their_forms():
+    scene = column()
+    x, y = scene.particles.x.T
+    n = len(x)
+    one = np.array([-3.0, -5.0, -3.0, 0.5])
+    for given in (one, list(one), np.tile(one, (n, 1)), lambda x, y: one, lambda x, y: tuple(one)):
+        scene.initial("stress", given)
+        assert (scene.particles.stress == one).all()
+    scene.initial("displacement", lambda x, y: np.column_stack([x, -y]))
+    assert np.array_equal(scene.particles.displacement, np.column_stack([x, -y]))
+    motion = tawami.Dynamics(scene, velocity=lambda x, y: (y, 0.0))
+    assert np.array_equal(motion.velocity, np.column_stack([y, 0 * y]))
+
+
+def write_table(path, points, values, header):
+    rows = np.column_stack([points, values]).tolist()
+    lines = [header, *(",".join(map(repr, row)) for row in rows)]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def test_tables_are_linear_between_their_points(tmp_path):
+    random = np.random.default_rng(0)
+    points = np.concatenate([random.random((40, 2)), [[0, 0], [1, 0], [0, 1], [1, 1]]]) * [2, 4]
+    stress = np.column_stack([*k0(*points.T, 0.6)[:3], 3 * points[:, 0]])
+    path = tmp_path / "field.csv"
+    write_table(path, points, stress, "x, y, sxx, syy, szz, sxy")
+    scene = column()
+    scene.initial("stress", tawami.table(path))
+    x, y = scene.particles.x.T
+    expected = np.column_stack([*k0(x, y, 0.6)[:3], 3 * x])
+    assert scene.particles.stress == pytest.approx(expected, rel=1e-10, abs=1e-6)
+    scene.initial("displacement", tawami.table(path, "sxy", "syy"))
+    assert scene.particles.displacement[:, 0] == pytest.approx(3 * x)
+    motion = tawami.Dynamics(scene, velocity=tawami.table(path, "sxy", "sxy"))
+    assert motion.velocity[:, 1] == pytest.approx(3 * x)
+
+
+def test_outside_of_a_table(tmp_path):
+    path = tmp_path / "field.csv"
+    write_table(
+        path, [[0.2, 0], [2, 0], [2, 4], [0.2, 4]], [[1, 0], [2, 0], [3, 0], [4, 0]], "x,y,a,b"
+    )
+    scene = column()
+    with pytest.raises(tawami.InputError, match=r"particle 0 at \(0.1.*outside='nearest'"):
+        scene.initial("displacement", tawami.table(path))
+    scene.initial("displacement", tawami.table(path, outside="nearest"))
+    assert scene.particles.displacement[0, 0] == 1.0
+
+
+def test_an_earlier_run(tmp_path):
+    """The same particles get what is in the file, others what is linear between them."""
+    first = column("mohr_coulomb")
+    first.initial("stress", lambda x, y: k0(x, y, 0.45))
+    solution = first.solve()
+    path = tmp_path / "particles.vtu"
+    write_particles(path, solution)
+    state = tawami.earlier(path)
+    second = column("mohr_coulomb")
+    for name in ("stress", "eps_v", "displacement"):
+        second.initial(name, state)
+    assert np.array_equal(second.particles.stress, solution.stress)
+    assert np.array_equal(second.particles.eps_v, solution.eps_v)
+    assert np.array_equal(second.particles.displacement, solution.displacement_of_particles)
+    finer = column("mohr_coulomb", per_axis=3)
+    with pytest.raises(tawami.InputError, match=r"stress: particle 0 at .* are outside the points"):
+        finer.initial("stress", state)
+    finer.initial("stress", tawami.earlier(path, outside="nearest"))
+    inside = (abs(finer.particles.x - [1, 2]) < [0.85, 1.85]).all(axis=1)
+    expected = np.column_stack(k0(*finer.particles.x.T, 0.45)[:3])
+    assert finer.particles.stress[inside, :3] == pytest.approx(expected[inside], rel=1e-6)
+    grid = first.grid
+    again = tawami.Scene(grid, state.body, LAWS["mohr_coulomb"])
+    assert np.array_equal(again.particles.x, solution.x)
+    assert np.array_equal(again.particles.volume, solution.volume)
+    with pytest.raises(tawami.InputError, match=r"has no array 'velocity' of 2 components: it has"):
+        tawami.Dynamics(column(), velocity=state)
+
+
+@pytest.mark.parametrize(
+    ("name", "source", "message"),
+    [
+        ("strain", 0.0, "initial\\('strain'\\): expected one of 'stress', 'displacement', 'eps_v'"),
+        ("velocity", 0.0, r"velocities come in as Dynamics\(scene, velocity=...\)"),
+        ("plastic_strain", 0.0, "expected one of 'stress', 'displacement', 'eps_v', which this scene"),
+        ("stress", 1.0, r"stress has shape \(\): expected 4 numbers, 128 x 4, a function"),
+        ("stress", [1.0, 2.0, 3.0], r"stress has shape \(3,\): expected 4 numbers, 128 x 4"),
+        ("stress", "high", r"stress has the value 'high': expected 4 numbers"),
+        ("stress", [1.0, 2.0, np.nan, 0.0], r"stress of particle 0 is \(1, 2, nan, 0\) Pa: expec"),
+        ("stress", lambda x, y: (x, y), "the function returned .* for 128 positions: expected 4 such"),
+        ("stress", lambda x, y: (x, y[16:], x, y), r"parts of shape \(128,\), \(112,\), .* expected 4"),
+        ("stress", lambda x: x, "the function failed on arrays of 128 positions"),
+        ("stress", lambda x, y: (x / (x - x), y, y, y), r"stress of particle 0 is \(inf"),
+        ("eps_v", np.zeros(3), r"eps_v has shape \(3,\): expected a number, 128 of them"),
+        ("eps_v", lambda x, y: x[1:], "the function returned .* expected an array of that length"),
+        ("displacement", np.zeros((128, 3)), r"displacement has shape \(128, 3\): expected two numbers"),
+    ],
+)  # fmt: skip
+@pytest.mark.filterwarnings("ignore:divide by zero")
+def test_a_wrong_field_gets_one_sentence(name, source, message):
+    scene = column()
+    with pytest.raises(tawami.InputError, match=message):
+        scene.initial(name, source)
+    assert not scene.particles.stress.any()
+
+
+def test_it_comes_before_the_first_solve_and_before_a_motion():
+    solved, moving = column(), column()
+    solved.solve()
+    tawami.Dynamics(moving)
+    for scene in (solved, moving):
+        before = scene.particles.stress.copy()
+        with pytest.raises(tawami.InputError, match="after the scene was solved or set in motion"):
+            scene.initial("stress", k0)
+        assert np.array_equal(scene.particles.stress, before)
+    with pytest.raises(tawami.InputError, match="beyond = 'ignore': expected 'stop' or 'return'"):
+        column().initial("stress", k0, beyond="ignore")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "its first row is empty: expected names"),
+        ("x,z,a\n1,2,3\n", "its first row is x, z, a: expected names of columns, x, y and at least"),
+        ("x,y\n1,2\n", "first row is x, y: expected names"),
+        ("x,y,a\n0,0,1\n1,0,b\n0,1,1\n", "row 3: 1,0,b: expected finite numbers"),
+        ("x,y,a\n0,0,1\n1,0\n0,1,1\n", "row 3: 1,0: expected finite numbers"),
+        ("x,y,a\n0,0,1\n1,0,nan\n0,1,1\n", "row 3: 1,0,nan: expected finite numbers"),
+        ("x,y,a\n0,0,1\n1,0,1\n", "has 2 points: expected three or more"),
+        ("x,y,a\n0,0,1\n1,0,1\n0,0,2\n", r"the point \(0, 0\) m is there 2 times"),
+        ("x,y,a\n0,0,1\n0,1,1\n0,2,2\n", "are less than a triangle: .* np.interp"),
+        ("x,y,a,b\n0,0,1,1\n0,1,1,1\n9,2,2,2\n", r"has 2 columns besides x and y: expected 1 \(value\)"),
+    ],
+)  # fmt: skip
+def test_a_wrong_table_gets_one_sentence(tmp_path, text, message):
+    path = tmp_path / "field.csv"
+    path.write_text(text)
+    with pytest.raises(tawami.InputError, match=message):
+        column().initial("eps_v", tawami.table(path))
+
+
+def test_files_that_are_not_there(tmp_path):
+    with pytest.raises(tawami.InputError, match=r"table\('.*none.csv'\) cannot be read"):
+        tawami.table(tmp_path / "none.csv")
+    with pytest.raises(tawami.InputError, match=r"earlier\('.*none.vtu'\) is no such file"):
+        tawami.earlier(tmp_path / "none.vtu")
+    (tmp_path / "text.vtu").write_text("no particles")
+    with pytest.raises(tawami.InputError, match=r"earlier\('.*text.vtu'\) cannot be read"):
+        tawami.earlier(tmp_path / "text.vtu")
+    with pytest.raises(tawami.InputError, match="outside = 'far': expected 'stop' or 'nearest'"):
+        tawami.table("any.csv", outside="far")
+
+
+def test_a_law_in_numpy_is_asked_too():
+    """One that bears no tension."""
+
+    def respond(strain, stress):
+        stress = np.minimum(stress, 0.0)
+        return stress, np.broadcast_to(np.eye(4), (len(strain), 4, 4))
+
+    grid = grid_of()
+    body = tawami.box(grid, grid.origin, grid.upper)
+    scene = tawami.Scene(grid, body, tawami.NumpyLaw(respond, K=1.0, mu=1.0))
+    scene.initial("stress", [-1.0, -2.0, -1.0, 0.0])
+    with pytest.raises(tawami.InputError, match=r"returns it to \(-1, 0, -1, 0\) Pa"):
+        scene.initial("stress", [-1.0, 2.0, -1.0, 0.0])

@@ -1,0 +1,163 @@
+"""Factorisations are kept and reused: the results are those of factorising every time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import grid_of
+from scipy.sparse import csr_matrix
+from ufl import div, dot, grad, inner
+
+import tawami
+from cases.cantilever import mpm
+from tawami.base.errors import InexactSumWarning
+from tawami.form.form import Form
+from tawami.solve import direct
+
+
+def hardening(strength):
+    """Displacement only, with a stress that grows with the cube of the volume change."""
+
+    def residual(u, w, sigma, mu, sum_p, t, ds):
+        harder = sum_p(strength * mu, inner(div(u) ** 3, div(w)))
+        return sum_p(sigma, grad(w)) + harder - dot(t, w) * ds
+
+    return Form({"u": ("displacement", "w")}, "displacement", residual)
+
+
+def beam(form, **options):
+    grid = grid_of((8, 4), h=0.25)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=3)
+    material = tawami.linear_elastic(E=1e3, nu=0.2)
+    with pytest.warns(InexactSumWarning):  # degree 6
+        scene = tawami.Scene(grid, body, material, form=form, tolerance=1e-11, **options)
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    scene.traction("right", (120.0, 20.0))
+    return scene
+
+
+@pytest.mark.parametrize("assembly", ["fast", "reference"])
+def test_one_factorisation_serves_a_step_and_the_next(assembly, monkeypatch):
+    form = hardening(20.0)
+    scene = beam(form, assembly=assembly)
+    first = scene.solve()
+    assert first.iterations > 3
+    assert first.krylov[0] == 0
+    assert all(0 < number <= direct.PAYS for number in first.krylov[1:])
+    scene.traction("right", (12.0, 2.0))
+    second = scene.solve()
+    assert 0 not in second.krylov
+    monkeypatch.setattr(direct, "PAYS", -1)
+    again = beam(hardening(20.0), assembly=assembly)
+    every_time = again.solve()
+    assert set(every_time.krylov) == {0}
+    assert np.abs(first.u - every_time.u).max() < 1e-10 * np.abs(first.u).max()
+    assert first.iterations <= every_time.iterations + 1
+    again.traction("right", (12.0, 2.0))
+    assert np.abs(second.u - again.solve().u).max() < 1e-10 * np.abs(first.u).max()
+
+
+def test_a_tangent_that_changed_too_much_is_factorised_again(monkeypatch):
+    slow = beam(hardening(3e4)).solve()
+    late = [k for k, number in enumerate(slow.krylov[:-1]) if number > direct.PAYS]
+    assert late
+    assert all(slow.krylov[k + 1] == 0 for k in late)
+    monkeypatch.setattr(direct, "LIMIT", 1)  # what does not get there in time is factorised at once
+    at_once = beam(hardening(3e4)).solve()
+    assert at_once.krylov.count(0) > slow.krylov.count(0)
+    assert np.abs(at_once.u - slow.u).max() < 1e-9 * np.abs(slow.u).max()
+
+
+@pytest.mark.parametrize("form", ["u", "u_epsv", "u_p"])
+@pytest.mark.parametrize("load", [10.0, 20.0, 40.0])
+def test_a_load_beyond_what_the_stress_can_carry_is_no_equilibrium(form, load):
+    """The deviator is bounded: the iterates run away, and nothing may call that converged."""
+    K, mu = 2.0, 1.0
+    unit = np.array([1.0, 1.0, 1.0, 0.0])
+    weight = np.array([1.0, 1.0, 1.0, 0.5])  # of gamma_xy in e : e
+
+    def respond(strain, stress):
+        volume = strain[:, :3].sum(axis=1)
+        e = strain - volume[:, None] / 3 * unit
+        root = np.sqrt(1 + 1e3 * (weight * e**2).sum(axis=1))[:, None]
+        s = 2 * mu * weight * e / root
+        projector = np.eye(4) - np.outer(unit, unit) / 3
+        slope = (
+            2
+            * mu
+            * (
+                np.diag(weight)[None] / root[..., None]
+                - 1e3 * np.einsum("ni,nj->nij", weight * e, weight * e) / root[..., None] ** 3
+            )
+        )
+        tangent = slope @ projector + K * np.outer(unit, unit)
+        return stress + s + K * volume[:, None] * unit, tangent
+
+    grid = grid_of((8, 4), h=0.25)
+    body = tawami.box(grid, grid.origin, grid.upper)
+    scene = tawami.Scene(grid, body, tawami.NumpyLaw(respond, K=K, mu=mu), form=form)
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    scene.traction("right", (0.0, -load))
+    with pytest.raises((tawami.SingularError, tawami.ConvergenceError)):
+        scene.solve()
+    assert not scene.particles.stress.any()
+
+
+def test_a_tangent_that_is_not_a_number():
+    def residual(u, w, sigma, mu, sum_p, t, ds):
+        root = sum_p(mu, inner((div(u) ** 2) ** 0.5, div(w)))
+        return sum_p(sigma, grad(w)) + root - dot(t, w) * ds
+
+    form = Form({"u": ("displacement", "w")}, "displacement", residual)
+    with pytest.raises(tawami.SingularError, match="the tangent holds NaN or infinity"):
+        beam(form).solve()
+
+
+def test_other_supports_are_other_unknowns_and_factorised():
+    scene = beam(hardening(20.0))
+    scene.solve()
+    scene.hold((1.0, 1.0), "y", 1e-3)
+    assert scene.solve().krylov[0] == 0
+
+
+def test_a_linear_scene_needs_one_iteration_on_an_old_factorisation():
+    scene = mpm.build("u_epsv", "paper", 8, alpha=0.1)
+    once = scene.solve()
+    scene.traction("right", (0.0, -1e3))
+    twice = scene.solve()
+    assert twice.krylov == (1,)
+    assert max(twice.history[-1]) < 1e-10
+    assert np.abs(twice.u - 2 * once.u).max() < 1e-10 * np.abs(once.u).max()
+
+
+def test_an_unsymmetric_tangent():
+    scene = mpm.build("u_epsv", "paper", 8, alpha=0.1, stabilisation="residual_based")
+    first = scene.solve()
+    assert not first.symmetric
+    scene.traction("right", (0.0, -1e3))
+    assert scene.solve().krylov == (1,)
+
+
+@pytest.mark.parametrize("method", ["u", "u_epsv"])
+def test_the_condition_number(method):
+    """Against the dense inverse; a few random vectors are good for a factor of a few."""
+    options = {"alpha": 0.1} if method == "u_epsv" else {}
+    scene = mpm.build(method, "clamped", 4, **options)
+    solution = scene.solve()
+    newton, reduction = scene.attached.newton, scene.problem().reduction
+    c = np.zeros(scene.num_coefficients)
+    newton.internal(c)
+    matrix = scene.attached.field.tangent(c, newton.data, reduction)
+    scale = newton._scale(matrix, reduction)
+    start, columns, values = matrix.getValuesCSR()
+    dense = csr_matrix((values, columns, start)).toarray() * scale * scale[:, None]
+    exact = np.linalg.norm(dense) / np.sqrt(len(dense)) * np.linalg.norm(np.linalg.inv(dense))
+    assert exact / 3 < solution.condition < 3 * exact
+
+
+def test_the_same_bits_every_time():
+    runs = [beam(hardening(20.0)).solve() for _ in range(2)]
+    assert runs[0].u.tobytes() == runs[1].u.tobytes()
+    assert runs[0].stress.tobytes() == runs[1].stress.tobytes()
