@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from tawami.base.errors import FormError
+from tawami.fem.rules import Rule
 
 Part = Literal["value", "strain", "gradient", "volume"]
 
