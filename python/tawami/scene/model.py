@@ -69,7 +69,7 @@ class Model:
     @property
     def moves(self) -> bool:
         """Whether particles move with the body: strains are finite and each step resets the grid."""
-        return self.form.strain.is_finite
+        return self.form.strain.finite
 
     @property
     def moduli(self) -> Array:
@@ -147,7 +147,7 @@ def build(
         warn(message, ParameterWarning)
     particles, materials, law = _particles(body, material, material_of, loaded)
     densities = assignment.densities(density, len(materials), body.names)
-    if loaded.strain.is_finite and law is not None:
+    if loaded.strain.finite and law is not None:
         raise InputError(
             f"form {loaded.name} has finite strains: expected a law in Rust, a NumpyLaw has small ones "
             "only"
@@ -172,7 +172,7 @@ def _particles(
     x, volume = checks.array("x", body.x, 2), checks.array("volume", body.volume, 1)
     assigned = assignment.assigned(material, material_of, body, len(x))
     particles = _rust.Particles(x, volume, assigned.number)
-    particles.check_materials(assigned.materials, form.kinematics.name, form.strain.is_finite)
+    particles.check_materials(assigned.materials, form.kinematics.name, form.strain.finite)
     particles.add_history(assigned.materials)
     return particles, assigned.materials, assigned.law
 
@@ -181,7 +181,7 @@ def _warn_of_locking(
     grid: Grid, form: Form, materials: Sequence[_rust.Material], particles: _rust.Particles
 ) -> None:
     """Warn of a nearly incompressible material in a form without a field for the volume."""
-    if form.kinematics.name != "displacement" or grid.comm.rank:
+    if not form.kinematics.locks or grid.comm.rank:
         return
     ratios = np.array([m.bulk_modulus / m.shear_modulus for m in materials])[particles.material]
     p = int(ratios.argmax())
