@@ -95,7 +95,7 @@ class Dynamics(Unique):
         self.gamma = checks.number("gamma", gamma, low=0.5, high=1.0)
         self.beta = (self.gamma + 0.5) ** 2 / 4
         self.scene, self.damping = scene, damping
-        self.transfer, self._moves = TRANSFERS[transfer], scene.form.strain == "finite"
+        self.transfer, self._moves = TRANSFERS[transfer], scene.form.strain.finite
         if damping != np.inf and not (self.transfer.flip and self._moves):
             raise InputError(
                 f"damping = {damping:g} s relaxes the velocities of FLIP: expected transfer "
@@ -307,7 +307,7 @@ class Dynamics(Unique):
         guess = np.zeros(scene.num_coefficients)
         n = u.size
         guess[:n] = u.ravel()
-        if scene.form.kinematics == "mixed":
+        if scene.form.kinematics.has_eps_v:
             ln_j = scene.attached.stage.volume_strains(guess[:n], None)[:, 0]
             weight = scene.constants["K"] * scene.particles.volume
             # a guess that halves a particle or turns it inside out is not followed that far

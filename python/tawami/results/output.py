@@ -372,7 +372,7 @@ def write_particles(path: str | Path, solution: Solution) -> None:
     checks.instance("write_particles: solution", solution, Solution, SOLVED)
     scene = solution.scene
     names = ["displacement", "stress", "mean stress", "volume"]
-    names += ["eps_v"] if scene.form.kinematics == "mixed" else []
+    names += ["eps_v"] if scene.form.kinematics.has_eps_v else []
     frame = _of_particles(of_particles(names, scene, None), solution_view(solution))
     _write_once(path, frame, scene.grid)
 

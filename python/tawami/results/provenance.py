@@ -17,6 +17,7 @@ from tawami.base import ranks
 from tawami.base.files import result_folder, whole_file
 from tawami.fem import environment
 from tawami.form.form import Form
+from tawami.form.kinematics import Kinematics, StrainMeasure
 
 if TYPE_CHECKING:
     from tawami.motion.dynamics import Dynamics
@@ -135,7 +136,9 @@ def source_of(form: Form) -> bytes | None:
     lines = [f"# Form {form.name}: defined in {file}"]
     lines += [f"from ufl import {', '.join(names)}"] if names else []
     for key in ("fields", "kinematics", "parameters", "options", "strain", "whole_cells"):
-        lines.append(f"{key} = {getattr(form, key)!r}")
+        value = getattr(form, key)
+        text = str(value) if isinstance(value, Kinematics | StrainMeasure) else value
+        lines.append(f"{key} = {text!r}")
     lines += ["", "", source.rstrip()]
     lines += [] if name == "residual" else ["", "", f"residual = {name}"]
     return ("\n".join(lines) + "\n").encode()

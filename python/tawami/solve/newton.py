@@ -232,9 +232,7 @@ class Newton:
         grid, basis = self.field.grid, self.field.layout.basis
         g = np.asarray(_rust.gradients(self.location, basis, np.ascontiguousarray(u)))
         g = g.reshape(-1, 2, 2)
-        strain = g + g.transpose(0, 2, 1)
-        if self.compiled.form.strain == "finite":
-            strain = strain + g.transpose(0, 2, 1) @ g
+        strain = self.compiled.form.strain.metric_change(g)
         largest = self._comm.allreduce(float(np.abs(strain).max(initial=0.0)), op=MPI.MAX)
         return bool(moved == 0 or largest <= 1e-10 * moved / grid.h)
 
