@@ -39,7 +39,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 from pathlib import Path
-from types import MappingProxyType, ModuleType
+from types import ModuleType
 from typing import Any, NoReturn
 
 from tawami.base.checks import TEXT, number, one_of, real, shown
@@ -56,7 +56,7 @@ from tawami.form.quantities import COMPONENTS
 
 #: The shipped forms, `tawami/forms`.
 SHIPPED = Path(__file__).parents[1] / "forms"
-NOTHING: Mapping[str, Any] = MappingProxyType({})
+NOTHING: Mapping[str, Any] = {}
 #: What a parameter may declare.
 LIMITS = ("default", "minimum", "maximum", "usual")
 #: Names that every form has.
