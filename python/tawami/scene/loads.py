@@ -6,6 +6,7 @@ there already stays.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,6 +17,7 @@ import numpy.typing as npt
 from tawami import _rust
 from tawami.base import checks
 from tawami.base.errors import CheckpointError, InputError, SupportError
+from tawami.base.identity import text
 from tawami.grid import edges
 from tawami.grid.edges import Interval, Profile
 from tawami.grid.grid import Edge, Grid
@@ -92,6 +94,14 @@ class Loads:
             traction.carried = carried
         for forces, carried in zip(self.forces, state["forces"], strict=True):
             forces.carried = carried
+
+    def identity(self) -> list[Any]:
+        """What tells them from other loads, for checkpoints."""
+        return [
+            list(map(float, self.gravity)),
+            *([t.edge, *map(text, t.value), text(t.between)] for t in self.tractions),
+            *(hashlib.sha256(f.force.tobytes()).hexdigest() for f in self.forces),
+        ]
 
     def add_forces(self, particles: npt.ArrayLike, force: Sequence[float]) -> None:
         """Share a force [N per metre depth] out among particles of the body, a mask or numbers."""

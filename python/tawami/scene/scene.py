@@ -18,6 +18,7 @@ import scipy.sparse as sp
 from tawami import _rust
 from tawami.base import checks, ranks, signals
 from tawami.base.errors import ConvergenceError, InputError, LockingWarning, ParameterWarning
+from tawami.base.identity import fingerprint
 from tawami.base.process import Unique, check_process
 from tawami.base.timing import Stopwatch
 from tawami.body.body import Body
@@ -47,6 +48,8 @@ FIELDS: dict[str, type[Field]] = {"fast": FastField, "reference": Field}
 #: K/mu from which displacement-only forms lock: nu = 0.49. At 0.495 the mean stress of the cantilever
 #: has 4 times the error that it has at 0.3, at 0.49995 70 times (`python -m cases.extremes`).
 LOCKS = 50.0
+#: Arrays of particles whose values are lengths, or lengths per time.
+LENGTHS = ("x", "displacement", "velocity", "acceleration")
 #: Times that a step is solved with other states of the walls before it is given up.
 PASSES = 40
 
@@ -646,6 +649,35 @@ class Scene(description.Elsewhere, Unique):
         self.particles, location = placement.migrated(self.grid, self.particles)
         self.attached = self._attach(location)
         return solution
+
+    @property
+    def scene(self) -> Scene:
+        """Itself: observers find the scene in the same way in a scene and in its `Dynamics`."""
+        return self
+
+    @property
+    def motion(self) -> None:
+        """None: a scene by itself is static."""
+
+    def identity(self) -> dict[str, Any]:
+        """What tells it from another scene, for checkpoints; a call for all ranks."""
+        sizes = {"stress": self.attached.newton.stiffest} | dict.fromkeys(LENGTHS, self.grid.h)
+        arrays = placement.gathered(self.grid, self.particles)
+        facts = {
+            "basis": self.basis,
+            "parameters": self.parameters | self.options,
+            "laws": self.law_texts,
+            "density": self.densities,
+            "tolerance": self.numerics.tolerance,
+            "number of particles": self.num_particles,
+            "supports": self.supports.identity(),
+            "loads": self.loads.identity(),
+        }
+        values = {
+            f"'{name}' of the particles at its start": fingerprint(values, sizes.get(name, 1.0))
+            for name, values in arrays.items()
+        }
+        return self.grid.identity() | self.form.identity() | facts | values
 
     def state(self) -> dict[str, Any]:
         """All that it carries from one step to the next, of all ranks, for a checkpoint; a call for all

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from tawami.base import checks
 from tawami.base.errors import InputError
+from tawami.base.identity import text
 from tawami.field.reduction import Reduction
 from tawami.grid import edges
 from tawami.grid.basis import Basis
@@ -273,6 +274,14 @@ class Supports:
             support.way = values["way"]
         for wall, values in zip(self.walls, state["walls"], strict=True):
             wall.state = Contact(values["touching"], values["slip"])
+
+    def identity(self) -> list[Any]:
+        """What tells them from other supports, for checkpoints."""
+        held = [
+            [str(s.given), s.component, text(s.value), text(s.velocity), text(s.between)]
+            for s in self.all
+        ]
+        return held + [["wall", w.edge, w.friction, w.separates] for w in self.walls]
 
     def friction(self, forces: Array) -> Array:
         """Friction of the walls from what supports have to give, functions x 2."""
