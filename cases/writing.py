@@ -24,7 +24,7 @@ from mpi4py import MPI
 import tawami
 from cases.table import as_text
 from tawami.base import archive
-from tawami.motion.observer import Moment
+from tawami.motion.observer import Snapshot
 from tawami.results.output import Output
 from tawami.results.series import Format
 
@@ -57,11 +57,11 @@ def measure(
 ) -> tuple[Row, Path]:
     """Time of a file, and the last one."""
     scene = motion.scene
-    output.begin(folder, scene, motion, None)
+    output.begin(folder, motion, None)
     times = []
     for step in range(repeat):
         before = perf_counter()
-        output.look(Moment(scene, motion, None, 0.1 * step, step, step == repeat - 1))
+        output.look(Snapshot(motion, None, 0.1 * step, step, step == repeat - 1))
         times.append(perf_counter() - before)
     files = [path for path in (folder / output.name).glob("*") if path.is_file()]
     last = max(files, default=folder / f"{output.name}.csv")
@@ -98,7 +98,7 @@ def rows_of(cells: int, repeat: int, folder: Path) -> list[Row]:
 
 
 def _keep(motion: tawami.Dynamics, path: Path) -> None:
-    archive.write(path, {}, {"scene": motion.scene.state(), "motion": motion.state()})
+    archive.write(path, {}, {"scene": motion.state()})
 
 
 def _timed(action: Callable[[], object]) -> float:

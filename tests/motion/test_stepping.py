@@ -8,9 +8,9 @@ from conftest import grid_of
 from mpi4py import MPI
 
 import tawami
+from tawami.motion.observer import NullObserver
 from tawami.motion.pace import Pace
 from tawami.motion.stepping import march
-from tawami.results.phase import Unwatched
 
 ELASTIC = tawami.linear_elastic(E=100.0, nu=0.3)
 
@@ -34,7 +34,7 @@ def refusing(limit, calls):
 
 def test_sizes_are_halved_on_failure_and_grow_after_three():
     calls = []
-    steps = march(Pace(0.0, 0.25), 1.0, 1e-3, refusing(lambda _: 0.1, calls), Unwatched("s"))
+    steps = march(Pace(0.0, 0.25), 1.0, 1e-3, refusing(lambda _: 0.1, calls), NullObserver("s"))
     assert calls[:4] == [0.25, 0.125, 0.0625, 0.0625]
     assert 0.125 in calls[4:]  # tried again
     assert steps[-1].end == 1.0
@@ -49,14 +49,14 @@ def test_at_the_smallest_size_the_error_says_where():
             1.0,
             0.1,
             refusing(lambda end: 0.0 if end > 0.6 else 1.0, []),
-            Unwatched("s"),
+            NullObserver("s"),
         )
     assert error.value.__notes__ == ["at 0.5 s, with the smallest step of 0.125 s"]
 
 
 @pytest.mark.parametrize(("size", "count"), [(0.3, 4), (0.1, 10), (1.0, 1)])
 def test_the_end_is_met_exactly_and_without_a_crumb(size, count):
-    steps = march(Pace(0.0, size), 1.0, 0.0, refusing(lambda _: 1.0, []), Unwatched("s"))
+    steps = march(Pace(0.0, size), 1.0, 0.0, refusing(lambda _: 1.0, []), NullObserver("s"))
     assert len(steps) == count
     assert steps[-1].end == 1.0
 

@@ -33,7 +33,3 @@ def size(number: int) -> str:
     """A number of bytes."""
     return f"{number / 1e6:.3g} MB" if number >= 1e6 else f"{number / 1e3:.3g} kB"
 
-
-def stated(value: object) -> str:
-    """A value as text; functions cannot be compared and are only called so."""
-    return "a function" if callable(value) else repr(value)

@@ -79,6 +79,10 @@ class Grid(Unique):
         (x, y), (x1, y1) = self.origin, self.upper
         return f"[{x:g}, {x1:g}] x [{y:g}, {y1:g}]"
 
+    def identity(self) -> dict[str, Any]:
+        """What tells it from another grid, for checkpoints."""
+        return {"grid": [list(self.origin), self.h, list(self.cells)]}
+
     @property
     def rectangle(self) -> dolfinx.Rectangle:
         """The dolfinx mesh, made when it is first needed."""

@@ -18,13 +18,14 @@ import numpy.typing as npt
 
 from tawami.base import checks, ranks
 from tawami.base.errors import InputError
+from tawami.base.identity import text
 from tawami.base.process import Unique
 from tawami.field.reduction import Reduction
 from tawami.motion.energy import Energies, Growth
+from tawami.motion.observer import Recorder, observed
 from tawami.motion.pace import Pace, Step
 from tawami.motion.stepping import march
 from tawami.motion.transfer import TRANSFERS, TransferName, gradient_of, to_grid
-from tawami.results.results import Results, phase
 from tawami.scene import description, sources
 from tawami.scene.scene import Accepted, Problem, Scene
 from tawami.scene.solution import Solution
@@ -144,6 +145,11 @@ class Dynamics(Unique):
         """m_p [kg per metre depth]."""
         return self.scene.mass
 
+    @property
+    def motion(self) -> Dynamics:
+        """Itself: observers find the motion in the same way in a scene and in its `Dynamics`."""
+        return self
+
     def header(self) -> str:
         """As `Scene.header`, with the motion."""
         return description.header(self.scene, self)
@@ -247,10 +253,15 @@ class Dynamics(Unique):
         supports = scene.supports
         return (*scene.loads.signature, *map(id, supports.all), *map(id, supports.walls))
 
+    def identity(self) -> dict[str, Any]:
+        """As `Scene.identity`, with the motion."""
+        own = [self.gamma, text(self.damping), str(self.transfer)]
+        return self.scene.identity() | {"motion": own}
+
     def state(self) -> dict[str, Any]:
-        """As `Scene.state`, of the motion; what the particles carry is in that of the scene."""
+        """As `Scene.state`, with the motion."""
         kept = self.on_grid
-        return {
+        own = {
             "time": self.time,
             "steps": self.steps,
             "kept": None if kept is None else list(kept),
@@ -259,9 +270,12 @@ class Dynamics(Unique):
             "growth": self._growth.state(),
             "particles_have": self._particles_have,
         }
+        return self.scene.state() | {"motion": own}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """The reverse of :meth:`state`, after `Scene.restore`."""
+        """The reverse of :meth:`state`, as `Scene.restore`."""
+        self.scene.restore(state)
+        state = state["motion"]
         self.time, self.steps = state["time"], state["steps"]
         self._borne = () if state["sudden"] else self._loads_and_supports
         kept = state["kept"]
@@ -342,7 +356,7 @@ class Dynamics(Unique):
         *,
         smallest: float | None = None,
         each: Callable[[Solution], None] | None = None,
-        results: Results | None = None,
+        results: Recorder | None = None,
     ) -> list[Step]:
         """Steps until `end` [s]; one that fails is halved, and the size grows again after three.
 
@@ -371,9 +385,9 @@ class Dynamics(Unique):
         checks.number("dt", dt, low=max(left, 0.0) / MOST_STEPS)
         least = dt / 1024 if smallest is None else checks.number("smallest", smallest, low=0.0)
         each = checks.function("each", each, "of a solution")
-        with phase(results, "motion", self.scene, self, end, "s") as watched:
+        with observed(results, "motion", self, end, "s") as observer:
             return march(
-                Pace(self.time, dt), end, least, lambda _, size: self.step(size), watched, each
+                Pace(self.time, dt), end, least, lambda _, size: self.step(size), observer, each
             )
 
     # -- what is conserved ---------------------------------------------------

@@ -12,16 +12,14 @@ errors of both). Vertices without particles in their cells have no value: NaN.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks
-
-if TYPE_CHECKING:
-    from tawami.scene.scene import Scene
+from tawami.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 Projection = Literal["lumped", "consistent"]

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from tawami import _rust
 from tawami.base import ranks, signals
 from tawami.base.errors import ConvergenceError
+from tawami.base.identity import fingerprint
 from tawami.base.process import check_process
 from tawami.base.timing import Stopwatch
 from tawami.particles import placement
@@ -31,6 +32,8 @@ from tawami.solve.newton import Converged
 from tawami.solve.numerics import Numerics
 
 Array = npt.NDArray[np.float64]
+#: Arrays of particles whose values are lengths, or lengths per time.
+LENGTHS = ("x", "displacement", "velocity", "acceleration")
 #: Solves of one step with other states of the walls, after which it has failed.
 PASSES = 40
 
@@ -226,6 +229,22 @@ class Configuration:
         return Outcome(accepted, coefficients, reactions, arrays)
 
     # -- checkpoints ---------------------------------------------------------
+
+    def identity(self) -> dict[str, Any]:
+        """What tells it from another one, for checkpoints; a call for all ranks."""
+        grid = self.model.grid
+        sizes = {"stress": self.domain.newton.stiffest} | dict.fromkeys(LENGTHS, grid.h)
+        arrays = placement.gathered(grid, self.domain.particles)
+        particles = {
+            f"'{name}' of the particles at its start": fingerprint(values, sizes.get(name, 1.0))
+            for name, values in arrays.items()
+        }
+        facts = {
+            "tolerance": self.numerics.tolerance,
+            "supports": self.supports.identity(),
+            "loads": self.loads.identity(),
+        }
+        return self.model.identity() | facts | particles
 
     def state(self) -> dict[str, Any]:
         """All that is carried from one step to the next, of all ranks; a call for all ranks."""

@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from tawami.base import checks
 from tawami.base.errors import InputError, SupportError
-from tawami.base.text import listed, stated
+from tawami.base.identity import text
+from tawami.base.text import listed
 from tawami.grid import edges
 from tawami.grid.edges import Interval, Profile
 from tawami.grid.grid import Edge, Grid
@@ -174,7 +175,7 @@ class Loads:
         """What decides the results of a run, as JSON holds it."""
         return [
             list(map(float, self.gravity)),
-            *([t.edge, *map(stated, t.value), stated(t.between)] for t in self.tractions),
+            *([t.edge, *map(text, t.value), text(t.between)] for t in self.tractions),
             *(hashlib.sha256(f.force.tobytes()).hexdigest() for f in self.forces),
         ]
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -101,18 +100,20 @@ class Model:
         used += [f"{name} '{choice}'" for name, choice in self.options.items()]
         return ", ".join([f"{self.form.name} in {' and '.join(self.form.fields)}", *used])
 
-    def identity(self) -> Iterator[tuple[str, Any]]:
-        """What decides the results of a run, by name, as JSON holds it."""
-        grid, form = self.grid, self.form
+    def identity(self) -> dict[str, Any]:
+        """What tells it from another model, for checkpoints."""
         laws = [] if self.law is None else [self.law.source]
-        yield "grid", [list(grid.origin), grid.h, list(grid.cells)]
-        yield "basis", self.basis
-        yield "form", form.name
-        yield "form source", hashlib.sha256(form.source.encode()).hexdigest()
-        yield "parameters", {**self.parameters, **self.options}
-        yield "laws", [*map(repr, self.materials), *laws]
-        yield "density", None if self.density is None else self.density.tolist()
-        yield "number of particles", self.num_particles
+        return (
+            self.grid.identity()
+            | self.form.identity()
+            | {
+                "basis": self.basis,
+                "parameters": {**self.parameters, **self.options},
+                "laws": [*map(repr, self.materials), *laws],
+                "density": None if self.density is None else self.density.tolist(),
+                "number of particles": self.num_particles,
+            }
+        )
 
 
 def build(

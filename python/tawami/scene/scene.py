@@ -14,7 +14,6 @@ import scipy.sparse as sp
 from tawami import _rust
 from tawami.base import checks
 from tawami.base.errors import InputError
-from tawami.base.identity import fingerprint
 from tawami.base.process import Unique, check_process
 from tawami.base.sealed import Sealed
 from tawami.base.timing import Stopwatch
@@ -24,7 +23,7 @@ from tawami.form.form import Form
 from tawami.grid.basis import Basis
 from tawami.grid.edges import Component, Interval, Profile
 from tawami.grid.grid import Edge, Grid
-from tawami.particles import assignment, placement
+from tawami.particles import assignment
 from tawami.scene import description, initial
 from tawami.scene.absent import Elsewhere
 from tawami.scene.configuration import Configuration
@@ -36,8 +35,6 @@ from tawami.scene.supports import Velocity
 from tawami.solve.numerics import Assembly, Factorise, Numerics, SolverName
 
 Array = npt.NDArray[np.float64]
-#: Arrays of particles whose values are lengths, or lengths per time.
-LENGTHS = ("x", "displacement", "velocity", "acceleration")
 
 
 class Scene(Elsewhere, Sealed, Unique):
@@ -361,6 +358,33 @@ class Scene(Elsewhere, Sealed, Unique):
             SupportError: A point is held that no particle is near.
         """
         return description.header(self.configuration)
+
+    # -- as the subject of a run ---------------------------------------------
+
+    @property
+    def scene(self) -> Scene:
+        """Itself: observers find the scene in the same way in a scene and in its `Dynamics`."""
+        return self
+
+    @property
+    def motion(self) -> None:
+        """None: a scene by itself is static."""
+
+    def identity(self) -> dict[str, Any]:
+        """What tells it from another scene, for checkpoints; a call for all ranks."""
+        return self.configuration.identity()
+
+    def state(self) -> dict[str, Any]:
+        """All that is carried from one step to the next, for checkpoints; a call for all ranks."""
+        return self.configuration.state()
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """The reverse of :meth:`state`; a call for all ranks.
+
+        Raises:
+            CheckpointError: Particles with other arrays.
+        """
+        self.configuration.restore(state)
 
     # -- the discrete problem ------------------------------------------------
 

@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from tawami.base import checks
 from tawami.base.errors import InputError
-from tawami.base.text import listed, stated
+from tawami.base.identity import text
+from tawami.base.text import listed
 from tawami.field.reduction import Reduction
 from tawami.grid import edges
 from tawami.grid.basis import Basis
@@ -302,7 +303,7 @@ class Supports:
     def identity(self) -> list[list[Any]]:
         """What decides the results of a run, as JSON holds it."""
         given = [
-            [str(s.given), s.component, *map(stated, (s.value, s.velocity, s.between))]
+            [str(s.given), s.component, *map(text, (s.value, s.velocity, s.between))]
             for s in self.all
         ]
         return given + [["wall", w.edge, w.friction, w.separates] for w in self.walls]
