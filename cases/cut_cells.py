@@ -84,7 +84,7 @@ def solve(method: str, offset: float, reference: float | None = None) -> Row:
     u, y = solution.displacement_of_particles[:, 1], scene.particles.x[:, 1]
     middle = (1 + N / 2 + offset) * H
     stretch = float(u[np.abs(y - middle) < H / 2].mean() - u[y < y.min() + H / 4].mean())
-    reduction = scene.problem().reduction
+    reduction = scene.reduction()
     matrix = scene.tangent(np.zeros(scene.num_coefficients))
     reduced = (reduction.selection.T @ matrix @ reduction.selection).toarray()
     singular = np.linalg.svd(reduced, compute_uv=False)

@@ -1,4 +1,4 @@
-"""The rooms of the package: who imports whom, and how large things are, read from the source with `ast`."""
+"""The rooms of the package, read from the source: who imports whom, and how large things are."""
 
 from __future__ import annotations
 
@@ -96,16 +96,15 @@ def test_a_module_uses_no_private_name_of_another(name):
 
 
 def private_names(tree: ast.Module) -> set[str]:
-    """Names with an underscore that a module defines: functions, classes, variables, attributes of self."""
+    """Names with an underscore that a module defines."""
     names = {"_rust", "_exit", "_mesh"}  # of os and of dolfinx
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             names.add(node.name)
         elif isinstance(node, ast.Name):
             names.add(node.id)
-        elif isinstance(node, ast.Attribute):
-            if isinstance(node.value, ast.Name) and node.value.id in ("self", "cls"):
-                names.add(node.attr)
+        elif isinstance(node, ast.Attribute) and ast.unparse(node.value) in ("self", "cls"):
+            names.add(node.attr)
     return names
 
 

@@ -156,7 +156,7 @@ def test_materials_by_name_or_in_the_order_of_the_numbers():
     )
     listed = tawami.Scene(grid, body, [sand, clay], density=[2e3, 1e3])
     for scene in (named, listed):
-        stiff = scene.constants["mu"] == sand.shear_modulus
+        stiff = scene.configuration.domain.constants["mu"] == sand.shear_modulus
         assert stiff.any()
         assert (stiff == (body.material_of == 0)).all()
         areas = [moments(points, cells[tag == group])[0] for group in (SAND, CLAY)]

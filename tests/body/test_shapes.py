@@ -180,7 +180,9 @@ def test_numbers_of_materials_come_with_the_body():
     soft, stiff = (tawami.linear_elastic(E=E, nu=0.3) for E in (1.0, 2.0))
     body = tawami.Body(box.x, box.volume, (box.x[:, 0] > 0).astype(np.uint32))
     scene = tawami.Scene(grid, body, [soft, stiff])
-    assert ((scene.constants["mu"] == stiff.shear_modulus) == (box.x[:, 0] > 0)).all()
+    assert (
+        (scene.configuration.domain.constants["mu"] == stiff.shear_modulus) == (box.x[:, 0] > 0)
+    ).all()
 
 
 def test_what_is_round_off_of_a_cell_gets_no_particle():

@@ -105,7 +105,7 @@ def test_a_body_at_rest_stays_at_rest():
     motion.run(5.0, 0.005, each=lambda _: speeds.append(np.abs(motion.velocity).max()))
     assert len(speeds) == 1000
     assert max(speeds) < 1e-4 * np.sqrt(G * 0.75)
-    place = scene.supports.all[-1].place
+    place = scene.configuration.supports.all[-1].place
     scene.release(place)
     motion.run(5.1, 0.005)
     assert np.abs(motion.velocity).max() > 1e-2
@@ -243,7 +243,7 @@ def test_a_pendulum_hangs_at_a_point():
     turns = np.flatnonzero(np.diff(np.sign(way)))
     zeros = [time[k] - way[k] * (time[k + 1] - time[k]) / (way[k + 1] - way[k]) for k in turns]
     assert np.diff(zeros)[0] == pytest.approx(period / 2, rel=0.01)
-    assert np.abs(np.array(scene.supports.all[0].place) - pivot).max() < 1e-9
+    assert np.abs(np.array(scene.configuration.supports.all[0].place) - pivot).max() < 1e-9
 
 
 def test_a_support_that_moves_gives_the_momentum():

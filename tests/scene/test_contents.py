@@ -287,7 +287,7 @@ def test_the_header_counts_what_is_there(assembly):
     assert line(header, "supports") == (
         "fix(edge='bottom') x, fix(edge='bottom') y, hold(point=(0.0, 1.7)) x = 0.01 m"
     )
-    data = scene.attached.newton.data["particle"]
+    data = scene.configuration.domain.newton.data["particle"]
     # sigma 3 and its derivatives 3 x (3 + 1), K, K^2/mu; and K and mu themselves
     assert data.shape[1] == 3 + 12 + 2
     assert f"{8 * (17 + 2)} more each" in line(header, "particles")

@@ -137,7 +137,7 @@ def test_wrong_walls_get_a_sentence():
     with pytest.raises(tawami.InputError, match=r"release\('top'\): no such support.*bottom"):
         scene.release("top")
     scene.release("bottom")
-    assert not scene.supports.walls
+    assert not scene.configuration.supports.walls
 
 
 def test_a_function_that_goes_round_in_circles_is_let_go():
@@ -182,7 +182,7 @@ def test_a_wall_looks_at_the_gap_where_particles_do_not_move():
     scene.wall("bottom", 0.3)
     points = [(x, 0.45) for x in (0.05, 0.45)]
     for y, expected in ((1e-3, 0.0), (0.5e-3, 0.0), (-1e-4, 1.0)):
-        scene.supports.all.clear()
+        scene.configuration.supports.all.clear()
         for point in points:
             scene.hold(point, "y", y)
         scene.hold(points[0], "x")

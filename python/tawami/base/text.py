@@ -32,4 +32,3 @@ def listed(texts: Sequence[str]) -> str:
 def size(number: int) -> str:
     """A number of bytes."""
     return f"{number / 1e6:.3g} MB" if number >= 1e6 else f"{number / 1e3:.3g} kB"
-

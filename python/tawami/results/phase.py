@@ -107,7 +107,7 @@ class Phase:
         """Go on from the newest checkpoint of the phase, or begin it."""
         self._pace, self._steps, self._asked = pace, steps, pace.size
         self._identity = identity(self.subject, self.name)
-        self.subject.scene.attached.newton.keep()
+        self.subject.scene.configuration.domain.newton.keep()
         folder, state = self.results.folder / self.name, self._found()
         if state is not None:
             self._restore(state)
@@ -215,7 +215,7 @@ class Phase:
             self._write()
         elif by_number or by_time:
             if by_number:  # the same factorisations then, whoever goes on from here
-                self.subject.scene.attached.newton.keep()
+                self.subject.scene.configuration.domain.newton.keep()
             self._write_or_warn()
         if stop:
             self._stop()

@@ -73,7 +73,7 @@ def nodal(scene: Scene, values: Array, method: Projection = "lumped") -> Array:
 
 def _sums(scene: Scene, data: Array) -> Array:
     """sum_p V_p M_i data_p, vertices x columns."""
-    return scene.attached.sums(np.asarray(scene.particles.volume), data, "bilinear")
+    return scene.configuration.domain.sums(np.asarray(scene.particles.volume), data, "bilinear")
 
 
 def _conjugate_gradients(scene: Scene, start: Array, weight: Array, right: Array) -> Array:
@@ -81,7 +81,7 @@ def _conjugate_gradients(scene: Scene, start: Array, weight: Array, right: Array
 
     Every rank has whole vectors and takes the same steps.
     """
-    location = scene.attached.location
+    location = scene.configuration.domain.location
 
     def product(f: Array) -> Array:
         at_particles = [

@@ -238,19 +238,19 @@ def _at_vertices(scene: Scene, coefficients: Array) -> Array:
 def _displacement(now: Snapshot) -> Array:
     """Since the start, and of the last step where strains are finite."""
     scene, solution = now.scene, now.solution
-    u = scene.split(scene.gap)[0] if solution is None else solution.u
+    u = scene.split(scene.configuration.before)[0] if solution is None else solution.u
     return _at_vertices(scene, u)
 
 
 def _bilinear(now: Snapshot) -> Array:
     scene, solution = now.scene, now.solution
-    values = scene.split(scene.gap)[1] if solution is None else solution.volumetric
+    values = scene.split(scene.configuration.before)[1] if solution is None else solution.volumetric
     return np.asarray(values)
 
 
 def _velocity(now: Snapshot) -> Array:
     """That of the particles with its gradient, by their mass; NaN where there are none."""
-    motion, attached = now.subject.motion, now.scene.attached
+    motion, attached = now.subject.motion, now.scene.configuration.domain
     assert motion is not None
     kept = motion.on_grid
     if kept is not None:  # a grid that stays has its own

@@ -86,9 +86,7 @@ class Configuration:
         self.begun = self._coverage_checked = False
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
-        self.domain = Domain.attach(
-            self.model, particles, location, self.numerics, self.stopwatch
-        )
+        self.domain = Domain.attach(self.model, particles, location, self.numerics, self.stopwatch)
 
     @property
     def before(self) -> Array:

@@ -1,4 +1,4 @@
-"""The particles where they are: what belongs to their present cells, from one reset of the grid to the next."""
+"""The particles in their present cells, from one reset of the grid to the next."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from tawami.base.errors import InputError, InstabilityWarning
 from tawami.base.timing import Stopwatch
 from tawami.base.warn import warn
 from tawami.field.fast import FastField
-from tawami.field.reference import Field
 from tawami.field.reduction import Layout
+from tawami.field.reference import Field
 from tawami.grid.basis import Basis
 from tawami.particles.numpy_law import NumpyStage
 from tawami.scene.model import Model
@@ -64,7 +64,12 @@ class Domain:
                 stopwatch,
             )  # fmt: skip
         rust = _rust.Stage(
-            particles, location, list(model.materials), form.kinematics.name, model.moves, model.basis
+            particles,
+            location,
+            list(model.materials),
+            form.kinematics.name,
+            model.moves,
+            model.basis,
         )
         stage = rust if law is None else NumpyStage(rust, particles, law)
         newton = Newton(
@@ -130,7 +135,10 @@ class Domain:
         return ranks.sum_of(self.model.grid.comm, counts)
 
     def warn_of_partial_cells(self) -> None:
-        """Warn of partially filled cells if an option of the form needs whole ones; a call for all ranks."""
+        """Warn of partially filled cells if an option of the form needs whole ones.
+
+        A call for all ranks.
+        """
         form, options = self.model.form, self.model.options
         for option in options.values():
             if option in form.whole_cells:

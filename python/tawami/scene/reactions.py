@@ -11,7 +11,7 @@ import numpy.typing as npt
 from tawami.base import checks
 from tawami.base.errors import InputError
 from tawami.grid import edges
-from tawami.grid.grid import EDGES
+from tawami.grid.grid import EDGES, Edge
 from tawami.scene.model import Model
 from tawami.scene.step import Accepted
 from tawami.scene.supports import Supports
@@ -21,7 +21,7 @@ Array = npt.NDArray[np.float64]
 SAME_POINT = 1e-8
 
 
-def supported_edge(place: str, supported: set[str]) -> edges.Edge:
+def supported_edge(place: str, supported: set[str]) -> Edge:
     """The edge of that name, one of those with supports.
 
     Raises:

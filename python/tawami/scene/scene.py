@@ -19,6 +19,7 @@ from tawami.base.sealed import Sealed
 from tawami.base.timing import Stopwatch
 from tawami.body.body import Body
 from tawami.fem.rules import TangentRule
+from tawami.field.reduction import Reduction
 from tawami.form.form import Form
 from tawami.grid.basis import Basis
 from tawami.grid.edges import Component, Interval, Profile
@@ -107,7 +108,16 @@ class Scene(Elsewhere, Sealed, Unique):
             tolerance, max_iterations, assembly, tangent_rule, factorise, linear_solver
         )
         model, particles = build(
-            grid, body, material, material_of, form, basis, density, leaving, tangent_rule, parameters
+            grid,
+            body,
+            material,
+            material_of,
+            form,
+            basis,
+            density,
+            leaving,
+            tangent_rule,
+            parameters,
         )
         self.configuration = Configuration(model, particles, numerics)
         self.grid, self.form, self.basis = model.grid, model.form, model.basis
@@ -119,9 +129,7 @@ class Scene(Elsewhere, Sealed, Unique):
     def how_to_set(self, name: str) -> str:
         """What to do instead of setting an attribute."""
         if name in self.form.parameters or name in self.form.options:
-            return (
-                f"the form's parameters are fixed when a scene is made: Scene(..., {name}=...)"
-            )
+            return f"the form's parameters are fixed when a scene is made: Scene(..., {name}=...)"
         if name == "particles":
             return "write into its arrays, as scene.particles.stress[:] = ..., or use scene.initial(...)"
         return "a scene is given by Scene(...) and changed by its methods (fix, traction, gravity, ...)"
@@ -155,6 +163,11 @@ class Scene(Elsewhere, Sealed, Unique):
     def numerics(self) -> Numerics:
         """How a step is solved."""
         return self.configuration.numerics
+
+    @property
+    def laws(self) -> list[str]:
+        """Names of the material laws, each with its history variables."""
+        return self.configuration.model.laws
 
     @property
     def mass(self) -> Array:
@@ -400,6 +413,10 @@ class Scene(Elsewhere, Sealed, Unique):
             InputError: Not the coefficients of all fields.
         """
         return self.configuration.domain.layout.split(self._coefficients(coefficients))
+
+    def reduction(self) -> Reduction:
+        """What the present supports leave free: coefficients = selection @ unknowns + offset."""
+        return StaticStep(self.configuration).problem().reduction
 
     def residual(self, coefficients: Array) -> Array:
         """The form's integrals over particles and cells, for every test function, before supports.

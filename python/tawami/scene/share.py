@@ -54,6 +54,6 @@ def check_same_number(what: str, stored: int, made: int) -> None:
     """
     if stored != made:
         raise CheckpointError(
-            f"the run had {stored} {what}s of a kind when it was stored, and the script has made {made}: "
-            f"they were changed while it ran (each=). Expected {what}s to change between two phases"
+            f"the run had {stored} {what}s of a kind when it was stored, and the script made {made}. "
+            f"They were changed while it ran (each=): expected {what}s to change between two phases"
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -56,7 +56,8 @@ class Solution(Elsewhere, Sealed, Unique):
     """
 
     def __init__(self, scene: Solved, outcome: Outcome) -> None:
-        self.scene = scene
+        #: `tawami.Scene`, which is built on solutions and cannot be imported here.
+        self.scene: Any = scene
         self._model = scene.configuration.model
         layout, step = outcome.accepted.problem.reduction.layout, outcome.accepted.step
         self.u, self._volumetric = layout.split(outcome.coefficients)

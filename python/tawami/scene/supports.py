@@ -295,9 +295,7 @@ class Supports:
     def line(self) -> str:
         """The supports in words, for the header of a run."""
         texts = [f"{support} {'xy'[support.component]}{support.motion}" for support in self.all]
-        texts += [
-            f"wall(edge='{wall.edge}') friction {wall.friction:g}" for wall in self.walls
-        ]
+        texts += [f"wall(edge='{wall.edge}') friction {wall.friction:g}" for wall in self.walls]
         return listed(texts)
 
     def identity(self) -> list[list[Any]]:

@@ -131,9 +131,7 @@ class Wall:
         friction[f, along] = self.friction * push * self.state.slip[sliding] if self.friction else 0
         return friction
 
-    def adapt(
-        self, forces: Array, u: Array, before: Array, active: Mask, prescribed: Mask
-    ) -> bool:
+    def adapt(self, forces: Array, u: Array, before: Array, active: Mask, prescribed: Mask) -> bool:
         """Change the states that contradict a solution; returns whether there were any.
 
         A function that comes back to the wall, or to rest, more than RERETURNS times in one step
