@@ -132,11 +132,13 @@ def test_a_step_that_fails_changes_nothing():
     assert motion.steps == 0
 
 
-def test_steps_are_halved_and_grow_again():
+def test_steps_are_halved_and_grow_again(monkeypatch):
     scene = block(max_iterations=2)
     motion = tawami.Dynamics(scene, velocity=spin(scene, 5.0))
-    sizes, step = [], motion.step
-    motion.step = lambda dt: (sizes.append(dt), step(dt))[1]
+    sizes, step = [], tawami.Dynamics.step
+    monkeypatch.setattr(
+        tawami.Dynamics, "step", lambda motion, dt: (sizes.append(dt), step(motion, dt))[1]
+    )
     motion.run(0.3, 0.1)
     assert motion.time == pytest.approx(0.3)
     assert min(sizes) < 0.1

@@ -146,7 +146,7 @@ def initial() -> dict[str, np.ndarray]:
         plastic.initial("stress", stress)
     except tawami.InputError as error:
         told = str(error)
-    assert "beyond what its law bears" in told
+    assert "beyond the yield surface" in told
     plastic.initial("stress", stress, beyond="return")
     order = np.argsort(joined(grid.comm, plastic.particles.number))
     found = {"initial stress": joined(grid.comm, np.array(plastic.particles.stress))[order]}

@@ -14,6 +14,7 @@ from conftest import FINITE, FORMS, grid_of
 import tawami
 from tawami.fem import dolfinx
 from tawami.form import compilation
+from tawami.scene.domain import Domain
 from tawami.solve.newton import Newton
 
 ELASTIC = {"E": 10.0, "nu": 0.3}
@@ -147,7 +148,7 @@ def test_a_static_scene_assembles_no_mass(monkeypatch):
         raise AssertionError("a mass")
 
     monkeypatch.setattr(Newton, "_add_mass", refuse)
-    monkeypatch.setattr(tawami.Scene, "mass", property(refuse))
+    monkeypatch.setattr(Domain, "mass", property(refuse))
     scene = scene_of(density=1.0, form="u_epsv_finite")
     scene.traction("top", (0.0, -0.1))
     assert scene.solve().displacement((0.0, 1.9))[1] < -1e-3

@@ -299,7 +299,7 @@ def test_only_the_arrays_that_a_scene_needs_exist():
                 _ = scene.particles.eps_v
         else:
             assert scene.particles.eps_v.shape == scene.particles.volume.shape
-        assert scene._compiled.traction is not None
+        assert scene.configuration.model.compiled.traction is not None
     assert bytes_of == {"u": 80, "u_epsv": 88}
 
 

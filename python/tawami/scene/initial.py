@@ -121,7 +121,7 @@ def _to_surface(domain: Domain, beyond: Beyond) -> None:
         f"stress of particle {number} at ({x:g}, {y:g}) m is ({_row(stress[p])}) Pa, beyond the "
         f"yield surface by {off[p]:.3g} Pa, {100 * off[p] / size[p]:.2g} % of it, as are "
         f"{len(wrong) - 1} others: expected stress within the yield surface; beyond='return' takes the "
-        f"stress to which the law returns it, ({_row(returned[p])}) Pa"
+        f"stress on it to which the law returns it, ({_row(returned[p])}) Pa"
     )
 
 
