@@ -101,7 +101,7 @@ class Dynamics(Unique):
                 f"damping = {damping:g} s relaxes the velocities of FLIP: expected transfer "
                 "'affine_flip' or 'flip' and a form of finite strain; gamma > 0.5 damps too"
             )
-        with ranks.together(scene.grid.comm):
+        with ranks.raise_together(scene.grid.comm):
             given = sources.values(scene, "velocity", velocity, "x y", "m/s")
         for name, width in (
             ("velocity", 2), ("acceleration", 2),
@@ -159,7 +159,7 @@ class Dynamics(Unique):
         """
         dt = checks.number("dt", dt, low=SHORTEST, high=LONGEST)
         scene, attached = self.scene, self.scene.attached
-        with ranks.together(scene.grid.comm):
+        with ranks.raise_together(scene.grid.comm):
             scene.particles.check()
         supports = scene.supports
         for support in supports.all:

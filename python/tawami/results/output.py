@@ -128,7 +128,7 @@ class Output:
             self._multiple = self._whole(state["time"])
         self._time = state.get("time", math.nan)
         self._resolve(scene, motion)
-        with ranks.together(scene.grid.comm):
+        with ranks.raise_together(scene.grid.comm):
             if scene.grid.comm.rank == 0:
                 self._open(folder, self._seen if state else None, motion)
 
@@ -199,7 +199,7 @@ class _SeriesOutput(Output):
 
     def _write(self, moment: Moment, size: float) -> None:
         frame, comm = self._frame(moment), moment.scene.grid.comm
-        with ranks.together(comm):
+        with ranks.raise_together(comm):
             if comm.rank == 0:
                 self._series.write(moment.step, moment.time, frame)
 
@@ -319,7 +319,7 @@ class TableOutput(Output):
     def _write(self, moment: Moment, size: float) -> None:
         values = [float(v) for column in self._columns for v in column.of(moment, size)]
         comm = moment.scene.grid.comm
-        with ranks.together(comm):
+        with ranks.raise_together(comm):
             if comm.rank == 0:
                 _append(self.path, _line([moment.step, float(moment.time), *values]))
 
@@ -395,7 +395,7 @@ def write_grid(path: str | Path, solution: Solution) -> None:
 
 
 def _write_once(path: str | Path, frame: Frame, grid: Grid) -> None:
-    with ranks.together(grid.comm):
+    with ranks.raise_together(grid.comm):
         if grid.comm.rank == 0:
             write_vtu(path, frame)
 

@@ -42,7 +42,7 @@ def write(folder: str | Path, scene: Scene, motion: Dynamics | None = None) -> N
     """
     comm = scene.grid.comm
     header = scene.header() if motion is None else motion.header()
-    with ranks.together(comm):
+    with ranks.raise_together(comm):
         if comm.rank == 0:
             home = result_folder(folder)
             script, module = driver()

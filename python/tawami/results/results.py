@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from tawami.base import archive, checks
 from tawami.base.errors import InputError, OutputError
 from tawami.base.files import result_folder, whole_file
-from tawami.base.ranks import together
+from tawami.base.ranks import raise_together
 from tawami.results import provenance
 from tawami.results.output import PHASES, Output
 from tawami.results.phase import LOG, Phase, Unwatched
@@ -119,7 +119,7 @@ class Results:
             OutputError: It cannot be written.
         """
         if not self._phases:
-            with together(scene.grid.comm):
+            with raise_together(scene.grid.comm):
                 if scene.grid.comm.rank == 0:
                     self._open()
             self.resumes = scene.grid.comm.bcast(self.resumes)

@@ -34,7 +34,7 @@ COMPONENTS = {"stress": ("xx yy zz xy", "Pa"), "displacement": ("x y", "m")}
 def give(scene: Scene, name: str, given: Source, beyond: Beyond) -> None:
     """See `Scene.initial`."""
     _check(scene, name, beyond)
-    with ranks.together(scene.grid.comm):
+    with ranks.raise_together(scene.grid.comm):
         found = sources.values(scene, name, given, *COMPONENTS.get(name, ("value", "")))
         if name == "eps_v" and not isinstance(given, Earlier):
             _check_volume(scene, found[:, 0])
@@ -48,7 +48,7 @@ def give(scene: Scene, name: str, given: Source, beyond: Beyond) -> None:
     before = array.copy()
     array[:] = found.reshape(array.shape)
     try:
-        with ranks.together(scene.grid.comm):
+        with ranks.raise_together(scene.grid.comm):
             if name == "stress" or name in scene.particles.history_names:
                 _to_surface(scene, beyond)
     except InputError:

@@ -592,7 +592,7 @@ class Scene(description.Elsewhere, Unique):
             done: What else belongs to a step that is stored.
         """
         check_process()
-        with ranks.together(self.grid.comm):
+        with ranks.raise_together(self.grid.comm):
             self.particles.check()
         for option in self._whole_cells:
             self.attached.warn_of_parts(self.particles.volume, option)
@@ -614,7 +614,7 @@ class Scene(description.Elsewhere, Unique):
             accepted = Accepted(step, u, a, forces.reshape(-1, 2), smooth.reshape(-1, 2))
             store = also(accepted) if also is not None else None
             with signals.deferred():
-                with self.stopwatch("commit"), ranks.together(self.grid.comm):
+                with self.stopwatch("commit"), ranks.raise_together(self.grid.comm):
                     dissipated = self.attached.stage.commit(*self.split(step.coefficients))
                 committed = True
                 if store is not None:
