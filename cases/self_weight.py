@@ -79,7 +79,7 @@ def solve(form: str, *, h: float = 1.0, increments: int = 20, **options: object)
 def errors(scene: tawami.Scene) -> tuple[float, float]:
     """Errors of the height and, rms over the base stress, of the vertical stress."""
     end = np.array(scene.particles.x[:, 1])
-    if scene.form.strain == "small":
+    if not scene.form.strain.finite:
         end += scene.particles.displacement[:, 1]
         start = np.array(scene.particles.x[:, 1])
     else:
@@ -90,7 +90,7 @@ def errors(scene: tawami.Scene) -> tuple[float, float]:
     # tau_yy = E ln l; Cauchy's stress is that over the stretch
     stretches = np.array([stretch(z) for z in start])
     stress = np.array(scene.particles.stress[:, 1])
-    if scene.form.strain == "finite":
+    if scene.form.strain.finite:
         stress /= stretches
     exact = E * np.log(stretches) / stretches
     rms = float(np.sqrt(np.mean((stress - exact) ** 2)) / (WEIGHT * H))

@@ -96,13 +96,13 @@ class Dynamics(Unique):
         self.gamma = checks.number("gamma", gamma, low=0.5, high=1.0)
         self.beta = (self.gamma + 0.5) ** 2 / 4
         self.scene, self.damping = scene, damping
-        self.transfer, self._moves = TRANSFERS[transfer], scene.form.strain == "finite"
+        self.transfer, self._moves = TRANSFERS[transfer], scene.form.strain.finite
         if damping != np.inf and not (self.transfer.flip and self._moves):
             raise InputError(
                 f"damping = {damping:g} s relaxes the velocities of FLIP: expected transfer "
                 "'affine_flip' or 'flip' and a form of finite strain; gamma > 0.5 damps too"
             )
-        with ranks.together(scene.grid.comm):
+        with ranks.raise_together(scene.grid.comm):
             given = sources.values(scene, "velocity", velocity, "x y", "m/s")
         for name, width in (
             ("velocity", 2), ("acceleration", 2),
@@ -165,7 +165,7 @@ class Dynamics(Unique):
         """
         dt = checks.number("dt", dt, low=SHORTEST, high=LONGEST)
         scene, attached = self.scene, self.scene.attached
-        with ranks.together(scene.grid.comm):
+        with ranks.raise_together(scene.grid.comm):
             scene.particles.check()
         supports = scene.supports
         for support in supports.all:
@@ -321,7 +321,7 @@ class Dynamics(Unique):
         guess = np.zeros(scene.num_coefficients)
         n = u.size
         guess[:n] = u.ravel()
-        if scene.form.kinematics == "mixed":
+        if scene.form.kinematics.has_eps_v:
             ln_j = scene.attached.stage.volume_strains(guess[:n], None)[:, 0]
             weight = scene.constants["K"] * scene.particles.volume
             # a guess that halves a particle or turns it inside out is not followed that far

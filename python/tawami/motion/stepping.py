@@ -128,7 +128,7 @@ def settle(
     checks.instance("settle: scene", scene, Scene, "a tawami.Scene")
     tolerance = checks.number("tolerance", tolerance, low=1e-14, high=0.1)
     max_resets = checks.whole_number("max_resets", max_resets, low=1)
-    if scene.form.strain != "finite":
+    if not scene.form.strain.finite:
         raise InputError(
             "settle(...) resets the grid: expected a scene with a form of finite strain"
         )

@@ -150,7 +150,7 @@ def _point(name: str, text: str) -> tuple[float, float]:
 def _displacement(name: str, point: tuple[float, float], scene: Scene) -> Columns:
     """Of the grid where it stays, of the particles that were around the point where it does not."""
     location = edges.locate_point(scene.grid, point, name)
-    moves = scene.form.strain == "finite"
+    moves = scene.form.strain.finite
     if moves:
         displacement_near(scene, point, name)
 

@@ -17,6 +17,7 @@ from tawami.base import ranks
 from tawami.base.files import result_folder, whole_file
 from tawami.fem import environment
 from tawami.form.form import Form
+from tawami.form.kinematics import Kinematics, StrainMeasure
 from tawami.motion.observer import Subject
 
 #: What is written: the record, and copies of the driver script and of the form.
@@ -38,7 +39,7 @@ def write(folder: str | Path, subject: Subject) -> None:
     """
     scene, header = subject.scene, subject.header()
     comm = scene.grid.comm
-    with ranks.together(comm):
+    with ranks.raise_together(comm):
         if comm.rank == 0:
             home = result_folder(folder)
             script, module = driver()
@@ -132,7 +133,9 @@ def source_of(form: Form) -> bytes | None:
     lines = [f"# Form {form.name}: defined in {file}"]
     lines += [f"from ufl import {', '.join(names)}"] if names else []
     for key in ("fields", "kinematics", "parameters", "options", "strain", "whole_cells"):
-        lines.append(f"{key} = {getattr(form, key)!r}")
+        value = getattr(form, key)
+        text = str(value) if isinstance(value, Kinematics | StrainMeasure) else value
+        lines.append(f"{key} = {text!r}")
     lines += ["", "", source.rstrip()]
     lines += [] if name == "residual" else ["", "", f"residual = {name}"]
     return ("\n".join(lines) + "\n").encode()

@@ -16,6 +16,7 @@ import scipy.sparse as sp
 
 from tawami import _rust
 from tawami.base.errors import InputError, NotModelledError
+from tawami.form.kinematics import FIELD_UNITS
 from tawami.grid import edges
 from tawami.grid.basis import extraction, greville_1d, values_1d
 from tawami.motion.observer import Snapshot, Subject
@@ -137,7 +138,7 @@ def of_particles(names: Iterable[str], subject: Subject) -> list[Quantity]:
 def usual_of_particles(subject: Subject) -> tuple[str, ...]:
     """What is written where nothing is asked for."""
     scene, names = subject.scene, ["displacement", "stress", "mean stress"]
-    names += ["eps_v"] if scene.form.kinematics == "mixed" else []
+    names += ["eps_v"] if scene.form.kinematics.has_eps_v else []
     names += ["velocity"] if subject.motion is not None else []
     return (*names, *scene.particles.history_names)
 
@@ -216,12 +217,9 @@ def _of_grid(scene: Scene) -> dict[str, GridQuantity]:
             "particles [-]", lambda now: now.scene.particles_per_cell.astype(float), cells=True
         ),
     }
-    if (
-        scene.form.strain == "small"
-    ):  # else the grid has that of a step, and the particles all of it
-        for name in list(scene.form.fields)[1:]:
-            unit = "-" if scene.form.kinematics == "mixed" else "Pa"
-            found[name] = GridQuantity(f"{name} [{unit}]", _bilinear)
+    if not scene.form.strain.finite:  # else the grid has only that of the last step
+        for name, (kind, _) in list(scene.form.fields.items())[1:]:
+            found[name] = GridQuantity(f"{name} [{FIELD_UNITS[kind]}]", _bilinear)
     return found
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from tawami.base import ranks
 from tawami.base.errors import NotModelledError
+from tawami.form.kinematics import STRAIN_MEASURES
 from tawami.motion.transfer import TRANSFERS
 
 if TYPE_CHECKING:
@@ -36,8 +37,6 @@ GRADIENT = (
     "no form stores it. At finite strain, as with form='u_epsv_finite', the stress tells the elastic "
     "part of it, and positions and displacements the motion"
 )
-#: The form with a volumetric strain of each kind of strain.
-MIXED = {"small": "u_epsv", "finite": "u_epsv_finite"}
 
 
 class Absent:
@@ -160,7 +159,7 @@ def _models(scene: Scene, motion: Dynamics | None) -> Iterator[str]:
     carried = "velocity" in dict(scene.particles.arrays)
     statics = "statics between the steps of a motion" if carried else "statics"
     yield statics if motion is None else "inertia"
-    yield "small strain" if scene.form.strain == "small" else "finite strain, particles that move"
+    yield scene.form.strain.description
     yield f"laws {', '.join(dict.fromkeys(scene.laws))}"
 
 
@@ -209,7 +208,7 @@ def _motion(scene: Scene, motion: Dynamics | None) -> str:
     if motion is None:
         return ""
     text = f"Newmark gamma {motion.gamma:g}, beta {motion.beta:g}, from {motion.time:g} s"
-    if scene.form.strain == "small":
+    if not scene.form.strain.finite:
         return f"{text}, velocities stay on the grid"
     (transfer,) = (name for name, kind in TRANSFERS.items() if kind == motion.transfer)
     damping = f"{motion.damping:g} s" if np.isfinite(motion.damping) else "none"
@@ -234,12 +233,12 @@ def _not_modelled(scene: Scene, motion: Dynamics | None) -> Iterator[str]:
     if motion is None:
         density = "" if scene.has_density else " with Scene(..., density=...)"
         yield f"inertia (Dynamics(scene){density})"
-    if form.strain == "small":
-        yield f"finite strain (form='{MIXED['finite']}')"
+    if not form.strain.finite:
+        yield f"finite strain (form='{STRAIN_MEASURES['finite'].mixed_form}')"
     if not scene.particles.history_names and "NumpyLaw" not in scene.laws:
         yield "plasticity (von_mises(...), drucker_prager(...), mohr_coulomb(...))"
     if len(form.fields) == 1:
-        yield f"a field for the volume (form='{MIXED[form.strain]}')"
+        yield f"a field for the volume (form='{form.strain.mixed_form}')"
     if scene.options.get("ghost_penalty") == "off":
         yield "ghost penalty (ghost_penalty='on')"
     if not scene.supports.walls:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from tawami.base import checks, ranks
 from tawami.base.errors import InputError
+from tawami.form import quantities
 from tawami.scene import sources
 from tawami.scene.sources import Earlier, Source
 
@@ -33,7 +34,7 @@ COMPONENTS = {"stress": ("xx yy zz xy", "Pa"), "displacement": ("x y", "m")}
 def give(scene: Scene, name: str, given: Source, beyond: Beyond) -> None:
     """See `Scene.initial`."""
     _check(scene, name, beyond)
-    with ranks.together(scene.grid.comm):
+    with ranks.raise_together(scene.grid.comm):
         found = sources.values(scene, name, given, *COMPONENTS.get(name, ("value", "")))
         if name == "eps_v" and not isinstance(given, Earlier):
             _check_volume(scene, found[:, 0])
@@ -47,20 +48,20 @@ def give(scene: Scene, name: str, given: Source, beyond: Beyond) -> None:
     before = array.copy()
     array[:] = found.reshape(array.shape)
     try:
-        with ranks.together(scene.grid.comm):
+        with ranks.raise_together(scene.grid.comm):
             if name == "stress" or name in scene.particles.history_names:
                 _to_surface(scene, beyond)
     except InputError:
         array[:] = before
         raise
-    if name == "stress" and scene.form.kinematics == "mixed":
+    if name == "stress" and scene.form.kinematics.has_eps_v:
         scene.particles.eps_v[:] = _mean(scene) / scene.constants["K"]
 
 
 def _check(scene: Scene, name: str, beyond: Beyond) -> None:
     checks.choice("beyond", beyond, ("stop", "return"))
     known = [*COMPONENTS, *scene.particles.history_names]
-    if scene.form.kinematics == "mixed":
+    if scene.form.kinematics.has_eps_v:
         known.append("eps_v")
     if not checks.one_of(name, known):
         moves = checks.one_of(name, ("velocity",))
@@ -128,14 +129,12 @@ def _borne(scene: Scene) -> Array:
     """What the laws answer to no strain [Pa], xx, yy, zz, xy."""
     layout = scene.attached.layout
     fields = layout.split(np.zeros(layout.size))
-    if scene.form.strain == "finite":
-        requests, plane = [("P", "value", 0), ("tau_m", "value", 4)], [0, 3, 1]
-    else:
-        requests, plane = [("sigma", "value", 0), ("sigma_m", "value", 3)], [0, 1, 2]
-    data = np.zeros((len(scene.particles), 5))
+    strain = scene.form.strain
+    requests = [(strain.mean, "value", 0), (strain.stress, "value", 1)]
+    data = np.zeros((len(scene.particles), 1 + quantities.COMPONENTS[strain.stress]))
     scene.attached.stage.evaluate(*fields, requests, data)
-    xx, yy, xy = data[:, plane].T
-    mean = data[:, requests[1][2]]
+    mean, components = data[:, 0], data[:, 1:]
+    xx, yy, xy = components[:, strain.stress_xx_yy_xy].T
     return np.column_stack([xx, yy, 3 * mean - xx - yy, xy])
 
 

@@ -176,12 +176,12 @@ class Scene(description.Elsewhere, Unique):
         assigned = assignment.assigned(material, material_of, body, len(x))
         materials, law, numbers = assigned.materials, assigned.law, assigned.number
         whole = _rust.Particles(x, volume, numbers)
-        whole.check_materials(materials, self.form.kinematics, self.form.strain == "finite")
+        whole.check_materials(materials, self.form.kinematics.name, self.form.strain.finite)
         whole.add_history(materials)
         self._materials, self._law, self._values = materials, law, values
         self._moduli = np.array([(m.bulk_modulus, m.shear_modulus) for m in materials])
         self._densities = assignment.densities(density, len(materials), body.names)
-        self._finite = self.form.strain == "finite"
+        self._finite = self.form.strain.finite
         if self._finite and law is not None:
             raise InputError(
                 f"form {self.form.name} has finite strains: expected a law in Rust, a NumpyLaw has "
@@ -194,7 +194,7 @@ class Scene(description.Elsewhere, Unique):
         check_used(self._compiled, options, parameters)
         self.options = options
         self.parameters = {name: values[name] for name in values if name in self._compiled.used}
-        if self.form.kinematics == "mixed":
+        if self.form.kinematics.has_eps_v:
             self.particles.add_eps_v()
         self.stopwatch = Stopwatch()
         self._leaving, self.left = leaving, list[tuple[int, tuple[float, float], float]]()
@@ -206,7 +206,7 @@ class Scene(description.Elsewhere, Unique):
     def _warn_of_locking(self, particles: _rust.Particles) -> None:
         bulk, mu = self._moduli[particles.material].T
         p = int(np.argmax(bulk / mu))
-        if self.form.kinematics != "displacement" or bulk[p] < LOCKS * mu[p] or self.grid.comm.rank:
+        if not self.form.kinematics.locks or bulk[p] < LOCKS * mu[p] or self.grid.comm.rank:
             return
         warnings.warn(
             f"form {self.form.name} has no field for the volume, and K/mu = {bulk[p] / mu[p]:.3g} at "
@@ -223,7 +223,7 @@ class Scene(description.Elsewhere, Unique):
                 self.grid, self._compiled, self.basis, location, self.particles.volume,
                 self._values, self.stopwatch,
             )  # fmt: skip
-        kinematics, law = self.form.kinematics, self._law
+        kinematics, law = self.form.kinematics.name, self._law
         rust = _rust.Stage(
             self.particles, location, self._materials, kinematics, self._finite, self.basis
         )
@@ -595,7 +595,7 @@ class Scene(description.Elsewhere, Unique):
             done: What else belongs to a step that is stored.
         """
         check_process()
-        with ranks.together(self.grid.comm):
+        with ranks.raise_together(self.grid.comm):
             self.particles.check()
         for option in self._whole_cells:
             self.attached.warn_of_parts(self.particles.volume, option)
@@ -617,7 +617,7 @@ class Scene(description.Elsewhere, Unique):
             accepted = Accepted(step, u, a, forces.reshape(-1, 2), smooth.reshape(-1, 2))
             store = also(accepted) if also is not None else None
             with signals.deferred():
-                with self.stopwatch("commit"), ranks.together(self.grid.comm):
+                with self.stopwatch("commit"), ranks.raise_together(self.grid.comm):
                     dissipated = self.attached.stage.commit(*self.split(step.coefficients))
                 committed = True
                 if store is not None:

@@ -13,6 +13,7 @@ from tawami.base import checks
 from tawami.base.errors import InputError
 from tawami.base.process import Unique
 from tawami.field.reduction import Reduction
+from tawami.form.kinematics import KINEMATICS
 from tawami.grid import edges
 from tawami.grid.grid import EDGES, Edge
 from tawami.particles import placement
@@ -90,7 +91,7 @@ class Solution(description.Elsewhere, Unique):
         self.x, self.volume = whole(particles.x), whole(particles.volume)
         self.stress = whole(particles.stress)
         self.displacement_of_particles = whole(particles.displacement)
-        mixed = scene.form.kinematics == "mixed"
+        mixed = scene.form.kinematics.has_eps_v
         self._eps_v = whole(particles.eps_v) if mixed else None
 
     @property
@@ -100,7 +101,7 @@ class Solution(description.Elsewhere, Unique):
         Raises:
             InputError: The form has neither.
         """
-        return self._of_form("volumetric", self._volumetric, ("mixed", "deviatoric"))
+        return self._of_form("volumetric", self._volumetric, "volume_fields")
 
     @property
     def eps_v(self) -> Array:
@@ -109,14 +110,15 @@ class Solution(description.Elsewhere, Unique):
         Raises:
             InputError: The form does not have that field.
         """
-        return self._of_form("eps_v", self._eps_v, ("mixed",))
+        return self._of_form("eps_v", self._eps_v, "has_eps_v")
 
-    def _of_form(self, name: str, values: Array | None, kinematics: tuple[str, ...]) -> Array:
+    def _of_form(self, name: str, values: Array | None, having: str) -> Array:
         if values is None:
             form = self.scene.form
+            kinematics = [k.name for k in KINEMATICS.values() if getattr(k, having)]
             raise InputError(
                 f"{name}: form {form.name} does not have it: expected a form with the kinematics "
-                f"{' or '.join(map(repr, kinematics))}, as form='{description.MIXED[form.strain]}'"
+                f"{' or '.join(map(repr, kinematics))}, as form='{form.strain.mixed_form}'"
             )
         return values
 
