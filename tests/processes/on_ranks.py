@@ -14,7 +14,7 @@ from mpi4py import MPI
 import tawami
 from cases import collapse
 from cases.cantilever import fem, mpm
-from tawami.base.ranks import joined
+from tawami.base.ranks import allgathered
 from tawami.form.form import Form
 
 
@@ -148,8 +148,8 @@ def initial() -> dict[str, np.ndarray]:
         told = str(error)
     assert "beyond the yield surface" in told
     plastic.initial("stress", stress, beyond="return")
-    order = np.argsort(joined(grid.comm, plastic.particles.number))
-    found = {"initial stress": joined(grid.comm, np.array(plastic.particles.stress))[order]}
+    order = np.argsort(allgathered(grid.comm, plastic.particles.number))
+    found = {"initial stress": allgathered(grid.comm, np.array(plastic.particles.stress))[order]}
     scene = tawami.Scene(grid, ring, elastic, density=10.0)
     scene.initial("stress", lambda x, y: (4e3 * (x - 0.6), 0.0, 0.0, 0.0))
     for point in ((0.6, 0.3), (0.2, 0.7)):
@@ -163,9 +163,9 @@ def initial() -> dict[str, np.ndarray]:
 def whole(motion: tawami.Dynamics) -> dict[str, np.ndarray]:
     """What the particles carry, in the order of their numbers."""
     particles, comm = motion.scene.particles, motion.scene.grid.comm
-    order = np.argsort(joined(comm, particles.number))
+    order = np.argsort(allgathered(comm, particles.number))
     arrays = {"x": particles.x, "stress": particles.stress, "velocity": motion.velocity}
-    return {name: joined(comm, np.array(values))[order] for name, values in arrays.items()}
+    return {name: allgathered(comm, np.array(values))[order] for name, values in arrays.items()}
 
 
 if __name__ == "__main__":

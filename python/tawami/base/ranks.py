@@ -1,8 +1,8 @@
 """Several ranks: sums and gathered arrays, errors that every rank raises, an end that all come to.
 
-An error that one rank alone meets in a local block is raised on all of them (:func:`together`), so a
-driver script may catch it. What is left uncaught on any rank is printed once and ends all of them
-(:func:`watch`): the others would wait for it for ever.
+An error that one rank alone meets in a local block is raised on all of them
+(:func:`raise_together`), so a driver script may catch it. What is left uncaught on any rank is printed
+once and ends all of them (:func:`watch`): the others would wait for it for ever.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def any_of(comm: Any, mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     return mask
 
 
-def joined(comm: Any, part: npt.NDArray[Any]) -> npt.NDArray[Any]:
+def allgathered(comm: Any, part: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """The ranks' arrays one after the other, on every rank."""
     if comm.size == 1:
         return part
@@ -62,7 +62,7 @@ def exchanged(comm: Any, rows: npt.NDArray[Any], to: npt.NDArray[Any]) -> npt.ND
 
 
 @contextmanager
-def together(comm: Any) -> Iterator[None]:
+def raise_together(comm: Any) -> Iterator[None]:
     """An error in the block, on whichever rank, is raised on all; the block must not communicate.
 
     Of several errors it is that of the lowest rank.

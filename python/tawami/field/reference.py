@@ -276,7 +276,7 @@ class Field:
         everything = Reduction.of_all(self.layout)
         mine = rows_of(self.tangent(coefficients, data, everything)).tocoo()
         rows, columns, values = (
-            ranks.joined(self.grid.comm, part)
+            ranks.allgathered(self.grid.comm, part)
             for part in (mine.row + everything.own.start, mine.col, mine.data)
         )
         unknowns, shape = everything.unknowns, (self.layout.size, self.layout.size)

@@ -75,7 +75,7 @@ class Dynamics(Sealed, Unique):
         self.gamma = checks.number("gamma", gamma, low=0.5, high=1.0)
         self.beta = (self.gamma + 0.5) ** 2 / 4
         self._now = scene.configuration
-        with ranks.together(scene.grid.comm):
+        with ranks.raise_together(scene.grid.comm):
             given = sources.values(self._now.domain, "velocity", velocity, "x y", "m/s")
         self._carried = Carried(self._now, self.transfer, self.damping)
         self.velocity[:] = given
@@ -143,7 +143,7 @@ class Dynamics(Sealed, Unique):
         """
         dt = checks.number("dt", dt, low=SHORTEST, high=LONGEST)
         now = self._now
-        with ranks.together(now.model.grid.comm):
+        with ranks.raise_together(now.model.grid.comm):
             now.domain.particles.check()
         for support in now.supports.all:
             prescribes = support.velocity is None and not support.is_zero

@@ -123,7 +123,7 @@ class Output:
         self._time = state.get("time", math.nan)
         self._resolve(subject)
         comm = subject.scene.grid.comm
-        with ranks.together(comm):
+        with ranks.raise_together(comm):
             if comm.rank == 0:
                 self._open(folder, self._seen if state else None, subject)
 
@@ -194,7 +194,7 @@ class _SeriesOutput(Output):
 
     def _write(self, moment: Snapshot, size: float) -> None:
         frame, comm = self._frame(moment), moment.scene.grid.comm
-        with ranks.together(comm):
+        with ranks.raise_together(comm):
             if comm.rank == 0:
                 self._series.write(moment.step, moment.time, frame)
 
@@ -314,7 +314,7 @@ class TableOutput(Output):
     def _write(self, moment: Snapshot, size: float) -> None:
         values = [float(v) for column in self._columns for v in column.of(moment, size)]
         comm = moment.scene.grid.comm
-        with ranks.together(comm):
+        with ranks.raise_together(comm):
             if comm.rank == 0:
                 _append(self.path, _line([moment.step, float(moment.time), *values]))
 
@@ -390,7 +390,7 @@ def write_grid(path: str | Path, solution: Solution) -> None:
 
 
 def _write_once(path: str | Path, frame: Frame, grid: Grid) -> None:
-    with ranks.together(grid.comm):
+    with ranks.raise_together(grid.comm):
         if grid.comm.rank == 0:
             write_vtu(path, frame)
 

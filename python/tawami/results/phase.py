@@ -21,7 +21,7 @@ from tawami.base.errors import (
     SingularError,
 )
 from tawami.base.files import result_folder
-from tawami.base.ranks import any_of, together
+from tawami.base.ranks import any_of, raise_together
 from tawami.base.signals import Interruption
 from tawami.motion import pace
 from tawami.motion.observer import Snapshot, Subject
@@ -71,7 +71,7 @@ class Phase:
         self._seen, self._last, self._stopped = 0, False, False
 
     def __enter__(self) -> Self:
-        with together(self._comm):
+        with raise_together(self._comm):
             path = self.results.folder / LOG if self._writes else None
             self._open.enter_context(progress.logged(path))
         self._open.enter_context(self._interruption)
@@ -120,7 +120,7 @@ class Phase:
             log.info("%s had come to its end at %s", self.name, self._at)
             return
         self.finished = False
-        with together(self._comm):
+        with raise_together(self._comm):
             if self._writes:
                 result_folder(folder)
         told = {} if state is None else state["outputs"]
@@ -133,7 +133,7 @@ class Phase:
         )  # fmt: skip
         if state is None:
             header = self.subject.header().splitlines()
-            with together(self._comm):
+            with raise_together(self._comm):
                 if self._writes:
                     self.results.note(self.name, {"began": now(), "input": header})
             self._look(None, last=False)
@@ -162,7 +162,7 @@ class Phase:
 
     def _warn(self, sentence: str) -> None:
         """Once; where warnings are errors, an error on all ranks."""
-        with together(self._comm):
+        with raise_together(self._comm):
             if self._writes:
                 warnings.warn(sentence, CheckpointWarning, stacklevel=3)
 
@@ -263,7 +263,7 @@ class Phase:
         }
         name = f"{self.number:02d}-{self.name}-{len(self._steps):08d}.npz"
         path = self.results.folder / archive.FOLDER / name
-        with together(self._comm):
+        with raise_together(self._comm):
             if self._writes:
                 archive.write(path, self._identity, state)
                 own, later = self._files()
@@ -288,7 +288,7 @@ class Phase:
             "seconds": monotonic() - self._began,
             "finished": now(),
         }
-        with together(self._comm):
+        with raise_together(self._comm):
             if self._writes:
                 self.results.note(self.name, facts)
 

@@ -39,7 +39,7 @@ def write(folder: str | Path, subject: Subject) -> None:
     """
     scene, header = subject.scene, subject.header()
     comm = scene.grid.comm
-    with ranks.together(comm):
+    with ranks.raise_together(comm):
         if comm.rank == 0:
             home = result_folder(folder)
             script, module = driver()

@@ -18,7 +18,7 @@ from typing import Any, Literal, get_args
 from tawami.base import archive, checks
 from tawami.base.errors import InputError, OutputError
 from tawami.base.files import result_folder, whole_file
-from tawami.base.ranks import together
+from tawami.base.ranks import raise_together
 from tawami.motion.observer import Subject
 from tawami.results import provenance
 from tawami.results.output import PHASES, Output
@@ -114,7 +114,7 @@ class Results:
         """
         if not self._phases:
             comm = subject.scene.grid.comm
-            with together(comm):
+            with raise_together(comm):
                 if comm.rank == 0:
                     self._open()
             self.resumes = comm.bcast(self.resumes)

@@ -130,7 +130,7 @@ class Configuration:
             ConvergenceError, SingularError, SupportError, InputError: Nothing has changed.
         """
         check_process()
-        with ranks.together(self.model.grid.comm):
+        with ranks.raise_together(self.model.grid.comm):
             self.domain.particles.check()
         self.domain.warn_of_partial_cells()
         walls = [copy.deepcopy(wall.state) for wall in self.supports.walls]
@@ -140,7 +140,7 @@ class Configuration:
             moved = self._moved(accepted, kind.end)
             update = kind.accept(accepted)
             with signals.deferred():
-                with self.stopwatch("commit"), ranks.together(self.model.grid.comm):
+                with self.stopwatch("commit"), ranks.raise_together(self.model.grid.comm):
                     fields = self.domain.layout.split(accepted.step.coefficients)
                     dissipated = self.domain.stage.commit(*fields)
                 committed = True

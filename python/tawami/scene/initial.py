@@ -34,7 +34,7 @@ def set_field(now: Configuration, name: str, given: Source, beyond: Beyond) -> N
     """Set a field of the particles; see `Scene.initial`."""
     _check(now, name, beyond)
     domain = now.domain
-    with ranks.together(domain.model.grid.comm):
+    with ranks.raise_together(domain.model.grid.comm):
         found = sources.values(domain, name, given, *COMPONENTS.get(name, ("value", "")))
         if name == "eps_v" and not isinstance(given, Earlier):
             _check_volume(domain, found[:, 0])
@@ -48,7 +48,7 @@ def set_field(now: Configuration, name: str, given: Source, beyond: Beyond) -> N
     before = array.copy()
     array[:] = found.reshape(array.shape)
     try:
-        with ranks.together(domain.model.grid.comm):
+        with ranks.raise_together(domain.model.grid.comm):
             if name == "stress" or name in domain.particles.history_names:
                 _to_surface(domain, beyond)
     except InputError:

@@ -39,8 +39,8 @@ def weakest(
     """
     grid = field.grid
     own = np.argsort(-np.abs(direction))[:20]
-    entries = ranks.joined(grid.comm, np.abs(direction[own]))
-    unknowns = ranks.joined(grid.comm, reduction.own.start + own)
+    entries = ranks.allgathered(grid.comm, np.abs(direction[own]))
+    unknowns = ranks.allgathered(grid.comm, reduction.own.start + own)
     counts = np.bincount(location.cell, minlength=grid.cells[0] * grid.cells[1])
     counts = ranks.sum_of(grid.comm, counts)
     found: list[str] = []

@@ -108,7 +108,7 @@ class Newton:
         self._factors: dict[Rule, list[tuple[slice, Array]]] = {r: [] for r in self.data}
         for rule, densities in compiled.densities.items():
             for density, column in densities.items():
-                with ranks.together(field.grid.comm):
+                with ranks.raise_together(field.grid.comm):
                     self._place(rule, density, column)
         volumetric = list(compiled.form.fields.values())[1:]
         self.kind = volumetric[0][0] if volumetric else None
@@ -184,7 +184,7 @@ class Newton:
             for rule, requests in self._requests.items():
                 if requests:
                     fields = self.field.layout.split(coefficients)
-                    with ranks.together(self._comm):
+                    with ranks.raise_together(self._comm):
                         self.stage.evaluate(*fields, requests, self.data[rule])
                     for place, factor in self._factors[rule]:
                         self.data[rule][:, place] *= factor[:, None]
@@ -368,7 +368,7 @@ class Newton:
             tally.unknowns = max(tally.unknowns, reduction.size)
             if linear.singular:
                 self._report_singular(reduction, began=len(history) == 1)
-            change = reduction.selection @ ranks.joined(self._comm, found)
+            change = reduction.selection @ ranks.allgathered(self._comm, found)
             coefficients = coefficients + change
             if off is not None:
                 off = off + change[: len(off)]
