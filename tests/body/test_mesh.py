@@ -10,7 +10,7 @@ from time import perf_counter
 import meshio
 import numpy as np
 import pytest
-from conftest import grid_of
+from scenes import grid_of
 from mpi4py import MPI
 from scipy.spatial import Delaunay
 

@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 import pytest
-from conftest import grid_of
+from scenes import grid_of
 from mpi4py import MPI
 
 import tawami

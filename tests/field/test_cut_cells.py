@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import BASES, grid_of
+from scenes import BASES, grid_of
 from mpi4py import MPI
 from scipy.interpolate import BSpline
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import BASES, FORMS, clouds
+from scenes import BASES, FORMS, clouds
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline

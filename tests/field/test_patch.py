@@ -7,7 +7,7 @@ import warnings
 
 import numpy as np
 import pytest
-from conftest import FORMS, grid_of, linear_field
+from scenes import FORMS, grid_of, linear_field
 from mpi4py import MPI
 
 import tawami

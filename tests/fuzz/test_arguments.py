@@ -22,7 +22,7 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
-from conftest import grid_of
+from scenes import grid_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI

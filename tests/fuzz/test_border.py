@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import grid_of
+from scenes import grid_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from conftest import FINITE
+from scenes import FINITE
 from mpi4py import MPI
 
 import tawami

@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-from conftest import BASES, FORMS, grid_of
+from scenes import BASES, FORMS, grid_of
 from mpi4py import MPI
 
 import tawami

@@ -10,7 +10,7 @@ import venv
 from pathlib import Path
 
 import pytest
-from conftest import FINITE, FORMS
+from scenes import FINITE, FORMS
 
 from tawami.fem import environment
 from tawami.form.form import shipped

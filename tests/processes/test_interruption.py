@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import grid_of
+from scenes import grid_of
 
 import tawami
 from tawami.base.signals import deferred

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import clouds, grid_of
+from scenes import clouds, grid_of
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
-from conftest import small_files
+from programs import small_files
 from hypothesis import given
 from hypothesis import strategies as st
 from mpi4py import MPI

@@ -6,7 +6,7 @@ import gc
 
 import numpy as np
 import pytest
-from conftest import grid_of
+from scenes import grid_of
 from hypothesis import given
 from hypothesis import strategies as st
 from mpi4py import MPI

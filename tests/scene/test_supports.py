@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from conftest import greville, grid_of
+from scenes import greville, grid_of
 from hypothesis import given
 from hypothesis import strategies as st
 from mpi4py import MPI
