@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cases import elastica
+from cases.verification import elastica
 
 
 @pytest.mark.parametrize(

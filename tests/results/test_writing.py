@@ -19,7 +19,7 @@ import pytest
 from conftest import grid_of, small_files
 
 import tawami
-from cases import figure
+from cases.common import figure
 from tawami.results.output import result_folder, whole_file, write_grid, write_particles
 from tawami.study import process
 from tawami.study.table import COSTS, Row, Table

@@ -278,7 +278,7 @@ def test_a_quantity_that_no_run_returns_and_a_study_that_was_not_run(tmp_path):
 
 def test_the_shipped_results_are_those_of_the_shipped_studies():
     """Their settings are those that the studies would run, and each front has its knee."""
-    from cases.trade.__main__ import SHIPPED, STUDIES
+    from cases.costs.trade.__main__ import SHIPPED, STUDIES
 
     for name, study in STUDIES.items():
         table = Table.read(SHIPPED / f"{name}.csv")
@@ -292,7 +292,7 @@ def test_the_shipped_results_are_those_of_the_shipped_studies():
 def test_the_trade_runs_a_sample(tmp_path):
     root = Path(__file__).parents[2]
     run = subprocess.run(
-        [sys.executable, "-m", "cases.trade", "cook", "--sample", "2", "--results", str(tmp_path)],
+        [sys.executable, "-m", "cases.costs.trade", "cook", "--sample", "2", "--results", str(tmp_path)],
         cwd=root, capture_output=True, text=True, check=True,
     )  # fmt: skip
     assert "The knee:" in run.stdout
