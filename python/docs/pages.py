@@ -29,7 +29,7 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "cook": ("Cook's membrane", "verification", ("membrane",)),
     "cut_cells": ("Cut cells", "showcase", ()),
     "self_weight": ("Self-weight", "verification", ()),
-    "elastica": ("Elastica", "verification", ()),
+    "elastica": ("Elastica", "verification", ("strip",)),
     "footing": ("Footing", "verification", ()),
     "vibrating_beam": ("Vibrating beam", "verification", ("beam",)),
     "spinning_disc": ("Spinning disc", "verification", ()),

@@ -86,4 +86,6 @@ def test_the_study_writes_table_and_figures(tmp_path):
 def test_sizes_that_miss_the_ends_of_the_load_are_refused(capsys):
     with pytest.raises(SystemExit):
         study.main(["--sizes", "3"])
-    assert "--sizes 3: expected divisors of 4 such as 4,2,1,0.5" in capsys.readouterr().err
+    assert (
+        "argument --sizes: 3: expected divisors of 4 such as 4,2,1,0.5" in capsys.readouterr().err
+    )

@@ -1,4 +1,4 @@
-"""The cantilever of Okagawa, Hashimoto and Higo: mixed u-eps_v MPM beside B-bar and FEM.
+"""The cantilever of Okagawa, Hashimoto and Higo: mixed u-eps_v MPM compared with B-bar and FEM.
 
 python -m cases.verification.cantilever          the whole study: tables, figures, report
 python -m cases.verification.cantilever.mpm      the material point method alone

@@ -1,4 +1,4 @@
-"""The beam, its supports and its closed forms. Nothing here knows how it is solved.
+"""The beam, its supports and its closed forms. This module does not depend on a method.
 
     y
     |            L = 2 m                      plane strain, one static step
@@ -6,10 +6,10 @@
  root   D = 1 m                      | tip    P = 1 kN per metre depth, downward
     +--------------------------------+--- x
 
-Three supports, because the first has no limit (see `point_support_growth`):
+Three supports, because with the first the deflection has no limit (see `point_support_growth`):
 
 paper     u_x = 0 on the root, u_y = 0 at its centre, uniform shear on the tip
-exact     displacement and tractions of the closed form: eq. (3) is its limit
+exact     displacement and tractions of the closed form; the limit is eq. (3)
 clamped   u = 0 on the root, uniform shear on the tip
 
 Source: the paper, section 3; Timoshenko and Goodier, Theory of Elasticity, art. 21.
@@ -35,15 +35,15 @@ LAMBDA = K - 2 * MU / 3
 
 
 def deflection(nu: float) -> float:
-    """Eq. (3) [m]; the paper prints E where E_bar is meant."""
+    """Tip deflection, eq. (3) [m]. The paper prints E where E_bar is meant."""
     e_bar, nu_bar = E / (1 - nu**2), nu / (1 - nu)
     return P / (6 * e_bar * I) * ((4 + 5 * nu_bar) * D**2 * L / 4 + 2 * L**3)
 
 
-#: For the nu of the paper [m].
+#: Deflection for the Poisson's ratio of the paper [m].
 V_THEORY = deflection(NU)
 
-#: Where the deflections of the clamped beam converge to [m]; by refinement, no closed form.
+#: Limit of the deflection of the clamped beam [m], found by refinement; there is no closed form.
 V_CLAMPED = 0.009684
 
 COLUMNS = (
@@ -54,7 +54,7 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the table; None is a blank."""
+    """One line of the table. None stands for an empty cell."""
 
     method: str
     support: str
@@ -69,31 +69,31 @@ class Row:
 
     @property
     def error_percent(self) -> float:
-        """Eq. (4)."""
+        """Error of the deflection, eq. (4) [%]."""
         return 100 * (self.deflection_m - V_THEORY) / V_THEORY
 
 
 def root_displacement_x(y: Any, nu: float = NU) -> Any:
-    """u_x [m] on the root of the closed form."""
+    """Displacement u_x [m] of the closed form on the root."""
     e_bar, nu_bar = E / (1 - nu**2), nu / (1 - nu)
     return (2 + nu_bar) * P * y * (y**2 - D**2 / 4) / (6 * e_bar * I)
 
 
 def shear(y: Any) -> Any:
-    """Parabolic shear traction [Pa] of total P; up on the root, down on the tip."""
+    """Parabolic shear traction [Pa] with the resultant P, upward on the root and downward on the tip."""
     return 1.5 * P / D * (1 - 4 * y**2 / D**2)
 
 
 def mean_stress(x: Any, y: Any, nu: float = NU) -> Any:
-    """(1 + nu)/3 sigma_xx [Pa], sigma_xx = P (L - x) y / I."""
+    """Mean stress [Pa] of the closed form: (1 + nu)/3 sigma_xx, sigma_xx = P (L - x) y / I."""
     return (1 + nu) / 3 * P * (L - x) * y / I
 
 
 def point_support_growth() -> float:
     """Growth of the deflection [m] for each halving of h with the support `paper`.
 
-    The centre point carries the whole reaction P. Mirrored at the root, where u_x = 0, it is a
+    The centre point carries the whole reaction P. Mirrored at the root, where u_x = 0, this is a
     force 2 P in a full plane: u_y ~ 2 P (3 - 4 nu) / (8 pi mu (1 - nu)) ln(1/r) (Kelvin, plane
-    strain), and the grid cuts this off at r ~ h.
+    strain). The grid cuts this off at r ~ h.
     """
     return 2 * P * (3 - 4 * NU) / (8 * pi * MU * (1 - NU)) * log(2)

@@ -1,4 +1,4 @@
-"""The cantilever by finite elements, in plain dolfinx (0.5 to 0.11): what the MPM is compared with.
+"""The cantilever by finite elements in plain dolfinx (0.5 to 0.11), to compare the MPM with.
 
 fem_q2            biquadratic displacement, 3 x 3 Gauss points
 fem_taylor_hood   biquadratic displacement, bilinear p, 3 x 3 Gauss points; Herrmann's form,
@@ -10,7 +10,6 @@ python -m cases.verification.cantilever.fem
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 from time import perf_counter
 from typing import Any
@@ -21,18 +20,22 @@ import ufl
 from mpi4py import MPI
 
 from cases.common.finite_elements import (
+    free_unknowns,
     function_space,
+    integral,
     lagrange,
     mixed_element,
     nodal_value,
     prescribed,
+    run,
     solution_of,
-)  # fmt: skip
+)
 from cases.common.table import as_text
 from cases.verification.cantilever.beam import (
     COLUMNS,
     LAMBDA,
     MU,
+    SUPPORTS,
     D,
     K,
     L,
@@ -41,9 +44,10 @@ from cases.verification.cantilever.beam import (
     mean_stress,
     root_displacement_x,
     shear,
-)  # fmt: skip
+)
 
 METHODS = ("fem_q2", "fem_taylor_hood", "fem_q1_bbar")
+TIP, ROOT = 1, 2  # tags of the two ends
 
 
 def solve(method: str, support: str, n: int) -> Row:
@@ -55,11 +59,10 @@ def solve(method: str, support: str, n: int) -> Row:
     mixed = method == "fem_taylor_hood"
     degree = 1 if method == "fem_q1_bbar" else 2
     displacement = lagrange(degree, 2)
-    elements = mixed_element([displacement, lagrange(1)]) if mixed else displacement
-    W = function_space(mesh, elements)
+    W = function_space(mesh, mixed_element([displacement, lagrange(1)]) if mixed else displacement)
     V = W.sub(0) if mixed else W
 
-    # -- weak form; the unknown of the mixed form is p/mu, which is of the size of a strain
+    # weak form; the unknown p of the mixed form is divided by mu, so that it is of the size of a strain
     dx = ufl.dx(domain=mesh, metadata={"quadrature_degree": 2 * degree})
     dx_volume = ufl.dx(domain=mesh, metadata={"quadrature_degree": 1 if degree == 1 else 4})
     trial, test = ufl.TrialFunction(W), ufl.TestFunction(W)
@@ -69,68 +72,69 @@ def solve(method: str, support: str, n: int) -> Row:
         a += MU * (p * ufl.div(w) + q * ufl.div(u) - MU / LAMBDA * p * q) * dx
     else:
         a += -2 / 3 * MU * ufl.div(u) * ufl.div(w) * dx + K * ufl.div(u) * ufl.div(w) * dx_volume
-    x = ufl.SpatialCoordinate(mesh)
-    tip, root = at_end(mesh, L, 1), at_end(mesh, 0.0, 2)
-    tags = dolfinx.mesh.meshtags(mesh, 1, *(np.concatenate(c) for c in zip(tip, root, strict=True)))
-    ds = ufl.ds(domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": 4})
-    if support == "exact":
-        load = shear(x[1]) * w[1] * ds(2) - shear(x[1]) * w[1] * ds(1)
-    else:
-        load = -P / D * w[1] * ds(1)
 
-    # -- supports
-    on_root: Callable[[Any], Any] = lambda x: np.isclose(x[0], 0.0)  # noqa: E731
-    at_centre: Callable[[Any], Any] = lambda x: on_root(x) & np.isclose(x[1], 0.0)  # noqa: E731
-    profile = root_displacement_x if support == "exact" else np.zeros_like
-    supports = [
-        prescribed(V, 0, on_root, lambda x: profile(x[1])),
-        prescribed(V, 1, on_root if support == "clamped" else at_centre, lambda x: 0 * x[0]),
-    ]
-
-    solution = solution_of(a, load, supports)
-
-    # -- results
+    supports = supports_of(V, support)
+    solution = solution_of(a, load_of(mesh, w, support), supports)
     at_tip: Callable[[Any], Any] = lambda x: np.isclose(x[0], L) & np.isclose(x[1], 0.0)  # noqa: E731
-    deflection = -nodal_value(W, V, 1, solution, at_tip)
-    error = None
-    if support == "exact":
-        uh, ph = ufl.split(solution) if mixed else (solution, None)
-        sigma_m = MU * (ph + 2 / 3 * ufl.div(uh)) if mixed else K * ufl.div(uh)
-        exact = mean_stress(x[0], x[1])
-        error = float(np.sqrt(
-            integral((sigma_m - exact) ** 2 * dx_volume) / integral(exact**2 * dx_volume)
-        ))  # fmt: skip
-    held = sum(bc.dof_indices()[1] for bc in supports)
-    size = W.dofmap.index_map.size_global * W.dofmap.index_map_bs
+    uh, ph = ufl.split(solution) if mixed else (solution, None)
+    sigma_m = MU * (ph + 2 / 3 * ufl.div(uh)) if mixed else K * ufl.div(uh)
     return Row(
         method=method,
         support=support,
         n=n,
         alpha=None,
         particles_per_cell=None,
-        deflection_m=deflection,
-        mean_stress_l2=error,
+        deflection_m=-nodal_value(W, V, 1, solution, at_tip),
+        mean_stress_l2=mean_stress_error(mesh, sigma_m, dx_volume) if support == "exact" else None,
         newton_iterations=1,
-        unknowns=size - mesh.comm.allreduce(held),
+        unknowns=free_unknowns(W, supports),
         wall_s=perf_counter() - start,
     )
 
 
-def at_end(mesh: Any, x: float, tag: int) -> tuple[Any, Any]:
-    """Facets at one end of the beam, ascending, and their tags."""
-    facets = dolfinx.mesh.locate_entities_boundary(mesh, 1, lambda y: np.isclose(y[0], x))
-    return np.sort(facets), np.full(len(facets), tag, dtype=np.int32)
+def load_of(mesh: Any, w: Any, support: str) -> Any:
+    """Work of the tractions on a test function w."""
+    y = ufl.SpatialCoordinate(mesh)[1]
+    ends = facets(mesh, L, TIP), facets(mesh, 0.0, ROOT)
+    tags = dolfinx.mesh.meshtags(mesh, 1, *(np.concatenate(c) for c in zip(*ends, strict=True)))
+    ds = ufl.ds(domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": 4})
+    if support == "exact":
+        return shear(y) * w[1] * ds(ROOT) - shear(y) * w[1] * ds(TIP)
+    return -P / D * w[1] * ds(TIP)
 
 
-def integral(form: Any) -> float:
-    """Value of a form without arguments, over all ranks."""
-    value = dolfinx.fem.assemble_scalar(dolfinx.fem.form(form))
-    return float(MPI.COMM_WORLD.allreduce(value))
+def facets(mesh: Any, x: float, tag: int) -> tuple[Any, Any]:
+    """Facets at one end of the beam in ascending order, and their tags."""
+    found = dolfinx.mesh.locate_entities_boundary(mesh, 1, lambda y: np.isclose(y[0], x))
+    return np.sort(found), np.full(len(found), tag, dtype=np.int32)
+
+
+def supports_of(V: Any, support: str) -> list[Any]:
+    """Displacements prescribed on the root."""
+    on_root: Callable[[Any], Any] = lambda x: np.isclose(x[0], 0.0)  # noqa: E731
+    at_centre: Callable[[Any], Any] = lambda x: on_root(x) & np.isclose(x[1], 0.0)  # noqa: E731
+    profile = root_displacement_x if support == "exact" else np.zeros_like
+    return [
+        prescribed(V, 0, on_root, lambda x: profile(x[1])),
+        prescribed(V, 1, on_root if support == "clamped" else at_centre, lambda x: 0 * x[0]),
+    ]
+
+
+def mean_stress_error(mesh: Any, sigma_m: Any, dx: Any) -> float:
+    """Relative L2 error of the mean stress."""
+    exact = mean_stress(*ufl.SpatialCoordinate(mesh))
+    squared = integral((sigma_m - exact) ** 2 * dx) / integral(exact**2 * dx)
+    return float(np.sqrt(squared))
+
+
+def tables() -> str:
+    """Deflections with each support, a table each."""
+    cells = (2, 4, 8, 16)
+    return "\n".join(
+        as_text([solve(method, support, n) for method in METHODS for n in cells], COLUMNS)
+        for support in SUPPORTS
+    )
 
 
 if __name__ == "__main__":
-    logging.disable(logging.INFO)  # the compilation of forms is talkative
-    for kind in ("paper", "exact", "clamped"):
-        rows = [solve(m, kind, n) for m in METHODS for n in (2, 4, 8, 16)]
-        if MPI.COMM_WORLD.rank == 0:
-            print(as_text(rows, COLUMNS))
+    run(tables)

@@ -11,6 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 import tawami
+from cases.common.program import Program
 from cases.common.table import as_text
 from cases.verification.cantilever.beam import (
     COLUMNS,
@@ -23,7 +24,7 @@ from cases.verification.cantilever.beam import (
     mean_stress,
     root_displacement_x,
     shear,
-)  # fmt: skip
+)
 
 
 def build(
@@ -40,14 +41,14 @@ def build(
     """The beam as a scene.
 
     Args:
-        method: Form: 'u', 'u_bbar', 'u_epsv', 'u_p', or anything that `Scene` takes.
+        method: Form: 'u', 'u_bbar', 'u_epsv', 'u_p', or any other that `Scene` accepts.
         support: 'paper', 'exact' or 'clamped'.
         n: Cells over the height.
-        material: Another material than the paper's.
-        nu: Its Poisson's ratio, which the support 'exact' knows.
+        material: Material; that of the paper by default.
+        nu: Its Poisson's ratio, which the support 'exact' needs.
         per_axis: Particles per cell and axis.
-        gauss: Particles at Gauss points instead of evenly.
-        parameters: alpha, stabilisation, basis, ...
+        gauss: Particles at Gauss points instead of evenly spaced.
+        parameters: Options of `Scene`: alpha, stabilisation, basis, ...
     """
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, -D / 2), h=D / n, cells=(2 * n, n))
     body = tawami.box(grid, (0.0, -D / 2), (L, D / 2), per_axis=per_axis, gauss=gauss)
@@ -75,7 +76,13 @@ def build(
 def solve(
     method: str, support: str, n: int, alpha: float | None = None, **options: object
 ) -> tuple[Row, tawami.Solution]:
-    """Solve the beam; `alpha` for the forms that have it, the rest as in `build`."""
+    """Solve the beam.
+
+    Args:
+        method, support, n: As in `build`.
+        alpha: Stabilisation, for the forms that have it.
+        options: As in `build`.
+    """
     start = perf_counter()
     if alpha is not None:
         options["alpha"] = alpha
@@ -105,12 +112,16 @@ def mean_stress_error(solution: tawami.Solution, nu: float = NU) -> float:
     return float(np.linalg.norm(error) / np.linalg.norm(weight * exact))
 
 
+PROGRAM = Program("cases.verification.cantilever.mpm", __doc__, files=False)
+
+
 def main() -> None:
     """Print the deflections with the support of the paper."""
+    PROGRAM.start()
     cells = (2, 4, 8, 16)
     print(as_text([solve("u_epsv", "paper", n, alpha=0.1)[0] for n in cells], COLUMNS))
     print(as_text([solve("u_bbar", "paper", n)[0] for n in cells], COLUMNS))
 
 
 if __name__ == "__main__":
-    tawami.run(main, "cantilever")
+    PROGRAM.run(main)

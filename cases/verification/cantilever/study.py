@@ -1,8 +1,8 @@
-"""Every method, support and mesh of the comparison, in one list."""
+"""The list of all computations: every method, support and mesh."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from cases.verification.cantilever import fem, mpm
@@ -15,7 +15,7 @@ MPM_METHODS = (("u", None), ("u_bbar", None), *(("u_epsv", alpha) for alpha in A
 
 @dataclass(frozen=True)
 class Run:
-    """One computation: `alpha` is None where the method has none."""
+    """One computation; `alpha` is None for a method without stabilisation."""
 
     method: str
     support: str
@@ -29,7 +29,7 @@ class Run:
         return mpm.solve(self.method, self.support, self.n, self.alpha)[0]
 
 
-def runs(cells: tuple[int, ...] = CELLS) -> Iterator[Run]:
+def runs(cells: Sequence[int] = CELLS) -> Iterator[Run]:
     """All computations of the comparison."""
     for support in SUPPORTS:
         for method, alpha in MPM_METHODS:

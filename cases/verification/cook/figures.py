@@ -1,4 +1,4 @@
-"""The figures: error of the deflection over cell size, and mean stress on the deformed membrane."""
+"""Figures: error of the deflection over the cell size, mean stress on the deformed membrane."""
 
 from __future__ import annotations
 
@@ -30,14 +30,17 @@ TITLES = {
     "gauss": "3 x 3 Gauss points, exact in cut cells",
     "lattice": "2 x 2 particles, those outside left out",
 }
-#: Displacements are drawn so many times as large.
+#: Factor by which displacements are magnified.
 MAGNIFIED = 20
-#: Range of the colours of the mean stress; beyond it are the corners of the clamp.
+#: Range of the colours of the mean stress. The corners of the clamp are beyond it.
 STRESS = 0.2
 
 
 def deflection_error(rows: Sequence[Row], path: Path) -> None:
-    """Error of the deflection over the cell size; a row of panels a Poisson's ratio, a column a body."""
+    """Draw the error of the deflection over the cell size.
+
+    One row of panels per Poisson's ratio, one column per kind of body.
+    """
     ratios = sorted({row.nu for row in rows})
     figure, panels = plt.subplots(
         len(ratios), len(TITLES), figsize=(13, 4.2 * len(ratios)), layout="constrained",
@@ -56,6 +59,7 @@ def deflection_error(rows: Sequence[Row], path: Path) -> None:
 
 
 def _errors(axes: Axes, rows: Sequence[Row]) -> None:
+    """Draw one line per method, and first order dotted."""
     for method, (label, colour, marker, dash) in STYLES.items():
         mine = [row for row in rows if row.method == method]
         axes.plot(
@@ -71,7 +75,7 @@ def _errors(axes: Axes, rows: Sequence[Row]) -> None:
 
 
 def mean_stress(solutions: Mapping[str, tawami.Solution], nu: float, h: float, path: Path) -> None:
-    """Mean stress at the particles where they have moved to; a panel a method."""
+    """Draw the mean stress at the displaced particles, one panel per method."""
     figure, panels = plt.subplots(
         1, len(solutions), figsize=(4 * len(solutions), 6.4), layout="constrained", sharey=True
     )
@@ -95,7 +99,7 @@ def mean_stress(solutions: Mapping[str, tawami.Solution], nu: float, h: float, p
 
 
 def _particles(solution: tawami.Solution) -> PolyCollection:
-    """Each particle as the square of its volume, displaced."""
+    """Displaced particles as squares of their volume."""
     corners = 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     side = np.sqrt(solution.volume)[:, None, None]
     x = solution.x + MAGNIFIED * solution.displacement_of_particles

@@ -1,20 +1,20 @@
-"""Cook's membrane. Nothing here knows how it is solved.
+"""Cook's membrane. This module does not depend on a method.
 
     y                 _ (48, 60)    plane strain, small strain, one static step
     |         _ . - ' |
     44  _ - '         | P = 1       E = 70, nu = 0.499 or 0.4999; units are arbitrary, the depth is 1
     |               . ' (48, 44)    held on the left; P upward, uniform over the right end
     |           . '
-    |       . '                     asked for: u_y at the middle of the right end, (48, 52)
+    |       . '                     result: u_y at the middle of the right end, (48, 52)
     |   . '
     +--------------------- x
 
-Bending and shear at once, in a body whose sides are not those of the squares. Where the held side
-meets the free one, at (0, 44), stress is singular, so that on uniform meshes the deflection converges
-like h^1.1 with any method, finite elements included; no method's own order shows.
+The membrane combines bending and shear, and its sides are not aligned with the grid. The stress is
+singular at (0, 44), where the held side meets a free one. On uniform meshes the deflection therefore
+converges like h^1.1 with any method, finite elements included, and the order of a method does not show.
 
-Source: Cook, J. Struct. Div. ASCE 100 (1974) 1851; nearly incompressible it is a usual test for
-locking. No closed form.
+Source: Cook, J. Struct. Div. ASCE 100 (1974) 1851. Nearly incompressible, it is a common test for
+locking. There is no closed form.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 CORNERS = ((0.0, 0.0), (48.0, 44.0), (48.0, 60.0), (0.0, 44.0))
-LENGTH, HEIGHT = 48.0, 60.0  # of the smallest box around it
-CLAMPED = (0.0, 44.0)  # range of y on the left end
-LOADED = (44.0, 60.0)  # range of y on the right end
-MIDDLE = (48.0, 52.0)  # where the deflection is asked for
+LENGTH, HEIGHT = 48.0, 60.0  # of the bounding box
+CLAMPED = (0.0, 44.0)  # range of y at the left end
+LOADED = (44.0, 60.0)  # range of y at the right end
+MIDDLE = (48.0, 52.0)  # where the deflection is measured
 
 E = 70.0  # Young's modulus
 P = 1.0  # load
 SHEAR = P / (LOADED[1] - LOADED[0])  # traction on the right end
 
-#: Poisson's ratio: u_y that finite elements converge to (`cases.verification.cook.fem`), within 1e-6.
+#: Limit of u_y by Poisson's ratio, from finite elements (`cases.verification.cook.fem`), within 1e-6.
 REFERENCE = {0.499: 0.264752, 0.4999: 0.264456}
 
 COLUMNS = (
@@ -41,7 +41,7 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the table; None is a blank."""
+    """One line of the table. None stands for an empty cell."""
 
     method: str
     body: str | None
@@ -54,5 +54,5 @@ class Row:
 
     @property
     def error_percent(self) -> float:
-        """Of the deflection."""
+        """Error of the deflection [%]."""
         return 100 * (self.deflection / REFERENCE[self.nu] - 1)

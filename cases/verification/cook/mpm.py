@@ -1,7 +1,8 @@
 """Cook's membrane by the material point method, on squares that its slanted sides cut.
 
-Lines of the grid run through the ends of the loaded side, and the grid ends there and at the clamp.
-The cells above the clamp and below the load touch these edges at a corner only: they take no part.
+Grid lines run through the ends of the loaded side, and the grid ends at the clamp and at the loaded
+side. The cells above the clamp and below the loaded side touch these edges at a corner only. They
+carry no load.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ def body_of(grid: tawami.Grid, kind: str) -> tawami.Body:
 
     even      2 x 2 in full cells, Gauss points of triangles in cut cells
     gauss     3 x 3 Gauss points in full cells, the same in cut cells: all integrals exact
-    lattice   2 x 2 in every cell, those outside left out
+    lattice   2 x 2 in every cell, those outside the membrane left out
     """
     if kind == "even":
         return tawami.polygon(grid, CORNERS)
@@ -57,7 +58,7 @@ def build(method: str, nu: float, h: float, body: str = "even") -> tawami.Scene:
 
 
 def scene_of(nu: float, h: float, body: str, **options: object) -> tawami.Scene:
-    """The same with any form and options of `Scene`."""
+    """The membrane with any form and options of `Scene`."""
     cells = (round(LENGTH / h), round(HEIGHT / h))
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=h, cells=cells)
     material = tawami.linear_elastic(E=E, nu=nu)

@@ -1,18 +1,19 @@
-"""The vibrating beam: what it is, and Timoshenko's theory of it. Imports no solver.
+"""The vibrating beam and Timoshenko's theory of it. This module does not depend on a method.
 
-A cantilever of length L and depth D in plane strain, held at its left end, the y axis up from the
-axis of the beam. It starts straight, with the velocity of its first bending mode.
+    held  |=====================|   D = 1 m    plane strain, E = 1 MPa, nu = 0.3 and 0.49
+                 L = 8 m                       rho = 1000 kg/m3, y upward from the axis of the beam
 
-Timoshenko 1921, with shear deformation and rotary inertia; plane strain is Ebar = E/(1 - nu^2) and
-nubar = nu/(1 - nu) in place of E and nu. For displacements u_y = w, u_x = -y phi at the frequency
-omega
+The beam starts straight, with the velocity of its first bending mode.
+
+Theory: Timoshenko 1921, with shear deformation and rotary inertia. In plane strain Ebar = E/(1 - nu^2)
+and nubar = nu/(1 - nu) replace E and nu. For displacements u_y = w, u_x = -y phi at the frequency omega
 
     w' = phi + Q / (kappa G D)        phi' = M / (Ebar I)
     M' = -Q - rho I omega^2 phi       Q' = -rho D omega^2 w
 
 with w = phi = 0 at the root and M = Q = 0 at the tip. The shear coefficient is that of a narrow
 rectangle in plane stress, 5 (1 + nu)/(6 + 5 nu) (Hutchinson 2001, J. Appl. Mech. 68, 87), which is
-5/(6 - nu) in plane strain. What is left out: the root cannot contract along y.
+5/(6 - nu) in plane strain. The theory neglects that the held root cannot contract along y.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ Array = npt.NDArray[np.float64]
 L, D = 8.0, 1.0  # length and depth [m]
 E, RHO = 1.0e6, 1000.0  # [Pa], [kg/m3]
 NUS = (0.3, 0.49)
-AMPLITUDE = 0.1  # of the tip [m]: L/80, strains up to 0.3 %; frequencies change like its square
+AMPLITUDE = 0.1  # of the tip [m]: L/80, strains up to 0.3 %. Frequencies change with its square
 
 
 def lame(nu: float) -> tuple[float, float]:
@@ -46,7 +47,7 @@ def first_bending(nu: float) -> float:
 
 
 def mode(nu: float, x: Array) -> tuple[Array, Array, Array, Array]:
-    """w, phi and their derivatives w', phi' of the first mode at x [m]; w of the tip is 1."""
+    """w, phi, w' and phi' of the first mode at x [m], scaled to w = 1 at the tip."""
     system = _system(nu, first_bending(nu))
     to_tip = expm(system * L)
     root = np.array([0.0, 0.0, -to_tip[2, 3], to_tip[2, 2]])  # w, phi, M, Q; M = 0 at the tip
@@ -58,12 +59,12 @@ def mode(nu: float, x: Array) -> tuple[Array, Array, Array, Array]:
 
 
 def _stiffness(nu: float) -> float:
-    """Ebar I per metre depth [N m]."""
+    """Bending stiffness Ebar I per metre depth [N m]."""
     return E / (1 - nu**2) * D**3 / 12
 
 
 def _system(nu: float, omega: float) -> Array:
-    """Matrix of the four equations above, for (w, phi, M, Q)."""
+    """Matrix of the four equations above, for the state (w, phi, M, Q)."""
     shear = 5 / (6 - nu) * lame(nu)[1] * D
     system = np.zeros((4, 4))
     system[0, 1], system[0, 3] = 1.0, 1 / shear

@@ -19,18 +19,18 @@ COLOURS = {
     "flip": "tab:orange",
     "pic": "tab:gray",
 }
-#: Those that lie on affine FLIP.
+#: Dashed, because their lines coincide with that of affine FLIP.
 DASHES = {"apic": ":", "tpic": "--"}
 OF_NU = {0.3: "tab:green", 0.49: "tab:purple"}
 
 
 def motion(runs: Sequence[Run], periods: Mapping[float, float], path: Path) -> None:
-    """Deflection and energy over time, a column a Poisson's ratio, for each transfer.
+    """Draw deflection and energy over time for each transfer, one column per Poisson's ratio.
 
     Args:
-        runs: Those that differ in nu and transfer alone.
-        periods: Of the finite elements [s], by nu.
-        path: Where to.
+        runs: Runs that differ only in Poisson's ratio and transfer.
+        periods: Periods by finite elements [s], by Poisson's ratio.
+        path: File of the figure.
     """
     figure, panels = plt.subplots(3, len(NUS), figsize=(12, 10), layout="constrained", sharex=True)
     for column, nu in enumerate(NUS):
@@ -64,13 +64,13 @@ def motion(runs: Sequence[Run], periods: Mapping[float, float], path: Path) -> N
 def accuracy(
     over_steps: Sequence[Run], over_cells: Sequence[Run], periods: Mapping[float, float], path: Path
 ) -> None:
-    """Error of the period and loss of energy over step and cell.
+    """Draw the error of the period and the loss of energy over the sizes of step and cell.
 
     Args:
-        over_steps: Runs that differ in nu and the size of the step.
-        over_cells: Runs that differ in nu and the size of the cell.
-        periods: Of the finite elements [s], by nu.
-        path: Where to.
+        over_steps: Runs that differ only in Poisson's ratio and step size.
+        over_cells: Runs that differ only in Poisson's ratio and cell size.
+        periods: Periods by finite elements [s], by Poisson's ratio.
+        path: File of the figure.
     """
     figure, panels = plt.subplots(2, 2, figsize=(11, 8), layout="constrained", sharey="row")
     ticks = ((0.2, 0.5, 1, 2, 5), (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1))
