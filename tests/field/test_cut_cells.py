@@ -9,7 +9,7 @@ from mpi4py import MPI
 from scipy.interpolate import BSpline
 
 import tawami
-from cases import cut_cells
+from cases.showcase import cut_cells
 from tawami.field.reference import ghost
 from tawami.form.form import Form
 

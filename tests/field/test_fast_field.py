@@ -97,7 +97,7 @@ def test_any_cloud_of_particles(data):
 
 @pytest.mark.parametrize("support", ["paper", "exact", "clamped"])
 def test_the_beam(support):
-    from cases.cantilever import mpm
+    from cases.verification.cantilever import mpm
 
     rows = [mpm.solve("u_epsv", support, 8, 0.1, assembly=p)[0] for p in ("fast", "reference")]
     assert rows[0].deflection_m == pytest.approx(rows[1].deflection_m, rel=1e-12)

@@ -325,7 +325,7 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         "name": "toy", "function": run_of, "knobs": {"n": (1, 2)}, "reference": {"x": 1.0},
         "finest": {"n": 3}, "beside": (), "colour": "n", "folder": None}),
     "Study.run": (studied, {"sample": 1, "seed": 0, "limit": 10.0, "quiet": True}),
-    "recommend": (tawami.recommend, {"study": Path("cases/trade/cook.csv"), "tolerance": 0.1,
+    "recommend": (tawami.recommend, {"study": Path("cases/costs/trade/cook.csv"), "tolerance": 0.1,
                                      "cost": "wall_s"}),
     "run, a driver": (tawami.run, {"main": lambda: None, "name": "toy"}),
     "write_particles": (in_folder(write_particles), {"path": "p.vtu", "solution": scene_of().solve()}),

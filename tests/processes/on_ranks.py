@@ -12,8 +12,8 @@ from scenes import BASES, FORMS, grid_of
 from mpi4py import MPI
 
 import tawami
-from cases import collapse
-from cases.cantilever import fem, mpm
+from cases.showcase import collapse
+from cases.verification.cantilever import fem, mpm
 from tawami.base.ranks import allgathered
 from tawami.form.form import Form
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import tawami
-from cases import projection as case
+from cases.costs import projection as case
 from tawami.results.projection import nodal, vertices
 
 METHODS = ("lumped", "consistent")

@@ -20,7 +20,7 @@ from programs import small_files
 from scenes import grid_of
 
 import tawami
-from cases import figure
+from cases.common import figure
 from tawami.results.output import result_folder, whole_file, write_grid, write_particles
 from tawami.study import process
 from tawami.study.table import COSTS, Row, Table

@@ -9,7 +9,7 @@ from scipy.linalg import expm
 from scipy.optimize import root
 
 import tawami
-from cases import self_weight
+from cases.verification import self_weight
 from tawami.form.form import Form
 
 

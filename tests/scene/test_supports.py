@@ -261,7 +261,7 @@ def test_many_solves_do_not_keep_their_factorisations():
     """Memory after 30 more solves of 32 x 16 cells: a factorisation takes about 20 MB."""
     code = """
 import logging, resource; logging.disable(logging.INFO)
-from cases.cantilever import mpm
+from cases.verification.cantilever import mpm
 def peak(): return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 for k in range(40):
     scene = mpm.build("u_epsv", "paper", 16)

@@ -9,7 +9,7 @@ from scipy.sparse import csr_matrix
 from ufl import div, dot, grad, inner
 
 import tawami
-from cases.cantilever import mpm
+from cases.verification.cantilever import mpm
 from tawami.base.errors import InexactSumWarning
 from tawami.form.form import Form
 from tawami.solve import direct

@@ -211,7 +211,7 @@ class ParticleOutput(_SeriesOutput):
             'material', 'number', or a history variable of the laws; by default the usual ones of what
             the scene has.
         every, every_steps: When: see `Output`; every step by default.
-        format: 'vtu', or 'xdmf', which takes a quarter of the time (`python -m cases.writing`).
+        format: 'vtu', or 'xdmf', which takes a quarter of the time (`python -m cases.costs.writing`).
         name: Of index and folder.
         phases: As in `Output`.
     """

@@ -6,8 +6,9 @@
 `lumped` stays within the range of the particles around a vertex; at the border of a body, where they
 stand on one side of it, it is off by the slope. `consistent`, the projection in L2, is exact for
 bilinear fields and may overshoot elsewhere. Its matrix is singular where a cell holds fewer than four
-particles; conjugate gradients from `lumped` leave there what no particle sees (`cases/projection.py`:
-errors of both). Vertices without particles in their cells have no value: NaN.
+particles; conjugate gradients from `lumped` leave there what no particle sees
+(`cases/costs/projection.py`: errors of both). Vertices without particles in their cells have no
+value: NaN.
 """
 
 from __future__ import annotations
