@@ -9,8 +9,8 @@ import meshio
 import moments
 import numpy as np
 import pytest
-from scenes import grid_of
 from mpi4py import MPI
+from scenes import grid_of
 from scipy.spatial import Delaunay
 
 import tawami

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scenes import clouds, grid_of
 from hypothesis import given
 from hypothesis import strategies as st
+from scenes import clouds, grid_of
 
 import tawami
 from cases.costs import projection as case

@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from programs import small_files
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
+from programs import small_files
 
 import tawami
 from tawami.base import archive

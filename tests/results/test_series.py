@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
-from programs import small_files
 from hypothesis import given
 from hypothesis import strategies as st
 from mpi4py import MPI
+from programs import small_files
 from test_ranks import start
 
 import tawami

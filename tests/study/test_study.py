@@ -165,7 +165,9 @@ def test_failed_runs_are_reported_and_the_others_are_run(tmp_path):
 
 
 def test_a_process_that_dies_does_not_stop_a_study(tmp_path):
-    study = tawami.Study("toy", misbehaves, {"how": ("dies", "is well")}, {"x": 1.0}, folder=tmp_path)
+    study = tawami.Study(
+        "toy", misbehaves, {"how": ("dies", "is well")}, {"x": 1.0}, folder=tmp_path
+    )
     first, second = study.run(quiet=True).rows
     assert "ended with code 3" in first.failure
     assert second.failure is None
@@ -252,6 +254,8 @@ def test_shipped_results_belong_to_shipped_studies():
 
 @pytest.mark.slow
 def test_cases_trade_runs_a_sample(tmp_path):
-    run = python("-m", "cases.costs.trade", "cook", "--sample", "2", "--results", tmp_path, check=True)
+    run = python(
+        "-m", "cases.costs.trade", "cook", "--sample", "2", "--results", tmp_path, check=True
+    )
     assert "The knee:" in run.stdout
     assert (tmp_path / "cook" / "cook.png").exists()
