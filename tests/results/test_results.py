@@ -334,7 +334,7 @@ def test_loads_that_come_on_the_way_are_refused_in_a_sentence(tmp_path):
 
     with pytest.raises(Killed):
         driven(Kill(6))
-    with pytest.raises(tawami.CheckpointError, match="1 loads of a kind .* the script has made 0"):
+    with pytest.raises(tawami.CheckpointError, match="1 loads of a kind .* the script made 0"):
         driven(Kill())
 
 
@@ -378,7 +378,8 @@ def test_a_signal_in_the_end_of_a_phase_is_not_lost(tmp_path, monkeypatch):
 
 def test_iterations_may_be_more_in_a_run_that_goes_on(stopped):
     scene = block()
-    scene.numerics = replace(scene.numerics, max_iterations=30, factorise="always")
+    now = scene.configuration
+    now.numerics = replace(now.numerics, max_iterations=30, factorise="always")
     kill = Kill()
     run(stopped, scene=scene, each=kill)
     assert kill.count == 4
