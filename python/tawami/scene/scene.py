@@ -32,6 +32,7 @@ from tawami.grid.edges import Component, Interval, Profile, cells_between
 from tawami.grid.grid import Edge, Grid
 from tawami.particles import assignment, placement
 from tawami.particles.numpy_law import NumpyStage
+from tawami.particles.responses import Responses
 from tawami.scene import coverage, description, initial
 from tawami.scene.domain import Attached
 from tawami.scene.loads import Loads, Traction
@@ -225,10 +226,11 @@ class Scene(description.Elsewhere, Unique):
             self.particles, location, self._materials, kinematics, self._finite, self.basis
         )
         stage = rust if law is None else NumpyStage(rust, self.particles, law)
-        newton = Newton(
-            field, self._compiled, stage, self.particles, location, self.constants, self.stopwatch,
-            self.numerics,
+        responses = Responses(
+            self._compiled, self.particles, location, stage, self.constants, self.grid.comm,
+            self.stopwatch,
         )  # fmt: skip
+        newton = Newton(field, responses, self.stopwatch, self.numerics)
         return Attached(location, field, stage, newton)
 
     @property
