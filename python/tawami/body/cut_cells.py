@@ -19,7 +19,7 @@ import numpy.typing as npt
 from tawami import _rust
 from tawami.base.checks import instance, room, shown, switch, whole_number
 from tawami.base.errors import InputError
-from tawami.fem import dolfinx
+from tawami.fem import rules
 from tawami.grid.grid import Grid
 
 Array = npt.NDArray[np.float64]
@@ -111,7 +111,7 @@ def on_lines(scaled: Array) -> Array:
 
 def in_triangles(corners: Array, cell: Numbers) -> Points:
     """The Gauss points of triangles (n x 3 x 2), either way round, each in one cell."""
-    points, weights = dolfinx.triangle_rule(DEGREE)
+    points, weights = rules.triangle_rule(DEGREE)
     barycentric = np.column_stack([1 - points.sum(axis=1), points])
     return Points(
         (barycentric @ corners).reshape(-1, 2),

@@ -15,7 +15,7 @@ from tawami.base import ranks
 from tawami.base.checks import number, one_of, pair, point, room, shown, whole_number
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
-from tawami.fem import dolfinx
+from tawami.fem import mesh
 
 Array = npt.NDArray[np.float64]
 Edge = Literal["left", "right", "bottom", "top"]
@@ -64,8 +64,8 @@ class Grid(Unique):
                 f"origin = {self.origin}: expected at most {FAR:g} cells of {self.h:g} m from (0, 0): "
                 "farther away positions have too few digits; move body and grid nearer"
             )
-        self._rectangle: dolfinx.Rectangle | None = None
-        self._spaces: dict[int, dolfinx.Space] = {}
+        self._rectangle: mesh.Rectangle | None = None
+        self._spaces: dict[int, mesh.FunctionSpace] = {}
 
     @property
     def upper(self) -> tuple[float, float]:
@@ -80,10 +80,10 @@ class Grid(Unique):
         return f"[{x:g}, {x1:g}] x [{y:g}, {y1:g}]"
 
     @property
-    def rectangle(self) -> dolfinx.Rectangle:
+    def rectangle(self) -> mesh.Rectangle:
         """The dolfinx mesh, made when it is first needed."""
         if self._rectangle is None:
-            self._rectangle = dolfinx.Rectangle(self.comm, self.origin, self.h, self.cells)
+            self._rectangle = mesh.Rectangle(self.comm, self.origin, self.h, self.cells)
         return self._rectangle
 
     @functools.cached_property
@@ -94,10 +94,10 @@ class Grid(Unique):
         rank[ij[:, 0] + self.cells[0] * ij[:, 1]] = self.comm.rank
         return ranks.sum_of(self.comm, rank)
 
-    def space(self, num_fields: int, element: Any) -> dolfinx.Space:
+    def space(self, num_fields: int, element: Any) -> mesh.FunctionSpace:
         """The function space of displacement and `num_fields - 1` bilinear fields."""
         if num_fields not in self._spaces:
-            self._spaces[num_fields] = dolfinx.Space(self.rectangle, element)
+            self._spaces[num_fields] = mesh.FunctionSpace(self.rectangle, element)
         return self._spaces[num_fields]
 
     def edge(self, name: Edge) -> tuple[int, int]:
