@@ -12,7 +12,7 @@ import pytest
 from scenes import FINITE, FORMS, grid_of
 
 import tawami
-from tawami.fem import dolfinx
+from tawami.fem import kernels
 from tawami.form import compilation
 from tawami.scene.domain import Domain
 from tawami.solve.newton import Newton
@@ -103,14 +103,14 @@ def test_bytes_of_a_static_and_of_a_moving_scene():
 def compiled(monkeypatch):
     """Kinds of the kernels that are made from now on."""
     kinds: list[str] = []
-    make = dolfinx.compile_kernel
+    make = kernels.compile_kernel
 
     def counted(comm, form, kind="cell"):
         kinds.append(kind)
         return make(comm, form, kind)
 
     monkeypatch.setattr(compilation, "_compiled", {})
-    monkeypatch.setattr(dolfinx, "compile_kernel", counted)
+    monkeypatch.setattr(kernels, "compile_kernel", counted)
     return kinds
 
 

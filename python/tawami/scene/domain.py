@@ -17,6 +17,7 @@ from tawami.field.reduction import Layout
 from tawami.field.reference import Field
 from tawami.grid.basis import Basis
 from tawami.particles.numpy_law import NumpyStage
+from tawami.particles.responses import Responses
 from tawami.scene.model import Model
 from tawami.solve.newton import Newton
 from tawami.solve.numerics import Numerics
@@ -72,11 +73,13 @@ class Domain:
             model.basis,
         )
         stage = rust if law is None else NumpyStage(rust, particles, law)
-        newton = Newton(
-            field, model.compiled, stage, particles, location, _constants(model, particles),
-            stopwatch, numerics,
+        responses = Responses(
+            model.compiled, particles, location, stage, _constants(model, particles),
+            model.grid.comm, stopwatch,
         )  # fmt: skip
-        return cls(model, particles, location, field, stage, newton)
+        return cls(
+            model, particles, location, field, stage, Newton(field, responses, stopwatch, numerics)
+        )
 
     @property
     def layout(self) -> Layout:
