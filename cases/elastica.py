@@ -51,8 +51,8 @@ from tqdm import tqdm
 
 import tawami
 from cases import figure, table
+from tawami.base.files import result_folder
 from tawami.fem.environment import header
-from tawami.results.output import result_folder
 
 Array = npt.NDArray[np.float64]
 

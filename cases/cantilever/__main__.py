@@ -28,8 +28,9 @@ from cases.cantilever.beam import (
 )  # fmt: skip
 from cases.cantilever.study import CELLS, runs
 from cases.table import as_csv, as_text
+from tawami.base.files import atomic_file, result_folder
 from tawami.fem.environment import header
-from tawami.results.output import result_folder, whole_file, write_grid, write_particles
+from tawami.results.single import write_grid, write_particles
 
 FIELDS = {
     "displacement only": ("u", None),
@@ -70,9 +71,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             write_grid(folder / f"grid_{name}_{support}_n16.vtu", solution)
     if first:
         draw(rows, solutions, folder)
-        with whole_file(folder / "cantilever.csv") as part:
+        with atomic_file(folder / "cantilever.csv") as part:
             part.write_text(as_csv(rows, COLUMNS))
-        with whole_file(folder / "report.md") as part:
+        with atomic_file(folder / "report.md") as part:
             part.write_text(report(rows))
     print(as_text(rows, COLUMNS))
     print(paper_support_in_words(rows))

@@ -20,8 +20,8 @@ import tawami
 from cases.cook import fem, figures, mpm
 from cases.cook.membrane import COLUMNS, LENGTH, REFERENCE, Row
 from cases.table import as_csv, as_text
+from tawami.base.files import atomic_file, result_folder
 from tawami.fem.environment import header
-from tawami.results.output import result_folder, whole_file
 
 SHOWN = ("u_epsv_0.1", "u_epsv_0.01", "u_bbar", "u")  # methods whose mean stress is drawn
 
@@ -60,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if MPI.COMM_WORLD.rank == 0:
         figures.deflection_error(rows, folder / "deflection_error.png")
         figures.mean_stress(solutions, nu, h, folder / "mean_stress.png")
-        with whole_file(folder / "cook.csv") as part:
+        with atomic_file(folder / "cook.csv") as part:
             part.write_text(as_csv(rows, COLUMNS))
     print(as_text(rows, COLUMNS))
     print(f"\n{len(rows)} computations in {perf_counter() - start:.1f} s. Results: {folder}/")

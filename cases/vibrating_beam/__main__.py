@@ -22,9 +22,9 @@ import tawami
 from cases.vibrating_beam import fem, figures
 from cases.vibrating_beam.beam import AMPLITUDE, NUS, D, L, first_bending
 from cases.vibrating_beam.mpm import Run, solve
+from tawami.base.files import result_folder
 from tawami.fem.environment import header
 from tawami.motion.dynamics import TRANSFERS
-from tawami.results.output import result_folder
 
 #: What differs from affine FLIP, u_epsv_finite, 4 cells, 2 x 2 particles, 50 steps, alpha = 0.01.
 STUDY: dict[str, list[dict[str, Any]]] = {

@@ -41,8 +41,9 @@ from tawami.particles.laws import (
     von_mises,
 )
 from tawami.particles.numpy_law import NumpyLaw
-from tawami.results.output import GridOutput, ParticleOutput, TableOutput
+from tawami.results.outputs import GridOutput, ParticleOutput
 from tawami.results.results import Results
+from tawami.results.table import TableOutput
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
 from tawami.scene.sources import earlier, table

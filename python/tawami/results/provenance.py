@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from tawami.base import ranks
-from tawami.base.files import result_folder, whole_file
+from tawami.base.files import atomic_file, result_folder
 from tawami.fem import environment
 from tawami.form.form import Form
 from tawami.form.kinematics import Kinematics, StrainMeasure
@@ -158,5 +158,5 @@ def _bytes(path: Path) -> bytes | None:
 
 def _write(path: Path, content: bytes | None) -> None:
     if content is not None:
-        with whole_file(path) as part:
+        with atomic_file(path) as part:
             part.write_bytes(content)
