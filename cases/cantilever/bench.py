@@ -31,7 +31,7 @@ from cases.cantilever import mpm
 from cases.cantilever.beam import NU, D, E, L, P
 from tawami.base.errors import InexactSumWarning
 from tawami.base.files import atomic_file, result_folder
-from tawami.base.ranks import mpirun
+from tawami.base.program import mpirun
 from tawami.fem.environment import header, peak_memory
 from tawami.form.compilation import compile_form
 

@@ -22,7 +22,7 @@ from tawami.base.errors import (
     TawamiError,
     TawamiWarning,
 )
-from tawami.base.ranks import run
+from tawami.base.program import run
 from tawami.body.body import Body, box
 from tawami.body.disc import disc
 from tawami.body.level_set import level_set

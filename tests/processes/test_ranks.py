@@ -10,7 +10,7 @@ import meshio
 import numpy as np
 import pytest
 
-from tawami.base.ranks import mpirun
+from tawami.base.program import mpirun
 
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.mpi

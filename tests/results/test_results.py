@@ -23,7 +23,7 @@ from mpi4py import MPI
 
 import tawami
 from tawami.base import archive
-from tawami.base.ranks import mpirun
+from tawami.base.program import mpirun
 from tawami.results import checkpoints, progress
 from tawami.results.output import Output
 
