@@ -30,10 +30,10 @@ from tqdm import tqdm
 
 import tawami
 from cases.common.figure import save
+from tawami.base.files import result_folder
 from tawami.fem.environment import header
 from tawami.motion.energy import Energies
 from tawami.motion.transfer import TransferName
-from tawami.results.output import result_folder
 
 Array = npt.NDArray[np.float64]
 

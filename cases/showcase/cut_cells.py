@@ -24,8 +24,8 @@ from mpi4py import MPI
 import tawami
 from cases.common import table
 from cases.common.figure import save
+from tawami.base.files import result_folder
 from tawami.fem.environment import header
-from tawami.results.output import result_folder
 
 H, N = 0.25, 6  # cell [m], cells along a side of the block
 E, NU, RHO, G = 1e6, 0.49, 1000.0, 10.0  # [Pa], [-], [kg/m3], [m/s2]

@@ -44,9 +44,9 @@ from tqdm import tqdm
 
 import tawami
 from cases.common import figure, table
+from tawami.base.files import result_folder
 from tawami.fem.environment import header
 from tawami.grid.basis import Basis
-from tawami.results.output import result_folder
 
 Array = npt.NDArray[np.float64]
 
