@@ -31,9 +31,7 @@ def python(*arguments: object, **options: Any) -> subprocess.CompletedProcess[st
     )  # fmt: skip
 
 
-def on_ranks(
-    number: int, *arguments: object, **variables: str
-) -> subprocess.CompletedProcess[str]:
+def on_ranks(number: int, *arguments: object, **variables: str) -> subprocess.CompletedProcess[str]:
     """Run Python with these arguments on several ranks. A hang fails the test."""
     command, environment = mpirun(number, [sys.executable, *map(str, arguments)])
     environment |= {"PYTHONPATH": PYTHONPATH, "OMP_NUM_THREADS": "1"} | variables

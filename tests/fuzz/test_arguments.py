@@ -22,10 +22,10 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
-from scenes import grid_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
+from scenes import grid_of
 
 import tawami
 from tawami.results.output import result_folder, whole_file, write_grid, write_particles

@@ -8,8 +8,8 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-from scenes import BASES, FORMS, grid_of
 from mpi4py import MPI
+from scenes import BASES, FORMS, grid_of
 
 import tawami
 from cases import collapse

@@ -165,7 +165,9 @@ def test_failed_runs_are_reported_and_the_others_are_run(tmp_path):
 
 
 def test_a_process_that_dies_does_not_stop_a_study(tmp_path):
-    study = tawami.Study("toy", misbehaves, {"how": ("dies", "is well")}, {"x": 1.0}, folder=tmp_path)
+    study = tawami.Study(
+        "toy", misbehaves, {"how": ("dies", "is well")}, {"x": 1.0}, folder=tmp_path
+    )
     first, second = study.run(quiet=True).rows
     assert "ended with code 3" in first.failure
     assert second.failure is None
