@@ -169,7 +169,7 @@ def test_what_writing_costs(capsys):
     """
     writing.main(["--cells", "8", "--repeat", "2"])
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "256 particles"
+    assert lines[1] == "256 particles"
     (raw,) = (line for line in lines if "particles, xdmf" in line)
     assert float(raw.split()[-1]) == 3 * 24 + 32 + 2 * 8 + 4
-    assert len(lines) == 9
+    assert len(lines) == 10
