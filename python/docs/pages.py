@@ -32,8 +32,8 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "elastica": ("Elastica", "verification", ("strip",)),
     "footing": ("Footing", "verification", ()),
     "vibrating_beam": ("Vibrating beam", "verification", ("beam",)),
-    "spinning_disc": ("Spinning disc", "verification", ()),
-    "collapse": ("Collapse", "showcase", ()),
+    "spinning_disc": ("Spinning disc", "verification", ("disc",)),
+    "collapse": ("Collapse", "showcase", ("pile",)),
     "projection": ("Nodal projection", "costs", ()),
     "writing": ("Writing results", "costs", ()),
 }

@@ -7,10 +7,9 @@ import csv
 import pytest
 from programs import python
 
-from cases import writing
-from cases.cantilever import __main__ as study
-from cases.cantilever import bench
-from cases.cantilever.beam import COLUMNS, SUPPORTS
+from cases.costs import bench, writing
+from cases.verification.cantilever import __main__ as study
+from cases.verification.cantilever.beam import COLUMNS, SUPPORTS
 
 
 def test_the_study_writes_table_figures_fields_and_report(tmp_path, capsys):
@@ -95,7 +94,7 @@ def test_the_sizes_of_raw_files_are_known(capsys):
 
 def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
     (tmp_path / "file").touch()
-    run = python("-m", "cases.cantilever", "--results", tmp_path / "file" / "below")
+    run = python("-m", "cases.verification.cantilever", "--results", tmp_path / "file" / "below")
     assert run.returncode == 1
     assert run.stderr.splitlines()[-1].startswith("cantilever: result folder")
     assert "Traceback" not in run.stderr

@@ -105,9 +105,7 @@ def test_large_stresses_are_shown_in_kpa_or_mpa():
 
 
 def test_a_folder_that_cannot_be_drawn_is_rejected(scene, tmp_path):
-    with pytest.raises(
-        tawami.InputError, match=r"run.json. cannot be read .*: expected the folder of a run"
-    ):
+    with pytest.raises(tawami.InputError, match="run.json. cannot be read .*: expected the folder"):
         plot(tmp_path)
     provenance.write(tmp_path, scene)
     with pytest.raises(
