@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from petsc4py import PETSc
+
+from tawami.base.libraries import PETSc
 
 
 class Handles(dict[str, Any]):

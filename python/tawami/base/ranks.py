@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from mpi4py import MPI
+
+from tawami.base.libraries import MPI
 
 
 def sum_of(comm: Any, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
