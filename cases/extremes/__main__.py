@@ -16,7 +16,7 @@ from time import perf_counter
 import matplotlib
 
 import tawami
-from cases import table
+from cases.common import table
 from cases.extremes import attempt, stability_map
 from cases.extremes.attempt import Attempt
 from tawami.fem.environment import header

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cases import collapse
+from cases.showcase import collapse
 
 
 @pytest.fixture(scope="module")

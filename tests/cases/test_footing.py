@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cases import footing
+from cases.verification import footing
 
 
 @pytest.fixture(scope="module")

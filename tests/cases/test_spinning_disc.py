@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cases import spinning_disc
-from cases.spinning_disc import KINDS, OMEGA, RHO, R
+from cases.verification import spinning_disc
+from cases.verification.spinning_disc import KINDS, OMEGA, RHO, R
 
 AFFINE_FLIP, TPIC, DISPLACEMENT, FLIP = KINDS
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from conftest import FINITE, FORMS, grid_of
+from scenes import FINITE, FORMS, grid_of
 from ufl import SpatialCoordinate, div, dot, grad, inner, sym
 
 import tawami
@@ -166,11 +166,11 @@ def test_sums_at_vertices_are_row_sum_lumped(random_scene, assembly):
     form = form_of(lumped, BOTH, "mixed")
     scene = random_scene(form=form, assembly=assembly)
     c = np.zeros(scene.num_coefficients)
-    n = scene.attached.field.layout.num_displacement
+    n = scene.configuration.domain.field.layout.num_displacement
     block = scene.tangent(c).toarray()[n:, n:]
     grid = scene.grid
     s = (np.array(scene.particles.x) - grid.origin) / grid.h
-    weight = scene.particles.volume * scene.constants["K"]
+    weight = scene.particles.volume * scene.configuration.domain.constants["K"]
     hats = [np.maximum(0, 1 - np.abs(s[:, [k]] - np.arange(grid.cells[k] + 1))) for k in range(2)]
     expected = np.einsum("p,pj,pi->ji", weight, hats[1], hats[0]).ravel()
     assert np.abs(block - np.diag(expected)).max() < 1e-12 * expected.max()

@@ -22,10 +22,10 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
-from conftest import grid_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
+from scenes import grid_of
 
 import tawami
 from tawami.results.output import result_folder, whole_file, write_grid, write_particles
@@ -130,7 +130,7 @@ def solved(scene: tawami.Scene, method: str) -> Callable[..., Any]:
 
     def call(**arguments: Any) -> None:
         getattr(scene, method)(**arguments)
-        if any(support.velocity is not None for support in scene.supports.all):
+        if any(support.velocity is not None for support in scene.configuration.supports.all):
             tawami.Dynamics(scene).step(0.01)
         else:
             scene.solve()
@@ -325,7 +325,7 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         "name": "toy", "function": run_of, "knobs": {"n": (1, 2)}, "reference": {"x": 1.0},
         "finest": {"n": 3}, "beside": (), "colour": "n", "folder": None}),
     "Study.run": (studied, {"sample": 1, "seed": 0, "limit": 10.0, "quiet": True}),
-    "recommend": (tawami.recommend, {"study": Path("cases/trade/cook.csv"), "tolerance": 0.1,
+    "recommend": (tawami.recommend, {"study": Path("cases/costs/trade/cook.csv"), "tolerance": 0.1,
                                      "cost": "wall_s"}),
     "run, a driver": (tawami.run, {"main": lambda: None, "name": "toy"}),
     "write_particles": (in_folder(write_particles), {"path": "p.vtu", "solution": scene_of().solve()}),

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import tawami
-from cases import writing
-from cases.cantilever import __main__ as study
-from cases.cantilever import bench, mpm
-from cases.cantilever.beam import COLUMNS, SUPPORTS
+from cases.costs import bench, writing
+from cases.verification.cantilever import __main__ as study
+from cases.verification.cantilever import mpm
+from cases.verification.cantilever.beam import COLUMNS, SUPPORTS
 from tawami.results.output import result_folder, whole_file, write_grid, write_particles
 
 
@@ -58,7 +58,7 @@ def test_a_folder_that_cannot_be_written(tmp_path):
         with pytest.raises(tawami.OutputError, match="cannot be written .*: expected a folder"):
             result_folder(path)
     run = subprocess.run(
-        [sys.executable, "-m", "cases.cantilever", "--results", str(occupied / "below")],
+        [sys.executable, "-m", "cases.verification.cantilever", "--results", str(occupied / "below")],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert run.returncode == 1

@@ -12,7 +12,7 @@ from mpi4py import MPI
 from PIL import Image
 
 import tawami
-from tawami.motion.observer import Moment
+from tawami.motion.observer import Snapshot
 from tawami.results import plot as pictures
 from tawami.results import provenance
 from tawami.results.plot import plot
@@ -34,13 +34,13 @@ def run_of(folder, scene, *, format="vtu", phases=("ramp", "motion"), frames=5):
     provenance.write(folder, scene)
     for phase in phases:
         for writer in (output, table):
-            writer.begin(folder / phase, scene, None, None)
+            writer.begin(folder / phase, scene, None)
         for step in range(frames):
             scene.particles.move_to(x + np.array([0.2 * step, 0.0]))
             scene.particles.stress[:, :2] = [-1e4 * step, -2e4 * step]
             scene.particles.stress[:, 3] = 3e4 * x[:, 1]
             for writer in (output, table):
-                writer.look(Moment(scene, None, None, 0.25 * step, step, step == frames - 1))
+                writer.look(Snapshot(scene, None, 0.25 * step, step, step == frames - 1))
     scene.particles.move_to(x)
 
 

@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import small_files
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
+from programs import small_files
 
 import tawami
 from tawami.base import archive
@@ -61,7 +61,7 @@ class Recorder(Output):
         self.began: list[tuple[str, object]] = []
         self.seen: list[tuple[float, int, bool]] = []
 
-    def begin(self, folder, scene, motion, state):
+    def begin(self, folder, subject, state):
         self.began.append((folder.name, state))
         self.seen = [] if state is None else [tuple(one) for one in state["seen"]]
 
@@ -371,7 +371,7 @@ def test_a_signal_in_the_end_of_a_phase_is_not_lost(tmp_path, monkeypatch):
         write(*arguments)
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(phase_module.checkpoint, "write", signalled)
+    monkeypatch.setattr(phase_module.archive, "write", signalled)
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path / "run", checkpoint_steps=None)
 
@@ -550,9 +550,7 @@ def test_checkpoints_by_the_clock(tmp_path, monkeypatch):
     clock = iter(np.arange(0.0, 1e4, 1.5))
     monkeypatch.setattr(phase_module, "monotonic", lambda: next(clock))
     written = []
-    monkeypatch.setattr(
-        phase_module.checkpoint, "write", lambda path, *_: written.append(path.name)
-    )
+    monkeypatch.setattr(phase_module.archive, "write", lambda path, *_: written.append(path.name))
     run(tmp_path / "run", checkpoint_steps=None, checkpoint_minutes=0.2)
     assert 2 <= len(written) <= 5
     assert written[-1] == "01-motion-00000010.npz"
@@ -742,7 +740,7 @@ def test_durations(seconds, text):
 
 def child(folder, **variables):
     """The run of `python tests/results/test_results.py FOLDER` in a process of its own."""
-    path = f"{ROOT}:{ROOT / 'tests'}"
+    path = f"{ROOT / 'python'}:{ROOT}:{ROOT / 'tests'}"
     environment = os.environ | {"PYTHONPATH": path, "TAWAMI_EXISTING": "resume"} | variables
     return subprocess.Popen(
         [sys.executable, __file__, str(folder)],
@@ -809,7 +807,7 @@ def test_on_another_number_of_ranks(tmp_path):
     wait_for_steps(folder, 8)
     process.kill()
     process.communicate()
-    path = f"{ROOT}:{ROOT / 'tests'}"
+    path = f"{ROOT / 'python'}:{ROOT}:{ROOT / 'tests'}"
     for number in (2, 3):
         command, environment = mpirun(number, [sys.executable, __file__, str(folder)])
         environment |= {"PYTHONPATH": path, "TAWAMI_EXISTING": "resume", "OMP_NUM_THREADS": "1"}

@@ -10,15 +10,15 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
-from conftest import small_files
 from hypothesis import given
 from hypothesis import strategies as st
 from mpi4py import MPI
+from programs import small_files
 from test_ranks import start
 
 import tawami
 from tawami.motion.energy import Energies
-from tawami.motion.observer import Moment
+from tawami.motion.observer import Snapshot
 from tawami.results.output import Output
 
 STEEL = {"yield_stress": 20.0, "hardening": 10.0}
@@ -40,13 +40,13 @@ def block(**options) -> tawami.Dynamics:
 def drive(motion, outputs, folder, steps, *, first=0, dt=0.004, states=None, seen=None):
     """What results.py does: a phase from a step on; the last of `steps` is its end."""
     for k, output in enumerate(outputs):
-        output.begin(folder, motion.scene, motion, None if states is None else states[k])
+        output.begin(folder, motion, None if states is None else states[k])
     for step in range(first, steps + 1):
         solution = None if step == 0 else motion.step(dt)
         if seen is not None:
             seen(motion, solution, step)
         for output in outputs:
-            output.look(Moment(motion.scene, motion, solution, motion.time, step, step == steps))
+            output.look(Snapshot(motion, solution, motion.time, step, step == steps))
 
 
 def pvd(path: Path) -> list[tuple[float, Path]]:
@@ -89,10 +89,10 @@ class Recorder(Output):
         super().__init__((), when.get("every"), when.get("every_steps"), "recorder")
         self.times = []
 
-    def _resolve(self, scene, motion):
+    def _resolve(self, subject):
         pass
 
-    def _open(self, folder, last, motion):
+    def _open(self, folder, last, subject):
         pass
 
     def _write(self, moment, size):
@@ -105,9 +105,9 @@ def scene():
 
 
 def look(recorder, scene, times, state=None, first=0):
-    recorder.begin(Path(), scene, None, state)
+    recorder.begin(Path(), scene, state)
     for step in range(first, len(times)):
-        moment = Moment(scene, None, None, times[step], step, step == len(times) - 1)
+        moment = Snapshot(scene, None, times[step], step, step == len(times) - 1)
         recorder.look(moment)
 
 
@@ -126,9 +126,9 @@ def test_the_first_step_at_or_after_each_multiple(scene, every, sizes, cut):
     assert whole.times == sorted(wanted)
     # stopped after some step and gone on with
     first, second = Recorder(every=every), Recorder(every=every)
-    first.begin(Path(), scene, None, None)
+    first.begin(Path(), scene, None)
     for step in range(cut + 1):
-        first.look(Moment(scene, None, None, times[step], step, last=False))
+        first.look(Snapshot(scene, None, times[step], step, last=False))
     look(second, scene, times, json.loads(json.dumps(first.state())), first=cut)
     assert sorted(first.times + second.times) == sorted(wanted)
 
@@ -340,15 +340,15 @@ def test_reactions_at_the_vertices_balance_the_loads(tmp_path):
     names = ("reaction left", "reaction (0, 0.5)", "displacement (2, 0.5)", "step size")
     outputs = [grid_output, tawami.TableOutput(*names)]
     for output in outputs:
-        output.begin(tmp_path, scene, None, None)
-        output.look(Moment(scene, None, None, 0.0, 0, last=False))
+        output.begin(tmp_path, scene, None)
+        output.look(Snapshot(scene, None, 0.0, 0, last=False))
     parts = []
 
     def each(solution):
         parts.append(solution)
         for output in outputs:
             part = len(parts) / 4
-            output.look(Moment(scene, None, solution, part, len(parts), last=part == 1.0))
+            output.look(Snapshot(scene, solution, part, len(parts), last=part == 1.0))
 
     tawami.ramp(scene, 0.25, each=each)
     series = pvd(tmp_path / "grid.pvd")
@@ -389,7 +389,7 @@ P, G, T = tawami.ParticleOutput, tawami.GridOutput, tawami.TableOutput
 )
 def test_what_a_scene_does_not_model_names_the_switch(output, sentence, tmp_path):
     with pytest.raises(tawami.NotModelledError, match=sentence):
-        output.begin(tmp_path, static("u"), None, None)
+        output.begin(tmp_path, static("u"), None)
     assert not list(tmp_path.iterdir())
 
 
@@ -407,12 +407,12 @@ def test_what_a_scene_does_not_model_names_the_switch(output, sentence, tmp_path
 )  # fmt: skip
 def test_unknown_names_list_the_known(output, sentence, tmp_path):
     with pytest.raises(tawami.InputError, match=sentence):
-        output.begin(tmp_path, static(), None, None)
+        output.begin(tmp_path, static(), None)
 
 
 def test_a_point_away_from_a_body_that_moves(tmp_path):
     with pytest.raises(tawami.InputError, match="no particle was within a cell of it, 0.25 m: exp"):
-        T("displacement (0.45, 1.7)").begin(tmp_path, block().scene, None, None)
+        T("displacement (0.45, 1.7)").begin(tmp_path, block().scene, None)
 
 
 # -- runs that are cut short -------------------------------------------------
@@ -460,11 +460,11 @@ def test_what_is_later_than_the_checkpoint_goes_at_once(tmp_path):
     drive(motion, [output], tmp_path, 3)
     state = output.state()
     drive(motion, [tawami.ParticleOutput("velocity")], tmp_path, 5, first=4, states=[state])
-    tawami.ParticleOutput("velocity").begin(tmp_path, motion.scene, motion, state)
+    tawami.ParticleOutput("velocity").begin(tmp_path, motion, state)
     names = [path.name for _, path in pvd(tmp_path / "particles.pvd")]
     assert names == [f"particles-{k:06d}.vtu" for k in range(4)]
     assert sorted(path.name for path in (tmp_path / "particles").iterdir()) == names
-    tawami.ParticleOutput("velocity").begin(tmp_path, motion.scene, motion, None)
+    tawami.ParticleOutput("velocity").begin(tmp_path, motion, None)
     assert pvd(tmp_path / "particles.pvd") == []
     assert not list((tmp_path / "particles").iterdir())
 
@@ -477,7 +477,7 @@ def test_a_table_that_goes_on_has_the_same_columns(tmp_path):
     with pytest.raises(
         tawami.InputError, match=r"run-out \[m\], and .*momentum y .* are asked for"
     ):
-        T("momentum").begin(tmp_path, motion.scene, motion, output.state())
+        T("momentum").begin(tmp_path, motion, output.state())
     assert (tmp_path / "table.csv").read_text() == before
 
 
@@ -487,7 +487,7 @@ def test_an_index_that_is_none(tmp_path):
     with pytest.raises(
         tawami.OutputError, match=r"particles.pvd' cannot be read .*remove it to beg"
     ):
-        P("velocity").begin(tmp_path, motion.scene, motion, {"seen": 3, "written": 3, "time": 0.1})
+        P("velocity").begin(tmp_path, motion, {"seen": 3, "written": 3, "time": 0.1})
 
 
 @pytest.mark.parametrize(
@@ -510,7 +510,7 @@ def test_a_full_disk_stops_with_a_sentence_and_keeps_the_series(output, room, tm
         for step in range(3, 30):
             moments.append(step)
             solution = motion.step(0.004)
-            writer.look(Moment(motion.scene, motion, solution, motion.time, step, last=False))
+            writer.look(Snapshot(motion, solution, motion.time, step, last=False))
 
     with (
         small_files(room),

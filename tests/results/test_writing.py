@@ -16,10 +16,11 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import pytest
-from conftest import grid_of, small_files
+from programs import small_files
+from scenes import grid_of
 
 import tawami
-from cases import figure
+from cases.common import figure
 from tawami.results.output import result_folder, whole_file, write_grid, write_particles
 from tawami.study import process
 from tawami.study.table import COSTS, Row, Table
@@ -200,7 +201,7 @@ def test_killed_while_writing(tmp_path):
 MADE = """
 import resource, sys
 import tawami
-from conftest import grid_of
+from scenes import grid_of
 def main():
     most = int(sys.argv[1])
     grid = grid_of((2, 2))

@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 import tawami
-from cases.cantilever import mpm
+from cases.verification.cantilever import mpm
 
 
 def pushed(**options) -> tawami.Scene:

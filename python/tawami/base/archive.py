@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 import json
-import math
 import os
 import re
 import zipfile
@@ -20,12 +19,11 @@ import numpy as np
 
 from tawami.base.errors import CheckpointError
 from tawami.base.files import whole_file
+from tawami.base.identity import same
 
 #: Changes with what a state holds.
-FORMAT = 1
+FORMAT = 2
 ABOUT = "about.json"
-#: Numbers that tell a run from another are compared to this share of them.
-ALIKE = 1e-9
 #: In the folder of results.
 FOLDER = "checkpoints"
 
@@ -94,7 +92,7 @@ def read(path: Path, identity: Mapping[str, Any] | None = None) -> dict[str, Any
         )
     for name, own in (identity or {}).items():
         other = written.get(name)
-        if not _same(other, own):
+        if not same(other, own):
             raise CheckpointError(
                 f"checkpoint '{path}' is of another run: {name} {_short(other)} there, {_short(own)} "
                 "here. Expected the same scene; start anew with existing='replace'"
@@ -128,17 +126,6 @@ def _unpacked(value: Any, arrays: Mapping[str, Any]) -> Any:
     if "array" in value:
         return arrays[value["array"]]
     return {name: _unpacked(item, arrays) for name, item in value["items"].items()}
-
-
-def _same(one: Any, other: Any) -> bool:
-    """Whether two values are alike; numbers to the round-off of a run on several ranks."""
-    if isinstance(one, float) and isinstance(other, float):
-        return math.isclose(one, other, rel_tol=ALIKE) or (math.isnan(one) and math.isnan(other))
-    if isinstance(one, list) and isinstance(other, list):
-        return len(one) == len(other) and all(map(_same, one, other))
-    if isinstance(one, dict) and isinstance(other, dict):
-        return one.keys() == other.keys() and all(_same(one[k], other[k]) for k in one)
-    return bool(one == other)
 
 
 def _short(value: Any) -> str:

@@ -17,7 +17,7 @@ import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -26,7 +26,7 @@ from tawami.base import checks, ranks
 from tawami.base.errors import InputError, OutputError
 from tawami.base.files import result_folder, whole_file
 from tawami.grid.grid import Grid
-from tawami.motion.observer import Moment
+from tawami.motion.observer import Snapshot, Subject
 from tawami.results.columns import Columns, columns, usual_columns
 from tawami.results.projection import Projection, check_projection, vertices
 from tawami.results.quantities import (
@@ -42,10 +42,6 @@ from tawami.results.quantities import (
 )
 from tawami.results.series import Format, Frame, Series, check_format, with_z, write_vtu
 from tawami.scene.solution import Solution
-
-if TYPE_CHECKING:
-    from tawami.motion.dynamics import Dynamics
-    from tawami.scene.scene import Scene
 
 __all__ = [
     "GridOutput",
@@ -106,14 +102,12 @@ class Output:
         self._seen = self._written = -1
         self._multiple, self._time = -math.inf, math.nan
 
-    def begin(
-        self, folder: Path, scene: Scene, motion: Dynamics | None, state: dict[str, Any] | None
-    ) -> None:
+    def begin(self, folder: Path, subject: Subject, state: dict[str, Any] | None) -> None:
         """A phase begins; a call for all ranks.
 
         Args:
             folder: Of the phase.
-            scene, motion: What is observed.
+            subject: What is observed.
             state: What `state()` gave when the checkpoint was written that the run goes on from: later
                 files are dropped; None for a new phase.
 
@@ -127,12 +121,13 @@ class Output:
         if self._every is not None and state.get("every") not in (None, self._every):
             self._multiple = self._whole(state["time"])
         self._time = state.get("time", math.nan)
-        self._resolve(scene, motion)
-        with ranks.raise_together(scene.grid.comm):
-            if scene.grid.comm.rank == 0:
-                self._open(folder, self._seen if state else None, motion)
+        self._resolve(subject)
+        comm = subject.scene.grid.comm
+        with ranks.raise_together(comm):
+            if comm.rank == 0:
+                self._open(folder, self._seen if state else None, subject)
 
-    def look(self, moment: Moment) -> None:
+    def look(self, moment: Snapshot) -> None:
         """Write what is due; a call for all ranks, for every moment of a phase.
 
         Raises:
@@ -155,7 +150,7 @@ class Output:
             known |= {"multiple": self._multiple, "every": self._every}
         return known
 
-    def _due(self, moment: Moment) -> bool:
+    def _due(self, moment: Snapshot) -> bool:
         if self._every is None:
             return moment.step % self._steps == 0
         multiple = self._whole(moment.time)
@@ -170,15 +165,15 @@ class Output:
         assert self._every is not None
         return math.floor(time / self._every * (1 + 1e-12) + 1e-9)
 
-    def _resolve(self, scene: Scene, motion: Dynamics | None) -> None:
+    def _resolve(self, subject: Subject) -> None:
         """Find what the names stand for in this scene."""
         raise NotImplementedError
 
-    def _open(self, folder: Path, last: int | None, motion: Dynamics | None) -> None:
+    def _open(self, folder: Path, last: int | None, subject: Subject) -> None:
         """Begin the files, or keep what is not later than a step; on the first rank."""
         raise NotImplementedError
 
-    def _write(self, moment: Moment, size: float) -> None:
+    def _write(self, moment: Snapshot, size: float) -> None:
         """Write a moment, `size` after the one before; a call for all ranks."""
         raise NotImplementedError
 
@@ -193,17 +188,17 @@ class _SeriesOutput(Output):
         super().__init__(names, every, every_steps, name, phases)
         self._format: Format = check_format(kind)
 
-    def _open(self, folder: Path, last: int | None, motion: Dynamics | None) -> None:
+    def _open(self, folder: Path, last: int | None, subject: Subject) -> None:
         self._series = Series(folder, self.name, self._format)
         self._series.begin(last)
 
-    def _write(self, moment: Moment, size: float) -> None:
+    def _write(self, moment: Snapshot, size: float) -> None:
         frame, comm = self._frame(moment), moment.scene.grid.comm
         with ranks.raise_together(comm):
             if comm.rank == 0:
                 self._series.write(moment.step, moment.time, frame)
 
-    def _frame(self, moment: Moment) -> Frame:
+    def _frame(self, moment: Snapshot) -> Frame:
         raise NotImplementedError
 
 
@@ -216,7 +211,7 @@ class ParticleOutput(_SeriesOutput):
             'material', 'number', or a history variable of the laws; by default the usual ones of what
             the scene has.
         every, every_steps: When: see `Output`; every step by default.
-        format: 'vtu', or 'xdmf', which takes a quarter of the time (`python -m cases.writing`).
+        format: 'vtu', or 'xdmf', which takes a quarter of the time (`python -m cases.costs.writing`).
         name: Of index and folder.
         phases: As in `Output`.
     """
@@ -232,12 +227,12 @@ class ParticleOutput(_SeriesOutput):
     ) -> None:
         super().__init__(names, every, every_steps, name, phases, format)
 
-    def _resolve(self, scene: Scene, motion: Dynamics | None) -> None:
-        names = self.names or usual_of_particles(scene, motion)
-        self._quantities = of_particles(names, scene, motion)
+    def _resolve(self, subject: Subject) -> None:
+        names = self.names or usual_of_particles(subject)
+        self._quantities = of_particles(names, subject)
 
-    def _frame(self, moment: Moment) -> Frame:
-        return _of_particles(self._quantities, body_view(moment.scene, moment.motion))
+    def _frame(self, moment: Snapshot) -> Frame:
+        return _of_particles(self._quantities, body_view(moment.subject))
 
 
 class GridOutput(_SeriesOutput):
@@ -266,11 +261,11 @@ class GridOutput(_SeriesOutput):
         super().__init__(names, every, every_steps, name, phases, format)
         self._projection = check_projection(projection)
 
-    def _resolve(self, scene: Scene, motion: Dynamics | None) -> None:
-        names = self.names or usual_on_grid(scene)
-        self._quantities = on_grid(names, scene, motion, self._projection)
+    def _resolve(self, subject: Subject) -> None:
+        names = self.names or usual_on_grid(subject.scene)
+        self._quantities = on_grid(names, subject, self._projection)
 
-    def _frame(self, moment: Moment) -> Frame:
+    def _frame(self, moment: Snapshot) -> Frame:
         return _of_grid(self._quantities, moment)
 
 
@@ -297,12 +292,12 @@ class TableOutput(Output):
     ) -> None:
         super().__init__(names, every, every_steps, name, phases)
 
-    def _resolve(self, scene: Scene, motion: Dynamics | None) -> None:
-        self._columns: list[Columns] = columns(self.names or usual_columns(motion), scene, motion)
+    def _resolve(self, subject: Subject) -> None:
+        self._columns: list[Columns] = columns(self.names or usual_columns(subject), subject)
 
-    def _open(self, folder: Path, last: int | None, motion: Dynamics | None) -> None:
+    def _open(self, folder: Path, last: int | None, subject: Subject) -> None:
         self.path = result_folder(folder) / f"{self.name}.csv"
-        time = "pseudo-time [-]" if motion is None else "time [s]"
+        time = "pseudo-time [-]" if subject.motion is None else "time [s]"
         labels = [label for column in self._columns for label in column.labels]
         text = _line(["step [-]", time, *labels])
         if last is not None and self.path.exists():
@@ -316,7 +311,7 @@ class TableOutput(Output):
         with whole_file(self.path) as part:
             part.write_text(text)
 
-    def _write(self, moment: Moment, size: float) -> None:
+    def _write(self, moment: Snapshot, size: float) -> None:
         values = [float(v) for column in self._columns for v in column.of(moment, size)]
         comm = moment.scene.grid.comm
         with ranks.raise_together(comm):
@@ -373,7 +368,7 @@ def write_particles(path: str | Path, solution: Solution) -> None:
     scene = solution.scene
     names = ["displacement", "stress", "mean stress", "volume"]
     names += ["eps_v"] if scene.form.kinematics.has_eps_v else []
-    frame = _of_particles(of_particles(names, scene, None), solution_view(solution))
+    frame = _of_particles(of_particles(names, scene), solution_view(solution))
     _write_once(path, frame, scene.grid)
 
 
@@ -390,8 +385,8 @@ def write_grid(path: str | Path, solution: Solution) -> None:
     """
     checks.instance("write_grid: solution", solution, Solution, SOLVED)
     scene = solution.scene
-    now = Moment(scene, None, solution, 0.0, 0, last=True)
-    _write_once(path, _of_grid(on_grid(usual_on_grid(scene), scene, None), now), scene.grid)
+    now = Snapshot(scene, solution, 0.0, 0, last=True)
+    _write_once(path, _of_grid(on_grid(usual_on_grid(scene), scene), now), scene.grid)
 
 
 def _write_once(path: str | Path, frame: Frame, grid: Grid) -> None:
@@ -406,7 +401,7 @@ def _of_particles(quantities: Sequence[Quantity], view: View) -> Frame:
     return Frame(with_z(x), "vertex", np.arange(len(x))[:, None], data)
 
 
-def _of_grid(quantities: Sequence[GridQuantity], now: Moment) -> Frame:
+def _of_grid(quantities: Sequence[GridQuantity], now: Snapshot) -> Frame:
     nx, ny = now.scene.grid.cells
     corner = (np.arange(nx) + (nx + 1) * np.arange(ny)[:, None]).ravel()
     squares = corner[:, None] + np.array([0, 1, nx + 2, nx + 1])

@@ -24,58 +24,24 @@ from tawami.base.files import result_folder
 from tawami.base.ranks import any_of, raise_together
 from tawami.base.signals import Interruption
 from tawami.motion import pace
-from tawami.motion.observer import Moment
+from tawami.motion.observer import Snapshot, Subject
 from tawami.motion.pace import Pace, Step
 from tawami.results import progress
 from tawami.results.identity import identity
 from tawami.results.provenance import now
+from tawami.scene.solution import Solution
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from tawami.motion.dynamics import Dynamics
     from tawami.results.results import Results
-    from tawami.scene.scene import Scene
-    from tawami.scene.solution import Solution
 
 #: In the folder of results.
 LOG = "log.txt"
 log = logging.getLogger("tawami")
 
 
-class Unwatched:
-    """A phase of a run that nothing observes.
-
-    Args:
-        unit: Of times or shares, for messages.
-    """
-
-    #: Whether it had come to its end in an earlier run.
-    finished = False
-
-    def __init__(self, unit: str) -> None:
-        self.unit = unit
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        pass
-
-    def begin(self, pace: Pace, steps: list[Step]) -> None:
-        """Before the first step; a run that is gone on with gets its pace and its steps."""
-
-    def accepted(self, solution: Solution, pace: Pace, steps: list[Step], *, last: bool) -> None:
-        """After an accepted step, before the driver script looks at it."""
-
-    def keep(self) -> None:
-        """After that."""
-
-    def halved(self, error: Exception, pace: Pace) -> None:
-        """After a step that failed."""
-
-
-class Phase(Unwatched):
+class Phase:
     """A phase of a run with results; made by `Results.phase`."""
 
     def __init__(
@@ -83,17 +49,16 @@ class Phase(Unwatched):
         results: Results,
         number: int,
         name: str,
-        scene: Scene,
-        motion: Dynamics | None,
+        subject: Subject,
         end: float,
         unit: str,
     ) -> None:
-        super().__init__(unit)
+        self.unit, self.finished = unit, False
         self.results, self.number, self.name = results, number, name
         kind = name.partition("-")[0]
         self._outputs = [o for o in results.outputs if o.phases is None or kind in o.phases]
-        self.scene, self.motion, self.end = scene, motion, end
-        self._comm = scene.grid.comm
+        self.subject, self.end = subject, end
+        self._comm = subject.scene.grid.comm
         self._writes = self._comm.rank == 0
         self._interruption = Interruption()
         self._line = progress.Line(results.progress if self._writes else False)
@@ -141,8 +106,8 @@ class Phase(Unwatched):
     def begin(self, pace: Pace, steps: list[Step]) -> None:
         """Go on from the newest checkpoint of the phase, or begin it."""
         self._pace, self._steps, self._asked = pace, steps, pace.size
-        self._identity = identity(self.scene, self.motion, self.name)
-        self.scene.attached.newton.keep()
+        self._identity = identity(self.subject, self.name)
+        self.subject.scene.configuration.domain.newton.keep()
         folder, state = self.results.folder / self.name, self._found()
         if state is not None:
             self._restore(state)
@@ -160,14 +125,14 @@ class Phase(Unwatched):
                 result_folder(folder)
         told = {} if state is None else state["outputs"]
         for output in self._outputs:
-            output.begin(folder, self.scene, self.motion, told.get(output.name))
+            output.begin(folder, self.subject, told.get(output.name))
         verb = "begins" if state is None else "goes on"
         log.info(
             "%s %s at %s, to %g: tawami on %d ranks",
             self.name, verb, self._at, self.end, self._comm.size,
         )  # fmt: skip
         if state is None:
-            header = (self.motion or self.scene).header().splitlines()
+            header = self.subject.header().splitlines()
             with raise_together(self._comm):
                 if self._writes:
                     self.results.note(self.name, {"began": now(), "input": header})
@@ -208,9 +173,7 @@ class Phase(Unwatched):
         return own, [path for path in there if of(path) > self.number]
 
     def _restore(self, state: Mapping[str, Any]) -> None:
-        self.scene.restore(state["scene"])
-        if self.motion is not None:
-            self.motion.restore(state["motion"])
+        self.subject.restore(state["scene"])
         for name, value in state["pace"].items():
             setattr(self._pace, name, value)
         self._steps[:] = pace.unpacked(state["steps"])
@@ -218,9 +181,10 @@ class Phase(Unwatched):
 
     # -- steps ---------------------------------------------------------------
 
-    def accepted(self, solution: Solution, pace: Pace, steps: list[Step], *, last: bool) -> None:
+    def accepted(self, solution: Solution, *, last: bool) -> None:
         """Say so, and let the outputs look."""
-        step, self._last = steps[-1], last
+        pace, steps, self._last = self._pace, self._steps, last
+        step = steps[-1]
         momentum, volume = step.history[-1]
         measures = f"{momentum:.1e}" if volume is None else f"{momentum:.1e}, {volume:.1e}"
         count = len(solution.number)
@@ -239,7 +203,7 @@ class Phase(Unwatched):
         self._look(solution, last=last)
         self._seen = len(steps)
 
-    def keep(self) -> None:
+    def checkpoint(self) -> None:
         """Write a checkpoint where one is due; end if a signal asks for it."""
         by_number, by_time = self._due()
         asked = np.array([self._interruption.signal is not None, by_time])
@@ -251,7 +215,7 @@ class Phase(Unwatched):
             self._write()
         elif by_number or by_time:
             if by_number:  # the same factorisations then, whoever goes on from here
-                self.scene.attached.newton.keep()
+                self.subject.scene.configuration.domain.newton.keep()
             self._write_or_warn()
         if stop:
             self._stop()
@@ -259,16 +223,18 @@ class Phase(Unwatched):
     def _asked_to_stop(self) -> bool:
         return bool(any_of(self._comm, np.array([self._interruption.signal is not None]))[0])
 
-    def halved(self, error: Exception, pace: Pace) -> None:
+    def failed(self, error: Exception) -> None:
         """Say that a step failed; end if a signal asks for it."""
-        log.warning("%s: a step from %s failed, now %g: %s", self.name, self._at, pace.size, error)
+        log.warning(
+            "%s: a step from %s failed, now %g: %s", self.name, self._at, self._pace.size, error
+        )
         if self._asked_to_stop():
             if len(self._steps) > self._stored:
                 self._write()
             self._stop()
 
     def _look(self, solution: Solution | None, *, last: bool) -> None:
-        moment = Moment(self.scene, self.motion, solution, self._pace.at, len(self._steps), last)
+        moment = Snapshot(self.subject, solution, self._pace.at, len(self._steps), last)
         for output in self._outputs:
             output.look(moment)
 
@@ -288,8 +254,7 @@ class Phase(Unwatched):
             OutputError: It cannot be written.
         """
         state = {
-            "scene": self.scene.state(),
-            "motion": None if self.motion is None else self.motion.state(),
+            "scene": self.subject.state(),
             "pace": asdict(self._pace),
             "steps": pace.packed(self._steps),
             "asked": self._asked,

@@ -13,20 +13,17 @@ import os
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 from tawami.base import archive, checks
 from tawami.base.errors import InputError, OutputError
 from tawami.base.files import result_folder, whole_file
 from tawami.base.ranks import raise_together
+from tawami.motion.observer import Subject
 from tawami.results import provenance
 from tawami.results.output import PHASES, Output
-from tawami.results.phase import LOG, Phase, Unwatched
+from tawami.results.phase import LOG, Phase
 from tawami.results.provenance import FORM, RUN, SCRIPT
-
-if TYPE_CHECKING:
-    from tawami.motion.dynamics import Dynamics
-    from tawami.scene.scene import Scene
 
 Existing = Literal["stop", "replace", "resume"]
 #: Takes precedence over `existing`: how `tawami resume` starts a script.
@@ -102,15 +99,12 @@ class Results:
         """The checkpoints that there are, oldest first."""
         return archive.files(self.folder)
 
-    def phase(
-        self, kind: str, scene: Scene, motion: Dynamics | None, end: float, unit: str
-    ) -> Phase:
+    def phase(self, kind: str, subject: Subject, end: float, unit: str) -> Phase:
         """The next phase of the run, for a with statement; a call for all ranks.
 
         Args:
             kind: 'ramp', 'settle' or 'motion'.
-            scene: The scene.
-            motion: Its motion; None without inertia.
+            subject: The scene, or its motion.
             end: Where it ends.
             unit: Of that.
 
@@ -119,15 +113,16 @@ class Results:
             OutputError: It cannot be written.
         """
         if not self._phases:
-            with raise_together(scene.grid.comm):
-                if scene.grid.comm.rank == 0:
+            comm = subject.scene.grid.comm
+            with raise_together(comm):
+                if comm.rank == 0:
                     self._open()
-            self.resumes = scene.grid.comm.bcast(self.resumes)
+            self.resumes = comm.bcast(self.resumes)
             if not self.resumes:
-                provenance.write(self.folder, scene, motion)
+                provenance.write(self.folder, subject)
         before = sum(name.partition("-")[0] == kind for name in self._phases)
         self._phases.append(f"{kind}-{before + 1}" if before else kind)
-        return Phase(self, len(self._phases), self._phases[-1], scene, motion, end, unit)
+        return Phase(self, len(self._phases), self._phases[-1], subject, end, unit)
 
     def _open(self) -> None:
         result_folder(self.folder)
@@ -208,21 +203,3 @@ class Results:
         known["phases"] = list(phases.values())
         with whole_file(run) as part:
             part.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
-
-
-def phase(
-    results: Results | None,
-    kind: str,
-    scene: Scene,
-    motion: Dynamics | None,
-    end: float,
-    unit: str,
-) -> Unwatched:
-    """The next phase of a run, with results or without; see `Results.phase`."""
-    if results is None:
-        return Unwatched(unit)
-    if not isinstance(results, Results):
-        raise InputError(
-            f"results = {checks.shown(results)}: expected tawami.Results(folder, ...), or None"
-        )
-    return results.phase(kind, scene, motion, end, unit)

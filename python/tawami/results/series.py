@@ -51,7 +51,7 @@ def with_z(values: npt.ArrayLike) -> Array:
 
 
 def write_vtu(path: str | Path, frame: Frame) -> None:
-    """A VTU file, not compressed: zlib takes five times as long (`python -m cases.writing`).
+    """A VTU file, not compressed: zlib takes five times as long (`python -m cases.costs.writing`).
 
     Raises:
         OutputError: The file cannot be written, or has another ending.
