@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-
-from tawami.base.libraries import PETSc
+from petsc4py import PETSc
 
 
 class Handles(dict[str, Any]):

@@ -15,9 +15,10 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any, NoReturn
 
+from mpi4py import MPI
+
 from tawami.base import checks
 from tawami.base.errors import TawamiError
-from tawami.base.libraries import MPI
 from tawami.base.petsc import clean_up, keep_communicator
 
 #: Seconds that a rank gives each rank before it to print its message first, and the longest wait.

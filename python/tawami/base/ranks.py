@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-
-from tawami.base.libraries import MPI
+from mpi4py import MPI
 
 
 def sum_of(comm: Any, values: npt.NDArray[Any]) -> npt.NDArray[Any]:

@@ -1,4 +1,4 @@
-"""The imports of dolfinx, basix and FFCx, and the elements: versions 0.5.2, 0.9 and 0.11.
+"""The imports of dolfinx, basix and FFCx and the elements: versions 0.5.2, 0.9 and 0.11.
 
 The modules of this room take `basix`, `cpp`, `dolfinx`, `jit` and `ufl` from here, after the checks that
 tell a user what is missing. Nothing outside this room imports them.
@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from tawami.base.arrays import Array
-from tawami.base.libraries import MPI, missing
+from tawami.base.dependencies import missing
 
 __all__ = [
-    "BILINEAR_DOFS", "DISPLACEMENT_DOFS", "MPI", "OLD", "IntegralType", "at_points", "at_vertices",
+    "BILINEAR_DOFS", "DISPLACEMENT_DOFS", "OLD", "IntegralType", "at_points", "at_vertices",
     "basix", "cpp", "dolfinx", "domain", "function_space", "jit", "lagrange", "mixed", "per_cell",
     "reference_nodes", "version",
 ]  # fmt: skip
