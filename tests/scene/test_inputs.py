@@ -152,7 +152,7 @@ def test_boxes():
         tawami.box(grid, (-1.0, 0.5), (0.3, 2.0))
     with pytest.raises(tawami.InputError, match="must lie on lines of the grid"):
         tawami.box(grid, (-1.0, 0.5), (2.0, 2.0))
-    with pytest.raises(tawami.InputError, match="a body without particles"):
+    with pytest.raises(tawami.InputError, match="so the body has no particles"):
         tawami.box(grid, (0.0, 0.5), (0.0, 2.0))
     with pytest.raises(tawami.InputError, match="per_axis = 0"):
         tawami.box(grid, (-1.0, 0.5), (0.0, 2.0), per_axis=0)

@@ -16,7 +16,8 @@ from mpi4py import MPI
 
 from tawami import _rust
 from tawami.base.errors import InputError, SingularError
-from tawami.body.body import Body, box
+from tawami.body.body import Body
+from tawami.body.box import box
 from tawami.form.form import Form
 from tawami.grid.basis import Basis
 from tawami.grid.edges import Component

@@ -65,7 +65,7 @@ class Field:
         self._location, self._volume = location, volume
         self._values = {"h": grid.h, **parameters}
         rectangle = grid.rectangle
-        self._space = grid.space(len(compiled.form.fields), compiled.element)
+        self._space = grid.function_space(len(compiled.form.fields), compiled.element)
         index = rectangle.ij[:, 0] + grid.cells[0] * rectangle.ij[:, 1]
         active = np.zeros(grid.cells[::-1], dtype=bool)
         active.ravel()[location.active] = True
