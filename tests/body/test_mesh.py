@@ -9,8 +9,8 @@ import meshio
 import moments
 import numpy as np
 import pytest
-from conftest import grid_of
 from mpi4py import MPI
+from scenes import grid_of
 from scipy.spatial import Delaunay
 
 import tawami
@@ -144,13 +144,13 @@ def test_materials_by_name_or_in_the_order_of_the_numbers():
     )
     listed = tawami.Scene(grid, body, [sand, clay], density=[2e3, 1e3])
     for scene in (named, listed):
-        stiff = scene.constants["mu"] == sand.shear_modulus
+        stiff = scene.configuration.domain.constants["mu"] == sand.shear_modulus
         assert stiff.any()
         assert (stiff == (body.material_of == 0)).all()
         areas = [moments.of_polygons(points[cells[tag == group]])[0] for group in (SAND, CLAY)]
         assert scene.mass.sum() == pytest.approx(2e3 * areas[0] + 1e3 * areas[1])
     mine = tawami.Scene(grid, body, clay, material_of=np.zeros(len(body.x)))
-    assert np.ptp(mine.constants["mu"]) == 0
+    assert np.ptp(mine.configuration.domain.constants["mu"]) == 0
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,10 @@ import moments
 import numpy as np
 import pytest
 import shapely
-from conftest import FORMS, grid_of
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from mpi4py import MPI
+from scenes import FORMS, grid_of
 from scipy.spatial import ConvexHull, QhullError
 
 import tawami

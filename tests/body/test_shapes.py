@@ -6,10 +6,10 @@ import meshio
 import numpy as np
 import pytest
 import shapely
-from conftest import grid_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
+from scenes import grid_of
 
 import tawami
 
@@ -180,7 +180,9 @@ def test_the_body_has_the_numbers_of_materials():
     soft, stiff = (tawami.linear_elastic(E=E, nu=0.3) for E in (1.0, 2.0))
     body = tawami.Body(box.x, box.volume, (box.x[:, 0] > 0).astype(np.uint32))
     scene = tawami.Scene(grid, body, [soft, stiff])
-    assert ((scene.constants["mu"] == stiff.shear_modulus) == (box.x[:, 0] > 0)).all()
+    assert (
+        (scene.configuration.domain.constants["mu"] == stiff.shear_modulus) == (box.x[:, 0] > 0)
+    ).all()
 
 
 def test_parts_that_are_round_off_have_no_particles():

@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from tawami.fem import dolfinx
+from tawami.fem import rules
 
 Array = npt.NDArray[np.float64]
 Numbers = npt.NDArray[np.int64]
@@ -65,7 +65,7 @@ def halves(corner: Array | Numbers, size: float = 1.0) -> Array:
 
 def in_triangles(corners: Array, cell: Numbers, material: Numbers | None = None) -> Points:
     """Gauss points of triangles (n x 3 x 2) of either orientation, each triangle in one cell."""
-    points, weights = dolfinx.triangle_rule(DEGREE)
+    points, weights = rules.triangle_rule(DEGREE)
     barycentric = np.column_stack([1 - points.sum(axis=1), points])
     return Points(
         (barycentric @ corners).reshape(-1, 2),

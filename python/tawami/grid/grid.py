@@ -12,11 +12,11 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from tawami import _rust
-from tawami.base import ranks
+from tawami.base import program, ranks
 from tawami.base.checks import number, one_of, pair, point, room, shown, whole_number
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
-from tawami.fem import dolfinx
+from tawami.fem import mesh
 from tawami.grid.space import PLANE, Counts, Position
 
 Array = npt.NDArray[np.float64]
@@ -57,7 +57,7 @@ class Grid(Unique):
                 f"comm = {shown(comm)}: expected a communicator, such as mpi4py's MPI.COMM_WORLD"
             )
         check_process()
-        ranks.watch(comm)
+        program.watch(comm)
         self.comm = comm
         self.space = PLANE
         self.origin = point("origin", origin)
@@ -72,8 +72,8 @@ class Grid(Unique):
                 f"origin = {self.origin}: expected at most {FARTHEST:g} cells of {self.h:g} m from "
                 "(0, 0): farther away, positions have too few digits; move body and grid nearer"
             )
-        self._rectangle: dolfinx.Rectangle | None = None
-        self._function_spaces: dict[int, dolfinx.Space] = {}
+        self._rectangle: mesh.Rectangle | None = None
+        self._function_spaces: dict[int, mesh.FunctionSpace] = {}
 
     @property
     def num_cells(self) -> int:
@@ -92,11 +92,15 @@ class Grid(Unique):
         ends = zip(self.origin, self.upper, strict=True)
         return " x ".join(f"[{low:g}, {high:g}]" for low, high in ends)
 
+    def identity(self) -> dict[str, Any]:
+        """What distinguishes it from another grid, for checkpoints."""
+        return {"grid": [list(self.origin), self.h, list(self.cells)]}
+
     @property
-    def rectangle(self) -> dolfinx.Rectangle:
+    def rectangle(self) -> mesh.Rectangle:
         """The dolfinx mesh, made when it is first needed."""
         if self._rectangle is None:
-            self._rectangle = dolfinx.Rectangle(self.comm, self.origin, self.h, self.cells)
+            self._rectangle = mesh.Rectangle(self.comm, self.origin, self.h, self.cells)
         return self._rectangle
 
     @functools.cached_property
@@ -106,10 +110,10 @@ class Grid(Unique):
         rank[self.cell_numbers(self.rectangle.ij)] = self.comm.rank
         return ranks.sum_of(self.comm, rank)
 
-    def function_space(self, num_fields: int, element: Any) -> dolfinx.Space:
+    def function_space(self, num_fields: int, element: Any) -> mesh.FunctionSpace:
         """The function space of displacement and `num_fields - 1` bilinear fields."""
         if num_fields not in self._function_spaces:
-            self._function_spaces[num_fields] = dolfinx.Space(self.rectangle, element)
+            self._function_spaces[num_fields] = mesh.FunctionSpace(self.rectangle, element)
         return self._function_spaces[num_fields]
 
     def edge(self, name: Edge) -> tuple[int, int]:
