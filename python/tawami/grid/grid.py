@@ -93,7 +93,7 @@ class Grid(Unique):
         return " x ".join(f"[{low:g}, {high:g}]" for low, high in ends)
 
     def identity(self) -> dict[str, Any]:
-        """What tells it from another grid, for checkpoints."""
+        """What distinguishes it from another grid, for checkpoints."""
         return {"grid": [list(self.origin), self.h, list(self.cells)]}
 
     @property
