@@ -71,7 +71,7 @@ def test_a_quantity_of_the_law_times_constants_of_the_particle(random_scene):
         return sum_p(sigma, grad(w))
 
     scenes = [random_scene(form=form_of(function)) for function in (scaled, plain)]
-    mu = scenes[0].constants["mu"]
+    mu = scenes[0].configuration.domain.constants["mu"]
     scenes[1].particles.volume[:] *= 2 * mu
     c = np.random.default_rng(0).standard_normal(scenes[0].num_coefficients)
     for function in (lambda s: s.residual(c), lambda s: s.tangent(c).toarray()):
@@ -316,7 +316,7 @@ def test_wrong_parameters(random_scene, given, message):
 
 def test_parameters_change_without_compiling_again(random_scene):
     a, b = (random_scene(form="u_epsv", alpha=alpha) for alpha in (0.1, 0.7))
-    assert a._compiled is b._compiled
+    assert a.configuration.model.compiled is b.configuration.model.compiled
     c = np.ones(a.num_coefficients)
     c[::3] = 0
     assert np.abs(a.residual(c) - b.residual(c)).max() > 1e-3
