@@ -25,7 +25,7 @@ from mpi4py import MPI
 from tqdm import tqdm
 
 import tawami
-from tawami.base.files import result_folder, whole_file
+from tawami.base.files import atomic_file, result_folder
 from tawami.fem.environment import header
 
 T = TypeVar("T", int, float)
@@ -86,7 +86,7 @@ class Program:
     def write(self, name: str, text: str) -> None:
         """Write a text file to the results folder, on the first rank."""
         if MPI.COMM_WORLD.rank == 0:
-            with whole_file(self.folder / name) as part:
+            with atomic_file(self.folder / name) as part:
                 part.write_text(text)
 
     def list_results(self) -> None:

@@ -30,10 +30,10 @@ import tawami
 from cases.verification.cantilever import mpm
 from cases.verification.cantilever.beam import NU, D, E, L, P
 from tawami.base.errors import InexactSumWarning
-from tawami.base.ranks import mpirun
+from tawami.base.files import atomic_file, result_folder
+from tawami.base.program import mpirun
 from tawami.fem.environment import header, peak_memory
 from tawami.form.compilation import compile_form
-from tawami.results.output import result_folder, whole_file
 
 #: Stages of a Newton step; not every path has all of them.
 STAGES = {
@@ -263,7 +263,7 @@ def per_particle(row: dict[str, Any]) -> tuple[float, float]:
 
 def keep(rows: Sequence[dict[str, Any]], path: Path) -> None:
     """All numbers as CSV."""
-    with whole_file(path) as part, part.open("w", newline="") as file:
+    with atomic_file(path) as part, part.open("w", newline="") as file:
         writer = csv.DictWriter(file, rows[0])
         writer.writeheader()
         writer.writerows(rows)

@@ -1,18 +1,19 @@
-"""What projecting stresses from particles to vertices costs: a cantilever's exact bending and shear
-stress, given at its particles, against the same at the vertices.
+"""Errors of projecting stresses from particles to the vertices of the grid.
+
+The particles carry the bending and shear stress of a cantilever,
+
+    sigma_xx = P (L - x) y / I,    sigma_xy = -P (D^2/4 - y^2) / 2 I,
+
+with L = 2 m, D = 1 m and P = 1 kN per metre depth. The projected stresses are compared with these
+formulas at the vertices of cells with particles. Errors are root mean squares and maxima, over
+max |sigma|. The consistent projection is solved iteratively, and directly for comparison; the condition
+number is that of its matrix with rows and columns scaled to ones on the diagonal.
 
 python -m cases.costs.projection
-
-sigma_xx = P (L - x) y / I, sigma_xy = -P (D^2/4 - y^2) / 2 I; errors over max |sigma|, as root mean
-square and largest over the vertices of cells with particles; the condition number of the consistent
-projection's matrix, rows and columns scaled to ones on the diagonal. A direct solution of it is there
-to compare with.
 """
 
 from __future__ import annotations
 
-import argparse
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,12 +22,13 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 import tawami
+from cases.common.program import Program
 from cases.common.table import as_text
 from tawami.results.projection import nodal, vertices
 
 Array = npt.NDArray[np.float64]
 L, D, P = 2.0, 1.0, 1e3  # [m], [m], [N per metre depth]
-I = D**3 / 12  # noqa: E741 - the beam's
+I = D**3 / 12  # noqa: E741 - second moment of area of the beam
 COLUMNS = ("particles", "n", "method", "bending_rms", "bending_max", "shear_rms", "shear_max",
            "condition")  # fmt: skip
 
@@ -36,11 +38,12 @@ class Row:
     """Errors of one projection, over max |sigma|.
 
     Attributes:
-        particles: How they stand.
+        particles: Arrangement of the particles.
         n: Cells over the height.
-        method: Of the projection.
-        bending_rms, bending_max, shear_rms, shear_max: Of sigma_xx and sigma_xy.
-        condition: Of the matrix, where it was solved directly.
+        method: Method of projection.
+        bending_rms, bending_max: Errors of sigma_xx.
+        shear_rms, shear_max: Errors of sigma_xy.
+        condition: Condition number of the matrix, if it was solved directly.
     """
 
     particles: str
@@ -60,9 +63,7 @@ def stresses(x: Array) -> Array:
 
 
 def scene_of(particles: str, n: int) -> tawami.Scene:
-    """The beam with 2 x 2 particles a cell as a lattice, the same moved by parts of a cell, or as many
-    anywhere.
-    """
+    """The beam with 2 x 2 particles per cell as a lattice, moved by a part of a cell, or at random."""
     h = D / n
     grid = tawami.Grid(MPI.COMM_SELF, origin=(-h, -D / 2 - h), h=h, cells=(2 * n + 3, n + 3))
     body = tawami.box(grid, (0.0, -D / 2), (L, D / 2))
@@ -74,7 +75,11 @@ def scene_of(particles: str, n: int) -> tawami.Scene:
 
 
 def consistent(scene: tawami.Scene, values: Array) -> tuple[Array, float]:
-    """Solved directly: vertices x columns, and the condition number of the matrix, scaled."""
+    """Solve the consistent projection directly.
+
+    Returns:
+        Values at the vertices, vertices x columns, and the condition number of the scaled matrix.
+    """
     x = (np.asarray(scene.particles.x) - scene.grid.origin) / scene.grid.h
     cell = np.floor(x).astype(int)
     t, stride = x - cell, scene.grid.cells[0] + 1
@@ -93,7 +98,7 @@ def consistent(scene: tawami.Scene, values: Array) -> tuple[Array, float]:
 
 
 def rows_of(particles: str, n: int) -> list[Row]:
-    """Every projection for one set of particles."""
+    """Errors of every projection for one arrangement of particles."""
     scene = scene_of(particles, n)
     values, exact = stresses(np.asarray(scene.particles.x)), stresses(vertices(scene))
     direct, condition = consistent(scene, values)
@@ -111,14 +116,15 @@ def rows_of(particles: str, n: int) -> list[Row]:
     return rows
 
 
+PROGRAM = Program("cases.costs.projection", __doc__, files=False)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(prog="python -m cases.costs.projection", description=__doc__)
-    parser.parse_args(arguments)
-    logging.disable(logging.INFO)  # the compilation of forms is talkative
+    PROGRAM.start(arguments)
     kinds = ("lattice", "moved", "random")
     print(as_text([row for kind in kinds for n in (4, 8, 16) for row in rows_of(kind, n)], COLUMNS))
 
 
 if __name__ == "__main__":
-    tawami.run(main, "projection")
+    PROGRAM.run(main)

@@ -1,31 +1,33 @@
-"""A block that slides over the grid: what cells that it fills in part do to answer and condition.
+"""A block in different positions on the grid: how partially filled cells affect answer and condition.
 
-A block of 6 x 6 cells hangs at its middle, and its lower half stretches under its weight. The same
-particles are shifted to the right and up by parts of a cell, once by so much that rows of them lie in
-the next cells by 1e-8 h only. With and without the ghost penalty; condition numbers are those of the
-scaled matrix, and of the same before scaling.
+     ________
+    |        |       1.5 m x 1.5 m, 6 x 6 cells of 0.25 m, 2 x 2 particles each, plane strain
+    |-o-o-o--|       E = 1 MPa, nu = 0.49, rho = 1000 kg/m3
+    |________|       held at its middle; the lower half stretches under its weight
 
-python -m cases.showcase.cut_cells [--results results/cut_cells]
+The same particles are shifted to the right and up by fractions of a cell. One of the offsets puts rows
+of them into the next cells by 1e-8 h only. Each method runs with and without the ghost penalty where it
+has one. Condition numbers are those of the scaled matrix and of the matrix before scaling. The reference
+is the offset 0, where all cells are full.
+
+python -m cases.showcase.cut_cells
 """
 
 from __future__ import annotations
 
-import argparse
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
 from mpi4py import MPI
 
 import tawami
-from cases.common import table
 from cases.common.figure import save
-from tawami.fem.environment import header
-from tawami.results.output import result_folder
+from cases.common.program import Program
+from cases.common.table import as_text
+from cases.common.tangent import reduced_tangent
 
 H, N = 0.25, 6  # cell [m], cells along a side of the block
 E, NU, RHO, G = 1e6, 0.49, 1000.0, 10.0  # [Pa], [-], [kg/m3], [m/s2]
@@ -42,8 +44,15 @@ METHODS = {
 
 @dataclass(frozen=True)
 class Row:
-    """One computation: offset in cells, how much longer the block is [m], its error against the
-    offset 0 [%], condition numbers.
+    """One computation.
+
+    Attributes:
+        method: Form and options, a key of `METHODS`.
+        offset: Shift in cells.
+        stretch: Elongation of the lower half [m].
+        change_percent: Difference of the stretch from that at the offset 0 [%].
+        condition: Condition number of the scaled matrix.
+        unscaled: Condition number before scaling.
     """
 
     method: str
@@ -55,7 +64,7 @@ class Row:
 
     @property
     def where(self) -> str:
-        """The offset in words."""
+        """The offset as text."""
         return f"{self.offset:.1f}" if self.offset != SLIVER else "0.25 + 1e-8"
 
 
@@ -78,22 +87,19 @@ def build(method: str, offset: float) -> tawami.Scene:
 
 
 def solve(method: str, offset: float, reference: float | None = None) -> Row:
-    """Stretch and conditions at one offset."""
+    """Compute stretch and condition numbers at one offset."""
     scene = build(method, offset)
     solution = scene.solve()
     u, y = solution.displacement_of_particles[:, 1], scene.particles.x[:, 1]
     middle = (1 + N / 2 + offset) * H
     stretch = float(u[np.abs(y - middle) < H / 2].mean() - u[y < y.min() + H / 4].mean())
-    reduction = scene.reduction()
-    matrix = scene.tangent(np.zeros(scene.num_coefficients))
-    reduced = (reduction.selection.T @ matrix @ reduction.selection).toarray()
-    singular = np.linalg.svd(reduced, compute_uv=False)
+    singular = np.linalg.svd(reduced_tangent(scene)[0], compute_uv=False)
     change = 0.0 if reference is None else 100 * (stretch / reference - 1)
     return Row(method, offset, stretch, change, solution.condition, singular[0] / singular[-1])
 
 
 def study() -> list[Row]:
-    """Every method at every offset."""
+    """Solve with every method at every offset."""
     rows: list[Row] = []
     for method in METHODS:
         first = solve(method, 0.0)
@@ -102,7 +108,7 @@ def study() -> list[Row]:
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """Change of the answer and condition number over the offset."""
+    """Draw the change of the stretch and the condition numbers over the offset."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
     for method in METHODS:
         mine = sorted((r for r in rows if r.method == method), key=lambda r: r.offset)
@@ -121,20 +127,17 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     save(figure, path)
 
 
+PROGRAM = Program("cases.showcase.cut_cells", __doc__)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Print the table, draw it, say where."""
-    parser = argparse.ArgumentParser(prog="python -m cases.showcase.cut_cells", description=__doc__)
-    parser.add_argument("--results", default="results/cut_cells", help="folder for the results")
-    options = parser.parse_args(arguments)
-    matplotlib.use("Agg")
-    logging.disable(logging.INFO)  # the compilation of forms is talkative
-    print(header(), flush=True)
-    folder = result_folder(options.results)
+    """Print the table and draw it."""
+    PROGRAM.start(arguments)
     rows = study()
-    print(table.as_text(rows, COLUMNS))
-    draw(rows, folder / "cut_cells.png")
-    print(f"Results: {folder / 'cut_cells.png'}")
+    print(as_text(rows, COLUMNS))
+    draw(rows, PROGRAM.folder / "cut_cells.png")
+    PROGRAM.list_results()
 
 
 if __name__ == "__main__":
-    tawami.run(main, "cut_cells")
+    PROGRAM.run(main)

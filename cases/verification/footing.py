@@ -1,4 +1,4 @@
-"""A rigid, rough strip footing is pressed into weightless clay, and its bearing capacity.
+"""The bearing capacity of a rigid, rough strip footing on weightless clay.
 
     axis        b = 1 m
      |=============|                       one half; width B = 2 b, the ground 4 m x 2 m, plane strain
@@ -8,55 +8,50 @@
 
 Prandtl 1920 (Z. angew. Math. Mech. 1, 15): under the displacement w of the footing the force grows to
 
-    Q = (2 + pi) s_u B,
+    Q = (2 + pi) s_u B.
 
-exact for both laws: in plane strain they flow at the same shear s_u once elastic strain has ended.
-Flow keeps the volume. A method that cannot follow it locks: its force grows without an end.
+This is exact for both laws: in plane strain both flow at the shear stress s_u. Plastic flow preserves
+the volume. A method that cannot represent it locks: its force grows without limit.
 
-The footing is a part of the top edge, moved down in steps that adapt. Splines spread it: all functions
-on its cells are held, n + 2 where it has n cells, and the last one moves the ground beside it by up to
-half as much. The footing acts wider than it is, by a share of h, and Q comes down to Prandtl's linearly.
+The footing is a part of the top edge, moved down in adaptive steps. With n cells, splines hold n + 2
+functions under it, and the last one moves the ground next to the footing by up to half as much. The
+footing therefore acts wider than it is, by a fraction of h, and Q converges to Prandtl's linearly from
+above.
 
-Points held (`scene.hold`) do the same if there are as many as functions, at both ends and at the
-centres of the cells; more points hold the same twice. The centres alone leave the last function free:
-the edge of the footing stays behind, and Q comes up from below.
+Points held (`scene.hold`) are equivalent if there are as many of them as functions: at both ends and at
+the centres of the cells. More points make the constraints redundant. The centres alone leave the last
+function free: the edge of the footing settles less, and Q converges from below.
 
-python -m cases.verification.footing [--results results/footing]
+python -m cases.verification.footing
 """
 
 from __future__ import annotations
 
-import argparse
-import logging
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Literal
 
-import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
-from tqdm import tqdm
 
 import tawami
-from cases.common import figure, table
-from tawami.fem.environment import header
-from tawami.grid.basis import Basis
-from tawami.results.output import result_folder
+from cases.common.figure import save
+from cases.common.program import Program, progress
+from cases.common.table import as_csv, as_text
 
 Array = npt.NDArray[np.float64]
 
 B_HALF, WIDTH, DEPTH = 1.0, 4, 2  # of footing and ground [m]
 S_U, RIGIDITY = 1.0e3, 667.0  # undrained strength [Pa], mu/s_u [-]
-SETTLEMENT = 12.0  # of the footing at the end, times s_u b/mu
+SETTLEMENT = 12.0  # of the footing at the end, in units of s_u b/mu
 PRANDTL = 2 + np.pi  # Q / (s_u B)
 Law = Literal["von_mises", "tresca"]
 Footing = Literal["edge", "centres", "lines", "greville"]
-#: What differs from u_epsv, von Mises, nu = 0.499, splines, the footing as a part of the edge.
+#: Runs of the study: differences from u_epsv, von Mises, nu = 0.499, splines, part of the edge.
 STUDY: dict[str, list[dict[str, Any]]] = {
     "cells": [{"form": form, "n": n} for form in ("u_epsv", "u_bbar", "u") for n in (2, 4, 8)]
     + [{"form": "u_epsv", "n": 16}],
@@ -81,24 +76,29 @@ DASHES = {2: ":", 4: "--", 8: "-", 16: "-."}
 
 @dataclass
 class Run:
-    """A run and what it recorded after every step.
+    """A run and its records, at the start and after every step.
 
     Attributes:
-        form, law, basis, footing: Weak form, material, basis of u, how the footing is prescribed.
+        form: Weak form.
+        law: Material.
+        basis: Basis of u.
+        footing: How the settlement is prescribed.
         n: Cells over half the footing's width.
-        nu, alpha, per_axis: Poisson's ratio, stabilisation, particles per cell and axis.
-        settlement: Of the footing, times mu/(s_u b).
-        q: Its force over s_u B.
-        iterations: Newton's.
-        uneven: Largest difference of the footing's settlement from what is prescribed, as a share.
+        nu: Poisson's ratio.
+        alpha: Stabilisation.
+        per_axis: Particles per cell and axis.
+        settlement: Settlement of the footing, in units of s_u b/mu.
+        q: Force of the footing over s_u B.
+        iterations: Newton iterations of each step.
+        uneven: Difference of the largest and smallest settlement under the footing, as a share.
         seconds: Wall time.
-        x, plastic: Positions [m] of the particles and their plastic strain (see the laws).
-        stopped: Why it did not get to the end, if so.
+        x, plastic: Positions [m] and plastic strain of the particles at the end.
+        stopped: Why the run ended early; empty if it did not.
     """
 
     form: str
     law: Law
-    basis: Basis
+    basis: str
     footing: Footing
     n: int
     nu: float
@@ -115,27 +115,27 @@ class Run:
 
     @property
     def steps(self) -> int:
-        """That were accepted."""
+        """Number of accepted steps."""
         return len(self.iterations)
 
     @property
     def mean_iterations(self) -> float:
-        """Newton iterations of a step."""
+        """Newton iterations, mean over the steps."""
         return float(np.mean(self.iterations))
 
     @property
     def last(self) -> float:
-        """Force over s_u B at the end."""
+        """Force at the end, over s_u B."""
         return self.q[-1]
 
     @property
     def error(self) -> float:
-        """Of it against Prandtl's [%]."""
+        """Error of the force at the end against Prandtl's [%]."""
         return 100 * (self.q[-1] / PRANDTL - 1)
 
     @property
     def growth(self) -> float:
-        """Of the force over the last quarter of the settlement [%]."""
+        """Growth of the force over the last quarter of the settlement [%]."""
         before = np.interp(0.75 * self.settlement[-1], self.settlement, self.q)
         return float(100 * (self.q[-1] / before - 1))
 
@@ -147,7 +147,7 @@ COLUMNS = (
 
 
 def held_points(footing: Footing, n: int) -> Array:
-    """Positions [m] of the points that make the footing; none where it is a part of the edge."""
+    """Positions [m] of the points held under the footing; none if it is a part of the edge."""
     h = B_HALF / n
     centres = (np.arange(n) + 0.5) * h
     positions = {
@@ -159,8 +159,8 @@ def held_points(footing: Footing, n: int) -> Array:
     return positions[footing]
 
 
-def build(run: Run) -> tawami.Scene:
-    """The ground, and the settlement of the footing, which is new."""
+def build(run: Run, settlement: float = SETTLEMENT) -> tawami.Scene:
+    """The ground, with the settlement of the footing [s_u b/mu] as the next displacement to apply."""
     h, mu = B_HALF / run.n, RIGIDITY * S_U
     grid = tawami.Grid(
         MPI.COMM_WORLD, origin=(0.0, -DEPTH), h=h, cells=(WIDTH * run.n, DEPTH * run.n)
@@ -179,12 +179,12 @@ def build(run: Run) -> tawami.Scene:
     scene.fix("right", "x")
     scene.fix("bottom", "x")
     scene.fix("bottom", "y")
-    down = -SETTLEMENT * B_HALF / RIGIDITY
+    down = -settlement * B_HALF / RIGIDITY
     if run.footing == "edge":
         scene.fix("top", "x", between=(0.0, B_HALF))
         scene.fix("top", "y", down, between=(0.0, B_HALF))
     for x in held_points(run.footing, run.n):
-        if x > 0:  # the axis is held already
+        if x > 0:  # the left edge holds the axis
             scene.hold((x, 0.0), "x")
         scene.hold((x, 0.0), "y", down)
     return scene
@@ -196,13 +196,13 @@ def solve(
     n: int = 4,
     law: Law = "von_mises",
     nu: float = 0.499,
-    basis: Basis = "quadratic_spline",
+    basis: str = "quadratic_spline",
     footing: Footing = "edge",
     alpha: float = 0.1,
     per_axis: int = 2,
     step: float = 0.04,
 ) -> Run:
-    """Press the footing down, in steps of at most this share."""
+    """Press the footing down, in steps of at most the share `step` of the settlement."""
     begin = perf_counter()
     run = Run(form, law, basis, footing, n, nu, alpha, per_axis)
     scene = build(run)
@@ -211,7 +211,7 @@ def solve(
     def record(solution: tawami.Solution) -> None:
         forces = [solution.reaction((x, 0.0))[1] for x in points]
         force = sum(forces) if len(points) else solution.reaction("top")[1]
-        run.q.append(-force / (S_U * B_HALF))  # both are halves
+        run.q.append(-force / (S_U * B_HALF))  # the force of half the footing over half its width
         run.settlement.append(-solution.displacement((0.0, 0.0))[1] * RIGIDITY / B_HALF)
         run.iterations.append(solution.iterations)
         under = [solution.displacement((x, 0.0))[1] for x in np.linspace(0, B_HALF, 8 * n + 1)]
@@ -227,12 +227,9 @@ def solve(
     return run
 
 
-# -- figures -------------------------------------------------------------------
-
-
 def curves(runs: dict[str, list[Run]], path: Path) -> None:
-    """Force over settlement: forms and cells, Poisson's ratios, laws, bases."""
-    figure_, panels = plt.subplots(2, 2, figsize=(12, 9), layout="constrained", sharex=True)
+    """Draw the force over the settlement for forms and cells, Poisson's ratios, laws and bases."""
+    figure, panels = plt.subplots(2, 2, figsize=(12, 9), layout="constrained", sharex=True)
     titles = {
         "cells": "von Mises, splines, $\\nu$ = 0.499",
         "nu": "von Mises, splines, 4 cells",
@@ -254,12 +251,12 @@ def curves(runs: dict[str, list[Run]], path: Path) -> None:
         axes.set_ylabel("$Q / (s_u B)$ [-]")
         axes.grid(alpha=0.3)
         axes.legend(fontsize=7, loc="lower right", ncols=2)
-    figure.save(figure_, path)
+    save(figure, path)
 
 
 def zones(runs: Sequence[Run], path: Path) -> None:
-    """Plastic strain at the particles, a panel a run."""
-    figure_, panels = plt.subplots(
+    """Draw the plastic strain at the particles, one panel per run."""
+    figure, panels = plt.subplots(
         len(runs), 1, figsize=(8, 4.1 * len(runs)), layout="constrained", squeeze=False
     )
     for axes, run in zip(panels.ravel(), runs, strict=True):
@@ -272,42 +269,39 @@ def zones(runs: Sequence[Run], path: Path) -> None:
         axes.set_xlabel("$x$ [m]")
         axes.set_ylabel("$y$ [m]")
         axes.legend(loc="lower right", fontsize=8)
-        figure_.colorbar(shown, ax=axes, label="plastic strain $\\times\\, b / w$ [-]")
-    figure.save(figure_, path)
+        figure.colorbar(shown, ax=axes, label="plastic strain $\\times\\, b / w$ [-]")
+    save(figure, path)
 
 
 def prandtl() -> Array:
-    """Border of his mechanism under the right half: wedge below the footing, fan, passive wedge."""
+    """Border of Prandtl's mechanism under the right half: active wedge, fan, passive wedge [m]."""
     radius = np.sqrt(2) * B_HALF
     turn = np.linspace(-0.75 * np.pi, -0.25 * np.pi, 50)
     fan = np.column_stack([B_HALF + radius * np.cos(turn), radius * np.sin(turn)])
     return np.vstack([[0.0, -B_HALF], fan, [3 * B_HALF, 0.0]])
 
 
+PROGRAM = Program("cases.verification.footing", __doc__)
+PROGRAM.option("--cells", type=int, default=16, help="most cells over half the footing")
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the study, print the table, draw the figures, say where."""
-    parser = argparse.ArgumentParser(prog="python -m cases.verification.footing")
-    parser.add_argument("--results", default="results/footing", help="folder for the results")
-    parser.add_argument("--cells", type=int, default=16, help="most cells over half the footing")
-    options = parser.parse_args(arguments)
-    matplotlib.use("Agg")
-    logging.disable(logging.INFO)  # the compilation of forms is talkative
-    print(header(), flush=True)
-    folder = result_folder(options.results)
+    """Run the study, print the table, draw the figures."""
+    options = PROGRAM.start(arguments)
     print(f"Prandtl: Q/(s_u B) = 2 + pi = {PRANDTL:.4f}")
     work = [(name, c) for name in STUDY for c in STUDY[name] if c["n"] <= options.cells]
     runs: dict[str, list[Run]] = {name: [] for name in STUDY}
-    for name, change in tqdm(work, desc="footing", disable=not sys.stderr.isatty()):
+    for name, change in progress(work, desc="footing"):
         runs[name].append(solve(**change))
     rows = [run for name in STUDY for run in runs[name]]
-    print(table.as_text(rows, COLUMNS))
-    (folder / "table.csv").write_text(table.as_csv(rows, COLUMNS))
-    curves(runs, folder / "curves.png")
+    print(as_text(rows, COLUMNS))
+    PROGRAM.write("table.csv", as_csv(rows, COLUMNS))
+    curves(runs, PROGRAM.folder / "curves.png")
     finest = [max((r for r in runs["cells"] if r.form == form and r.n <= 8), key=lambda r: r.n)
               for form in ("u_epsv", "u")]  # fmt: skip
-    zones(finest, folder / "zones.png")
-    print(f"Results: {folder / 'curves.png'}, {folder / 'zones.png'}, {folder / 'table.csv'}")
+    zones(finest, PROGRAM.folder / "zones.png")
+    PROGRAM.list_results()
 
 
 if __name__ == "__main__":
-    tawami.run(main, "footing")
+    PROGRAM.run(main)

@@ -1,14 +1,18 @@
-"""A column that collapses under its own weight: finite strain across many cells of the grid.
+"""A column that shrinks under its own weight: finite strain across many cells of the grid.
 
-Held at the sides, Hencky elastic with nu = 0, so that every layer is in uniaxial strain and carries
-what stands on it: `E ln(l) / l = -rho0 g (H - Z)` gives the stretch l of the layer that was at Z.
-The weight comes in equal increments, each a step with the grid reset.
+    |   |   H = 50 m     E = 10 kPa, nu = 0, Hencky elastic; rho0 g = 800 N/m3
+    |   |                held at the sides and at the bottom: uniaxial strain
+    |___|
+
+Each layer carries the weight above it. E ln(l) / l = -rho0 g (H - Z) gives the stretch l of the layer
+that was at Z. The weight is applied in equal increments; each is a step, after which the grid is reset.
 
 python -m cases.verification.self_weight
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +21,8 @@ from scipy.integrate import quad
 from scipy.special import lambertw
 
 import tawami
+from cases.common.program import Program
+from cases.common.table import as_text
 
 H = 50.0  # height [m]
 E = 1.0e4  # Young's modulus [Pa]
@@ -36,24 +42,39 @@ def stretch(z: float) -> float:
 
 
 def final_height() -> float:
-    """Integral of the stretch [m]."""
+    """Height of the column under its weight [m], the integral of the stretch."""
     return float(quad(stretch, 0.0, H)[0])
 
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a run: height of the column [m], error of it, rms error of the vertical stress over
-    the base stress, Newton iterations of each step.
+    """Result of a run.
+
+    Attributes:
+        form: Weak form.
+        height: Height of the column [m].
+        height_error: Relative error of the height.
+        stress_error: rms error of the vertical stress over the stress at the base.
+        iterations: Newton iterations of each step.
     """
 
+    form: str
     height: float
     height_error: float
     stress_error: float
     iterations: tuple[int, ...]
 
+    @property
+    def most_iterations(self) -> int:
+        """Largest number of Newton iterations of a step."""
+        return max(self.iterations)
+
+
+COLUMNS = ("form", "height", "height_error", "stress_error", "most_iterations")
+
 
 def build(form: str, h: float = 1.0, **options: object) -> tawami.Scene:
-    """The column at a cell size [m]; with two cells abreast, instead of one, B-bar bulges sideways."""
+    """The column, one cell wide, with cells of side h [m]. With two cells B-bar bulges sideways."""
     cells = round(H / h)
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=h, cells=(1, cells))
     body = tawami.box(grid, (0.0, 0.0), (h, H))
@@ -66,50 +87,44 @@ def build(form: str, h: float = 1.0, **options: object) -> tawami.Scene:
 
 
 def solve(form: str, *, h: float = 1.0, increments: int = 20, **options: object) -> Result:
-    """The column under its weight, in increments."""
+    """Apply the weight in increments."""
     scene = build(form, h, **options)
     iterations = []
     for k in range(1, increments + 1):
         scene.gravity((0.0, -G * k / increments))
         iterations.append(scene.solve().iterations)
-    height, stress = errors(scene)
-    return Result((1 + height) * final_height(), height, stress, tuple(iterations))
+    height, stress = errors(scene, form)
+    return Result(form, (1 + height) * final_height(), height, stress, tuple(iterations))
 
 
-def errors(scene: tawami.Scene) -> tuple[float, float]:
-    """Errors of the height and, rms over the base stress, of the vertical stress."""
-    end = np.array(scene.particles.x[:, 1])
-    if not scene.form.strain.finite:
-        end += scene.particles.displacement[:, 1]
-        start = np.array(scene.particles.x[:, 1])
-    else:
-        start = end - scene.particles.displacement[:, 1]
+def errors(scene: tawami.Scene, form: str) -> tuple[float, float]:
+    """Relative error of the height, and rms error of the vertical stress over that at the base."""
+    particles, finite = scene.particles, form.endswith("_finite")
+    now, displacement = np.array(particles.x[:, 1]), particles.displacement[:, 1]
+    start, end = (now - displacement, now) if finite else (now, now + displacement)
     # the top is half a (deformed) particle above the highest one
     top = start.max()
     height = end.max() + (H - top) * stretch(0.5 * (H + top))
-    # tau_yy = E ln l; Cauchy's stress is that over the stretch
+    # tau_yy = E ln l, and Cauchy's stress is tau_yy / l
     stretches = np.array([stretch(z) for z in start])
-    stress = np.array(scene.particles.stress[:, 1])
-    if scene.form.strain.finite:
-        stress /= stretches
+    stress = particles.stress[:, 1] / (stretches if finite else 1.0)
     exact = E * np.log(stretches) / stretches
     rms = float(np.sqrt(np.mean((stress - exact) ** 2)) / (WEIGHT * H))
     return height / final_height() - 1, rms
 
 
-def main() -> None:
-    """Print height and stress beside the closed form."""
+PROGRAM = Program("cases.verification.self_weight", __doc__, files=False)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print height and stress with each form, compared with the closed form."""
+    PROGRAM.start(arguments)
     scene = build("u_epsv_finite")
     scene.gravity((0.0, -G))
     print(scene.header())
     print(f"closed form: {final_height():.5f} m")
-    for form in FORMS:
-        r = solve(form)
-        print(
-            f"{form:14} height {r.height:.5f} m ({100 * r.height_error:+.3f} %), stress rms "
-            f"{100 * r.stress_error:.2f} % of the base stress, Newton iterations {r.iterations}"
-        )
+    print(as_text([solve(form) for form in FORMS], COLUMNS))
 
 
 if __name__ == "__main__":
-    tawami.run(main, "self_weight")
+    PROGRAM.run(main)

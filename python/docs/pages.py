@@ -20,7 +20,7 @@ import executed
 import messages
 from sources import ROOT
 
-from tawami.base import errors, ranks
+from tawami.base import errors, program
 
 SOURCE = Path(__file__).parent
 #: Cases: title, folder of `cases/`, and the modules that state the problem, besides the one that runs.
@@ -32,8 +32,8 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "elastica": ("Elastica", "verification", ("strip",)),
     "footing": ("Footing", "verification", ()),
     "vibrating_beam": ("Vibrating beam", "verification", ("beam",)),
-    "spinning_disc": ("Spinning disc", "verification", ()),
-    "collapse": ("Collapse", "showcase", ()),
+    "spinning_disc": ("Spinning disc", "verification", ("disc",)),
+    "collapse": ("Collapse", "showcase", ("pile",)),
     "projection": ("Nodal projection", "costs", ()),
     "writing": ("Writing results", "costs", ()),
 }
@@ -176,7 +176,7 @@ def _try_all() -> str:
     for number in (1, 2):
         words, environment = [sys.executable, str(SOURCE / "compatibility.py")], dict(os.environ)
         if number > 1:
-            words, environment = ranks.mpirun(number, words)
+            words, environment = program.mpirun(number, words)
         start = perf_counter()
         what = f"compatibility, ranks: {number}"
         text = executed.command(words, ROOT, what, environment)

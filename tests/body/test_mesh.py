@@ -150,7 +150,7 @@ def test_materials_by_name_or_in_the_order_of_the_numbers():
         areas = [moments.of_polygons(points[cells[tag == group]])[0] for group in (SAND, CLAY)]
         assert scene.mass.sum() == pytest.approx(2e3 * areas[0] + 1e3 * areas[1])
     mine = tawami.Scene(grid, body, clay, material_of=np.zeros(len(body.x)))
-    assert np.ptp(mine.constants["mu"]) == 0
+    assert np.ptp(mine.configuration.domain.constants["mu"]) == 0
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import grid_of
+from scenes import grid_of
 
 import tawami
 from tawami.grid.space import PLANE, Space, lattice, tensor_product

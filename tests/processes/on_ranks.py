@@ -12,7 +12,7 @@ from mpi4py import MPI
 from scenes import BASES, FORMS, grid_of
 
 import tawami
-from cases.showcase import collapse
+from cases.showcase.collapse.pile import build as pile_of_rods
 from cases.verification.cantilever import fem, mpm
 from tawami.base.ranks import allgathered
 from tawami.form.form import Form
@@ -112,7 +112,7 @@ def motion() -> dict[str, np.ndarray]:
     one that loses particles.
     """
     found = {}
-    pile = collapse.build("u_epsv_finite", h=0.02)
+    pile = pile_of_rods("u_epsv_finite", h=0.02)
     pile.run(0.1, 1e-3)
     found["motion pile momentum"] = pile.linear_momentum
     found["motion pile energy"] = np.array(pile.energies.dissipated)

@@ -47,7 +47,8 @@ def state(motion: tawami.Dynamics) -> dict[str, Any]:
         for name in ("velocity", "acceleration", "velocity_gradient", "acceleration_gradient")
     }
     (wall,) = scene.configuration.supports.walls
-    arrays |= {"touching": wall.state.touching, "slip": wall.state.slip, "total": scene._total}
+    arrays |= {"touching": wall.state.touching, "slip": wall.state.slip}
+    arrays["total"] = scene.configuration.total
     arrays["cell"] = scene.configuration.domain.location.cell
     balance = (energies.kinetic, energies.elastic, energies.dissipated, energies.left)
     carried = scene.configuration.loads.weight.carried[1]

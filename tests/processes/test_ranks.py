@@ -10,7 +10,7 @@ import meshio
 import numpy as np
 import pytest
 
-from tawami.base.ranks import mpirun
+from tawami.base.program import mpirun
 
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.mpi
@@ -178,7 +178,7 @@ def test_output_is_written_and_printed_once(tmp_path):
     code = (
         SCENE
         + f"""
-from tawami.results.output import write_particles, write_grid
+from tawami.results.single import write_grid, write_particles
 def main():
     s = scene()
     s.traction("right", (0.0, 1e-3))

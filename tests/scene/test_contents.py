@@ -176,7 +176,7 @@ solution = scene.solve()
 others = ("matplotlib", "meshio", "shapely", "tqdm", "hypothesis", "scipy.spatial", "scipy.optimize")
 print(*[name for name in others if name in sys.modules])
 tawami.polygon(grid, [(0, 0), (2, 0), (2, 1)])
-from tawami.results.output import write_particles
+from tawami.results.single import write_particles
 write_particles("p.vtu", solution)
 print(*[name for name in others if name in sys.modules])
 """

@@ -8,7 +8,7 @@ from mpi4py import MPI
 from scenes import grid_of
 
 import tawami
-from tawami.results.output import write_particles
+from tawami.results.single import write_particles
 
 RHO, G, HEIGHT, K0 = 2000.0, 9.81, 4.0, 0.5
 SOIL = tawami.linear_elastic(E=1e7, nu=0.3)

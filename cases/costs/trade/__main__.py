@@ -12,8 +12,8 @@ from pathlib import Path
 
 import tawami
 from cases.costs.trade import cantilever, collapse, cook, self_weight, spinning_disc
+from tawami.base.files import atomic_file
 from tawami.fem.environment import header
-from tawami.results.output import whole_file
 from tawami.study import Table
 
 CASES = (cantilever, cook, collapse, self_weight, spinning_disc)
@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             study = STUDIES[name]
             study.path = Path(options.results) / name
             table = study.run(sample=options.sample)
-            with whole_file(study.path / f"{name}.md") as part:
+            with atomic_file(study.path / f"{name}.md") as part:
                 part.write_text(in_words(table))
             print(f"\nResults: {study.path}/{name}.csv, {name}.md, {name}.png")
         print(f"\n{in_words(table)}")

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 import tawami
-from cases.showcase import collapse
+from cases.showcase.collapse import pile
 
 END = 0.3  # [s]
 #: Side of the squares that heights and mean stress are averaged over [m].
@@ -18,7 +18,7 @@ BOXES = (30, 6)
 
 def run(form: str, h: float, dt: float, **options: Any) -> dict[str, Any]:
     """At the end: run-out [m], height in strips [m], mean stress in boxes [Pa], its roughness."""
-    motion = collapse.build(form, h=h, **options)
+    motion = pile.build(form, h=h, **options)
     motion.run(END, dt)
     particles = motion.scene.particles
     x, volume = np.array(particles.x), np.array(particles.volume)
@@ -32,7 +32,7 @@ def run(form: str, h: float, dt: float, **options: Any) -> dict[str, Any]:
         "run-out": float(np.quantile(x[:, 0], 0.99)),
         "profile": (filled.sum(axis=1) / BOX).tolist(),
         "mean stress": (stress / BOX**2).ravel().tolist(),
-        "roughness": collapse.roughness(x, mean_stress, h),
+        "roughness": pile.roughness(x, mean_stress, h),
     }
 
 

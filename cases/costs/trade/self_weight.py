@@ -26,7 +26,7 @@ def run(form: str, h: float, inertia: str, increments: int, **options: object) -
         scene.gravity((0.0, -G))
         motion = tawami.Dynamics(scene, gamma=1.0)
         motion.run(increments * PERIOD, PERIOD)
-    height, stress = self_weight.errors(scene)
+    height, stress = self_weight.errors(scene, form)
     return {"height": 1 + height, "stress": stress}
 
 

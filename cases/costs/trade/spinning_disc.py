@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import tawami
-from cases.verification import spinning_disc
-from cases.verification.spinning_disc import Kind
+from cases.verification.spinning_disc import disc
+from cases.verification.spinning_disc.disc import Kind
 
 
 def run(form: str, transfer: Any, n: int, steps: int, **options: Any) -> dict[str, float]:
     """Largest changes, as shares, of the momenta; change of the energy; rms error of the mean stress."""
-    spun = spinning_disc.solve(Kind(form, transfer, form, ""), turns=1, steps=steps, n=n, **options)
+    spun = disc.solve(Kind(form, transfer, form, ""), turns=1, steps=steps, n=n, **options)
     return {
         "momentum": max(spun.linear),
         "angular momentum": spun.drift,

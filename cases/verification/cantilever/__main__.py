@@ -19,7 +19,7 @@ from cases.verification.cantilever import figures, mpm
 from cases.verification.cantilever.beam import COLUMNS, Row
 from cases.verification.cantilever.report import paper_support, report
 from cases.verification.cantilever.study import CELLS, runs
-from tawami.results.output import write_grid, write_particles
+from tawami.results.single import write_grid, write_particles
 
 #: Methods whose fields are drawn: form and alpha, by the title of the panel.
 FIELDS = {

@@ -5,8 +5,8 @@ The weights are found by non-negative least squares (Piazzon, Sommariva and Vian
 
 from __future__ import annotations
 
-import math
 from contextlib import suppress
+from functools import reduce
 from itertools import product
 
 import numpy as np
@@ -14,8 +14,8 @@ import numpy as np
 from tawami.body.points import DEGREE, Array, Mask
 from tawami.grid.space import PLANE
 
-#: Exponents of the monomials up to the degree of the rule.
-EXPONENTS = [e for e in product(range(DEGREE + 1), repeat=PLANE.dim) if sum(e) <= DEGREE]
+#: Exponents of the monomials up to the degree of the rule, monomials x axes.
+EXPONENTS = np.array([e for e in product(range(DEGREE + 1), repeat=PLANE.dim) if sum(e) <= DEGREE])
 #: Largest number of points that is left: the number of moments.
 MOST = len(EXPONENTS)
 #: Largest error of the moments, relative to the area.
@@ -57,8 +57,8 @@ def _monomials(x: Array) -> Array:
     low, high = x.min(axis=0), x.max(axis=0)
     t = (2 * x - low - high) / np.maximum(high - low, np.finfo(float).tiny)
     powers = t[:, :, None] ** np.arange(DEGREE + 1)
-    columns = [math.prod(powers[:, k, n] for k, n in enumerate(e)) for e in EXPONENTS]
-    return np.column_stack(columns)
+    factors = (powers[:, axis, e] for axis, e in enumerate(EXPONENTS.T))
+    return np.ascontiguousarray(reduce(np.multiply, factors))
 
 
 def _fitted(functions: Array, moments: Array, weight: Array) -> tuple[Array, float]:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from tawami import _rust
-from tawami.base import ranks
+from tawami.base import program, ranks
 from tawami.base.checks import number, one_of, pair, point, room, shown, whole_number
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
@@ -57,7 +57,7 @@ class Grid(Unique):
                 f"comm = {shown(comm)}: expected a communicator, such as mpi4py's MPI.COMM_WORLD"
             )
         check_process()
-        ranks.watch(comm)
+        program.watch(comm)
         self.comm = comm
         self.space = PLANE
         self.origin = point("origin", origin)
@@ -93,7 +93,7 @@ class Grid(Unique):
         return " x ".join(f"[{low:g}, {high:g}]" for low, high in ends)
 
     def identity(self) -> dict[str, Any]:
-        """What tells it from another grid, for checkpoints."""
+        """What distinguishes it from another grid, for checkpoints."""
         return {"grid": [list(self.origin), self.h, list(self.cells)]}
 
     @property

@@ -13,8 +13,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from tawami.base import ranks
-from tawami.base.files import result_folder, whole_file
+from tawami.base import program, ranks
+from tawami.base.files import atomic_file, result_folder
 from tawami.fem import environment
 from tawami.form.form import Form
 from tawami.form.kinematics import Kinematics, StrainMeasure
@@ -101,7 +101,7 @@ def git(folder: Path) -> dict[str, Any] | None:
         command = ["git", "-C", str(folder), *words]
         run = subprocess.run(
             command, capture_output=True, text=True, check=True, timeout=PATIENCE,
-            stdin=subprocess.DEVNULL, env=ranks.own_environment(),
+            stdin=subprocess.DEVNULL, env=program.own_environment(),
         )  # fmt: skip
         return run.stdout.strip()
 
@@ -158,5 +158,5 @@ def _bytes(path: Path) -> bytes | None:
 
 def _write(path: Path, content: bytes | None) -> None:
     if content is not None:
-        with whole_file(path) as part:
+        with atomic_file(path) as part:
             part.write_bytes(content)

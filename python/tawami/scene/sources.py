@@ -186,7 +186,8 @@ def earlier(path: str | Path, *, outside: Outside = "stop") -> Earlier:
             "checkpoint, ending in .npz, or a folder of results with checkpoints"
         )
     if file.suffix == ".npz":
-        arrays = archive.read(file)["scene"]["particles"]
+        _, state = archive.read(file)
+        arrays = state["scene"]["particles"]
         number = arrays["number"][:, 0].astype(np.int64)
         return Earlier(name, arrays["x"], number, arrays, outside)
     import meshio
