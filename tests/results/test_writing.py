@@ -23,7 +23,9 @@ from cases import figure
 from tawami.base.files import atomic_file, result_folder
 from tawami.results.single import write_grid, write_particles
 from tawami.study import process
-from tawami.study.table import COSTS, Row, Table
+from tawami.study.figure import picture
+from tawami.study.row import COSTS, Row
+from tawami.study.table import Table
 
 BEFORE = "before"
 
@@ -63,7 +65,7 @@ WRITERS = {
     "p.vtu": lambda path, solution: write_particles(path, solution),
     "g.vtu": lambda path, solution: write_grid(path, solution),
     "figure.png": lambda path, _: drawn(path),
-    "study.png": lambda path, _: table().draw(path),
+    "study.png": lambda path, _: picture(table(), path),
     "study.csv": lambda path, _: csv(path),
 }
 
@@ -156,7 +158,7 @@ def runs(n: int) -> dict[str, float]:
 def test_a_study_without_room(folder, monkeypatch):
     """A line that does not fit is taken back; the runs before it are still there, and it goes on."""
     outcome = {"values": runs(1)} | dict.fromkeys(COSTS, 1.0)
-    monkeypatch.setattr(process, "measured", lambda *_: outcome)
+    monkeypatch.setattr(process, "measure", lambda *_: outcome)
     study = tawami.Study("toy", runs, {"n": (1,)}, {"x": 1.0}, folder=folder)
     kept = folder / "runs.jsonl"
     kept.write_text('{"label": "other", "knobs": {}, "fingerprint": "0"}\n')

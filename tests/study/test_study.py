@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 import tawami
 from tawami.study import Row, Series, Table
-from tawami.study.table import error_of
+from tawami.study.row import error_of
 
 MB = 2**20
 
@@ -235,7 +235,7 @@ def test_the_cheapest_setting_within_a_tolerance(tmp_path):
         tawami.recommend(table, 1e-6)
     with pytest.raises(tawami.InputError, match="quantity 'y' of study 'toy': expected one of 'x'"):
         tawami.recommend(table, {"y": 0.1})
-    with pytest.raises(tawami.InputError, match=r"nowhere.csv.*expected a CSV file"):
+    with pytest.raises(tawami.InputError, match=r"nowhere.csv.*expected the CSV file"):
         tawami.recommend(tmp_path / "nowhere.csv", 0.1)
 
 
@@ -272,7 +272,7 @@ def test_a_quantity_that_no_run_returns_and_a_study_that_was_not_run(tmp_path):
     study = tawami.Study("toy", converges, {"n": (1,)}, {"z": 1.0}, folder=tmp_path)
     with pytest.raises(tawami.InputError, match="nothing has been run"):
         study.table()
-    with pytest.raises(tawami.InputError, match="no quantity 'z' among what its function returned"):
+    with pytest.raises(tawami.InputError, match="its function returned no quantity 'z'"):
         study.run(quiet=True)
 
 
