@@ -1,4 +1,7 @@
-"""Observers of a run: files, checkpoints, log and pictures."""
+"""Results of a run: files, tables, checkpoints, log and pictures, made by observers of its phases.
+
+`tawami.results.plot.plot` draws a run.
+"""
 
 from tawami.results.output import Output
 from tawami.results.outputs import GridOutput, ParticleOutput
