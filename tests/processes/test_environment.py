@@ -41,7 +41,7 @@ mpm.build("u", "paper", 2)
 
 
 def test_a_closed_pipe_prints_no_page_about_a_crash():
-    code = "from cases.verification.cantilever import mpm; import sys; [print('x' * 200) for _ in range(9999)]"
+    code = "import tawami, sys; [print('x' * 200) for _ in range(9999)]"
     command = f"'{sys.executable}' -c \"{code}\" | head -n 1"
     run = subprocess.run(
         command, shell=True, cwd=ROOT, capture_output=True, text=True, check=True,
