@@ -16,6 +16,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from tawami.base.arrays import Array
 from tawami.base.checks import one_of, shown
 from tawami.base.errors import InputError
 
@@ -98,6 +99,6 @@ def lattice(along: Sequence[npt.NDArray[Scalar]]) -> npt.NDArray[Scalar]:
     return np.stack([c.ravel(order="F") for c in np.meshgrid(*along, indexing="ij")], axis=-1)
 
 
-def tensor_product(along: Sequence[npt.NDArray[np.float64]]) -> npt.NDArray[np.float64]:
+def tensor_product(along: Sequence[Array]) -> Array:
     """Products of weights along each axis at the points of a lattice; x fastest."""
     return reduce(lambda inner, outer: np.outer(outer, inner).ravel(), along)
