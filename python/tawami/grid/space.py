@@ -35,7 +35,7 @@ class Space:
     Attributes:
         axes: Names of the axes.
         volume: Unit of the volume of a particle or a cell, in text.
-        depth: What extensive quantities refer to, in text after their unit.
+        depth: Text after the units of extensive quantities, which refer to a metre of depth.
     """
 
     axes: tuple[str, ...]
@@ -67,7 +67,7 @@ class Space:
         return h**self.dim
 
     def unit(self, unit: str) -> str:
-        """Unit of an extensive quantity: 'N per metre depth'."""
+        """Unit of an extensive quantity per metre depth: 'N per m'."""
         return unit + self.depth
 
     def axis(self, component: str) -> int:
@@ -90,7 +90,7 @@ class Space:
 PLANE = Space(
     axes=("x", "y"),
     volume="m2",
-    depth=" per metre depth",
+    depth=" per m",
 )
 
 
