@@ -225,7 +225,7 @@ def law_bytes(scene: tawami.Scene) -> int:
     """Bytes that the law's stage reads and writes once for this rank's particles, at least."""
     particles = scene.particles
     read = particles.stress.nbytes + particles.material.nbytes + len(particles) * (4 + 2 * 8)
-    return read + sum(data.nbytes for data in scene.configuration.domain.newton.data.values())
+    return read + sum(data.nbytes for data in scene.configuration.domain.responses.data.values())
 
 
 def copy_bandwidth(threads: int) -> float:
