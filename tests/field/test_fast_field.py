@@ -46,7 +46,7 @@ def reduced(scene, c):
     """P^T K P as the field side gives it to the solver, at increments c."""
     reduction = scene.reduction()
     scene.configuration.domain.newton.internal(c)
-    field, data = scene.configuration.domain.field, scene.configuration.domain.newton.data
+    field, data = scene.configuration.domain.assembly, scene.configuration.domain.responses.data
     start, columns, values = field.tangent(c, data, reduction).getValuesCSR()
     return csr_matrix((values, columns, start), shape=(reduction.size,) * 2).toarray()
 
@@ -147,7 +147,7 @@ for basis in ("quadratic_spline", "bilinear", "biquadratic"):
     total.update(scene.residual(c).tobytes() + scene.tangent(c).data.tobytes())
     domain, reduction = scene.configuration.domain, scene.reduction()
     for _ in range(3):
-        matrix = domain.field.tangent(c, domain.newton.data, reduction)
+        matrix = domain.assembly.tangent(c, domain.responses.data, reduction)
         total.update(matrix.getValuesCSR()[2].tobytes())
 print(total.hexdigest())
 """
@@ -176,14 +176,14 @@ def test_one_field_with_several_reductions_in_turn(random_scene):
     close(*[reduced(scene, c) for scene in scenes])
     values = []
     for scene, reduction in zip(scenes, reductions, strict=True):
-        matrix = scene.configuration.domain.field.tangent(
-            c, scene.configuration.domain.newton.data, reduction
+        matrix = scene.configuration.domain.assembly.tangent(
+            c, scene.configuration.domain.responses.data, reduction
         )
         vector = matrix.createVecLeft()
         vector.set(3.0)
         matrix.diagonalScale(vector, vector)
-        again = scene.configuration.domain.field.tangent(
-            c, scene.configuration.domain.newton.data, reduction
+        again = scene.configuration.domain.assembly.tangent(
+            c, scene.configuration.domain.responses.data, reduction
         )
         values.append(again.getValuesCSR()[2].sum())
     assert values[0] == pytest.approx(values[1], rel=1e-9)
@@ -208,9 +208,11 @@ def test_solving_again_with_other_supports():
 
 def test_arrays_that_do_not_fit_are_refused_and_never_panic(random_scene):
     scene = random_scene(form="u")
-    field, c = scene.configuration.domain.field, np.zeros(scene.num_coefficients)
+    field, c = scene.configuration.domain.assembly, np.zeros(scene.num_coefficients)
     scene.residual(c)
-    kernels = field._kernels(field.compiled.tangent, scene.configuration.domain.newton.data)
+    kernels = field._kernels(
+        field.attachment.compiled.tangent, scene.configuration.domain.responses.data
+    )
     volume = scene.particles.volume
     with pytest.raises(RuntimeError, match="a kernel of another rank"):
         field._assembler.vector(kernels, volume, c)

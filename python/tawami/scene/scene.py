@@ -431,7 +431,7 @@ class Scene(Elsewhere, Sealed, Unique):
         """Derivative of :meth:`residual` as the form's tangent gives it, before supports."""
         coefficients, domain = self._coefficients(coefficients), self.configuration.domain
         domain.newton.internal(coefficients)
-        return domain.field.unreduced_tangent(coefficients, domain.newton.data)
+        return domain.assembly.unreduced_tangent(coefficients, domain.responses.data)
 
     def _coefficients(self, values: Array) -> Array:
         coefficients = checks.array("coefficients", values, 1)

@@ -16,7 +16,7 @@ from tawami.form.kinematics import KINEMATICS
 from tawami.grid import edges
 from tawami.scene.absent import Elsewhere
 from tawami.scene.configuration import Configuration, Outcome
-from tawami.solve.newton import History
+from tawami.solve.measures import History
 
 Array = npt.NDArray[np.float64]
 
