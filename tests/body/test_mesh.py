@@ -10,8 +10,8 @@ from time import perf_counter
 import meshio
 import numpy as np
 import pytest
-from conftest import grid_of
 from mpi4py import MPI
+from scenes import grid_of
 from scipy.spatial import Delaunay
 
 import tawami

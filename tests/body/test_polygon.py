@@ -7,10 +7,10 @@ from math import factorial
 import numpy as np
 import pytest
 import shapely
-from conftest import FORMS, grid_of
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from mpi4py import MPI
+from scenes import FORMS, grid_of
 from scipy.spatial import ConvexHull, QhullError
 
 import tawami

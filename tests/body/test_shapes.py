@@ -6,10 +6,10 @@ import meshio
 import numpy as np
 import pytest
 import shapely
-from conftest import grid_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
+from scenes import grid_of
 
 import tawami
 

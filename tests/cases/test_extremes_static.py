@@ -7,8 +7,8 @@ import re
 
 import numpy as np
 import pytest
-from conftest import grid_of
 from mpi4py import MPI
+from scenes import grid_of
 
 import tawami
 from cases.extremes import __main__ as extremes

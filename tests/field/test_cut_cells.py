@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import BASES, grid_of
 from mpi4py import MPI
+from scenes import BASES, grid_of
 from scipy.interpolate import BSpline
 
 import tawami

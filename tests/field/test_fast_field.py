@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import BASES, FORMS, clouds, grid_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenes import BASES, FORMS, clouds, grid_of
 from scipy.sparse import csr_matrix, identity
 
 import tawami

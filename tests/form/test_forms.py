@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from conftest import FINITE, FORMS, grid_of
+from scenes import FINITE, FORMS, grid_of
 from ufl import SpatialCoordinate, div, dot, grad, inner, sym
 
 import tawami

@@ -22,10 +22,10 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
-from conftest import grid_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
+from scenes import grid_of
 
 import tawami
 from tawami.base.files import atomic_file, result_folder

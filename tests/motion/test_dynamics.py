@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from conftest import FINITE
 from mpi4py import MPI
+from scenes import FINITE
 
 import tawami
 from tawami.motion.dynamics import TRANSFERS

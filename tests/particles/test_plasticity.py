@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import FINITE, FORMS, grid_of
+from scenes import FINITE, FORMS, grid_of
 
 import tawami
 

@@ -1,4 +1,4 @@
-"""The documentation: whole, and true where that can be seen without building it."""
+"""The documentation: complete, and correct as far as that can be checked without building it."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_every_page_has_one_title_and_a_place():
     assert placed == set(PAGES) | GENERATED
 
 
-def test_links_lead_somewhere():
+def test_links_have_targets():
     labels = [x for t in PAGES.values() for x in re.findall(r"^:label: (\w+)$", t, re.MULTILINE)]
     assert len(labels) == len(set(labels)) > 30
     for name, text in PAGES.items():
@@ -59,7 +59,7 @@ def test_links_lead_somewhere():
         pages._check_links(name, text)
 
 
-def test_a_link_that_is_not_well_formed_is_refused():
+def test_a_malformed_link_is_rejected():
     with pytest.raises(executed.RunError, match="not well-formed"):
         pages._check_links("page", "see [it](https://nowhere)")
 
@@ -79,7 +79,7 @@ def test_files_and_symbols_that_pages_name_exist():
         "rust/basis.rs Basis::none",
     ],
 )
-def test_what_does_not_exist_is_told(reference):
+def test_a_missing_file_or_symbol_is_named(reference):
     assert reference.split()[-1].split(".")[-1].split("::")[-1] in sources.missing(reference)
 
 
@@ -104,13 +104,13 @@ def test_every_public_name_is_in_the_api():
     assert named <= set(tawami.__all__)
 
 
-def test_what_exists():
+def test_existing_names_are_found():
     assert pages.exists("tawami.scene.scene.Scene.solve")
     assert pages.exists("tawami.motion.stepping")
     assert not pages.exists("tawami.scene.scene.Scene.nothing")
 
 
-def test_every_class_of_error_and_warning_has_its_sentence():
+def test_every_class_of_error_and_warning_has_a_message():
     collected = messages.collected()
     kinds = {message.kind for message in collected}
     bases = {"TawamiError", "TawamiWarning"}  # never raised themselves
@@ -122,8 +122,8 @@ def test_every_class_of_error_and_warning_has_its_sentence():
     assert set(listed) == kinds
 
 
-def test_help_is_for_sentences_that_exist():
-    """Each heading is a part of a sentence of the code, with dots for what is filled in."""
+def test_help_is_for_messages_that_exist():
+    """Each heading is part of a message of the code, with dots for the values."""
     headings = re.findall(r"^### `(.+)`$", PAGES["messages"], flags=re.MULTILINE)
     assert len(headings) >= 25
     says = [re.sub(r"<.*?>", "...", message.says) for message in messages.collected()]
@@ -134,8 +134,8 @@ def test_help_is_for_sentences_that_exist():
         assert any(re.search(pattern, text) for text in says), heading
 
 
-def test_messages_are_found_where_they_stand():
-    """Some of each way to raise: with a name, through a helper, as a warning, from Rust."""
+def test_messages_of_every_kind_are_found():
+    """Raised by name, through a helper, as a warning, from Rust."""
     found = {(message.kind, message.says) for message in messages.collected()}
     for kind, says in (
         ("InputError", "edge <shown(name)>: expected 'left', 'right', 'bottom' or 'top'"),
@@ -146,7 +146,7 @@ def test_messages_are_found_where_they_stand():
         assert (kind, says) in found
 
 
-def test_code_of_a_page_is_run_and_must_end_as_it_says():
+def test_code_of_a_page_is_run_and_must_raise_what_it_says():
     printed = executed.run_blocks([("", "x = 2"), ("", "print(x + 1)"), ("ValueError", "int('x')")])
     assert printed[1] == "3\n"
     assert printed[2].startswith("ValueError: invalid literal")
@@ -156,7 +156,7 @@ def test_code_of_a_page_is_run_and_must_end_as_it_says():
         executed.run_blocks([("ValueError", "1 + 1")])
 
 
-def test_nothing_runs_twice_unless_its_sources_changed(tmp_path):
+def test_code_is_run_again_only_if_its_sources_changed(tmp_path):
     runs = []
 
     def work():
@@ -172,11 +172,11 @@ def test_nothing_runs_twice_unless_its_sources_changed(tmp_path):
 
     with pytest.raises(executed.RunError):
         executed.kept(tmp_path / "case", "c", fail)
-    executed.kept(tmp_path / "case", "c", work)  # a failure is no record
+    executed.kept(tmp_path / "case", "c", work)  # a failure is not kept
     assert len(runs) == 3
 
 
-def test_a_fingerprint_follows_its_files():
+def test_a_fingerprint_depends_on_its_files():
     one = executed.fingerprint(["forms/*.py"])
     assert one == executed.fingerprint(["forms/*.py"])
     assert one != executed.fingerprint(["forms/u*.py", "Cargo.lock"])
@@ -205,7 +205,7 @@ def tried():
     ]  # fmt: skip
 
 
-def test_a_part_of_the_compatibility(tried):
+def test_a_part_of_the_table_of_compatibility(tried):
     refused = {(cell.form, cell.law): cell.says for cell in tried if cell.error}
     assert set(refused) == {("u_p", "mohr_coulomb"), ("u_epsv_finite", "NumpyLaw")}
     assert {cell.error for cell in tried if cell.error} == {"InputError"}
@@ -213,15 +213,15 @@ def test_a_part_of_the_compatibility(tried):
     assert "expected a law in Rust" in refused["u_epsv_finite", "NumpyLaw"]
 
 
-def test_a_block_of_a_linear_law_is_pressed_as_by_hand(tried):
-    """K, mu once more: with free sides sigma_yy = E/(1 - nu^2) eps_yy; finite strain, less 1 %."""
+def test_the_stress_of_a_compressed_block_is_the_closed_form(tried):
+    """With free sides sigma_yy = E/(1 - nu^2) eps_yy; finite strain differs by 1 %."""
     exact = compatibility.E / (1 - compatibility.NU**2) * compatibility.PRESSED
     for cell in tried:
         if (cell.law, cell.time, cell.error) == ("linear_elastic", "static", ""):
             assert cell.numbers[0] == pytest.approx(exact, rel=0.03)
 
 
-def test_the_table_shows_what_was_found(tried):
+def test_the_table_shows_every_attempt(tried):
     text = compatibility.page(tried, {1: 1.0})
     assert text.count("| works |") + text.count("| works ") >= 6
     assert text.count("refused 1") == text.count("refused 2") == 2
@@ -230,7 +230,7 @@ def test_the_table_shows_what_was_found(tried):
     )
 
 
-def test_ranks_that_differ_are_told():
+def test_ranks_that_differ_are_found():
     one = compatibility.Cell("u", "von_mises", "static", 1, numbers=(1.0, 2.0))
     two = compatibility.Cell("u", "von_mises", "static", 2, numbers=(1.0, 2.2))
     assert compatibility.difference([one, two]) == pytest.approx(0.1)
@@ -247,8 +247,8 @@ def test_the_matrix_of_the_readme_has_the_columns_of_make_matrix():
     assert "SUITES:-bookworm trixie sid}" in script
 
 
-def test_make_matrix_says_what_it_needs():
-    """Whichever comes first here: root, its tools, or a suite that it knows."""
+def test_make_matrix_names_what_is_missing():
+    """Root, its tools, or a suite that it knows, whichever is missing first."""
     script = sources.ROOT / "tests" / "matrix.sh"
     run = subprocess.run(
         [script], env=os.environ | {"SUITES": "buster"}, capture_output=True, text=True, check=False

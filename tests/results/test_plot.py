@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 from PIL import Image
+from programs import python
+from runs import look
 
 import tawami
-from tawami.motion.observer import Snapshot
 from tawami.results import film as pictures
 from tawami.results import provenance
 from tawami.results.frame import Frame
@@ -27,7 +26,7 @@ def scene():
 
 
 def run_of(folder, scene, *, phases=("ramp", "motion"), frames=5):
-    """A block that moves to the right and is pressed more and more, without any solving."""
+    """Write a block that moves to the right under a growing stress, without solving anything."""
     x = np.array(scene.particles.x)
     output = tawami.ParticleOutput("stress", "mean stress", "displacement")
     table = tawami.TableOutput("run-out", "particles", "Newton iterations")
@@ -40,7 +39,7 @@ def run_of(folder, scene, *, phases=("ramp", "motion"), frames=5):
             scene.particles.stress[:, :2] = [-1e4 * step, -2e4 * step]
             scene.particles.stress[:, 3] = 3e4 * x[:, 1]
             for writer in (output, table):
-                writer.observe(Snapshot(scene, None, 0.25 * step, step, step == frames - 1))
+                look(writer, scene, None, 0.25 * step, step, last=step == frames - 1)
     scene.particles.move_to(x)
 
 
@@ -58,7 +57,7 @@ def test_a_run_is_drawn_from_its_files(scene, tmp_path):
             assert getattr(image, "n_frames", 1) == (5 if name.endswith("gif") else 1)
 
 
-def test_colours_and_view_stay_and_the_body_moves(scene, tmp_path):
+def test_a_movie_has_one_scale_of_colours_and_one_view(scene, tmp_path):
     run_of(tmp_path, scene, phases=("motion",))
     film = next(path for path in plot(tmp_path) if path.suffix == ".gif")
     with Image.open(film) as image:
@@ -76,7 +75,7 @@ def test_colours_and_view_stay_and_the_body_moves(scene, tmp_path):
     np.testing.assert_allclose(steps, steps.mean(), rtol=0.05)
 
 
-def test_what_a_quantity_may_be(scene, tmp_path):
+def test_components_and_norms_can_be_drawn(scene, tmp_path):
     run_of(tmp_path, scene, phases=("motion",), frames=2)
     drawn = plot(tmp_path, quantity="stress xx", movie=None)
     assert [path.name for path in drawn] == ["motion-stress-xx.png", "motion-table.png"]
@@ -98,14 +97,14 @@ def test_what_a_quantity_may_be(scene, tmp_path):
         plot(tmp_path, quantity="strss")
 
 
-def test_units_of_the_colours():
+def test_large_stresses_are_shown_in_kpa_or_mpa():
     assert pictures._scaled("Pa", 2.5e4) == ("kPa", 1e3)
     assert pictures._scaled("Pa", 2.5e6) == ("MPa", 1e6)
     assert pictures._scaled("Pa", 20.0) == ("Pa", 1.0)
     assert pictures._scaled("m/s", 2e4) == ("m/s", 1.0)
 
 
-def test_folders_that_cannot_be_drawn(scene, tmp_path):
+def test_a_folder_that_cannot_be_drawn_is_rejected(scene, tmp_path):
     with pytest.raises(
         tawami.InputError, match=r"run.json' cannot be read .*: expected the folder of a run"
     ):
@@ -126,11 +125,11 @@ def test_folders_that_cannot_be_drawn(scene, tmp_path):
         plot(tmp_path)
 
 
-def test_what_is_missing_is_named(scene, tmp_path, monkeypatch):
+def test_a_missing_package_or_program_is_named(scene, tmp_path, monkeypatch):
     run_of(tmp_path, scene, phases=("motion",), frames=2)
     code = "import sys; sys.modules['matplotlib'] = None\nfrom tawami.results.plot import plot\n"
     code += f"plot({str(tmp_path)!r})"
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    run = python("-c", code)
     assert "MissingDependencyError: pictures need matplotlib: pip install" in run.stderr
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(

@@ -9,7 +9,7 @@ import subprocess
 import sys
 
 import pytest
-from conftest import FINITE, FORMS, grid_of
+from scenes import FINITE, FORMS, grid_of
 
 import tawami
 from tawami.fem import dolfinx

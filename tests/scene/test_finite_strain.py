@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import BASES, FINITE, greville, grid_of, linear_field
+from scenes import BASES, FINITE, greville, grid_of, linear_field
 from scipy.linalg import expm
 from scipy.optimize import root
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import grid_of
 from mpi4py import MPI
+from scenes import grid_of
 
 import tawami
 from tawami.results.single import write_particles

@@ -6,10 +6,10 @@ import gc
 
 import numpy as np
 import pytest
-from conftest import grid_of
 from hypothesis import given
 from hypothesis import strategies as st
 from mpi4py import MPI
+from scenes import grid_of
 
 import tawami
 from tawami import _rust

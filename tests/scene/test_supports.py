@@ -8,10 +8,10 @@ import sys
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from conftest import greville, grid_of
 from hypothesis import given
 from hypothesis import strategies as st
 from mpi4py import MPI
+from scenes import greville, grid_of
 
 import tawami
 from tawami import _rust

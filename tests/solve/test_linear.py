@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import grid_of
+from scenes import grid_of
 from scipy.sparse import csr_matrix
 from ufl import div, dot, grad, inner
 
