@@ -43,8 +43,8 @@ class Recorder(Output):
         self.began.append((folder.name, state))
         self.seen = [] if state is None else [tuple(one) for one in state["seen"]]
 
-    def observe(self, snapshot):
-        self.seen.append((snapshot.time, snapshot.step, snapshot.last))
+    def observe(self, moment):
+        self.seen.append((moment.time, moment.step, moment.last))
 
     def state(self):
         return {"seen": self.seen}
@@ -122,7 +122,7 @@ def drive(motion, outputs, folder, steps, *, first=0, dt=0.004, states=None, see
         if seen is not None:
             seen(motion, solution, step)
         for output in outputs:
-            look(output, motion, solution, motion.time, step, last=step == steps)
+            look(output, motion.scene, motion, solution, motion.time, step, last=step == steps)
 
 
 def write_everything(folder: str | Path) -> None:
@@ -138,9 +138,9 @@ def write_everything(folder: str | Path) -> None:
     drive(plastic_block(), outputs, Path(folder), 12)
 
 
-def look(output, subject, solution, time, step, *, last):
+def look(output, scene, motion, solution, time, step, *, last):
     """Show an output the state after a step."""
-    output.observe(Snapshot(subject, solution, time, step, last))
+    output.observe(Snapshot(motion or scene, solution, time, step, last))
 
 
 def static_scene(form="u_epsv", **options) -> tawami.Scene:

@@ -23,7 +23,8 @@ from tawami.base.errors import (
     TawamiWarning,
 )
 from tawami.base.program import run
-from tawami.body.body import Body, box
+from tawami.body.body import Body
+from tawami.body.box import box
 from tawami.body.disc import disc
 from tawami.body.level_set import level_set
 from tawami.body.mesh import mesh

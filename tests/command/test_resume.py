@@ -33,7 +33,8 @@ def test_a_script_is_run_again_where_it_was_run(script, results, here):
     assert run.returncode == 0, run.stderr
     line, first, environment, ranks = run.stdout.splitlines()
     assert line == (
-        f"tawami resume: runs {script} ranks in '{script.parent}' on 1 rank, from the results in '{results}'"
+        f"tawami resume: runs {script} ranks in '{script.parent}' on 1 rank, from the results in "
+        f"'{results}'"
     )
     assert f"{[str(script), 'ranks']} {script.parent} {script.parent}" in first
     assert (environment, ranks) == ("resume None", "ranks 1")
@@ -64,7 +65,10 @@ def test_a_run_that_cannot_be_resumed_is_rejected(rejected, script, results):
         (json.dumps(described(script, arguments=[1])), "arguments are [1]"),
         (json.dumps(described(script, directory=None)), "directory is None"),
         (json.dumps(described(script, script=None)), "it was an interactive session, not a script"),
-        (json.dumps(described(script, directory="/nowhere")), "started in '/nowhere', which does not exist"),
+        (
+            json.dumps(described(script, directory="/nowhere")),
+            "started in '/nowhere', which does not exist",
+        ),
     ]:
         file.write_text(text)
         said = rejected("resume", results)

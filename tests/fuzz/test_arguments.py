@@ -131,7 +131,7 @@ def solved(scene: tawami.Scene, method: str) -> Callable[..., Any]:
 
     def call(**arguments: Any) -> None:
         getattr(scene, method)(**arguments)
-        if any(support.velocity is not None for support in scene.supports.all):
+        if any(support.velocity is not None for support in scene.configuration.supports.all):
             tawami.Dynamics(scene).step(0.01)
         else:
             scene.solve()
@@ -271,7 +271,7 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         kind.__name__: (in_folder(observed(kind)), {
             "path": "output", "quantity": quantity, "every": 0.5, "phases": ["ramp"]} | more)
         for kind, quantity, more in (
-            (tawami.ParticleOutput, "stress", {"name": "points"}),
+            (tawami.ParticleOutput, "stress", {}),
             (tawami.GridOutput, "stress", {"projection": "lumped"}),
             (tawami.TableOutput, "run-out", {}))
     },
@@ -326,7 +326,7 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         "name": "toy", "function": run_of, "knobs": {"n": (1, 2)}, "reference": {"x": 1.0},
         "finest": {"n": 3}, "beside": (), "colour": "n", "folder": None}),
     "Study.run": (studied, {"sample": 1, "seed": 0, "limit": 10.0, "quiet": True}),
-    "recommend": (tawami.recommend, {"study": Path("cases/trade/cook.csv"), "tolerance": 0.1,
+    "recommend": (tawami.recommend, {"study": Path("cases/costs/trade/cook.csv"), "tolerance": 0.1,
                                      "cost": "wall_s"}),
     "run, a driver": (tawami.run, {"main": lambda: None, "name": "toy"}),
     "write_particles": (in_folder(write_particles), {"path": "p.vtu", "solution": scene_of().solve()}),

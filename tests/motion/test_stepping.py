@@ -109,7 +109,7 @@ def test_a_load_beyond_the_strength_stops_where_it_is_reached_and_can_go_on():
     reached = scene.particles.stress[:, 0].mean() / -2.0
     assert reached == pytest.approx(1 / np.sqrt(3), rel=0.01)
     assert "of the load, with the smallest step" in error.value.__notes__[0]
-    scene.loads.tractions.clear()
+    scene.configuration.loads.tractions.clear()
     assert scene.solve().reaction("left") == pytest.approx([0.0, 0.0], abs=1e-6)
 
 
@@ -170,7 +170,7 @@ def test_an_edge_does_not_move_the_body_away_from_its_functions():
 def test_a_point_of_the_border_is_held_on_its_way_and_found_by_its_names():
     """Half a cell further its cell has lost its particles, its functions have not."""
     scene = block()
-    scene.supports.all.clear()
+    scene.configuration.supports.all.clear()
     points = [(0.999, 0.1), (0.999, 0.9)]
     for point in points:
         scene.hold(point, "x", 0.2)
@@ -179,7 +179,7 @@ def test_a_point_of_the_border_is_held_on_its_way_and_found_by_its_names():
     assert len(steps) == 10
     assert scene.particles.displacement[:, 0] == pytest.approx(np.full(64, 0.2), abs=1e-8)
     solution = scene.solve()
-    x, y = scene.supports.all[0].place
+    x, y = scene.configuration.supports.all[0].place
     assert (x, y) == pytest.approx((1.199, 0.1), abs=1e-8)
     for place in (points[0], (x, y)):
         assert solution.reaction(place) == pytest.approx([0.0, 0.0], abs=1e-6)

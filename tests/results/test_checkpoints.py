@@ -48,7 +48,7 @@ def test_any_damage_to_a_file_is_found(tmp_path, data):
     state = {"a": np.arange(30.0), "b": [1, {"c": np.array([[np.nan, -0.0]])}], "d": None, "e": 0.1}
     archive.write(path, {"run": 1}, state)
     whole = path.read_bytes()
-    assert str(archive.read(path)) == str(({"run": 1}, state))
+    assert str(archive.read(path)[1]) == str(state)
     if data.draw(st.booleans()):
         damaged = whole[: data.draw(st.integers(0, len(whole) - 1))]
     else:
@@ -57,10 +57,11 @@ def test_any_damage_to_a_file_is_found(tmp_path, data):
         damaged = whole[:at] + bytes([flipped]) + whole[at + 1 :]
     path.write_bytes(damaged)
     try:
-        found = archive.read(path)
+        identity, found = archive.read(path)
     except tawami.CheckpointError:
         return
-    assert str(found) == str(({"run": 1}, state))  # a date, or another byte without meaning
+    assert identity == {"run": 1}
+    assert str(found) == str(state)  # a date, or another byte without meaning
 
 
 @pytest.mark.parametrize(

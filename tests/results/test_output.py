@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import tawami
-from cases.cantilever import mpm
+from cases.verification.cantilever import mpm
 from tawami.base.files import atomic_file, result_folder
-from tawami.results import write_grid, write_particles
+from tawami.results.single import write_grid, write_particles
 
 
 @pytest.fixture(scope="module")

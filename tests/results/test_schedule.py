@@ -41,7 +41,7 @@ def observed(output, scene, times, state=None, first=0):
     """Show an output the steps at these times, the last as the end of its phase."""
     output.begin(Path(), scene, state)
     for step in range(first, len(times)):
-        look(output, scene, None, times[step], step, last=step == len(times) - 1)
+        look(output, scene, None, None, times[step], step, last=step == len(times) - 1)
 
 
 @pytest.mark.fuzz
@@ -62,7 +62,7 @@ def test_the_first_step_at_or_after_each_multiple_is_written(scene, every, sizes
     first, second = Times(every=every), Times(every=every)
     first.begin(Path(), scene, None)
     for step in range(cut + 1):
-        look(first, scene, None, times[step], step, last=False)
+        look(first, scene, None, None, times[step], step, last=False)
     observed(second, scene, times, json.loads(json.dumps(first.state())), first=cut)
     assert sorted(first.times + second.times) == sorted(wanted)
 

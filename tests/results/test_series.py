@@ -36,6 +36,7 @@ def written(tmp_path_factory):
     motion = plastic_block()
     outputs = [
         tawami.ParticleOutput(*FIELDS, every_steps=2),
+        tawami.ParticleOutput(*FIELDS, every_steps=2, name="raw"),
         tawami.GridOutput("velocity", "particles", every_steps=5),
         tawami.TableOutput(
             "energies", "reaction bottom", "run-out", "momentum", "angular momentum", "particles",
@@ -169,14 +170,14 @@ def test_reactions_balance_the_loads(tmp_path):
     outputs = [grid_output, tawami.TableOutput(*names)]
     for output in outputs:
         output.begin(tmp_path, scene, None)
-        look(output, scene, None, 0.0, 0, last=False)
+        look(output, scene, None, None, 0.0, 0, last=False)
     parts = []
 
     def each(solution):
         parts.append(solution)
         for output in outputs:
             part = len(parts) / 4
-            look(output, scene, solution, part, len(parts), last=part == 1.0)
+            look(output, scene, None, solution, part, len(parts), last=part == 1.0)
 
     tawami.ramp(scene, 0.25, each=each)
     series = pvd(tmp_path / "grid.pvd")

@@ -20,7 +20,7 @@ from programs import python, small_files
 from scenes import grid_of
 
 import tawami
-from cases import figure
+from cases.common import figure
 from tawami.base.files import atomic_file, result_folder
 from tawami.results.single import write_grid, write_particles
 from tawami.study import process

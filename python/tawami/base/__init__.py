@@ -1,6 +1,7 @@
-"""All that knows no mechanics: errors, checks of input, ranks, PETSc handles, signals, files, timing."""
+"""What knows no mechanics: errors, input checks, ranks, PETSc handles, signals, files, timing."""
 
+from tawami.base import dependencies  # isort: skip  # before any other module imports MPI or PETSc
 from tawami.base.files import atomic_file, result_folder
 from tawami.base.program import run
 
-__all__ = ["atomic_file", "result_folder", "run"]
+__all__ = ["atomic_file", "dependencies", "result_folder", "run"]

@@ -101,7 +101,7 @@ def ramp(
             )
     finally:
         if pace.at < 1.0:
-            scene.accept(pace.at)
+            scene.configuration.accept(pace.at)
 
 
 def settle(
@@ -137,7 +137,7 @@ def settle(
         )
     pace, steps = Pace(0.0, 1.0), list[Step]()
     with (
-        scene.tolerance_of(max(0.1 * tolerance, 1e-14)),
+        scene.configuration.tolerance(max(0.1 * tolerance, 1e-14)),
         observed(results, "settle", scene, max_resets, "resets") as observer,
     ):
         observer.begin(pace, steps)

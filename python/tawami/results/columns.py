@@ -7,20 +7,19 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-import numpy.typing as npt
 from mpi4py import MPI
 
 from tawami import _rust
 from tawami.base import checks
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError, NotModelledError
 from tawami.grid import edges
 from tawami.motion.energy import Energies
 from tawami.motion.observer import Motion, Snapshot, Subject
 from tawami.results.quantities import body_view
+from tawami.scene.reactions import supported_edge
 from tawami.scene.scene import Scene
-from tawami.scene.solution import supported_edge, supported_edges
 
-Array = npt.NDArray[np.float64]
 #: Particles that a linear fit of displacements around a point uses at finite strain.
 NEIGHBOURS = 12
 
@@ -126,11 +125,11 @@ def _reaction(name: str, place: str, scene: Scene) -> Columns:
     at: str | tuple[float, float] = place
     if place.startswith("("):
         at = _point(name, place)
-        held = [s for s in scene.supports.all if not isinstance(s.place, str)]
+        held = [s for s in scene.configuration.supports.all if not isinstance(s.place, str)]
         if not any(np.allclose(at, known) for s in held for known in (s.place, s.given)):
             raise InputError(f"{name}: no point is held there: expected hold({at}, ...) before")
     else:
-        supported_edge(place, supported_edges(scene.supports))
+        supported_edge(place, scene.configuration.supports.supported_edges)
 
     def of(now: Snapshot, _: float) -> list[float]:
         if now.solution is None:
@@ -157,7 +156,7 @@ def _displacement(name: str, point: tuple[float, float], scene: Scene) -> Column
     def of(now: Snapshot, _: float) -> list[float]:
         if moves:
             return list(displacement_near(now.scene, point, name))
-        u = now.scene.split(now.scene.gap)[0]
+        u = now.scene.split(now.scene.configuration.before)[0]
         return list(_rust.interpolate(location, now.scene.basis, 2, u)[0])
 
     return Columns((f"{name} x [m]", f"{name} y [m]"), of)

@@ -7,7 +7,8 @@
 are on one side of the vertex, its error is of the size of the gradient times h. `consistent`, the L2
 projection, is exact for bilinear fields and may overshoot. Its matrix is singular if a cell has fewer
 than four particles: conjugate gradients start from `lumped` and do not change what no particle sees.
-Vertices without particles in their cells have the value NaN. `cases/projection.py` measures both errors.
+Vertices without particles in their cells have the value NaN. `cases/costs/projection.py` measures both
+errors.
 """
 
 from __future__ import annotations
@@ -15,13 +16,12 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks
+from tawami.base.arrays import Array
 from tawami.scene.scene import Scene
 
-Array = npt.NDArray[np.float64]
 Projection = Literal["lumped", "consistent"]
 #: Relative residual at which conjugate gradients end, and their largest number of iterations.
 SMALL, MOST = 1e-10, 200
@@ -73,7 +73,7 @@ def nodal(scene: Scene, values: Array, method: Projection = "lumped") -> Array:
 
 def _sums(scene: Scene, data: Array) -> Array:
     """sum_p V_p M_i data_p, vertices x columns."""
-    return scene.attached.sums(np.asarray(scene.particles.volume), data, "bilinear")
+    return scene.configuration.domain.sums(np.asarray(scene.particles.volume), data, "bilinear")
 
 
 def _conjugate_gradients(scene: Scene, start: Array, weight: Array, right: Array) -> Array:
@@ -81,7 +81,7 @@ def _conjugate_gradients(scene: Scene, start: Array, weight: Array, right: Array
 
     Every rank has complete vectors and does the same iterations.
     """
-    location = scene.attached.location
+    location = scene.configuration.domain.location
 
     def product(f: Array) -> Array:
         at_particles = [

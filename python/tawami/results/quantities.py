@@ -11,10 +11,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 
 from tawami import _rust
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError, NotModelledError
 from tawami.form.kinematics import FIELD_UNITS
 from tawami.grid import edges
@@ -26,7 +26,6 @@ from tawami.results.projection import Projection, nodal
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
 
-Array = npt.NDArray[np.float64]
 #: Arrays of the particles by name.
 View = Callable[[str], Array]
 
@@ -238,19 +237,19 @@ def _at_vertices(scene: Scene, coefficients: Array) -> Array:
 def _displacement(now: Snapshot) -> Array:
     """Displacement since the start; at finite strain, of the last step."""
     scene, solution = now.scene, now.solution
-    u = scene.split(scene.gap)[0] if solution is None else solution.u
+    u = scene.split(scene.configuration.before)[0] if solution is None else solution.u
     return _at_vertices(scene, u)
 
 
 def _bilinear(now: Snapshot) -> Array:
     scene, solution = now.scene, now.solution
-    values = scene.split(scene.gap)[1] if solution is None else solution.volumetric
+    values = scene.split(scene.configuration.before)[1] if solution is None else solution.volumetric
     return np.asarray(values)
 
 
 def _velocity(now: Snapshot) -> Array:
     """Velocity of the particles, weighted by mass, with its gradient; NaN without particles around."""
-    motion, attached = now.subject.motion, now.scene.attached
+    motion, attached = now.subject.motion, now.scene.configuration.domain
     assert motion is not None
     kept = motion.on_grid
     if kept is not None:  # a grid that is not reset has its own velocity
