@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tawami.base.ranks import mpirun
+from tawami.base.program import mpirun
 
 ROOT = Path(__file__).parents[1]
 PYTHONPATH = os.pathsep.join(

@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 import tawami
-from tawami.motion.observer import Moment
+from tawami.motion.observer import Snapshot
 from tawami.results.output import Output
 
 ELASTIC = tawami.linear_elastic(E=1e5, nu=0.4)
@@ -39,11 +39,11 @@ class Recorder(Output):
         self.began: list[tuple[str, object]] = []
         self.seen: list[tuple[float, int, bool]] = []
 
-    def begin(self, folder, scene, motion, state):
+    def begin(self, folder, subject, state):
         self.began.append((folder.name, state))
         self.seen = [] if state is None else [tuple(one) for one in state["seen"]]
 
-    def look(self, moment):
+    def observe(self, moment):
         self.seen.append((moment.time, moment.step, moment.last))
 
     def state(self):
@@ -116,7 +116,7 @@ def steps_in(path: Path) -> list[int]:
 def drive(motion, outputs, folder, steps, *, first=0, dt=0.004, states=None, seen=None):
     """Let outputs observe steps `first` to `steps` of a motion, the last as the end of its phase."""
     for k, output in enumerate(outputs):
-        output.begin(folder, motion.scene, motion, None if states is None else states[k])
+        output.begin(folder, motion, None if states is None else states[k])
     for step in range(first, steps + 1):
         solution = None if step == 0 else motion.step(dt)
         if seen is not None:
@@ -130,7 +130,7 @@ def write_everything(folder: str | Path) -> None:
     outputs = [
         tawami.ParticleOutput("number", "velocity", "plastic_strain", every_steps=4),
         tawami.GridOutput("velocity", "reaction", "stress", every_steps=4, projection="consistent"),
-        tawami.GridOutput("mean stress", "particles", name="lumped", format="xdmf"),
+        tawami.GridOutput("mean stress", "particles", name="lumped"),
         tawami.TableOutput(
             "energies", "momentum", "run-out", "displacement (0.0, 1.25)", "particles"
         ),
@@ -140,7 +140,7 @@ def write_everything(folder: str | Path) -> None:
 
 def look(output, scene, motion, solution, time, step, *, last):
     """Show an output the state after a step."""
-    output.look(Moment(scene, motion, solution, time, step, last))
+    output.observe(Snapshot(motion or scene, solution, time, step, last))
 
 
 def static_scene(form="u_epsv", **options) -> tawami.Scene:

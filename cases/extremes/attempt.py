@@ -120,7 +120,7 @@ def untouched(scene: tawami.Scene) -> Iterator[None]:
 def _arrays(scene: tawami.Scene) -> dict[str, Any]:
     particles = scene.particles
     names = ["x", "volume", "stress", "displacement"]
-    if scene.form.kinematics == "mixed":
+    if scene.form.kinematics.has_eps_v:
         names.append("eps_v")
     arrays = {name: np.array(getattr(particles, name)) for name in names}
     return arrays | {name: np.array(particles.history(name)) for name in particles.history_names}

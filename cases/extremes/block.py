@@ -64,7 +64,7 @@ def state(motion: tawami.Dynamics) -> dict[str, Array]:
     """Copies of all arrays of the particles, by name."""
     particles = motion.scene.particles
     arrays = {name: getattr(particles, name) for name in ("x", "volume", "stress", "displacement")}
-    if motion.scene.form.kinematics == "mixed":
+    if motion.scene.form.kinematics.has_eps_v:
         arrays["eps_v"] = particles.eps_v
     arrays |= {name: particles.history(name) for name in particles.history_names}
     arrays |= {

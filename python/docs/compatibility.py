@@ -185,8 +185,8 @@ def table(cells: Sequence[Cell], time: str, footnotes: dict[str, int]) -> str:
     for name in forms:
         form = Form.load(FORMS[name]["form"])
         entries = [_entry(mine[name, law], footnotes) for law in laws]
-        row = [f"`{FORMS[name]['form']}`" + name[len(FORMS[name]["form"]) :], form.kinematics]
-        lines.append("| " + " | ".join([*row, form.strain, *entries]) + " |")
+        row = [f"`{FORMS[name]['form']}`" + name[len(FORMS[name]["form"]) :], form.kinematics.name]
+        lines.append("| " + " | ".join([*row, form.strain.name, *entries]) + " |")
     return "\n".join(lines)
 
 

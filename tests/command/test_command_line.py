@@ -114,7 +114,7 @@ def test_the_new_script_of_dynamics_is_stopped_resumed_and_drawn(here, process, 
     path.write_text(text.replace("import tawami\n", "import os, signal\nimport tawami\n", 1))
     stopped = process("run", "slump.py", cwd=tmp_path, variables={"STOP": "1"})
     assert stopped.returncode == 143, stopped.stderr
-    assert "go on with: tawami resume results/slump" in stopped.stderr
+    assert "resume it with: tawami resume results/slump" in stopped.stderr
     again = here("run", "slump.py", cwd=tmp_path)
     assert again.returncode == 1
     assert "the folder holds a run" in again.stderr

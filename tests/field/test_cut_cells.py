@@ -9,7 +9,7 @@ from scenes import BASES, grid_of
 from scipy.interpolate import BSpline
 
 import tawami
-from cases import cut_cells
+from cases.showcase import cut_cells
 from tawami.field.reference import ghost
 from tawami.form.form import Form
 
@@ -62,7 +62,7 @@ def spline(n, h, coefficients, x):
 def test_it_is_the_integral_of_the_jumps(corner):
     """sum over sides of k mu h^3 int [u,nn].[u,nn], and of -k K^2/mu h^3 int [eps_v,n]^2."""
     scene, matrix = penalty(corner)
-    grid, layout = scene.grid, scene.attached.layout
+    grid, layout = scene.grid, scene.configuration.domain.layout
     (nx, ny), h = grid.cells, grid.h
     random = np.random.default_rng(2)
     a, b = random.standard_normal(nx + 2), random.standard_normal(ny + 2)
@@ -75,7 +75,7 @@ def test_it_is_the_integral_of_the_jumps(corner):
     law = tawami.linear_elastic(E=2.0, nu=0.4)
     K, mu = law.bulk_modulus, law.shear_modulus
     expected = 0.0
-    for (i, j), (p, q), _ in ghost.sides(scene.attached.field.active):
+    for (i, j), (p, q), _ in ghost.sides(scene.configuration.domain.field.active):
         if p > i:
             bend = [second_derivative(nx, h, a, x) for x in (p * h - 1e-9, p * h + 1e-9)]
             along = spline(ny, h, b, j * h + points)

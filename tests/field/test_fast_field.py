@@ -44,9 +44,9 @@ def close(a, b):
 
 def reduced(scene, c):
     """P^T K P as the field side gives it to the solver, at increments c."""
-    reduction = scene.problem().reduction
-    scene.attached.newton.internal(c)
-    field, data = scene.attached.field, scene.attached.newton.data
+    reduction = scene.reduction()
+    scene.configuration.domain.newton.internal(c)
+    field, data = scene.configuration.domain.field, scene.configuration.domain.newton.data
     start, columns, values = field.tangent(c, data, reduction).getValuesCSR()
     return csr_matrix((values, columns, start), shape=(reduction.size,) * 2).toarray()
 
@@ -97,7 +97,7 @@ def test_any_cloud_of_particles(data):
 
 @pytest.mark.parametrize("support", ["paper", "exact", "clamped"])
 def test_the_beam(support):
-    from cases.cantilever import mpm
+    from cases.verification.cantilever import mpm
 
     rows = [mpm.solve("u_epsv", support, 8, 0.1, assembly=p)[0] for p in ("fast", "reference")]
     assert rows[0].deflection_m == pytest.approx(rows[1].deflection_m, rel=1e-12)
@@ -145,9 +145,10 @@ for basis in ("quadratic_spline", "bilinear", "biquadratic"):
         scene.hold((0.71, 0.1 * row + 0.06), "y")
     c = np.random.default_rng(0).standard_normal(scene.num_coefficients)
     total.update(scene.residual(c).tobytes() + scene.tangent(c).data.tobytes())
-    field, reduction = scene.attached.field, scene.problem().reduction
+    domain, reduction = scene.configuration.domain, scene.reduction()
     for _ in range(3):
-        total.update(field.tangent(c, scene.attached.newton.data, reduction).getValuesCSR()[2].tobytes())
+        matrix = domain.field.tangent(c, domain.newton.data, reduction)
+        total.update(matrix.getValuesCSR()[2].tobytes())
 print(total.hexdigest())
 """
     outputs = set()
@@ -169,17 +170,21 @@ def test_one_field_with_several_reductions_in_turn(random_scene):
         scene.fix("left", "x")
         scene.hold((-0.9, 1.9), "y")
     close(*[reduced(scene, c) for scene in scenes])
-    reductions = [scene.problem().reduction for scene in scenes]
+    reductions = [scene.reduction() for scene in scenes]
     for scene in scenes:
         scene.hold((0.4, 1.3), "y")
     close(*[reduced(scene, c) for scene in scenes])
     values = []
     for scene, reduction in zip(scenes, reductions, strict=True):
-        matrix = scene.attached.field.tangent(c, scene.attached.newton.data, reduction)
+        matrix = scene.configuration.domain.field.tangent(
+            c, scene.configuration.domain.newton.data, reduction
+        )
         vector = matrix.createVecLeft()
         vector.set(3.0)
         matrix.diagonalScale(vector, vector)
-        again = scene.attached.field.tangent(c, scene.attached.newton.data, reduction)
+        again = scene.configuration.domain.field.tangent(
+            c, scene.configuration.domain.newton.data, reduction
+        )
         values.append(again.getValuesCSR()[2].sum())
     assert values[0] == pytest.approx(values[1], rel=1e-9)
 
@@ -203,9 +208,9 @@ def test_solving_again_with_other_supports():
 
 def test_arrays_that_do_not_fit_are_refused_and_never_panic(random_scene):
     scene = random_scene(form="u")
-    field, c = scene.attached.field, np.zeros(scene.num_coefficients)
+    field, c = scene.configuration.domain.field, np.zeros(scene.num_coefficients)
     scene.residual(c)
-    kernels = field._kernels(field.compiled.tangent, scene.attached.newton.data)
+    kernels = field._kernels(field.compiled.tangent, scene.configuration.domain.newton.data)
     volume = scene.particles.volume
     with pytest.raises(RuntimeError, match="a kernel of another rank"):
         field._assembler.vector(kernels, volume, c)

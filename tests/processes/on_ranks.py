@@ -14,12 +14,12 @@ from mpi4py import MPI
 from scenes import BASES, FORMS, grid_of
 
 import tawami
-from cases import collapse
-from cases.cantilever import fem, mpm
+from cases.showcase.collapse.pile import build as pile_of_rods
+from cases.verification.cantilever import fem, mpm
 from tawami import _rust
-from tawami.base.ranks import joined
+from tawami.base.ranks import allgathered
 from tawami.form.form import Form
-from tawami.results.output import write_grid, write_particles
+from tawami.results.single import write_grid, write_particles
 from tawami.solve.newton import Newton
 
 COMM = MPI.COMM_WORLD
@@ -117,7 +117,7 @@ def singular() -> dict[str, np.ndarray]:
 def motion() -> dict[str, np.ndarray]:
     """A pile that collapses, a block that slides to another rank, one that loses particles."""
     found = {}
-    pile = collapse.build("u_epsv_finite", h=0.02)
+    pile = pile_of_rods("u_epsv_finite", h=0.02)
     pile.run(0.006, 1e-3)
     found["motion pile momentum"] = pile.linear_momentum
     found["motion pile energy"] = np.array(pile.energies.dissipated)
@@ -151,10 +151,10 @@ def initial() -> dict[str, np.ndarray]:
         plastic.initial("stress", stress)
     except tawami.InputError as error:
         told = str(error)
-    assert "beyond what its law bears" in told
+    assert "beyond the yield surface" in told
     plastic.initial("stress", stress, beyond="return")
-    order = np.argsort(joined(grid.comm, plastic.particles.number))
-    found = {"initial stress": joined(grid.comm, np.array(plastic.particles.stress))[order]}
+    order = np.argsort(allgathered(grid.comm, plastic.particles.number))
+    found = {"initial stress": allgathered(grid.comm, np.array(plastic.particles.stress))[order]}
     scene = tawami.Scene(grid, ring, elastic, density=10.0)
     scene.initial("stress", lambda x, y: (4e3 * (x - 0.6), 0.0, 0.0, 0.0))
     for point in ((0.6, 0.3), (0.2, 0.7)):
@@ -168,9 +168,9 @@ def initial() -> dict[str, np.ndarray]:
 def whole(motion: tawami.Dynamics) -> dict[str, np.ndarray]:
     """Arrays of the particles in the order of their numbers."""
     particles, comm = motion.scene.particles, motion.scene.grid.comm
-    order = np.argsort(joined(comm, particles.number))
+    order = np.argsort(allgathered(comm, particles.number))
     arrays = {"x": particles.x, "stress": particles.stress, "velocity": motion.velocity}
-    return {name: joined(comm, np.array(values))[order] for name, values in arrays.items()}
+    return {name: allgathered(comm, np.array(values))[order] for name, values in arrays.items()}
 
 
 def beam(**options: Any) -> tawami.Scene:

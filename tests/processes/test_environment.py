@@ -28,7 +28,7 @@ def test_a_missing_dolfinx_is_named_with_its_package():
 def test_a_missing_compiler_is_named_with_its_package(tmp_path):
     code = """
 import logging, os; logging.disable(logging.INFO)
-from cases.cantilever import mpm
+from cases.verification.cantilever import mpm
 os.environ["CC"] = "no-such-compiler"
 mpm.build("u", "paper", 2)
 """
@@ -41,7 +41,7 @@ mpm.build("u", "paper", 2)
 
 
 def test_a_closed_pipe_prints_no_page_about_a_crash():
-    code = "from cases.cantilever import mpm; import sys; [print('x' * 200) for _ in range(9999)]"
+    code = "import tawami, sys; [print('x' * 200) for _ in range(9999)]"
     command = f"'{sys.executable}' -c \"{code}\" | head -n 1"
     run = subprocess.run(
         command, shell=True, cwd=ROOT, capture_output=True, text=True, check=True,

@@ -10,7 +10,7 @@ import pytest
 from programs import ROOT, python
 
 import tawami
-from cases.cantilever import mpm
+from cases.verification.cantilever import mpm
 from tawami.form.form import Form
 
 TEXT = (ROOT / "README.md").read_text()

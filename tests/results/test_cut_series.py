@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from programs import on_ranks, small_files
-from readers import contents, pvd, table, xdmf
+from readers import contents, pvd, table
 from runs import drive, look, plastic_block, write_everything
 
 import tawami
@@ -18,7 +18,7 @@ import tawami
 def all_outputs():
     return [
         tawami.ParticleOutput("velocity", "stress", every=0.009),
-        tawami.ParticleOutput("velocity", every_steps=3, format="xdmf", name="raw"),
+        tawami.ParticleOutput("velocity", every_steps=3, name="raw"),
         tawami.GridOutput("mean stress", every_steps=4),
         tawami.TableOutput("energies", "step size", "reaction bottom"),
     ]
@@ -53,11 +53,11 @@ def test_files_later_than_the_checkpoint_are_removed(tmp_path):
     drive(motion, [output], tmp_path, 3)
     state = output.state()
     drive(motion, [tawami.ParticleOutput("velocity")], tmp_path, 5, first=4, states=[state])
-    tawami.ParticleOutput("velocity").begin(tmp_path, motion.scene, motion, state)
+    tawami.ParticleOutput("velocity").begin(tmp_path, motion, state)
     names = [path.name for _, path in pvd(tmp_path / "particles.pvd")]
     assert names == [f"particles-{k:06d}.vtu" for k in range(4)]
     assert sorted(path.name for path in (tmp_path / "particles").iterdir()) == names
-    tawami.ParticleOutput("velocity").begin(tmp_path, motion.scene, motion, None)
+    tawami.ParticleOutput("velocity").begin(tmp_path, motion, None)
     assert pvd(tmp_path / "particles.pvd") == []
     assert not list((tmp_path / "particles").iterdir())
 
@@ -70,7 +70,7 @@ def test_a_resumed_table_must_have_the_same_columns(tmp_path):
     with pytest.raises(
         tawami.InputError, match=r"run-out \[m\], and .*momentum y .* are asked for"
     ):
-        tawami.TableOutput("momentum").begin(tmp_path, motion.scene, motion, output.state())
+        tawami.TableOutput("momentum").begin(tmp_path, motion, output.state())
     assert (tmp_path / "table.csv").read_text() == before
 
 
@@ -81,7 +81,7 @@ def test_a_damaged_index_is_named(tmp_path):
         tawami.OutputError, match=r"particles.pvd' cannot be read .*remove it to beg"
     ):
         tawami.ParticleOutput("velocity").begin(
-            tmp_path, motion.scene, motion, {"seen": 3, "written": 3, "time": 0.1}
+            tmp_path, motion, {"seen": 3, "written": 3, "time": 0.1}
         )
 
 
@@ -89,9 +89,7 @@ def test_a_damaged_index_is_named(tmp_path):
     ("output", "room"),
     [
         (lambda: tawami.ParticleOutput("velocity", "stress"), 3_000),
-        (lambda: tawami.ParticleOutput("velocity", "stress", format="xdmf"), 1_000),
-        # the files fit, but not their index
-        (lambda: tawami.GridOutput("particles", format="xdmf"), 4_000),
+        (lambda: tawami.ParticleOutput("velocity", "stress"), 1_000),
         (lambda: tawami.TableOutput("energies"), 900),
     ],
 )
@@ -119,8 +117,6 @@ def test_a_full_disk_raises_an_error_and_leaves_complete_files(output, room, tmp
         assert len(after) == len(before) + len(moments) - 1
     for path in tmp_path.glob("*.pvd"):
         assert [len(meshio.read(p).points) for _, p in pvd(path)] == [36] * (2 + len(moments))
-    for path in tmp_path.glob("*.xdmf"):
-        assert len(xdmf(path)) == 2 + len(moments)
 
 
 @pytest.mark.mpi
@@ -133,16 +129,13 @@ def test_several_ranks_write_the_same_files_once(tmp_path):
     run = on_ranks(2, "-c", program)
     assert run.returncode == 0, run.stderr
     assert sorted(contents(one)) == sorted(contents(two))
-    for index in ("particles.pvd", "grid.pvd"):
+    for index in ("particles.pvd", "grid.pvd", "lumped.pvd"):
         for (_, alone), (_, shared) in zip(pvd(one / index), pvd(two / index), strict=True):
             a, b = meshio.read(alone), meshio.read(shared)
             np.testing.assert_allclose(a.points, b.points, rtol=0, atol=1e-10)
             for name, values in a.point_data.items():
                 size = max(np.nanmax(np.abs(values), initial=0.0), 1e-6)
                 np.testing.assert_allclose(b.point_data[name], values, rtol=0, atol=1e-7 * size)
-    for (_, a), (_, b) in zip(xdmf(one / "lumped.xdmf"), xdmf(two / "lumped.xdmf"), strict=True):
-        for name, values in a.items():
-            np.testing.assert_allclose(b[name], values, rtol=0, atol=1e-8)
     a, b = table(one / "table.csv"), table(two / "table.csv")
     for name, values in a.items():
         np.testing.assert_allclose(b[name], values, rtol=1e-8, atol=1e-8)

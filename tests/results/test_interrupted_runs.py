@@ -147,10 +147,10 @@ def test_an_error_of_the_driver_leaves_no_gap_in_a_table(tmp_path):
 
 def test_an_error_of_an_output_leaves_no_gap_in_a_table(tmp_path):
     class Failing(Recorder):
-        def look(self, moment):
+        def observe(self, moment):
             if moment.step == 5:
                 raise tawami.OutputError("full")
-            super().look(moment)
+            super().observe(moment)
 
     with pytest.raises(tawami.OutputError):
         run(tmp_path / "run", outputs=[tawami.TableOutput("energies"), Failing()])
@@ -192,7 +192,7 @@ def test_loads_that_are_added_during_a_run_cannot_be_resumed(tmp_path):
 
     with pytest.raises(Killed):
         driven(Kill(6))
-    with pytest.raises(tawami.CheckpointError, match="1 loads of a kind .* the script has made 0"):
+    with pytest.raises(tawami.CheckpointError, match="1 loads of a kind .* the script made 0"):
         driven(Kill())
 
 
@@ -253,7 +253,7 @@ def test_a_resumed_run_may_have_shorter_steps(interrupted):
 
 def test_a_resumed_run_may_have_more_iterations(interrupted):
     scene = block()
-    scene.numerics = replace(scene.numerics, max_iterations=30, factorise="always")
+    scene.configuration.numerics = replace(scene.numerics, max_iterations=30, factorise="always")
     kill = Kill()
     run(interrupted, scene=scene, each=kill)
     assert kill.count == 4

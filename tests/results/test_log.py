@@ -25,7 +25,7 @@ def test_the_log_holds_every_step_of_an_interrupted_run(tmp_path):
     assert "motion: step 10 to 0.05 s, size 0.005, " in steps[-1]
     assert "Newton iterations to " in steps[-1]
     assert steps[-1].endswith("16 particles")
-    assert any("goes on at 0.03 s" in line for line in lines)
+    assert any("resumes at 0.03 s" in line for line in lines)
 
 
 @pytest.mark.usefixtures("log_on")
@@ -56,7 +56,7 @@ class Terminal(io.StringIO):
 def test_a_terminal_shows_one_line(tmp_path, monkeypatch):
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
-    monkeypatch.setattr(progress, "OFTEN", 0.0)
+    monkeypatch.setattr(progress, "INTERVAL", 0.0)
     monkeypatch.setenv("COLUMNS", "120")
     run(tmp_path / "run")
     text = terminal.getvalue()

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import tawami
-from cases.cantilever import mpm
-from tawami.results.output import result_folder, whole_file, write_grid, write_particles
+from cases.verification.cantilever import mpm
+from tawami.base.files import atomic_file, result_folder
+from tawami.results.single import write_grid, write_particles
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +58,7 @@ def test_an_interrupted_file_stays_as_it_was(tmp_path):
     path.write_text("before")
 
     def interrupted():
-        with whole_file(path) as part:
+        with atomic_file(path) as part:
             part.write_text("half of what")
             raise KeyboardInterrupt
 
@@ -65,12 +66,12 @@ def test_an_interrupted_file_stays_as_it_was(tmp_path):
         interrupted()
     assert path.read_text() == "before"
     assert list(tmp_path.iterdir()) == [path]
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         part.write_text("after")
     assert path.read_text() == "after"
     with (
         pytest.raises(tawami.OutputError, match="cannot be written"),
-        whole_file(tmp_path / "no" / "x"),
+        atomic_file(tmp_path / "no" / "x"),
     ):
         (tmp_path / "no" / "y").write_text("")
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scenes import clouds, grid_of
 
 import tawami
-from cases import projection as case
+from cases.costs import projection as case
 from tawami.results.projection import nodal, vertices
 
 METHODS = ("lumped", "consistent")
@@ -49,7 +49,9 @@ def test_the_volume_integral_is_conserved(seed, method):
     x = grid.origin + grid.h * np.array(grid.cells) * random.random((25, 2))
     scene = scene_of(grid, x, random.uniform(0.1, 1.0, 25))
     values = random.standard_normal(25)
-    weight = scene.attached.sums(scene.particles.volume, np.ones((25, 1)), "bilinear")[:, 0]
+    weight = scene.configuration.domain.sums(scene.particles.volume, np.ones((25, 1)), "bilinear")[
+        :, 0
+    ]
     total = np.nansum(weight * nodal(scene, values, method))
     if method == "consistent":  # of the projected field at the particles
         assert total == pytest.approx(scene.particles.volume @ values, abs=1e-6)

@@ -26,7 +26,7 @@ P, G, T = tawami.ParticleOutput, tawami.GridOutput, tawami.TableOutput
 )
 def test_a_quantity_that_is_not_modelled_is_rejected(output, message, tmp_path):
     with pytest.raises(tawami.NotModelledError, match=message):
-        output.begin(tmp_path, static_scene("u"), None, None)
+        output.begin(tmp_path, static_scene("u"), None)
     assert not list(tmp_path.iterdir())
 
 
@@ -44,9 +44,9 @@ def test_a_quantity_that_is_not_modelled_is_rejected(output, message, tmp_path):
 )  # fmt: skip
 def test_an_unknown_quantity_is_rejected_with_the_known_ones(output, message, tmp_path):
     with pytest.raises(tawami.InputError, match=message):
-        output.begin(tmp_path, static_scene(), None, None)
+        output.begin(tmp_path, static_scene(), None)
 
 
 def test_a_point_away_from_the_body_is_rejected(tmp_path):
     with pytest.raises(tawami.InputError, match="no particle was within a cell of it, 0.25 m: exp"):
-        T("displacement (0.45, 1.7)").begin(tmp_path, plastic_block().scene, None, None)
+        T("displacement (0.45, 1.7)").begin(tmp_path, plastic_block().scene, None)

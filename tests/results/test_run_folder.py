@@ -56,7 +56,9 @@ def test_a_finished_run_without_checkpoints_cannot_be_resumed(tmp_path):
     run(tmp_path / "run", outputs=[tawami.TableOutput("energies")])
     for path in results_of(tmp_path / "run").checkpoints:
         path.unlink()
-    with pytest.raises(tawami.InputError, match="finished motion, and no checkpoint to go on from"):
+    with pytest.raises(
+        tawami.InputError, match="finished motion, and no checkpoint to resume it from"
+    ):
         run(tmp_path / "run")
     assert steps_in(tmp_path / "run" / "motion" / "table.csv") == list(range(11))
 

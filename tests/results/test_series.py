@@ -6,7 +6,7 @@ import meshio
 import numpy as np
 import pytest
 from mpi4py import MPI
-from readers import pvd, table, xdmf
+from readers import pvd, table
 from runs import drive, look, plastic_block, static_scene
 
 import tawami
@@ -36,7 +36,7 @@ def written(tmp_path_factory):
     motion = plastic_block()
     outputs = [
         tawami.ParticleOutput(*FIELDS, every_steps=2),
-        tawami.ParticleOutput(*FIELDS, every_steps=2, format="xdmf", name="raw"),
+        tawami.ParticleOutput(*FIELDS, every_steps=2, name="raw"),
         tawami.GridOutput("velocity", "particles", every_steps=5),
         tawami.TableOutput(
             "energies", "reaction bottom", "run-out", "momentum", "angular momentum", "particles",
@@ -73,24 +73,6 @@ def test_particles_are_written_as_a_series_of_vtu(written):
     for name, values in expected.items():
         given = found[name][:, :2] if values.ndim == 2 and values.shape[1] == 2 else found[name]
         np.testing.assert_allclose(given, values, rtol=1e-14, err_msg=name)
-
-
-def test_xdmf_holds_the_same_values_as_vtu(written):
-    folder, _ = written
-    series, raw = pvd(folder / "particles.pvd"), xdmf(folder / "raw.xdmf")
-    assert [time for time, _ in series] == [time for time, _ in raw]
-    for (_, path), (_, arrays) in zip(series, raw, strict=True):
-        mesh = meshio.read(path)
-        np.testing.assert_array_equal(arrays.pop("Geometry"), mesh.points)
-        np.testing.assert_array_equal(arrays.pop("Topology"), mesh.cells_dict["vertex"])
-        for k, component in enumerate(("xx", "yy", "zz", "xy")):
-            np.testing.assert_array_equal(
-                arrays.pop(f"stress {component} [Pa]"),
-                mesh.point_data["stress xx yy zz xy [Pa]"][:, k],
-            )
-        assert set(arrays) == set(mesh.point_data) - {"stress xx yy zz xy [Pa]"}
-        for name, values in arrays.items():
-            np.testing.assert_array_equal(values, mesh.point_data[name])
 
 
 def test_a_table_has_a_row_for_each_step(written):
@@ -187,7 +169,7 @@ def test_reactions_balance_the_loads(tmp_path):
     names = ("reaction left", "reaction (0, 0.5)", "displacement (2, 0.5)", "step size")
     outputs = [grid_output, tawami.TableOutput(*names)]
     for output in outputs:
-        output.begin(tmp_path, scene, None, None)
+        output.begin(tmp_path, scene, None)
         look(output, scene, None, None, 0.0, 0, last=False)
     parts = []
 

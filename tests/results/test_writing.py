@@ -20,8 +20,9 @@ from programs import python, small_files
 from scenes import grid_of
 
 import tawami
-from cases import figure
-from tawami.results.output import result_folder, whole_file, write_grid, write_particles
+from cases.common import figure
+from tawami.base.files import atomic_file, result_folder
+from tawami.results.single import write_grid, write_particles
 from tawami.study import process
 from tawami.study.table import COSTS, Row, Table
 
@@ -54,7 +55,7 @@ def table() -> Table:
 
 
 def csv(path: Path) -> None:
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         part.write_text(table().as_csv())
 
 
@@ -174,8 +175,8 @@ def test_a_study_keeps_its_runs_on_a_full_disk(folder, monkeypatch):
 KILLED = """
 import sys, time
 from pathlib import Path
-from tawami.results.output import whole_file
-with whole_file(sys.argv[1]) as part, part.open("w") as file:
+from tawami.base.files import atomic_file
+with atomic_file(sys.argv[1]) as part, part.open("w") as file:
     file.write("half of what")
     file.flush()
     print("now", flush=True)
@@ -193,7 +194,7 @@ def test_a_killed_process_leaves_the_old_file(tmp_path):
         child.send_signal(signal.SIGKILL)
     assert path.read_text() == BEFORE
     assert {p.name for p in tmp_path.iterdir()} == {"x.csv", f".{child.pid}-x.csv"}  # hidden
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         part.write_text("after")
     assert path.read_text() == "after"
 

@@ -12,8 +12,9 @@ import pytest
 from scenes import FINITE, FORMS, grid_of
 
 import tawami
-from tawami.fem import dolfinx
+from tawami.fem import kernels
 from tawami.form import compilation
+from tawami.scene.domain import Domain
 from tawami.solve.newton import Newton
 
 ELASTIC = {"E": 10.0, "nu": 0.3}
@@ -102,14 +103,14 @@ def test_bytes_of_a_static_and_of_a_moving_scene():
 def compiled(monkeypatch):
     """Kinds of the kernels that are made from now on."""
     kinds: list[str] = []
-    make = dolfinx.compile_kernel
+    make = kernels.compile_kernel
 
     def counted(comm, form, kind="cell"):
         kinds.append(kind)
         return make(comm, form, kind)
 
     monkeypatch.setattr(compilation, "_compiled", {})
-    monkeypatch.setattr(dolfinx, "compile_kernel", counted)
+    monkeypatch.setattr(kernels, "compile_kernel", counted)
     return kinds
 
 
@@ -147,7 +148,7 @@ def test_a_static_scene_assembles_no_mass(monkeypatch):
         raise AssertionError("a mass")
 
     monkeypatch.setattr(Newton, "_add_mass", refuse)
-    monkeypatch.setattr(tawami.Scene, "mass", property(refuse))
+    monkeypatch.setattr(Domain, "mass", property(refuse))
     scene = scene_of(density=1.0, form="u_epsv_finite")
     scene.traction("top", (0.0, -0.1))
     assert scene.solve().displacement((0.0, 1.9))[1] < -1e-3
@@ -175,7 +176,7 @@ solution = scene.solve()
 others = ("matplotlib", "meshio", "shapely", "tqdm", "hypothesis", "scipy.spatial", "scipy.optimize")
 print(*[name for name in others if name in sys.modules])
 tawami.polygon(grid, [(0, 0), (2, 0), (2, 1)])
-from tawami.results.output import write_particles
+from tawami.results.single import write_particles
 write_particles("p.vtu", solution)
 print(*[name for name in others if name in sys.modules])
 """
@@ -287,7 +288,7 @@ def test_the_header_counts_what_is_there(assembly):
     assert line(header, "supports") == (
         "fix(edge='bottom') x, fix(edge='bottom') y, hold(point=(0.0, 1.7)) x = 0.01 m"
     )
-    data = scene.attached.newton.data["particle"]
+    data = scene.configuration.domain.newton.data["particle"]
     # sigma 3 and its derivatives 3 x (3 + 1), K, K^2/mu; and K and mu themselves
     assert data.shape[1] == 3 + 12 + 2
     assert f"{8 * (17 + 2)} more each" in line(header, "particles")

@@ -41,7 +41,7 @@ def test_point_constraint_by_elimination_is_that_by_multiplier(basis, point, val
     # the same with Lagrange multipliers, by scipy
     n = scene.num_coefficients
     matrix = scene.tangent(np.zeros(n))
-    cells, layout = scene.attached.field.active, scene.attached.layout
+    cells, layout = scene.configuration.domain.field.active, scene.configuration.domain.layout
     held = edges.held_edge(scene.grid, basis, cells, "left", 0, 1e-3)
     rows = [sp.csr_matrix(([1.0], ([0], [k])), shape=(1, n)) for k in held.indices]
     values = list(held.values)
@@ -51,7 +51,7 @@ def test_point_constraint_by_elimination_is_that_by_multiplier(basis, point, val
         values.append(v)
     b = sp.vstack(rows)
     saddle = sp.bmat([[matrix, b.T], [b, None]], format="csc")
-    right = np.concatenate([scene.external(), values])
+    right = np.concatenate([scene.configuration.external(), values])
     expected = np.linalg.solve(saddle.toarray(), right)[:n]
     mine = np.concatenate([solution.u, solution.volumetric])
     assert np.abs(mine - expected).max() < 1e-9 * np.abs(expected).max()
@@ -74,16 +74,16 @@ def test_a_number_is_its_own_projection(basis):
 def test_profiles_are_projected_in_l2_and_reproduced_where_the_basis_can(basis):
     scene = beam(basis=basis)
     linear = edges.held_edge(
-        scene.grid, basis, scene.attached.field.active, "top", 0, lambda x, y: 2 + 3 * x
+        scene.grid, basis, scene.configuration.domain.field.active, "top", 0, lambda x, y: 2 + 3 * x
     )
     width = len(linear.indices)
-    u = np.zeros(scene.attached.field.layout.num_displacement)
+    u = np.zeros(scene.configuration.domain.field.layout.num_displacement)
     u[linear.indices] = linear.values
     for x in np.linspace(-1, 1, 7):
         location = edges.locate_point(scene.grid, (x, scene.grid.upper[1]), "test")
         assert _rust.interpolate(location, basis, 2, u)[0, 0] == pytest.approx(2 + 3 * x, abs=1e-13)
     # a cubic is not in the space: the error of the projection is orthogonal to it
-    active = scene.attached.field.active
+    active = scene.configuration.domain.field.active
     cubic = edges.held_edge(scene.grid, basis, active, "top", 0, lambda x, y: x**3)
     t, w = np.polynomial.legendre.leggauss(6)
     total = np.zeros(width)
@@ -233,7 +233,7 @@ def test_a_traction_adds_up_to_its_integral(edge, basis):
     body = tawami.box(grid, lower, upper, per_axis=3)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3), form="u", basis=basis)
     scene.traction(edge, (lambda x, y: 1 + x * y + x**2 + y**2, lambda x, y: -2 * x + y))
-    force = scene.external().reshape(-1, 2)
+    force = scene.configuration.external().reshape(-1, 2)
     along = 1 if edge in ("left", "right") else 0
     t, w = np.polynomial.legendre.leggauss(4)
     half = (upper[along] - lower[along]) / 2
@@ -261,7 +261,7 @@ def test_many_solves_do_not_keep_their_factorisations():
     """Memory after 30 more solves of 32 x 16 cells: a factorisation takes about 20 MB."""
     code = """
 import logging, resource; logging.disable(logging.INFO)
-from cases.cantilever import mpm
+from cases.verification.cantilever import mpm
 def peak(): return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 for k in range(40):
     scene = mpm.build("u_epsv", "paper", 16)
@@ -363,9 +363,9 @@ def test_hold_anywhere_holds_there(a, b):
 
 def test_reduction_selects_active_unsupported_coefficients_once():
     scene = beam()
-    layout = scene.attached.field.layout
-    held = [edges.held_edge(scene.grid, scene.basis, scene.attached.field.active, "left", k, 0.0)
-            for k in range(2)]  # fmt: skip
+    layout = scene.configuration.domain.field.layout
+    active = scene.configuration.domain.field.active
+    held = [edges.held_edge(scene.grid, scene.basis, active, "left", k, 0.0) for k in range(2)]
     reduction = Reduction(layout, held, [], np.zeros(layout.size))
     assert reduction.size == layout.size - 2 * (3 + 2)
     assert (reduction.selection.sum(axis=0) == 1).all()
@@ -379,10 +379,10 @@ def test_a_part_of_an_edge_is_loaded_and_held():
     scene.fix("bottom", "x", between=(-1.0, 0.0))
     scene.fix("bottom", "y", between=(-1.0, 0.0))
     scene.traction("top", (0.0, -3.0), between=(-0.5, 0.5))
-    force = scene.external()[: 2 * 20].reshape(-1, 2)
+    force = scene.configuration.external()[: 2 * 20].reshape(-1, 2)
     assert force[:, 1].sum() == pytest.approx(-3.0)
     assert np.flatnonzero(force[15:, 1]).tolist() == [1, 2, 3]
-    reduction = scene.problem().reduction
+    reduction = scene.reduction()
     assert np.flatnonzero(reduction.fixed).tolist() == [0, 1, 2, 3, 4, 5]
     assert scene.solve().reaction("bottom") == pytest.approx([0.0, 3.0], abs=1e-5)
 

@@ -9,7 +9,7 @@ from scipy.sparse import csr_matrix
 from ufl import div, dot, grad, inner
 
 import tawami
-from cases.cantilever import mpm
+from cases.verification.cantilever import mpm
 from tawami.base.errors import InexactSumWarning
 from tawami.form.form import Form
 from tawami.solve import direct
@@ -146,10 +146,10 @@ def test_the_condition_number(method):
     options = {"alpha": 0.1} if method == "u_epsv" else {}
     scene = mpm.build(method, "clamped", 4, **options)
     solution = scene.solve()
-    newton, reduction = scene.attached.newton, scene.problem().reduction
+    newton, reduction = scene.configuration.domain.newton, scene.reduction()
     c = np.zeros(scene.num_coefficients)
     newton.internal(c)
-    matrix = scene.attached.field.tangent(c, newton.data, reduction)
+    matrix = scene.configuration.domain.field.tangent(c, newton.data, reduction)
     scale = newton._scale(matrix, reduction)
     start, columns, values = matrix.getValuesCSR()
     dense = csr_matrix((values, columns, start)).toarray() * scale * scale[:, None]

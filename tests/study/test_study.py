@@ -241,7 +241,7 @@ def test_a_study_without_runs_or_without_a_quantity_raises_an_error(tmp_path):
 
 def test_shipped_results_belong_to_shipped_studies():
     """The shipped tables hold every setting of the studies."""
-    from cases.trade.__main__ import SHIPPED, STUDIES
+    from cases.costs.trade.__main__ import SHIPPED, STUDIES
 
     for name, study in STUDIES.items():
         table = Table.read(SHIPPED / f"{name}.csv")
@@ -254,6 +254,8 @@ def test_shipped_results_belong_to_shipped_studies():
 
 @pytest.mark.slow
 def test_cases_trade_runs_a_sample(tmp_path):
-    run = python("-m", "cases.trade", "cook", "--sample", "2", "--results", tmp_path, check=True)
+    run = python(
+        "-m", "cases.costs.trade", "cook", "--sample", "2", "--results", tmp_path, check=True
+    )
     assert "The knee:" in run.stdout
     assert (tmp_path / "cook" / "cook.png").exists()

@@ -220,7 +220,7 @@ def _compressed(form: Form, given: Settings) -> Found:
     if not _has_edge_term(form, given):
         yield "note", "no term - dot(t, w) * ds: traction(...) will be refused"
         return
-    cell = form.kinematics == "cell"
+    cell = form.kinematics.volume_at_centre
     error = scenes.compressed(form, given, "bilinear" if cell else "quadratic_spline")
     basis = ", bilinear functions" if cell else ""
     yield _judged(error, UNIFORM, f"error of the stress under a traction{basis}")

@@ -16,7 +16,8 @@ from mpi4py import MPI
 
 from tawami import _rust
 from tawami.base.errors import InputError, SingularError
-from tawami.body.body import Body, box
+from tawami.body.body import Body
+from tawami.body.box import box
 from tawami.form.form import Form
 from tawami.grid.basis import Basis
 from tawami.grid.edges import Component
@@ -46,7 +47,7 @@ def grid_of(
 
 def soil(form: Form) -> Law:
     """A plastic law: one that couples mean stress and shear where the form can take it."""
-    if form.kinematics == "deviatoric":
+    if form.kinematics.deviatoric:
         return lambda elastic: von_mises(elastic, yield_stress=0.1, hardening=0.1)
     return lambda elastic: drucker_prager(elastic, phi=20.0, c=0.05, psi=10.0)
 
@@ -100,11 +101,8 @@ def rigid_motion(form: Form, given: Settings) -> float:
     stretch of the same size.
     """
     scene = cloud(form, given)
-    points = scene.attached.layout.greville - np.array(scene.grid.origin)
-    c, s = np.cos(1.0), np.sin(1.0)
-    turn = np.array([[c - 1, -s], [s, c - 1]])
-    if form.strain == "small":
-        turn = np.array([[0.0, -1.0], [1.0, 0.0]])
+    points = scene.configuration.domain.layout.greville - np.array(scene.grid.origin)
+    turn = form.strain.rotation(1.0)
 
     def force(u: Array) -> float:
         coefficients = np.zeros(scene.num_coefficients)
@@ -141,11 +139,7 @@ def displaced(form: Form, given: Settings) -> float:
         for axis, component in enumerate(COMPONENTS):
             scene.fix(edge, component, _linear(GRADIENT[axis]))
     scene.solve()
-    strain = (GRADIENT + GRADIENT.T) / 2
-    if form.strain == "finite":
-        f = np.eye(2) + GRADIENT
-        strain = np.real(la.logm(f @ f.T)) / 2
-    return _error(scene, stress_of(strain))
+    return _error(scene, stress_of(form.strain.of_gradient(GRADIENT)))
 
 
 def compressed(form: Form, given: Settings, basis: Basis) -> float:
@@ -158,7 +152,7 @@ def compressed(form: Form, given: Settings, basis: Basis) -> float:
     # sigma_yy = 0; at finite strain sigma_xx / stretch_x, the force over the area at the start, is given
     ratio = -(K - 2 * MU / 3) / (K + 4 * MU / 3)
     modulus = K + 4 * MU / 3 + ratio * (K - 2 * MU / 3)
-    along, finite = -PRESSURE / modulus, form.strain == "finite"
+    along, finite = -PRESSURE / modulus, form.strain.finite
     for _ in range(100 if finite else 0):
         along = -PRESSURE * np.exp(along) / modulus
     return _error(scene, stress_of(np.diag([along, ratio * along])))
@@ -212,13 +206,13 @@ def inf_sup(form: Form, given: Settings) -> float:
     for edge in EDGES:
         scene.fix(edge, "x")
         scene.fix(edge, "y")
-    selection = scene.problem().reduction.selection
-    unknowns = scene.problem().reduction.unknowns
+    selection = scene.reduction().selection
+    unknowns = scene.reduction().unknowns
     tangent = (selection.T @ scene.tangent(np.zeros(scene.num_coefficients)) @ selection).toarray()
-    of_u = unknowns < scene.attached.layout.num_displacement
+    of_u = unknowns < scene.configuration.domain.layout.num_displacement
     A, B = tangent[of_u][:, of_u], tangent[~of_u][:, of_u]
     # in p = K eps_v, and each equation of the volume without its K
-    to_p = RATIO if form.kinematics == "mixed" else 1.0
+    to_p = RATIO if form.kinematics.has_eps_v else 1.0
     try:
         lifted = np.linalg.solve(A, tangent[of_u][:, ~of_u])
     except np.linalg.LinAlgError:

@@ -18,10 +18,10 @@ from time import perf_counter
 from mpi4py import MPI
 
 from tawami.base.errors import TawamiError
+from tawami.base.text import labelled
 from tawami.check import scenes
-from tawami.fem import dolfinx, environment
+from tawami.fem import environment, kernels
 from tawami.form.form import Form
-from tawami.scene.description import labelled
 
 MEMORY = Path("/proc/meminfo")
 #: Packages that only some things need: name, what for.
@@ -38,7 +38,7 @@ def lines() -> Iterator[tuple[str, str]]:
     yield "memory", _memory()
     yield "ranks", _ranks()
     yield "compiler", _compiler()
-    yield "kernels", f"of forms, compiled once, in {dolfinx.cache_directory()}"
+    yield "kernels", f"of forms, compiled once, in {kernels.cache_directory()}"
     for name, purpose in OPTIONAL:
         yield name, _package(name, purpose)
     yield "ffmpeg", _program("ffmpeg", "movies as MP4")

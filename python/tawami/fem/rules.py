@@ -1,18 +1,44 @@
-"""Quadrature rules: where on a cell the data of particles are given to a weak form."""
+"""Quadrature rules: the points of a cell where particle data enter a weak form."""
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from typing import Literal
 
-#: Points that densities are given at: the full rule, a smaller one for tangents, the cell's centre, its
-#: vertices; or one mean per cell.
+import numpy as np
+
+from tawami.base.arrays import Array
+from tawami.fem.dolfinx import basix, reference_nodes
+
+#: Rules of particle densities: the full rule, a smaller one for tangents, the centre of the cell, its
+#: vertices, or one mean per cell.
 Rule = Literal["particle", "reduced", "centre", "vertex", "mean"]
 
-#: Quadrature degree of each rule: 5 x 5 points make the tangent of quadratic splines exact, the 3 x 3 of
-#: the reduced rule do not (they are exact up to degree 2 along each axis).
+#: Quadrature degree of each rule. 5 x 5 points make the tangent of quadratic splines exact. The 3 x 3
+#: points of the reduced rule do not: they are exact up to degree 2 along each axis.
 DEGREE: Mapping[Rule, int] = {"particle": 8, "reduced": 4, "centre": 1, "vertex": 1}
-#: Family of each rule: the points of Gauss-Lobatto-Legendre's smallest are the vertices.
+#: Family of each rule; the points of the smallest Gauss-Lobatto-Legendre rule are the vertices.
 FAMILY: Mapping[Rule, str] = {**dict.fromkeys(DEGREE, "default"), "vertex": "GLL"}
-#: Rule of the tangent: the full one, or the smaller one, which is cheaper and may not converge.
+#: Rule of the tangent: the full one, or the smaller one, with which Newton may not converge.
 TangentRule = Literal["full", "reduced"]
+
+
+@functools.cache
+def reference_points(degree: int) -> Array:
+    """Points of the quadrature rule of a degree: points x 2, in reference axes."""
+    points = basix.make_quadrature(basix.CellType.quadrilateral, degree)[0]
+    return np.asarray(points, dtype=np.float64)
+
+
+def triangle_rule(degree: int) -> tuple[Array, Array]:
+    """Points and weights on the triangle (0, 0), (1, 0), (0, 1), all inside and positive."""
+    points, weights = basix.make_quadrature(basix.CellType.triangle, degree)
+    return np.asarray(points, dtype=np.float64), np.asarray(weights, dtype=np.float64)
+
+
+def rule_points(rule: Rule) -> Array:
+    """Points of a rule of densities, points x 2; none for means over cells."""
+    if rule == "mean":
+        return np.empty((0, 2))
+    return reference_nodes(1) if rule == "vertex" else reference_points(DEGREE[rule])

@@ -18,6 +18,7 @@ import scipy.sparse as sp
 from tawami import _rust
 from tawami.base import ranks
 from tawami.fem import dolfinx
+from tawami.fem.kernels import Kernel
 from tawami.field.reduction import Layout
 from tawami.form.compilation import Integral
 from tawami.grid.grid import Grid
@@ -135,7 +136,7 @@ def _means(grid: Grid, location: _rust.Location, volume: Array, data: Array) -> 
     return np.asarray(sums[:, 1:] / np.where(sums[:, :1] > 0, sums[:, :1], 1.0))
 
 
-def _call(kernel: dolfinx.Kernel) -> Callable[..., None]:
+def _call(kernel: Kernel) -> Callable[..., None]:
     """An FFCx kernel of two cells, as a function of arrays."""
     function = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 7)(kernel.address)
     same_way = np.zeros(2, dtype=np.uint8)  # both cells run along the side in the same direction

@@ -20,6 +20,7 @@ from scipy.sparse.linalg import spsolve
 from tawami import _rust
 from tawami.base.errors import SupportError
 from tawami.fem import dolfinx
+from tawami.fem.mesh import FunctionSpace
 from tawami.grid.basis import Basis, greville_1d
 from tawami.grid.edges import Held, PointHeld
 from tawami.grid.grid import Grid
@@ -48,7 +49,7 @@ class Layout:
         tied: Displacement coefficients that follow others, with these: pairs.
     """
 
-    def __init__(self, grid: Grid, basis: Basis, space: dolfinx.Space, active: Mask) -> None:
+    def __init__(self, grid: Grid, basis: Basis, space: FunctionSpace, active: Mask) -> None:
         self.grid, self.basis, self._space = grid, basis, space
         self._bilinear = space.dofs.shape[1] > dolfinx.DISPLACEMENT_DOFS
         self._of_cells = _rust.Active(grid.rust, np.flatnonzero(active).astype(np.uint32))

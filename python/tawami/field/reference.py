@@ -19,7 +19,7 @@ from tawami import _rust
 from tawami.base import ranks
 from tawami.base.petsc import Handles, aij, rows_of
 from tawami.base.timing import Stopwatch
-from tawami.fem import dolfinx
+from tawami.fem import dolfinx, mesh, rules
 from tawami.fem.rules import Rule
 from tawami.field import ghost
 from tawami.field.reduction import Layout, Reduction
@@ -65,7 +65,7 @@ class Field:
         self._location, self._volume = location, volume
         self._values = {"h": grid.h, **parameters}
         rectangle = grid.rectangle
-        self._space = grid.space(len(compiled.form.fields), compiled.element)
+        self._space = grid.function_space(len(compiled.form.fields), compiled.element)
         index = rectangle.ij[:, 0] + grid.cells[0] * rectangle.ij[:, 1]
         active = np.zeros(grid.cells[::-1], dtype=bool)
         active.ravel()[location.active] = True
@@ -100,7 +100,7 @@ class Field:
 
     def _point_indices(self, rule: Rule) -> list[tuple[int, int]]:
         """Indices along x and y, in the rule of one axis, of each point of dolfinx' rule."""
-        points = self.grid.rectangle.to_grid_axes(dolfinx.rule_points(rule))
+        points = self.grid.rectangle.to_grid_axes(rules.rule_points(rule))
         if rule == "mean":
             return []
         along = np.array([0.0, 1.0])
@@ -205,7 +205,7 @@ class Field:
 
     def _add_vector(self, vector: Array, form: Any, integral: Integral, packed: Array) -> None:
         constants = self._constants(integral)
-        dolfinx.add_vector(vector, form, integral.kernel, constants, packed)
+        mesh.add_vector(vector, form, integral.kernel, constants, packed)
 
     def traction(self, edge: Edge, values: Array) -> Array:
         """External forces on all coefficients of a traction on an edge of the grid.
@@ -276,7 +276,7 @@ class Field:
         everything = Reduction.of_all(self.layout)
         mine = rows_of(self.tangent(coefficients, data, everything)).tocoo()
         rows, columns, values = (
-            ranks.joined(self.grid.comm, part)
+            ranks.allgathered(self.grid.comm, part)
             for part in (mine.row + everything.own.start, mine.col, mine.data)
         )
         unknowns, shape = everything.unknowns, (self.layout.size, self.layout.size)
@@ -295,7 +295,7 @@ class Field:
                 packed = self._pack(integral, nodal, data)
             with self.stopwatch("tangent"):
                 form, constants = self._forms[id(integral)], self._constants(integral)
-                dolfinx.add_matrix(matrix, form, integral.kernel, constants, packed)
+                mesh.add_matrix(matrix, form, integral.kernel, constants, packed)
         for left, right in self.compiled.couplings:
             sides = [self._of_each_cell(integral, nodal, data) for integral in (left, right)]
             for dofs, row, column in zip(self._space.dofs[self._cells], *sides, strict=True):

@@ -20,7 +20,7 @@ from ufl.algorithms.check_arities import ArityMismatch, check_form_arity
 
 from tawami.base.errors import FormError, InputError, MissingDependencyError, OutputError
 from tawami.base.timing import tally
-from tawami.fem import dolfinx
+from tawami.fem import dolfinx, kernels, rules
 from tawami.fem.rules import DEGREE, Rule, TangentRule
 from tawami.form.form import Form
 from tawami.form.quantities import Density
@@ -54,7 +54,7 @@ class Integral:
     """A compiled integral and what it reads; `rank` is 1 for vectors and 2 for matrices."""
 
     rank: int
-    kernel: dolfinx.Kernel
+    kernel: kernels.Kernel
     slots: tuple[Slot, ...]
     constants: tuple[str, ...]
 
@@ -231,7 +231,7 @@ def _compile(
         width[density.rule] += density.size
 
     def integral(
-        ufl_form: Any, kind: dolfinx.Kind = "cell", at_particles: Rule = "particle"
+        ufl_form: Any, kind: kernels.Kind = "cell", at_particles: Rule = "particle"
     ) -> Integral:
         used = set(ufl_form.coefficients())
         displacement, bilinear = dolfinx.DISPLACEMENT_DOFS, dolfinx.BILINEAR_DOFS
@@ -253,13 +253,13 @@ def _compile(
                 exchange[symbol] = ufl.as_vector([together[first + k] for k in range(density.size)])
                 columns += range(start, start + density.size)
             kinds[together] = Slot(
-                points, max(len(dolfinx.rule_points(points)), 1) * size, tuple(columns)
+                points, max(len(rules.rule_points(points)), 1) * size, tuple(columns)
             )
         ufl_form = ufl.replace(ufl_form, exchange)
         with _refusals(form):
             # FFCx checks this too, but in newer versions it then leaves its cache locked
             check_form_arity(ufl.algorithms.expand_derivatives(ufl_form), ufl_form.arguments())
-            kernel = dolfinx.compile_kernel(comm, ufl_form, kind)
+            kernel = kernels.compile_kernel(comm, ufl_form, kind)
         order = ufl_form.coefficients()
         slots = tuple(kinds[order[i]] for i in kernel.coefficients)
         names = {constant: name for name, constant in symbols.constants.items()}

@@ -32,30 +32,32 @@ The method). The tangent is derived (`tawami.form.compilation`).
 from __future__ import annotations
 
 import functools
+import hashlib
 import importlib.util
 import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from numbers import Real
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NoReturn
 
 from tawami.base.checks import TEXT, number, one_of, real, shown
 from tawami.base.checks import path as as_path
 from tawami.base.errors import FormError, InputError
-from tawami.form.quantities import COMPONENTS, LAW
+from tawami.form.kinematics import (
+    FIELD_UNITS,
+    KINEMATICS,
+    STRAIN_MEASURES,
+    Kinematics,
+    StrainMeasure,
+)
+from tawami.form.quantities import COMPONENTS
 
 #: The shipped forms, `tawami/forms`.
 SHIPPED = Path(__file__).parents[1] / "forms"
-KINDS = ("displacement", "volumetric_strain", "pressure")
-KINEMATICS: Mapping[str, tuple[str, ...]] = {
-    "displacement": (),
-    "cell": (),
-    "mixed": ("volumetric_strain",),
-    "deviatoric": ("pressure",),
-}
+NOTHING: Mapping[str, Any] = {}
 #: What a parameter may declare.
 LIMITS = ("default", "minimum", "maximum", "usual")
 #: Names that every form has.
@@ -67,21 +69,22 @@ RESERVED = frozenset(
 )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Form:
     """A weak form; compared by identity.
 
     Args:
         fields: Unknowns: name -> (kind, name of the test function). Kinds are 'displacement' (in
             the basis the scene chooses), 'volumetric_strain' and 'pressure' [Pa] (both bilinear).
-        kinematics: 'displacement', 'mixed', 'cell' or 'deviatoric': the strain that the material
-            law receives.
+        kinematics: The strain that the material law receives: 'displacement', 'mixed', 'cell' or
+            'deviatoric'. The attribute is a `Kinematics`.
         residual: Function that returns the residual as a UFL form.
         parameters: Numbers that may change without compiling again: name -> {"default": ...,
             "minimum": ..., "maximum": ..., "usual": ...}, the limits optional; a maximum may be
             {option: maximum}; beyond what is usual a scene warns.
         options: Choices that make a different form: name -> the possible values, default first.
-        strain: 'small', or 'finite': logarithmic elastic strains, the grid reset after each step.
+        strain: 'small', or 'finite': logarithmic elastic strains, the grid reset after each step. The
+            attribute is a `StrainMeasure`.
         whole_cells: Those of the options that need cells which the body fills.
         name: What messages call it.
 
@@ -90,16 +93,37 @@ class Form:
     """
 
     fields: Mapping[str, tuple[str, str]]
-    kinematics: str
+    kinematics: Kinematics
     residual: Callable[..., Any]
-    parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    options: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    strain: str = "small"
-    whole_cells: tuple[str, ...] = ()
-    name: str = "of the driver script"
+    parameters: Mapping[str, Mapping[str, Any]]
+    options: Mapping[str, tuple[str, ...]]
+    strain: StrainMeasure
+    whole_cells: tuple[str, ...]
+    name: str
 
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        fields: Mapping[str, tuple[str, str]],
+        kinematics: str | Kinematics,
+        residual: Callable[..., Any],
+        parameters: Mapping[str, Mapping[str, Any]] = NOTHING,
+        options: Mapping[str, tuple[str, ...]] = NOTHING,
+        strain: str | StrainMeasure = "small",
+        whole_cells: tuple[str, ...] = (),
+        name: str = "of the driver script",
+    ) -> None:
+        declared = {
+            "fields": fields, "residual": residual, "parameters": parameters, "options": options,
+            "whole_cells": whole_cells, "name": name,
+        }  # fmt: skip
+        for attribute, value in declared.items():
+            object.__setattr__(self, attribute, value)
         self._check_declarations()
+        object.__setattr__(self, "kinematics", self._named("kinematics", kinematics, KINEMATICS))
+        object.__setattr__(self, "strain", self._named("strain", strain, STRAIN_MEASURES))
+        self._check()
+
+    def _check(self) -> None:
         names = [*self.fields, *(test for _, test in self.fields.values())]
         names += [*self.parameters, *self.options, *RESERVED]
         twice = sorted({name for name in names if names.count(name) > 1})
@@ -108,18 +132,16 @@ class Form:
         self._check_limits()
         kinds = [kind for kind, _ in self.fields.values()]
         for name, (kind, _) in self.fields.items():
-            if kind not in KINDS:
-                self._fail(f"field '{name}' is of kind '{kind}': expected one of {listed(KINDS)}")
-        if self.kinematics not in KINEMATICS:
-            self._fail(f"kinematics = '{self.kinematics}': expected one of {listed(KINEMATICS)}")
-        if self.strain not in LAW:
-            self._fail(f"strain = '{self.strain}': expected one of {listed(LAW)}")
-        if self.strain == "finite" and self.kinematics == "deviatoric":
+            if kind not in FIELD_UNITS:
+                self._fail(
+                    f"field '{name}' is of kind '{kind}': expected one of {listed(FIELD_UNITS)}"
+                )
+        if self.strain.finite and self.kinematics.deviatoric:
             self._fail(
                 "strain = 'finite' with the kinematics 'deviatoric': expected 'displacement', 'mixed' "
                 "or 'cell'"
             )
-        wanted = ("displacement", *KINEMATICS[self.kinematics])
+        wanted = ("displacement", *self.kinematics.volume_fields)
         if tuple(kinds) != wanted:
             self._fail(
                 f"kinematics '{self.kinematics}' needs fields of the kinds {listed(wanted)}, in this "
@@ -153,11 +175,14 @@ class Form:
                 )
         if not _are_names(self.whole_cells):
             self._fail(f"whole_cells = {shown(self.whole_cells)}: expected names of options")
-        for what in ("kinematics", "strain"):
-            if not isinstance(getattr(self, what), str):
-                self._fail(f"{what} = {shown(getattr(self, what))}: expected a name")
 
-    def _fail(self, message: str) -> None:
+    def _named(self, what: str, given: Any, known: Mapping[str, Any]) -> Any:
+        """The object that a declaration names."""
+        if not isinstance(given, str | Kinematics | StrainMeasure) or str(given) not in known:
+            self._fail(f"{what} = {shown(given)}: expected one of {listed(known)}")
+        return known[str(given)]
+
+    def _fail(self, message: str) -> NoReturn:
         raise FormError(f"form {self.name}: {message}")
 
     @staticmethod
@@ -193,6 +218,13 @@ class Form:
     def source(self) -> str:
         """Text of the residual."""
         return source_of(self.residual)
+
+    def identity(self) -> dict[str, Any]:
+        """What tells it from another form, for checkpoints."""
+        return {
+            "form": self.name,
+            "form source": hashlib.sha256(self.source.encode()).hexdigest(),
+        }
 
     def settings(self, given: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, str]]:
         """Parameters and options of this form, defaults filled in.

@@ -17,12 +17,10 @@ from tawami.fem.rules import Rule
 
 Part = Literal["value", "strain", "gradient", "volume"]
 
-#: Components of the quantities that the material law gives, at small and at finite strain.
-LAW: Mapping[str, Mapping[str, int]] = {
-    "small": {"sigma": 3, "s": 3, "sigma_m": 1},
-    "finite": {"P": 4, "P_s": 4, "tau_m": 1, "ln_J": 1},
-}
-COMPONENTS = {**LAW["small"], **LAW["finite"]}
+#: Components of the quantities that the material law gives: (xx, yy, xy) or (xx, xy, yx, yy).
+COMPONENTS: Mapping[str, int] = {
+    "sigma": 3, "s": 3, "sigma_m": 1, "P": 4, "P_s": 4, "tau_m": 1, "ln_J": 1
+}  # fmt: skip
 #: Numbers per component of the parts of a law quantity: itself, and its derivatives with respect to
 #: the strain (xx, yy, gamma_xy), grad u (xx, xy, yx, yy) and the volumetric strain.
 WIDTH: Mapping[Part, int] = {"value": 1, "strain": 3, "gradient": 4, "volume": 1}

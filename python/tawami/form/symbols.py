@@ -16,13 +16,11 @@ from tawami.fem.rules import DEGREE, FAMILY, Rule
 from tawami.form.form import Form, listed
 from tawami.form.quantities import (
     COMPONENTS,
-    LAW,
     MU,
     ONE,
     Density,
     K,
     LawQuantity,
-    Part,
     ParticleScalar,
     Quantity,
 )
@@ -67,7 +65,7 @@ class Symbols:
             **self.fields,
             **self.tests,
             **self.constants,
-            **{name: LawQuantity(name) for name in LAW[form.strain]},
+            **{name: LawQuantity(name) for name in form.strain.quantities},
             **options,
             "K": K,
             "mu": MU,
@@ -115,7 +113,7 @@ class Symbols:
         if not isinstance(quantity, (ParticleScalar, LawQuantity)):
             raise FormError(
                 f"form {self.form.name}: {caller} takes a particle quantity "
-                f"({', '.join(LAW[self.form.strain])}, K, mu, or arithmetic of K and mu) first, "
+                f"({', '.join(self.form.strain.quantities)}, K, mu, or arithmetic of K and mu) first, "
                 f"not {quantity}"
             )
         return quantity
@@ -155,13 +153,13 @@ class Symbols:
                 f"form {self.form.name}: sum_v({quantity.name}, ...): expected constants of the "
                 "particle (K, mu): the stress depends on the strain at the particle"
             )
-        cell, centre = self.form.kinematics == "cell", rule == "centre"
+        cell, centre = self.form.kinematics.volume_at_centre, rule == "centre"
         if not cell and centre:
             raise FormError(
                 f"form {self.form.name}: sum_c({quantity.name}, ...) needs kinematics 'cell': "
                 "elsewhere the stress depends on the strain at the particle"
             )
-        s, mean = ("P_s", "tau_m") if self.form.strain == "finite" else ("s", "sigma_m")
+        s, mean = self.form.strain.deviator, self.form.strain.mean
         if cell and quantity.name != (mean if centre else s):
             raise FormError(
                 f"form {self.form.name}: {caller}({quantity.name}, ...) with "
@@ -248,21 +246,15 @@ class Symbols:
 
     def _strain_change(self, quantity: LawQuantity, du: Any) -> list[Any]:
         """Change of a law quantity with the strain (or grad u) at the particle."""
-        g, e = ufl.grad(du), ufl.sym(ufl.grad(du))
-        part: Part = "strain"
-        direction: tuple[Any, ...] = (e[0, 0], e[1, 1], 2 * e[0, 1])
-        if self.form.strain == "finite":
-            part, direction = "gradient", (g[0, 0], g[0, 1], g[1, 0], g[1, 1])
+        direction = self.form.strain.direction(du)
+        part = self.form.strain.gradient_part
         c, m = self.density(Density("particle", quantity, part)), len(direction)
         n = COMPONENTS[quantity.name]
         return [sum(c[m * i + j] * direction[j] for j in range(m)) for i in range(n)]
 
     def _volume_change(self, du: Any) -> Any:
         """Change of div u (ln det f) where it is taken from the displacement."""
-        if self.form.strain == "small":
-            return ufl.div(du)
-        u = next(iter(self.fields.values()))
-        return ufl.inner(ufl.inv(ufl.Identity(2) + ufl.grad(u)).T, ufl.grad(du))
+        return self.form.strain.volume_change(next(iter(self.fields.values())), du)
 
     def _direction(self, density: Density) -> Any:
         """Change of a law quantity with the fields: C : strain(du) (or grad(du)) + c d_eps_v."""
@@ -273,9 +265,9 @@ class Symbols:
         if density.rule == "particle":
             change = self._strain_change(density.quantity, du)
         volume = None
-        if kinematics == "mixed" and density.quantity.name != "ln_J":
+        if kinematics.has_eps_v and density.quantity.name != "ln_J":
             volume = volumetric[0]
-        elif kinematics == "cell" and density.rule == "centre":
+        elif kinematics.volume_at_centre and density.rule == "centre":
             volume = self._volume_change(du)
         if volume is not None:
             c = self.density(Density(density.rule, density.quantity, "volume"))
@@ -287,7 +279,7 @@ class Symbols:
         at the centre, and the mean stress there with the strain at the particles. The centre being
         one point of the cell, each is a product of two linear forms of the cell, (left, right).
         """
-        if self.form.kinematics != "cell":
+        if not self.form.kinematics.volume_at_centre:
             return []
         du = next(iter(self.tests.values()))
         at_centre, at_particles = self.measures["centre"], self.measures["particle"]

@@ -1,4 +1,4 @@
-"""Supports as linear constraints on the coefficients of the displacement."""
+"""Edges of the grid, their cells and functions; supports as constraints on displacements."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ from tawami.base import checks
 from tawami.base.errors import InputError, SupportError
 from tawami.grid.basis import Basis, values_1d
 from tawami.grid.grid import Edge, Grid
+from tawami.grid.space import PLANE
 
 Array = npt.NDArray[np.float64]
 Component = Literal["x", "y"]
-#: A part of an edge, from one line of the grid to another [m].
+#: A part of an edge: from one line of the grid to another [m].
 Interval = tuple[float, float]
-#: A number, or a function of the position along an edge: f(x, y) on arrays.
+#: A number, or a function of position f(x, y) on arrays.
 Profile = float | Callable[[Array, Array], Any]
 
 
@@ -45,21 +46,19 @@ class PointHeld:
 
 
 def component_index(component: str) -> int:
-    """0 for 'x', 1 for 'y'.
+    """Number of a component of a vector: 0 for 'x', 1 for 'y'.
 
     Raises:
         InputError: Anything else.
     """
-    if not checks.one_of(component, ("x", "y")):
-        raise InputError(f"component {checks.shown(component)}: expected 'x' or 'y'")
-    return "xy".index(component)
+    return PLANE.axis(component)
 
 
 def evaluate(profile: Profile, x: Array, y: Array, what: str) -> Array:
-    """Values of a number or function at points.
+    """Values of a number or a function at points.
 
     Raises:
-        InputError: A function that fails, returns the wrong shape, or something not finite.
+        InputError: The function fails, returns another shape, or returns NaN or infinity.
     """
     try:
         value = profile(x, y) if callable(profile) else profile
@@ -131,41 +130,35 @@ def held_edge(
     return Held(indices, coefficients)
 
 
-#: A position this near to a line of the grid [cells] lies on it.
-ON_LINE = 1e-6
-
-
 def cells_between(grid: Grid, edge: Edge, between: Interval | None) -> npt.NDArray[np.bool_]:
-    """Which cells along an edge lie in a part of it.
+    """Mask of the cells along an edge that lie in a part of it.
 
     Raises:
         InputError: The part does not go from one line of the grid to a later one.
     """
-    axis = 1 - grid.edge(edge)[0]
+    (axis,) = grid.space.other_axes(grid.edge(edge)[0])
     n = grid.cells[axis]
     if between is None:
         return np.ones(n, dtype=bool)
-    a, b = checks.pair(f"edge='{edge}': between", between, "positions [m]")
-    lines = np.array([checks.number(f"edge='{edge}': between", end) for end in (a, b)])
-    with np.errstate(over="ignore"):
-        ends = (lines - grid.origin[axis]) / grid.h
-    first, last = np.rint(ends)
-    if not 0 <= first < last <= n or np.abs(ends - [first, last]).max() > ON_LINE:
+    ends = checks.pair(f"edge='{edge}': between", between, "positions [m]")
+    low, high = (checks.number(f"edge='{edge}': between", end) for end in ends)
+    found = grid.cells_between(axis, low, high)
+    if found is None or found[0] >= found[1]:
         raise InputError(
             f"edge='{edge}': between = {checks.shown(between)}: expected two lines of the grid, in "
             f"order, every {grid.h:g} m from {grid.origin[axis]:g} to {grid.upper[axis]:g} m"
         )
-    cell = np.arange(n)
-    inside: npt.NDArray[np.bool_] = (cell >= first) & (cell < last)
+    inside = np.zeros(n, dtype=bool)
+    inside[slice(*found)] = True
     return inside
 
 
 def edge_functions(grid: Grid, basis: Basis, edge: Edge) -> npt.NDArray[np.int64]:
-    """The displacement functions that do not vanish on an edge of the grid, along it."""
+    """Numbers of the displacement functions that do not vanish on an edge of the grid, along it."""
     axis, end = grid.edge(edge)
-    width, height = (_rust.basis_len(basis, n) for n in grid.cells)
-    numbers = np.arange(width * height).reshape(height, width)
-    functions: npt.NDArray[np.int64] = np.take(numbers, end, axis=1 - axis)
+    shape = [_rust.basis_len(basis, n) for n in grid.cells]
+    numbers = np.arange(np.prod(shape)).reshape(shape, order="F")
+    functions: npt.NDArray[np.int64] = np.take(numbers, end, axis=axis)
     return functions
 
 
@@ -222,13 +215,10 @@ def locate_point(grid: Grid, point: Sequence[float], what: str) -> _rust.Locatio
     """Cell and position of one point.
 
     Raises:
-        InputError: The point is outside the grid, or not two finite numbers.
+        InputError: The point is outside the grid, or is not two finite numbers.
     """
     x = np.array([checks.point(what, point)])
     try:
         return grid.rust.locate(x)
     except InputError:
-        raise InputError(
-            f"{what}: expected a point within the grid, [{grid.origin[0]:g}, {grid.upper[0]:g}] x "
-            f"[{grid.origin[1]:g}, {grid.upper[1]:g}]"
-        ) from None
+        raise InputError(f"{what}: expected a point within the grid, {grid.extent}") from None

@@ -66,8 +66,8 @@ def in_order(comm: Any, number: npt.NDArray[Any]) -> Callable[[npt.ArrayLike], A
     """What makes of an array of each rank's particles that of all of them, in the order of their
     numbers; on every rank, as a call for all.
     """
-    order = np.argsort(ranks.joined(comm, np.asarray(number)), kind="stable")
-    return lambda values: ranks.joined(comm, np.asarray(values))[order]
+    order = np.argsort(ranks.allgathered(comm, np.asarray(number)), kind="stable")
+    return lambda values: ranks.allgathered(comm, np.asarray(values))[order]
 
 
 def gathered(grid: Grid, particles: _rust.Particles) -> dict[str, Array]:
@@ -130,7 +130,7 @@ def check_staying(
         InputError: One leaves, or the last one does.
     """
     gone = outside(grid, x)
-    with ranks.together(grid.comm):
+    with ranks.raise_together(grid.comm):
         if gone.any() and stop:
             p = np.flatnonzero(gone)[0]
             when = "" if np.isnan(time) else f" at {time:g} s"

@@ -11,16 +11,14 @@ import sys
 import textwrap
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from tawami.base import ranks
-from tawami.base.files import result_folder, whole_file
+from tawami.base import program, ranks
+from tawami.base.files import atomic_file, result_folder
 from tawami.fem import environment
 from tawami.form.form import Form
-
-if TYPE_CHECKING:
-    from tawami.motion.dynamics import Dynamics
-    from tawami.scene.scene import Scene
+from tawami.form.kinematics import Kinematics, StrainMeasure
+from tawami.motion.observer import Subject
 
 #: What is written: the record, and copies of the driver script and of the form.
 RUN, SCRIPT, FORM = "run.json", "script.py", "form.py"
@@ -28,7 +26,7 @@ RUN, SCRIPT, FORM = "run.json", "script.py", "form.py"
 PATIENCE = 10
 
 
-def write(folder: str | Path, scene: Scene, motion: Dynamics | None = None) -> None:
+def write(folder: str | Path, subject: Subject) -> None:
     """Write run.json, and beside it form.py and script.py where these can be read; a call for all ranks.
 
     run.json holds: script (path, or null), module (as in `python -m`, or null), arguments, directory,
@@ -39,9 +37,9 @@ def write(folder: str | Path, scene: Scene, motion: Dynamics | None = None) -> N
     Raises:
         OutputError: The folder cannot be written.
     """
+    scene, header = subject.scene, subject.header()
     comm = scene.grid.comm
-    header = scene.header() if motion is None else motion.header()
-    with ranks.together(comm):
+    with ranks.raise_together(comm):
         if comm.rank == 0:
             home = result_folder(folder)
             script, module = driver()
@@ -103,7 +101,7 @@ def git(folder: Path) -> dict[str, Any] | None:
         command = ["git", "-C", str(folder), *words]
         run = subprocess.run(
             command, capture_output=True, text=True, check=True, timeout=PATIENCE,
-            stdin=subprocess.DEVNULL, env=ranks.own_environment(),
+            stdin=subprocess.DEVNULL, env=program.own_environment(),
         )  # fmt: skip
         return run.stdout.strip()
 
@@ -135,7 +133,9 @@ def source_of(form: Form) -> bytes | None:
     lines = [f"# Form {form.name}: defined in {file}"]
     lines += [f"from ufl import {', '.join(names)}"] if names else []
     for key in ("fields", "kinematics", "parameters", "options", "strain", "whole_cells"):
-        lines.append(f"{key} = {getattr(form, key)!r}")
+        value = getattr(form, key)
+        text = str(value) if isinstance(value, Kinematics | StrainMeasure) else value
+        lines.append(f"{key} = {text!r}")
     lines += ["", "", source.rstrip()]
     lines += [] if name == "residual" else ["", "", f"residual = {name}"]
     return ("\n".join(lines) + "\n").encode()
@@ -158,5 +158,5 @@ def _bytes(path: Path) -> bytes | None:
 
 def _write(path: Path, content: bytes | None) -> None:
     if content is not None:
-        with whole_file(path) as part:
+        with atomic_file(path) as part:
             part.write_bytes(content)

@@ -12,6 +12,7 @@ from tawami import _rust
 from tawami.base import ranks
 from tawami.field.reduction import Reduction
 from tawami.field.reference import Field
+from tawami.form.kinematics import Kinematics
 
 Array = npt.NDArray[np.float64]
 #: K/mu at which forms without a field for the volume have no digit left.
@@ -38,8 +39,8 @@ def weakest(
     """
     grid = field.grid
     own = np.argsort(-np.abs(direction))[:20]
-    entries = ranks.joined(grid.comm, np.abs(direction[own]))
-    unknowns = ranks.joined(grid.comm, reduction.own.start + own)
+    entries = ranks.allgathered(grid.comm, np.abs(direction[own]))
+    unknowns = ranks.allgathered(grid.comm, reduction.own.start + own)
     counts = np.bincount(location.cell, minlength=grid.cells[0] * grid.cells[1])
     counts = ranks.sum_of(grid.comm, counts)
     found: list[str] = []
@@ -53,7 +54,7 @@ def weakest(
     return found[:4]
 
 
-def lost_digits(comm: Any, ratio: Array, kinematics: str) -> str:
+def lost_digits(comm: Any, ratio: Array, kinematics: Kinematics) -> str:
     """What to do where K/mu is beyond a form without a field for the volume; nothing elsewhere.
 
     Args:
@@ -62,7 +63,7 @@ def lost_digits(comm: Any, ratio: Array, kinematics: str) -> str:
         kinematics: Of the form.
     """
     stiff = comm.allreduce(float(ratio.max(initial=0.0)), op=MPI.MAX)
-    if stiff < NO_DIGITS or kinematics not in ("displacement", "cell"):
+    if stiff < NO_DIGITS or kinematics.volume_fields:
         return ""
     return (
         f"K/mu is {stiff:.1e}: without a field for the volume no digit is left at that; use form "

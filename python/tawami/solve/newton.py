@@ -20,15 +20,13 @@ from mpi4py import MPI
 
 from tawami import _rust
 from tawami.base import ranks
-from tawami.base.errors import ConvergenceError, InputError, SingularError
+from tawami.base.errors import ConvergenceError, SingularError
 from tawami.base.petsc import clean_up
 from tawami.base.timing import Stopwatch, tally
 from tawami.fem.rules import Rule
 from tawami.field.reduction import Reduction
 from tawami.field.reference import Field
-from tawami.form.compilation import CompiledForm
-from tawami.form.quantities import Density, LawQuantity, ParticleScalar
-from tawami.particles.numpy_law import NumpyStage
+from tawami.particles.responses import Responses
 from tawami.solve import diagnosis
 from tawami.solve.direct import LinearSolver
 from tawami.solve.inertia import Inertia
@@ -77,11 +75,7 @@ class Newton:
 
     Args:
         field: The field side.
-        compiled: The form.
-        stage: The particle side.
-        particles: This rank's particles, with volumes and stresses.
-        location: Where they are.
-        constants: K and mu of each particle [Pa].
+        responses: The particle side.
         stopwatch: Where the time goes.
         numerics: How it is solved.
     """
@@ -89,27 +83,15 @@ class Newton:
     def __init__(
         self,
         field: Field,
-        compiled: CompiledForm,
-        stage: _rust.Stage | NumpyStage,
-        particles: _rust.Particles,
-        location: _rust.Location,
-        constants: Mapping[str, Array],
+        responses: Responses,
         stopwatch: Stopwatch,
         numerics: Numerics,
     ) -> None:
-        self.field, self.compiled, self.stage = field, compiled, stage
-        self.particles, self.location, self.constants = particles, location, constants
-        self.stopwatch = stopwatch
-        self.numerics = numerics
-        self.data = {
-            rule: np.zeros((len(particles), compiled.columns(rule))) for rule in compiled.densities
-        }
-        self._requests: dict[Rule, list[tuple[str, str, int]]] = {r: [] for r in self.data}
-        self._factors: dict[Rule, list[tuple[slice, Array]]] = {r: [] for r in self.data}
-        for rule, densities in compiled.densities.items():
-            for density, column in densities.items():
-                with ranks.together(field.grid.comm):
-                    self._place(rule, density, column)
+        self.field, self.responses, self.compiled = field, responses, responses.compiled
+        self.stage, self.constants = responses.stage, responses.constants
+        self.particles, self.location = responses.particles, responses.location
+        self.stopwatch, self.numerics = stopwatch, numerics
+        compiled, constants = self.compiled, self.constants
         volumetric = list(compiled.form.fields.values())[1:]
         self.kind = volumetric[0][0] if volumetric else None
         self._p_ref = self._started = 0.0
@@ -128,33 +110,15 @@ class Newton:
             for modulus in (softer, constants["mu"])
         )
 
-    def _place(self, rule: Rule, density: Density, column: int) -> None:
-        if isinstance(density.quantity, LawQuantity):
-            self._requests[rule].append((density.quantity.name, density.part, column))
-            if density.quantity.factor is not None:
-                place = slice(column, column + density.size)
-                self._factors[rule].append(
-                    (place, density.quantity.factor.evaluate(self.constants))
-                )
-        elif isinstance(density.quantity, ParticleScalar):
-            with np.errstate(all="ignore"):
-                values = density.quantity.evaluate(self.constants)
-            self.data[rule][:, column] = values
-            bad = np.flatnonzero(~np.isfinite(self.data[rule][:, column]))
-            if len(bad):
-                p = bad[0]
-                raise InputError(
-                    f"form {self.compiled.form.name}: '{density.quantity.text}' is not finite at "
-                    f"particle {self.particles.number[p]}, where K = {self.constants['K'][p]:g} "
-                    f"and mu = {self.constants['mu'][p]:g} Pa; with nu = 0.5 (K infinite) use form "
-                    "'u_p', or nu < 0.5"
-                )
+    @property
+    def data(self) -> Mapping[Rule, Array]:
+        """Particle data at the increments of the last residual."""
+        return self.responses.data
 
     @property
     def bytes_per_particle(self) -> int:
-        """What the particle data and the constants take."""
-        arrays = [*self.data.values(), *self.constants.values()]
-        return sum(array.itemsize * int(np.prod(array.shape[1:])) for array in arrays)
+        """Bytes of the particle data and the constants of one particle."""
+        return self.responses.bytes_per_particle
 
     def keep(self) -> None:
         """Keep what :meth:`state` needs from now on; nothing is taken over from earlier steps."""
@@ -180,15 +144,8 @@ class Newton:
 
     def internal(self, coefficients: Array) -> Array:
         """Internal forces and volume residual on all coefficients, at given increments."""
-        with self.stopwatch("law"):
-            for rule, requests in self._requests.items():
-                if requests:
-                    fields = self.field.layout.split(coefficients)
-                    with ranks.together(self._comm):
-                        self.stage.evaluate(*fields, requests, self.data[rule])
-                    for place, factor in self._factors[rule]:
-                        self.data[rule][:, place] *= factor[:, None]
-        return self.field.residual(coefficients, self.data)
+        data = self.responses.evaluate(*self.field.layout.split(coefficients))
+        return self.field.residual(coefficients, data)
 
     def _measures(
         self,
@@ -219,7 +176,7 @@ class Newton:
         volume = None
         if self.kind is not None:
             weight, strains = self._volume_scale(coefficients)
-            sums = self._nodal_sums((weight * strains)[:, None])
+            sums = self.responses.sums((weight * strains)[:, None])
             volume = float(np.linalg.norm(free[~of_u]) / np.linalg.norm(sums))
         # all ranks take the same way, to the bit
         measures: tuple[float, float | None] = self._comm.bcast((momentum, volume))
@@ -232,18 +189,9 @@ class Newton:
         grid, basis = self.field.grid, self.field.layout.basis
         g = np.asarray(_rust.gradients(self.location, basis, np.ascontiguousarray(u)))
         g = g.reshape(-1, 2, 2)
-        strain = g + g.transpose(0, 2, 1)
-        if self.compiled.form.strain == "finite":
-            strain = strain + g.transpose(0, 2, 1) @ g
+        strain = self.compiled.form.strain.metric_change(g)
         largest = self._comm.allreduce(float(np.abs(strain).max(initial=0.0)), op=MPI.MAX)
         return bool(moved == 0 or largest <= 1e-10 * moved / grid.h)
-
-    def _nodal_sums(self, columns: Array) -> Array:
-        """Volume-weighted sums over all particles on the bilinear functions."""
-        volume = self.particles.volume
-        return ranks.sum_of(
-            self._comm, _rust.nodal_sums(self.location, volume, columns, "bilinear")
-        )
 
     def _volume_scale(self, coefficients: Array) -> tuple[Array, Array]:
         """Weight of the volume equation and the strains it is compared with, per particle."""
@@ -272,7 +220,7 @@ class Newton:
         if self.kind is None:
             return scale
         bulk, mu = self.constants["K"], self.constants["mu"]
-        sums = self._nodal_sums(np.column_stack([np.ones_like(mu), 1 / bulk, 1 / mu]))
+        sums = self.responses.sums(np.column_stack([np.ones_like(mu), 1 / bulk, 1 / mu]))
         sums = sums[own[~of_u] - layout.num_displacement]
         least = 1e-14 * self.field.grid.h**2
         volume = np.maximum(sums[:, 0], least)
@@ -370,7 +318,7 @@ class Newton:
             tally.unknowns = max(tally.unknowns, reduction.size)
             if linear.singular:
                 self._report_singular(reduction, began=len(history) == 1)
-            change = reduction.selection @ ranks.joined(self._comm, found)
+            change = reduction.selection @ ranks.allgathered(self._comm, found)
             coefficients = coefficients + change
             if off is not None:
                 off = off + change[: len(off)]

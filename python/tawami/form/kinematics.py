@@ -1,0 +1,147 @@
+"""The kinematics and the strain measure of a form, and everything that differs between them.
+
+A form file names them: `kinematics = "mixed"`, `strain = "finite"`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg as la
+import ufl
+
+from tawami.form.quantities import Part
+
+Array = npt.NDArray[np.float64]
+
+#: Kinds of the fields of a form, with their units.
+FIELD_UNITS: Mapping[str, str] = {"displacement": "m", "volumetric_strain": "-", "pressure": "Pa"}
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """Which strain the material law receives at a particle.
+
+    Attributes:
+        name: As a form file declares it.
+        volume_fields: Kinds of the fields that the form needs after the displacement.
+        has_eps_v: Whether the volumetric strain is a field, which particles store.
+        volume_at_centre: Whether it is that of the displacement at the centre of the cell.
+        deviatoric: Whether the law receives the deviator alone: the pressure is a field.
+        locks: Whether the displacement alone is evaluated at the particles: locks near nu = 0.5.
+    """
+
+    name: str
+    volume_fields: tuple[str, ...] = ()
+    has_eps_v: bool = False
+    volume_at_centre: bool = False
+    deviatoric: bool = False
+    locks: bool = False
+
+    def __str__(self) -> str:
+        return self.name
+
+
+@dataclass(frozen=True)
+class StrainMeasure:
+    """How strains follow from a displacement gradient, and the stresses that belong to them.
+
+    Attributes:
+        name: As a form file declares it.
+        finite: Whether strains are finite. Then each step moves the particles and resets the grid.
+        quantities: Names of the quantities that the material law gives.
+        stress: Name of the stress.
+        stress_xx_yy_xy: Places of xx, yy and xy among its components.
+        deviator: Name of its deviator.
+        mean: Name of the mean stress.
+        gradient_part: What the tangent of a quantity is taken with respect to.
+        mixed_form: The shipped form with a field for the volumetric strain.
+        description: For the header of a run.
+    """
+
+    name: str
+    finite: bool
+    quantities: tuple[str, ...]
+    stress: str
+    stress_xx_yy_xy: tuple[int, int, int]
+    deviator: str
+    mean: str
+    gradient_part: Part
+    mixed_form: str
+    description: str
+
+    def __str__(self) -> str:
+        return self.name
+
+    def direction(self, du: Any) -> tuple[Any, ...]:
+        """Components of a change of displacement (UFL) that :attr:`gradient_part` multiplies."""
+        if self.finite:
+            g = ufl.grad(du)
+            return g[0, 0], g[0, 1], g[1, 0], g[1, 1]
+        e = ufl.sym(ufl.grad(du))
+        return e[0, 0], e[1, 1], 2 * e[0, 1]
+
+    def volume_change(self, u: Any, du: Any) -> Any:
+        """Change of div u (small strain) or ln det f (finite strain) with du, in UFL."""
+        if self.finite:
+            return ufl.inner(ufl.inv(ufl.Identity(2) + ufl.grad(u)).T, ufl.grad(du))
+        return ufl.div(du)
+
+    def metric_change(self, gradient: Array) -> Array:
+        """Twice the strain that vanishes for rigid motions; `gradient` is (n x 2 x 2)."""
+        transposed = gradient.transpose(0, 2, 1)
+        change = gradient + transposed
+        return change + transposed @ gradient if self.finite else change
+
+    def rotation(self, angle: float) -> Array:
+        """Displacement gradient of a rotation (2 x 2), linearised and of size 1 at small strain."""
+        c, s = np.cos(angle), np.sin(angle)
+        return np.array([[c - 1, -s], [s, c - 1]] if self.finite else [[0.0, -1.0], [1.0, 0.0]])
+
+    def of_gradient(self, gradient: Array) -> Array:
+        """Strain tensor of a displacement gradient (2 x 2 each), logarithmic at finite strain."""
+        if self.finite:
+            f = np.eye(2) + gradient
+            return np.asarray(np.real(la.logm(f @ f.T)) / 2)
+        return np.asarray((gradient + gradient.T) / 2)
+
+
+KINEMATICS: Mapping[str, Kinematics] = {
+    kinematics.name: kinematics
+    for kinematics in (
+        Kinematics("displacement", locks=True),
+        Kinematics("cell", volume_at_centre=True),
+        Kinematics("mixed", ("volumetric_strain",), has_eps_v=True),
+        Kinematics("deviatoric", ("pressure",), deviatoric=True),
+    )
+}
+STRAIN_MEASURES: Mapping[str, StrainMeasure] = {
+    "small": StrainMeasure(
+        name="small",
+        finite=False,
+        quantities=("sigma", "s", "sigma_m"),
+        stress="sigma",
+        stress_xx_yy_xy=(0, 1, 2),
+        deviator="s",
+        mean="sigma_m",
+        gradient_part="strain",
+        mixed_form="u_epsv",
+        description="small strain",
+    ),
+    "finite": StrainMeasure(
+        name="finite",
+        finite=True,
+        quantities=("P", "P_s", "tau_m", "ln_J"),
+        stress="P",
+        stress_xx_yy_xy=(0, 3, 1),
+        deviator="P_s",
+        mean="tau_m",
+        gradient_part="gradient",
+        mixed_form="u_epsv_finite",
+        description="finite strain, particles that move",
+    ),
+}
