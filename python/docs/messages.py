@@ -10,6 +10,8 @@ from pathlib import Path
 
 from sources import ROOT
 
+from tawami.base import errors
+
 PACKAGE = ROOT / "python" / "tawami"
 #: Subject of the modules; others stand under their own name.
 SUBJECTS: dict[str, tuple[str, ...]] = {
@@ -25,6 +27,8 @@ SUBJECTS: dict[str, tuple[str, ...]] = {
     "Command line": ("command_line",),
     "Studies": ("study",),
 }
+#: Classes of errors and warnings that users see.
+KINDS = {*errors.__all__, "InvertedError"}
 INTERNAL = ("RuntimeError", "NotImplementedError", "ValueError", "SystemExit", "TypeError")
 
 
@@ -68,13 +72,18 @@ def _of_module(tree: ast.Module) -> Iterator[tuple[str, str]]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and node.exc.args:
             kind = ast.unparse(node.exc.func)
-            if kind.isidentifier():
+            if kind in KINDS:
                 yield kind, _pattern(node.exc.args[0])
+        elif isinstance(node, ast.Return) and isinstance(node.value, ast.Call) and node.value.args:
+            kind = ast.unparse(node.value.func)  # a function that makes the error
+            if kind.endswith("Error"):
+                yield kind, _pattern(node.value.args[0])
         elif isinstance(node, ast.Call) and node.args:
             called = ast.unparse(node.func)
             if called in ("warn", "warnings.warn"):
                 kind = ast.unparse(node.args[1]) if len(node.args) > 1 else "UserWarning"
-                yield kind, _pattern(node.args[0])
+                if kind.endswith("Warning"):
+                    yield kind, _pattern(node.args[0])
             elif called == "self._fail" and fails:
                 yield fails, _pattern(node.args[-1])
 

@@ -19,7 +19,7 @@ from cases.verification.cantilever import fem, mpm
 from tawami import _rust
 from tawami.base.ranks import allgathered
 from tawami.form.form import Form
-from tawami.results.single import write_grid, write_particles
+from tawami.results import write_grid, write_particles
 from tawami.solve.newton import Newton
 
 COMM = MPI.COMM_WORLD

@@ -186,7 +186,7 @@ def test_an_error_of_a_driver_is_one_line(tmp_path):
     file = tmp_path / "file"
     file.touch()
     run = failed(
-        "import tawami; from cases.verification.cantilever.__main__ import main; "
+        "from cases.verification.cantilever.__main__ import main; import tawami; "
         f"tawami.run(lambda: main(['--results', '{file}']), 'cantilever')"
     )
     assert run.stderr.count("cantilever: result folder ") == 1, run.stderr

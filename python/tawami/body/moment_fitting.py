@@ -11,7 +11,8 @@ from itertools import product
 
 import numpy as np
 
-from tawami.body.points import DEGREE, Array, Mask
+from tawami.base.arrays import Array, Mask
+from tawami.body.points import DEGREE
 from tawami.grid.space import PLANE
 
 #: Exponents of the monomials up to the degree of the rule, monomials x axes.

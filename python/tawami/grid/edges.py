@@ -7,18 +7,17 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
 from tawami import _rust
 from tawami.base import checks
+from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import InputError, SupportError
 from tawami.grid.basis import Basis, values_1d
 from tawami.grid.grid import Edge, Grid
 from tawami.grid.space import PLANE
 
-Array = npt.NDArray[np.float64]
 Component = Literal["x", "y"]
 #: A part of an edge: from one line of the grid to another [m].
 Interval = tuple[float, float]
@@ -30,7 +29,7 @@ Profile = float | Callable[[Array, Array], Any]
 class Held:
     """Coefficients that are prescribed: `indices` of one displacement component take `values`."""
 
-    indices: npt.NDArray[np.int64]
+    indices: Indices
     values: Array
 
 
@@ -38,7 +37,7 @@ class Held:
 class PointHeld:
     """One multi-point constraint: `weights . coefficients[indices] = value`."""
 
-    indices: npt.NDArray[np.int64]
+    indices: Indices
     weights: Array
     value: float
     where: str
@@ -80,7 +79,7 @@ def evaluate(profile: Profile, x: Array, y: Array, what: str) -> Array:
 def held_edge(
     grid: Grid,
     basis: Basis,
-    active: npt.NDArray[np.bool_],
+    active: Mask,
     edge: Edge,
     component: int,
     value: Profile,
@@ -130,7 +129,7 @@ def held_edge(
     return Held(indices, coefficients)
 
 
-def cells_between(grid: Grid, edge: Edge, between: Interval | None) -> npt.NDArray[np.bool_]:
+def cells_between(grid: Grid, edge: Edge, between: Interval | None) -> Mask:
     """Mask of the cells along an edge that lie in a part of it.
 
     Raises:
@@ -153,23 +152,23 @@ def cells_between(grid: Grid, edge: Edge, between: Interval | None) -> npt.NDArr
     return inside
 
 
-def edge_functions(grid: Grid, basis: Basis, edge: Edge) -> npt.NDArray[np.int64]:
+def edge_functions(grid: Grid, basis: Basis, edge: Edge) -> Indices:
     """Numbers of the displacement functions that do not vanish on an edge of the grid, along it."""
     axis, end = grid.edge(edge)
     shape = [_rust.basis_len(basis, n) for n in grid.cells]
     numbers = np.arange(np.prod(shape)).reshape(shape, order="F")
-    functions: npt.NDArray[np.int64] = np.take(numbers, end, axis=axis)
+    functions: Indices = np.take(numbers, end, axis=axis)
     return functions
 
 
 def held_point(
     grid: Grid,
     basis: Basis,
-    active: npt.NDArray[np.bool_],
+    active: Mask,
     point: Sequence[float],
     component: int,
     value: float,
-    active_functions: npt.NDArray[np.bool_],
+    active_functions: Mask,
 ) -> PointHeld:
     """One displacement component at a point: a constraint on the interpolated value.
 

@@ -8,19 +8,17 @@ from collections.abc import Sequence
 from typing import Any, Literal, cast, get_args
 
 import numpy as np
-import numpy.typing as npt
 from mpi4py import MPI
 
 from tawami import _rust
 from tawami.base import program, ranks
+from tawami.base.arrays import Array, Indices
 from tawami.base.checks import number, one_of, pair, point, room, shown, whole_number
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
 from tawami.fem import mesh
 from tawami.grid.space import PLANE, Counts, Position
 
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int64]
 Edge = Literal["left", "right", "bottom", "top"]
 EDGES: tuple[Edge, ...] = get_args(Edge)
 #: A position is on a line of the grid if it is this near to it [cells].

@@ -16,6 +16,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from tawami.base.arrays import Array
 from tawami.base.checks import one_of, shown
 from tawami.base.errors import InputError
 
@@ -34,7 +35,7 @@ class Space:
     Attributes:
         axes: Names of the axes.
         volume: Unit of the volume of a particle or a cell, in text.
-        depth: What extensive quantities refer to, in text after their unit.
+        depth: Text after the units of extensive quantities, which refer to a metre of depth.
     """
 
     axes: tuple[str, ...]
@@ -66,7 +67,7 @@ class Space:
         return h**self.dim
 
     def unit(self, unit: str) -> str:
-        """Unit of an extensive quantity: 'N per metre depth'."""
+        """Unit of an extensive quantity per metre depth: 'N per m'."""
         return unit + self.depth
 
     def axis(self, component: str) -> int:
@@ -89,7 +90,7 @@ class Space:
 PLANE = Space(
     axes=("x", "y"),
     volume="m2",
-    depth=" per metre depth",
+    depth=" per m",
 )
 
 
@@ -98,6 +99,6 @@ def lattice(along: Sequence[npt.NDArray[Scalar]]) -> npt.NDArray[Scalar]:
     return np.stack([c.ravel(order="F") for c in np.meshgrid(*along, indexing="ij")], axis=-1)
 
 
-def tensor_product(along: Sequence[npt.NDArray[np.float64]]) -> npt.NDArray[np.float64]:
+def tensor_product(along: Sequence[Array]) -> Array:
     """Products of weights along each axis at the points of a lattice; x fastest."""
     return reduce(lambda inner, outer: np.outer(outer, inner).ravel(), along)
