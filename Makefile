@@ -3,7 +3,7 @@
 # make docs         the documentation as HTML, every script and case in it run; LINKS=1 checks the web's links
 # make matrix       make test on Debian 12, 13 and sid, each in a throw-away root (see tests/matrix.sh)
 # make extremes     try the method at its extremes, say what survives and what is refused
-# make bench        speed and memory, stage by stage
+# make bench        speed and memory, stage by stage (AGAINST=../checkout compares with another checkout)
 # make trade        what accuracy costs: every knob of four cases; goes on where it was
 # make lint, make format, make clean
 #
@@ -43,7 +43,7 @@ extremes: setup
 	$(PYTHON) -m cases.extremes
 
 bench: setup
-	$(PYTHON) -m cases.costs.bench
+	$(PYTHON) -m cases.costs.bench $(if $(AGAINST),--against $(AGAINST))
 
 trade: setup
 	$(PYTHON) -m cases.costs.trade

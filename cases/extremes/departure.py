@@ -1,6 +1,6 @@
-"""Particles flung out of the grid: a cloud without forces between its particles, each on its line.
+"""Particles that leave the grid: a cloud without internal forces, each particle on a straight line.
 
-Reference: x + v t of each particle says which have left, when and where.
+Reference: x + v t of each particle tells which particles leave, when and where.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ SIDE, STEPS = 2.0, 10  # of the grid [m]
 
 
 def cloud(speed: float, leaving: str) -> tawami.Dynamics:
-    """200 particles anywhere that fly apart, so heavy that they do not feel each other; the fastest by
-    `speed` cells in a step of 1 s.
+    """200 particles at random positions that fly apart, too heavy to affect each other.
+
+    The fastest moves by `speed` cells in a step of 1 s.
     """
     h = SIDE / 16
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(-SIDE / 2, -SIDE / 2), h=h, cells=(16, 16))
@@ -36,7 +37,7 @@ def cloud(speed: float, leaving: str) -> tawami.Dynamics:
         density=1e25,
         leaving=leaving,  # type: ignore[arg-type]
     )
-    # linear in x, so that the grid has it as they do
+    # linear in x, so that the grid represents it exactly
     rate = speed * h / (0.3 * SIDE)
     motion = tawami.Dynamics(scene, velocity=rate * x)
     motion.velocity_gradient[:] = rate * np.eye(2)
@@ -44,7 +45,7 @@ def cloud(speed: float, leaving: str) -> tawami.Dynamics:
 
 
 def removed(speed: float) -> float:
-    """Wrong entries in the list of those that left: number, step and place; to the end of the cloud."""
+    """Number of wrong entries in `scene.left`: particle, step or place, until the cloud has left."""
     motion = cloud(speed, "remove")
     scene = motion.scene
     x = np.array(scene.particles.x)
@@ -73,7 +74,7 @@ def removed(speed: float) -> float:
 
 
 def stopped(speed: float) -> float:
-    """Refused at the step in which the first leaves, nothing changed; its number counts one of these."""
+    """The error message of the first departure must name particle and time, with nothing changed."""
     motion = cloud(speed, "stop")
     x, v = np.array(motion.scene.particles.x), np.array(motion.velocity)
     for step in range(1, STEPS + 1):
@@ -86,7 +87,7 @@ def stopped(speed: float) -> float:
             if words not in str(error) or f"and {len(gone) - 1} others" not in str(error):
                 raise AssertionError(f"'{error}' instead of '{words}'") from error
             if not np.array_equal(before, motion.scene.particles.x):
-                raise AssertionError("refused, and moved") from error
+                raise AssertionError("the particles moved in spite of the error") from error
             raise
         if len(gone):
             return np.inf
@@ -94,7 +95,7 @@ def stopped(speed: float) -> float:
 
 
 def attempts(short: bool) -> Iterator[Attempt]:
-    """From a fraction of a cell to thousands of cells a step."""
+    """From a fraction of a cell to a million cells per step."""
     for speed in (0.7, 3.0, 1e3) if short else (0.1, 0.7, 1.0, 3.0, 10.0, 100.0, 1e3, 1e6):
         for what, run in (("remove", removed), ("stop", stopped)):
             yield attempted(

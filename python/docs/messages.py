@@ -27,8 +27,8 @@ SUBJECTS: dict[str, tuple[str, ...]] = {
     "Studies": ("study",),
     "Command line": ("command",),
 }
-#: Classes whose messages users see.
-KINDS = set(errors.__all__)
+#: Classes of errors and warnings that users see.
+KINDS = {*errors.__all__, "InvertedError"}
 
 
 @dataclass(frozen=True)
@@ -70,9 +70,9 @@ def _of_module(tree: ast.Module) -> Iterator[tuple[str, str]]:
     fails = _kind_of_fail(tree)
     for node in ast.walk(tree):
         if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and node.exc.args:
-            kind = ast.unparse(node.exc.func)
-            if kind.isidentifier():
-                yield kind, _pattern(node.exc.args[0])
+            yield ast.unparse(node.exc.func), _pattern(node.exc.args[0])
+        elif isinstance(node, ast.Return) and isinstance(node.value, ast.Call) and node.value.args:
+            yield ast.unparse(node.value.func), _pattern(node.value.args[0])  # returned, to be raised
         elif isinstance(node, ast.Call) and node.args:
             called = ast.unparse(node.func)
             if called in ("warn", "warnings.warn"):

@@ -140,7 +140,7 @@ right = symbols.Symbols._direction
 @pytest.mark.parametrize(
     ("form", "subject", "words"),
     [
-        ("nowhere.py", "declaration", "does not exist"),
+        ("nowhere.py", "declaration", "cannot be read"),
         (
             tawami.Form(ALONE, "displacement", lambda w, porosity: 0),
             "arguments",

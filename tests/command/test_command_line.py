@@ -123,7 +123,7 @@ def test_the_new_script_of_dynamics_is_stopped_resumed_and_drawn(here, process, 
     # the code's own number: the script printed 0.56 when it was written
     assert "run-out [m]: 0.56" in resumed.stdout
     folder = tmp_path / "results" / "slump"
-    assert "goes on" in (folder / "log.txt").read_text()
+    assert "resumes at" in (folder / "log.txt").read_text()
     drawn = here("plot", "results/slump", "--quantity", "plastic_strain", cwd=tmp_path)
     assert drawn.returncode == 0, drawn.stderr
     pictures = [tmp_path / line for line in drawn.stdout.splitlines()]

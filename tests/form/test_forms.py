@@ -179,7 +179,7 @@ def test_sums_at_vertices_are_row_sum_lumped(random_scene, assembly):
 BOTH = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
 WRONG = [
     (lambda: Form.load("u_eps"), r"'u_eps' is not shipped: expected one of 'u', 'u_bbar'"),
-    (lambda: Form.load("nowhere.py"), "'nowhere.py' does not exist"),
+    (lambda: Form.load("nowhere.py"), "'nowhere.py' cannot be read"),
     (lambda: Form.load(textwrap), "'textwrap' declares no 'fields', 'kinematics', 'residual'"),
     (lambda: form_of(None, {"u": ("velocity", "w")}), "kind 'velocity': expected one of"),
     (lambda: form_of(None, {"u": "displacement"}), r"expected \(kind, test function\)"),

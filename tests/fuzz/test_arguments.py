@@ -271,7 +271,7 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         kind.__name__: (in_folder(observed(kind)), {
             "path": "output", "quantity": quantity, "every": 0.5, "phases": ["ramp"]} | more)
         for kind, quantity, more in (
-            (tawami.ParticleOutput, "stress", {"name": "points"}),
+            (tawami.ParticleOutput, "stress", {}),
             (tawami.GridOutput, "stress", {"projection": "lumped"}),
             (tawami.TableOutput, "run-out", {}))
     },

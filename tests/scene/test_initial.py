@@ -293,7 +293,7 @@ def test_a_wrong_table_gets_one_sentence(tmp_path, text, message):
 def test_files_that_are_not_there(tmp_path):
     with pytest.raises(tawami.InputError, match=r"table\('.*none.csv'\) cannot be read"):
         tawami.table(tmp_path / "none.csv")
-    with pytest.raises(tawami.InputError, match=r"earlier\('.*none.vtu'\) is no such file"):
+    with pytest.raises(tawami.InputError, match=r"earlier\('.*none.vtu'\) cannot be read"):
         tawami.earlier(tmp_path / "none.vtu")
     (tmp_path / "text.vtu").write_text("no particles")
     with pytest.raises(tawami.InputError, match=r"earlier\('.*text.vtu'\) cannot be read"):

@@ -232,7 +232,7 @@ def test_a_study_without_runs_or_without_a_quantity_raises_an_error(tmp_path):
     study = tawami.Study("toy", converges, {"n": (1,)}, {"z": 1.0}, folder=tmp_path)
     with pytest.raises(tawami.InputError, match="nothing has been run"):
         study.table()
-    with pytest.raises(tawami.InputError, match="no quantity 'z' among what its function returned"):
+    with pytest.raises(tawami.InputError, match="its function returned no quantity 'z'"):
         study.run(quiet=True)
 
 

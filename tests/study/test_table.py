@@ -6,7 +6,7 @@ import pytest
 
 import tawami
 from tawami.study import Row, Table
-from tawami.study.table import error_of
+from tawami.study.row import error_of
 
 
 def table_of(*points: tuple[float, float], **knobs: tuple) -> Table:

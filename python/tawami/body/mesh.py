@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tawami.base.arrays import Array, Indices
-from tawami.base.checks import one_of, shown
+from tawami.base.checks import one_of, path, shown
 from tawami.base.errors import GeometryWarning, InputError
+from tawami.base.files import unreadable
 from tawami.base.warn import warn
 from tawami.body import elements
 from tawami.body.body import Body
@@ -88,8 +89,11 @@ def _read(source: Any) -> Any:
         raise InputError(
             f"mesh: source = {shown(source)}: expected the path of a mesh file or a meshio.Mesh"
         )
-    if not Path(source).is_file():
-        raise InputError(f"mesh: '{source}' is not a file: expected a mesh that meshio reads")
+    problem = unreadable(path("mesh: source", source))
+    if problem is not None:
+        raise InputError(
+            f"mesh: '{source}' cannot be read ({problem}): expected a mesh that meshio reads"
+        )
     try:
         return meshio.read(source)
     except (Exception, SystemExit) as error:  # meshio ends the program if no reader fits

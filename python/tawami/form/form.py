@@ -46,6 +46,7 @@ from typing import Any, NoReturn
 from tawami.base.checks import TEXT, number, one_of, real, shown
 from tawami.base.checks import path as as_path
 from tawami.base.errors import FormError, InputError
+from tawami.base.files import unreadable
 from tawami.form.kinematics import (
     FIELD_UNITS,
     KINEMATICS,
@@ -204,13 +205,16 @@ class Form:
         path = as_path("form", source)
         if path.suffix != ".py":
             path = SHIPPED / f"{source}.py"
-            if not _is_there(path):
+            if unreadable(path) is not None:
                 raise FormError(
                     f"form '{source}' is not shipped: expected one of {listed(shipped())}, "
                     "or the path of a .py file"
                 )
-        elif not _is_there(path):
-            raise FormError(f"form file '{source}' does not exist, or cannot be read")
+        problem = unreadable(path)
+        if problem is not None:
+            raise FormError(
+                f"form file '{source}' cannot be read ({problem}): expected a Python file with a form"
+            )
         resolved = path.resolve()
         return _from_file(resolved, resolved.stat().st_mtime_ns)
 
@@ -285,13 +289,6 @@ def _are_names(value: Any) -> bool:
     """Whether it is a sequence of names."""
     sequence = isinstance(value, Sequence) and not isinstance(value, TEXT)
     return sequence and all(isinstance(name, str) for name in value)
-
-
-def _is_there(path: Path) -> bool:
-    try:
-        return path.exists()
-    except OSError:  # a name too long, a folder without permission
-        return False
 
 
 def source_of(function: Callable[..., Any]) -> str:

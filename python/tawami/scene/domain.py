@@ -77,9 +77,8 @@ class Domain:
             model.compiled, particles, location, stage, _constants(model, particles),
             model.grid.comm, stopwatch,
         )  # fmt: skip
-        return cls(
-            model, particles, location, field, stage, Newton(field, responses, stopwatch, numerics)
-        )
+        newton = Newton(field, responses, stopwatch, numerics)
+        return cls(model, particles, location, field, stage, newton)
 
     @property
     def layout(self) -> Layout:
