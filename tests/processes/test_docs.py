@@ -127,9 +127,13 @@ def test_every_public_name_is_in_the_api():
     assert named <= set(tawami.__all__)
 
 
-def test_names_that_exist():
-    assert pages.exists("tawami.scene.scene.Scene.solve")
-    assert pages.exists("tawami.motion.stepping")
+def test_names_in_pages_exist():
+    """Names of the API, and imports in the code of pages."""
+    for name, text in PAGES.items():
+        named = re.findall(r"^\.\. auto\w+:: (\S+)$", text, re.MULTILINE)
+        for module, imported in re.findall(r"^from (tawami\S*) import (.+)$", text, re.MULTILINE):
+            named += [f"{module}.{part.split()[0]}" for part in imported.split(",")]
+        assert [dotted for dotted in named if not pages.exists(dotted)] == [], name
     assert not pages.exists("tawami.scene.scene.Scene.nothing")
 
 
