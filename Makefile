@@ -27,7 +27,7 @@ export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 .DELETE_ON_ERROR:
 
 cantilever: setup
-	$(PYTHON) -m cases.cantilever
+	$(PYTHON) -m cases.verification.cantilever
 
 test: setup
 	cargo test --locked --quiet

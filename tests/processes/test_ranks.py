@@ -170,7 +170,7 @@ def test_an_error_of_a_driver_is_one_line(tmp_path):
     file = tmp_path / "file"
     file.touch()
     run = failed(
-        "from cases.cantilever.__main__ import main; import tawami; "
+        "from cases.verification.cantilever.__main__ import main; import tawami; "
         f"tawami.run(lambda: main(['--results', '{file}']), 'cantilever')"
     )
     assert run.stderr.count("cantilever: result folder ") == 1, run.stderr
@@ -179,7 +179,7 @@ def test_an_error_of_a_driver_is_one_line(tmp_path):
 
 @pytest.mark.slow
 def test_the_study_of_the_cantilever_runs_on_two_ranks(tmp_path):
-    run = start(2, "-m", "cases.cantilever", "--cells", "2,4", "--results", tmp_path)
+    run = start(2, "-m", "cases.verification.cantilever", "--cells", "2,4", "--results", tmp_path)
     assert run.returncode == 0, run.stderr
     assert run.stdout.count("66 computations") == 1
     written = {path.name for path in tmp_path.iterdir()}
