@@ -42,29 +42,39 @@ class FastField(Field):
         bilinear = len(self.compiled.form.fields) > 1
         return _rust.Assembler(self._location, self.layout.basis, nodes, vertices, bilinear)
 
-    def _kernels(self, integrals: Sequence[Integral], data: Mapping[Rule, Array]) -> list[Any]:
-        """Address, rank, width, coefficients and constants of each kernel, as Rust takes them."""
-        kernels = []
-        for integral in integrals:
-            slots: list[Any] = []
-            for slot in integral.slots:
-                if slot.source == "fields":
-                    slots.append(None)
-                else:
-                    assert slot.source != "traction"  # refused in integrals over cells
-                    points, columns = self._points[slot.source], list(slot.columns)
-                    slots.append((data[slot.data], points, slot.source == "vertex", columns))
-            constants = self._constants(integral).tolist()
-            kernels.append(
-                (integral.kernel.address, integral.rank, integral.width, slots, constants)
-            )
-        return kernels
+    def _kernel(self, integral: Integral) -> tuple[Any, ...]:
+        """An integral as `_rust.Kernels` reads it."""
+        rules = list(self.compiled.densities)
+        slots: list[tuple[Any, ...] | None] = []
+        for slot in integral.slots:
+            if slot.source == "fields":
+                slots.append(None)
+                continue
+            assert slot.source != "traction"  # rejected in integrals over cells
+            points, vertices = self._points[slot.source], slot.source == "vertex"
+            slots.append((rules.index(slot.data), points, vertices, slot.columns))
+        kernel, constants = integral.kernel, self._constants(integral).tolist()
+        return kernel.module, kernel.address, integral.rank, integral.width, slots, constants
+
+    def _kernels(self, rank: int, integrals: Sequence[Integral]) -> _rust.Kernels:
+        return _rust.Kernels(self._assembler, rank, list(map(self._kernel, integrals)))
+
+    @functools.cached_property
+    def _of_residual(self) -> _rust.Kernels:
+        return self._kernels(1, self.compiled.residual)
+
+    @functools.cached_property
+    def _of_tangent(self) -> tuple[_rust.Kernels, _rust.Kernels]:
+        """Kernels of rank 2, and the pairs of kernels of rank 1 whose products are added."""
+        pairs = [integral for pair in self.compiled.couplings for integral in pair]
+        return self._kernels(2, self.compiled.tangent), self._kernels(1, pairs)
 
     def residual(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
         """Internal forces and volume residual on all coefficients, before supports, on every rank."""
         with self.stopwatch("residual"):
-            kernels = self._kernels(self.compiled.residual, data)
-            forces = self._sum(self._assembler.vector(kernels, self._volume, coefficients))
+            arrays = list(data.values())
+            vector = self._assembler.vector(self._of_residual, arrays, self._volume, coefficients)
+            forces = self._sum(vector)
         return self._with_ghost(forces, coefficients, data)
 
     def tangent(self, coefficients: Array, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
@@ -75,9 +85,10 @@ class FastField(Field):
             if not reduction.same_unknowns(self.reduction):
                 self._new_pattern(reduction)
         with self.stopwatch("tangent"):
-            kernels = self._kernels(self.compiled.tangent, data)
-            couplings = [self._kernels(pair, data) for pair in self.compiled.couplings]
-            self._assembler.matrix(kernels, couplings, self._volume, coefficients, *self._pattern)
+            arrays = list(data.values())
+            self._assembler.matrix(
+                *self._of_tangent, arrays, self._volume, coefficients, *self._pattern
+            )
             self._petsc["of cells"].assemble()
         if self.grid.comm.size == 1:
             return self._tangent_with_ghost(self._petsc["of cells"], data, reduction)
