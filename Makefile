@@ -43,10 +43,10 @@ extremes: setup
 	$(PYTHON) -m cases.extremes
 
 bench: setup
-	$(PYTHON) -m cases.cantilever.bench
+	$(PYTHON) -m cases.costs.bench
 
 trade: setup
-	$(PYTHON) -m cases.trade
+	$(PYTHON) -m cases.costs.trade
 
 lint: setup $(STAMPS)/lint
 	cargo fmt --check

@@ -16,11 +16,11 @@ from time import perf_counter
 import matplotlib
 
 import tawami
-from cases import table
+from cases.common import table
 from cases.extremes import attempt, stability_map
 from cases.extremes.attempt import Attempt
+from tawami.base.files import atomic_file, result_folder
 from tawami.fem.environment import header
-from tawami.results.output import result_folder, whole_file
 
 #: Modules of this package, each with `attempts(short)`.
 SUBJECTS = (
@@ -99,7 +99,7 @@ def study(subjects: Sequence[str], short: bool, file: Path) -> list[Attempt]:
             rows.append(row)
             print(as_line(row), flush=True)
         print(f"-- {name}: {perf_counter() - start:.1f} s\n", flush=True)
-        with whole_file(file) as part:
+        with atomic_file(file) as part:
             part.write_text(table.as_csv(rows, attempt.COLUMNS))
     return rows
 

@@ -18,8 +18,8 @@ from math import sqrt
 
 import numpy as np
 
-from cases.cantilever import beam, mpm
 from cases.extremes.attempt import Attempt, attempted
+from cases.verification.cantilever import beam, mpm
 
 SUBJECT = "alpha"
 ALPHAS = (0.0, 1e-4, 1e-3, 0.01, 0.1, 0.3, 1.0, 10.0, 100.0, 1000.0)

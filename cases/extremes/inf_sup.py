@@ -104,10 +104,10 @@ def blocks(body: str, n: int, basis: str, stabilisation: str) -> Blocks:
     tangents = []
     for alpha in (0.0, step):
         scene = scene_of(body, n, basis, alpha, stabilisation)
-        selection = scene.problem().reduction.selection
+        selection = scene.reduction().selection
         tangent = scene.tangent(np.zeros(scene.num_coefficients))
         tangents.append((selection.T @ tangent @ selection).toarray())
-    layout, unknowns = scene.attached.layout, scene.problem().reduction.unknowns
+    layout, unknowns = scene.configuration.domain.layout, scene.reduction().unknowns
     of_u = unknowns < layout.num_displacement
     plain, change = tangents[0], (tangents[1] - tangents[0]) / step
     return Blocks(

@@ -17,8 +17,8 @@ import numpy as np
 from mpi4py import MPI
 
 import tawami
-from cases.cantilever import beam, mpm
 from cases.extremes.attempt import Attempt, attempted, untouched
+from cases.verification.cantilever import beam, mpm
 
 SUBJECT = "overload"
 E, NU = 1e6, 0.3  # [Pa], [-]

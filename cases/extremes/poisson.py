@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from mpi4py import MPI
 
 import tawami
-from cases.cantilever import beam, mpm
 from cases.extremes.attempt import Attempt, attempted
+from cases.verification.cantilever import beam, mpm
 
 SUBJECT = "Poisson's ratio"
 METHODS = {

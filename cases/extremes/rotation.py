@@ -2,7 +2,7 @@
 
 The block spins with rho omega^2 R^2/E = 1e-3, R half its side, 40 steps a turn. Angular momentum,
 linear momentum, energy and shape are compared with those of the start. The trapezoidal rule itself
-takes up to twice (omega dt)^2/4 = 1.2 % of sum m x x v (`cases.spinning_disc` says why).
+takes up to twice (omega dt)^2/4 = 1.2 % of sum m x x v (`cases.verification.spinning_disc` says why).
 """
 
 from __future__ import annotations

@@ -13,8 +13,8 @@ import numpy as np
 from matplotlib.colors import LogNorm
 
 import tawami
-from cases.cantilever import beam, mpm
-from cases.figure import save
+from cases.common.figure import save
+from cases.verification.cantilever import beam, mpm
 
 #: Columns of the figure: what stands above, form, and its options.
 FORMS: dict[str, tuple[str, dict[str, str]]] = {

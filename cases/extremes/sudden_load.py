@@ -57,7 +57,7 @@ def ramped(form: str, factor: float) -> float:
 
     def wrong() -> float:
         """Last reaction against the share of the load that is borne, over the load."""
-        share = scene.loads.forces[0].carried
+        share = scene.configuration.loads.forces[0].share.carried
         if not np.isfinite(scene.particles.stress).all():
             return np.inf
         return float(abs(reactions[-1] / (factor * FORCE) + share))

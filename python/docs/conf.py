@@ -1,15 +1,28 @@
-"""Sphinx for the pages that `python python/docs` has put together in results/docs."""
+"""Sphinx settings for the pages that `python python/docs` puts together in results/docs."""
+
+from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
+
+from docutils import nodes
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "python" / "docs"), str(ROOT)]
 
+import sources  # noqa: E402  (it is found by the line above)
+
 project = "tawami"
 author = "The tawami developers"
 project_copyright = author
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "mathml"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.napoleon",
+    "sphinx-mathjax-offline",
+]
 exclude_patterns = ["html", "doctrees", "generated", "cases/*/**", "executed"]
 
 # Markdown
@@ -17,7 +30,6 @@ myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
 myst_heading_anchors = 4
 suppress_warnings: list[str] = []
 math_number_all = False
-html_math_renderer = "mathml"
 
 # docstrings
 default_role = "code"
@@ -32,10 +44,26 @@ napoleon_use_rtype = False
 napoleon_custom_sections = ["History"]
 python_maximum_signature_line_length = 88
 
-# pages: nothing is loaded from elsewhere
+# pages: nothing is loaded from the web
 html_theme = "furo"
 html_title = "tawami"
 html_show_sphinx = False
 html_copy_source = False
 html_static_path = [str(ROOT / "python" / "docs" / "style")]
 html_css_files = ["pages.css"]
+
+
+def src(
+    _name: str, rawtext: str, text: str, line: int, inliner: Any, *_: Any
+) -> tuple[list[nodes.Node], list[nodes.system_message]]:
+    """Role for a file of the repository and a symbol in it: {src}`forms/u.py residual`."""
+    problem = sources.missing(text)
+    if problem is not None:
+        return [], [inliner.reporter.warning(problem, line=line)]
+    return [nodes.literal(rawtext, text.replace(" ", ": ", 1), classes=["src"])], []
+
+
+def setup(app: Any) -> None:
+    """Register the role; draw equations as SVG, since browsers block fonts of local files."""
+    app.add_role("src", src)
+    app.config.mathjax_path = "mathjax/tex-svg.js"

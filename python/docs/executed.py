@@ -99,14 +99,14 @@ def command(
     return run.stdout
 
 
-def case(name: str) -> Output:
-    """A case as `python -m cases.NAME` runs it."""
-    folder = RESULTS / "cases" / name
-    own = (f"cases/{name}.py", f"cases/{name}/*.py", "cases/*.py")
+def case(room: str, name: str) -> Output:
+    """Run a case as `python -m cases.ROOM.NAME` does."""
+    folder, module = RESULTS / "cases" / name, f"cases.{room}.{name}"
+    own = (f"cases/{room}/{name}.py", f"cases/{room}/{name}/*.py", "cases/common/*.py")
     options = [] if name in WITHOUT_FILES else ["--results", str(folder)]
-    words = [sys.executable, "-m", f"cases.{name}", *SHORTER.get(name, ()), *options]
+    words = [sys.executable, "-m", module, *SHORTER.get(name, ()), *options]
     mark = fingerprint((*SHARED, *own), *SHORTER.get(name, ()))
-    output = kept(folder, mark, lambda: command(words, ROOT, f"python -m cases.{name}"))
+    output = kept(folder, mark, lambda: command(words, ROOT, f"python -m {module}"))
     return Output(output.text.replace(f"{ROOT}/", ""), output.pictures, output.seconds)
 
 

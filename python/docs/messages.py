@@ -72,7 +72,7 @@ def _of_module(tree: ast.Module) -> Iterator[tuple[str, str]]:
                 yield kind, _pattern(node.exc.args[0])
         elif isinstance(node, ast.Call) and node.args:
             called = ast.unparse(node.func)
-            if called == "warnings.warn":
+            if called in ("warn", "warnings.warn"):
                 kind = ast.unparse(node.args[1]) if len(node.args) > 1 else "UserWarning"
                 yield kind, _pattern(node.args[0])
             elif called == "self._fail" and fails:

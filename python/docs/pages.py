@@ -20,22 +20,22 @@ import executed
 import messages
 from sources import ROOT
 
-from tawami.base import errors, ranks
+from tawami.base import errors, program
 
 SOURCE = Path(__file__).parent
-#: Cases with their titles, and modules that state the problem beside the one that runs.
-CASES: dict[str, tuple[str, tuple[str, ...]]] = {
-    "cantilever": ("Cantilever", ("beam",)),
-    "cook": ("Cook's membrane", ("membrane",)),
-    "cut_cells": ("Cut cells", ()),
-    "self_weight": ("Self-weight", ()),
-    "elastica": ("Elastica", ()),
-    "footing": ("Footing", ()),
-    "vibrating_beam": ("Vibrating beam", ("beam",)),
-    "spinning_disc": ("Spinning disc", ()),
-    "collapse": ("Collapse", ()),
-    "projection": ("Nodal projection", ()),
-    "writing": ("Writing results", ()),
+#: Cases: title, folder of `cases/`, and the modules that state the problem, besides the one that runs.
+CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
+    "cantilever": ("Cantilever", "verification", ("beam",)),
+    "cook": ("Cook's membrane", "verification", ("membrane",)),
+    "cut_cells": ("Cut cells", "showcase", ()),
+    "self_weight": ("Self-weight", "verification", ()),
+    "elastica": ("Elastica", "verification", ("strip",)),
+    "footing": ("Footing", "verification", ()),
+    "vibrating_beam": ("Vibrating beam", "verification", ("beam",)),
+    "spinning_disc": ("Spinning disc", "verification", ("disc",)),
+    "collapse": ("Collapse", "showcase", ("pile",)),
+    "projection": ("Nodal projection", "costs", ()),
+    "writing": ("Writing results", "costs", ()),
 }
 TRADE = ("cantilever", "cook", "collapse", "self_weight", "spinning_disc")
 LINK = re.compile(r"https?://[^\s)>\"'`]+")
@@ -57,8 +57,8 @@ def assemble(target: Path) -> list[str]:
     for old in [*target.glob("*.md"), *target.glob("cases/*.md")]:
         if str(old.relative_to(target).with_suffix("")) not in texts:
             old.unlink()
-    for picture in [*ROOT.glob("cases/trade/*.png"), ROOT / "cases/extremes/map.png"]:
-        copy = target / picture.relative_to(ROOT / "cases")
+    for picture in [*ROOT.glob("cases/costs/trade/*.png"), ROOT / "cases/extremes/map.png"]:
+        copy = target / picture.parent.name / picture.name
         copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(picture, copy)
     return list(texts)
@@ -113,9 +113,9 @@ def exists(dotted: str) -> bool:
 
 def case_page(name: str) -> str:
     """A case: what it is about, its pictures, what it printed."""
-    title, beside = CASES[name]
-    output = executed.case(name)
-    folder = ROOT / "cases" / name
+    title, room, beside = CASES[name]
+    output = executed.case(room, name)
+    folder = ROOT / "cases" / room / name
     if folder.is_dir():
         files = [*(folder / f"{module}.py" for module in beside), folder / "__main__.py"]
     else:
@@ -123,7 +123,7 @@ def case_page(name: str) -> str:
     about = "\n\n".join(_docstring(file) for file in files)
     named = ", ".join(f"{{src}}`{file.relative_to(ROOT)}`" for file in files)
     options = executed.SHORTER.get(name, ())
-    command = " ".join(["python -m", f"cases.{name}", *options])
+    command = " ".join(["python -m", f"cases.{room}.{name}", *options])
     shorter = " Without the option it takes a few times as long." if options else ""
     pictures = "\n\n".join(
         f"![{title}: {path.stem.replace('_', ' ')}]({name}/{path.name})" for path in output.pictures
@@ -151,7 +151,8 @@ def _duration(seconds: float) -> str:
 def _trade() -> str:
     sections = []
     for name in TRADE:
-        words = (ROOT / "cases" / "trade" / f"{name}.md").read_text().partition("\n")[2].strip()
+        text = (ROOT / "cases" / "costs" / "trade" / f"{name}.md").read_text()
+        words = text.partition("\n")[2].strip()
         title = CASES[name][0]
         picture = f"![{title}: errors over wall time](trade/{name}.png)"
         sections.append(f"## {title}\n\n{picture}\n\n{_paragraphs(words)}")
@@ -175,7 +176,7 @@ def _try_all() -> str:
     for number in (1, 2):
         words, environment = [sys.executable, str(SOURCE / "compatibility.py")], dict(os.environ)
         if number > 1:
-            words, environment = ranks.mpirun(number, words)
+            words, environment = program.mpirun(number, words)
         start = perf_counter()
         what = f"compatibility, ranks: {number}"
         text = executed.command(words, ROOT, what, environment)

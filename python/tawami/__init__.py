@@ -22,8 +22,9 @@ from tawami.base.errors import (
     TawamiError,
     TawamiWarning,
 )
-from tawami.base.ranks import run
-from tawami.body.body import Body, box
+from tawami.base.program import run
+from tawami.body.body import Body
+from tawami.body.box import box
 from tawami.body.disc import disc
 from tawami.body.level_set import level_set
 from tawami.body.mesh import mesh
@@ -41,8 +42,9 @@ from tawami.particles.laws import (
     von_mises,
 )
 from tawami.particles.numpy_law import NumpyLaw
-from tawami.results.output import GridOutput, ParticleOutput, TableOutput
+from tawami.results.outputs import GridOutput, ParticleOutput
 from tawami.results.results import Results
+from tawami.results.table import TableOutput
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
 from tawami.scene.sources import earlier, table

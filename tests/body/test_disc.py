@@ -1,32 +1,19 @@
-"""Discs and rings: their moments are those of circles, whatever cells the arcs cut."""
+"""Discs and rings have the moments of circles, whichever cells the arcs cut."""
 
 from __future__ import annotations
 
+import moments
 import numpy as np
 import pytest
-from conftest import grid_of, linear_field
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
+from scenes import grid_of, linear_field
 
 import tawami
 from tawami import _rust
 
 MOST = 28  # particles in a cut cell
-
-
-def moments_of_ring(centre, radius, inner):
-    """Area, first moments and second moments (xx, yy, xy) about the origin."""
-    (x, y), area = centre, np.pi * (radius**2 - inner**2)
-    own = np.pi / 4 * (radius**4 - inner**4)
-    return np.array(
-        [area, area * x, area * y, own + area * x * x, own + area * y * y, area * x * y]
-    )
-
-
-def moments_of_particles(body):
-    x, y = body.x.T
-    return np.array([(body.volume * f).sum() for f in (1, x, y, x * x, y * y, x * y)])
 
 
 def most_in_a_cell(grid, body):
@@ -47,31 +34,31 @@ def test_area_centroid_and_second_moments(place, size, hole, per_axis):
     room = np.array(grid.upper) - grid.origin - 2 * radius
     centre = np.array(grid.origin) + radius + np.array(place) * room
     body = tawami.disc(grid, centre, radius, inner=hole * radius, per_axis=per_axis, gauss=True)
-    exact = moments_of_ring(centre, radius, hole * radius)
-    assert moments_of_particles(body) == pytest.approx(exact, rel=1e-11, abs=1e-11 * exact[0])
+    exact = moments.of_ring(centre, radius, hole * radius)
+    assert moments.of_particles(body) == pytest.approx(exact, rel=1e-11, abs=1e-11 * exact[0])
     assert (body.volume > 0).all()
     r = np.hypot(*(body.x - centre).T)
     assert r.max() <= radius * (1 + 1e-9)
     assert r.min() >= hole * radius * (1 - 1e-9)
     assert most_in_a_cell(grid, body) <= MOST
     even = tawami.disc(grid, centre, radius, inner=hole * radius, per_axis=per_axis)
-    assert moments_of_particles(even)[:3] == pytest.approx(
+    assert moments.of_particles(even)[:3] == pytest.approx(
         exact[:3], rel=1e-11, abs=1e-11 * exact[0]
     )
 
 
 @pytest.mark.parametrize(("inner", "cells"), [(0.0, 8), (0.25, 8), (0.5, 8), (0.5, 24), (0.999, 8)])
-def test_circles_that_touch_lines_and_the_end_of_the_grid(inner, cells):
+def test_circles_that_touch_lines_and_edges_of_the_grid(inner, cells):
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(-1, -1), h=2 / cells, cells=(cells, cells))
     body = tawami.disc(grid, (0, 0), 1.0, inner=inner, gauss=True)
-    exact = moments_of_ring((0, 0), 1.0, inner)
-    assert moments_of_particles(body) == pytest.approx(exact, abs=1e-12)
+    exact = moments.of_ring((0, 0), 1.0, inner)
+    assert moments.of_particles(body) == pytest.approx(exact, abs=1e-12)
     assert (np.abs(body.x) < 1).all()
 
 
 @pytest.mark.parametrize("per_axis", [1, 2, 3])
-def test_even_particles_miss_a_known_part_of_the_second_moments(per_axis):
-    """h^2 / (12 per_axis^2) of the area of the full cells: of second order in h."""
+def test_error_of_second_moments_with_evenly_spaced_particles(per_axis):
+    """It is h^2 / (12 per_axis^2) times the area of the full cells."""
     for n in (8, 16, 32):
         grid = tawami.Grid(MPI.COMM_WORLD, origin=(-1, -1), h=2 / n, cells=(n, n))
         body = tawami.disc(grid, (0.03, 0.01), 0.9, per_axis=per_axis)
@@ -80,13 +67,13 @@ def test_even_particles_miss_a_known_part_of_the_second_moments(per_axis):
         far = np.maximum(*(abs(part - [[0.03], [0.01]]) for part in (lines[:-1], lines[1:])))
         x, y = np.meshgrid(*far)
         full = np.count_nonzero(np.hypot(x, y) <= 0.9) * grid.h**2
-        missing = (moments_of_ring((0.03, 0.01), 0.9, 0.0) - moments_of_particles(body))[3:]
+        missing = (moments.of_ring((0.03, 0.01), 0.9, 0.0) - moments.of_particles(body))[3:]
         expected = full * grid.h**2 / (12 * per_axis**2)
         assert missing == pytest.approx([expected, expected, 0.0], abs=1e-13)
 
 
-def test_forces_of_a_constant_stress_are_those_on_the_circle():
-    """sum_p V_p grad N_i = int over the circle of N_i n: a linear field has no other forces."""
+def test_forces_of_a_constant_stress_act_on_the_circle_only():
+    """sum_p V_p grad N_i = int over the circle of N_i n."""
     grid, centre, radius = grid_of((8, 7), h=0.25), np.array([-0.05, 1.3]), 0.6
     body = tawami.disc(grid, centre, radius, gauss=True)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=3.0, nu=0.0), form="u")
@@ -112,6 +99,6 @@ def test_forces_of_a_constant_stress_are_those_on_the_circle():
         ({"radius": 0.3, "per_axis": 0}, "per_axis = 0: expected a whole number"),
     ],
 )  # fmt: skip
-def test_a_wrong_disc_gets_one_sentence(options, message):
+def test_error_messages(options, message):
     with pytest.raises(tawami.InputError, match=message):
         tawami.disc(grid_of(), **{"centre": (0, 1)} | options)

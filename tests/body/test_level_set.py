@@ -1,13 +1,13 @@
-"""Bodies of level sets: their area is within the tolerance, too much as often as too little."""
+"""Bodies of level sets have the right area, within the tolerance."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import grid_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
+from scenes import grid_of
 
 import tawami
 
@@ -57,9 +57,10 @@ def test_area_and_centroid_of_ellipses(centre, axes, turn, tolerance):
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_curved_borders_are_not_cut_short(sign):
-    """Chords between samples h/4 apart would take away h^2/(16 * 12 R^2) of a disc and give as much to
-    a hole; what is left of that has one hundredth of it, undivided.
+def test_area_of_curved_borders(sign):
+    """Chords between samples at a distance of h/4 would change the area by h^2/(16 * 12 R^2) of it.
+
+    The error, without any division, is less than a hundredth of that.
     """
     grid, R = square_grid(16), 0.7
     body = tawami.level_set(
@@ -95,7 +96,7 @@ def test_sides_on_lines_of_the_grid_make_a_box():
     assert body.volume[order] == pytest.approx(box.volume[order_of_box])
 
 
-def test_only_the_sign_of_the_function_counts():
+def test_only_the_sign_of_the_function_is_used():
     f = ellipse((0.0, 0.1), (0.6, 0.3), 0.5)
     one, other = (
         tawami.level_set(square_grid(), g) for g in (f, lambda x, y: np.where(f(x, y) < 0, -3e9, 0))
@@ -104,34 +105,34 @@ def test_only_the_sign_of_the_function_counts():
     assert np.array_equal(one.volume, other.volume)
 
 
-def test_what_is_thinner_than_the_samples_needs_more_of_them():
+def test_thin_parts_need_more_samples():
     def strip(x, y):
         return np.maximum(np.abs(x - 0.49) - 0.002, np.abs(y) - 0.5)
 
     grid = square_grid()
-    with pytest.raises(tawami.InputError, match="nowhere negative at the 16641 points"):
+    with pytest.raises(tawami.InputError, match="not negative at any of the 16641 samples"):
         tawami.level_set(grid, strip)
     body = tawami.level_set(grid, strip, samples=32)
     assert body.volume.sum() == pytest.approx(0.004, rel=1e-6)
 
 
-def test_the_grid_may_end_the_body_if_the_script_says_so():
+def test_bodies_that_end_at_edges_of_the_grid():
     grid = grid_of()
     slope = tawami.level_set(grid, lambda x, y: y - 1.2 - 0.1 * x, ends=("bottom", "left", "right"))
     assert slope.volume.sum() == pytest.approx(2 * 0.7, rel=1e-12)
     with pytest.raises(tawami.InputError, match=r"negative on the edge 'left'.*ends=\('left',\)"):
         tawami.level_set(grid, lambda x, y: y - 1.2 - 0.1 * x, ends=("bottom", "right"))
-    whole = tawami.level_set(grid, lambda x, y: -1.0, ends=("bottom", "left", "right", "top"))
+    full = tawami.level_set(grid, lambda x, y: -1.0, ends=("bottom", "left", "right", "top"))
     box = tawami.box(grid, grid.origin, grid.upper)
-    assert set(map(tuple, whole.x)) == set(map(tuple, box.x))
+    assert set(map(tuple, full.x)) == set(map(tuple, box.x))
 
 
 @pytest.mark.parametrize(
     ("f", "options", "message"),
     [
         (1.0, {}, "f = 1.0: expected a function f"),
-        (lambda x, y: x * 0 + 1, {}, "f is nowhere negative at the 825 points.*change its sign"),
-        (lambda x, y: np.where(x > 0, np.nan, -1), {}, r"f is not a number at \(0.0625, 0.5\) m and"),
+        (lambda x, y: x * 0 + 1, {}, "f is not negative at any of the 825 samples.*change its sign"),
+        (lambda x, y: np.where(x > 0, np.nan, 1), {}, r"f is NaN at 400 points, the first is \(0.0625"),
         (lambda x, y: -1.0 if x < 0 else 1.0, {}, "f failed on arrays .*np.where"),
         (lambda x, y: x[:3], {}, r"f returned an array of shape \(3,\): expected \(825,\)"),
         (lambda x, y: x, {"tolerance": 0}, "tolerance = 0: expected a finite number of at least 1e-13"),
@@ -144,6 +145,6 @@ def test_the_grid_may_end_the_body_if_the_script_says_so():
         ),
     ],
 )  # fmt: skip
-def test_a_wrong_level_set_gets_one_sentence(f, options, message):
+def test_error_messages(f, options, message):
     with pytest.raises(tawami.InputError, match=message):
         tawami.level_set(grid_of(), f, **options)

@@ -1,6 +1,4 @@
-"""Bodies of meshes: each group has its elements' area and moments in every format, and what is wrong
-with a mesh is said.
-"""
+"""Bodies of meshes: each group has the moments of its elements in every format; error messages."""
 
 from __future__ import annotations
 
@@ -8,10 +6,11 @@ import warnings
 from time import perf_counter
 
 import meshio
+import moments
 import numpy as np
 import pytest
-from conftest import grid_of
 from mpi4py import MPI
+from scenes import grid_of
 from scipy.spatial import Delaunay
 
 import tawami
@@ -21,7 +20,7 @@ NAMES = {"clay": np.array([CLAY, 2]), "sand": np.array([SAND, 2])}
 
 
 def quads(nx=5, ny=4, size=(1.7, 1.1), turn=0.2, place=(-0.75, 0.55)):
-    """A turned rectangle of squares, and the group of each: sand below a line, clay above."""
+    """A rotated rectangle of squares, and the group of each: sand below, clay above."""
     x, y = np.meshgrid(np.linspace(0, size[0], nx + 1), np.linspace(0, size[1], ny + 1))
     c, s = np.cos(turn), np.sin(turn)
     points = np.column_stack([(c * x - s * y).ravel(), (s * x + c * y).ravel()]) + place
@@ -37,38 +36,23 @@ def triangles(**options):
 
 def made(points, kind, cells, tag=None, names=NAMES, z=0.0, **options):
     data = {} if tag is None else {"gmsh:physical": [tag], "gmsh:geometrical": [tag]}
-    whole = np.column_stack([points, np.full(len(points), z)])
-    return meshio.Mesh(whole, [(kind, cells)], cell_data=data, field_data=names, **options)
+    in_space = np.column_stack([points, np.full(len(points), z)])
+    return meshio.Mesh(in_space, [(kind, cells)], cell_data=data, field_data=names, **options)
 
 
 def second_order(points, cells):
-    """Nodes in the middle of the sides, one for each side of each element."""
+    """The elements with a node in the middle of each side."""
     n, m = cells.shape
     middle = (points[cells] + points[np.roll(cells, -1, axis=1)]) / 2
     numbers = len(points) + np.arange(n * m).reshape(n, m)
     return np.concatenate([points, middle.reshape(-1, 2)]), np.concatenate([cells, numbers], axis=1)
 
 
-def moments(points, cells):
-    """Area, first and second moments of straight-sided elements: sums over sides, Green's theorem."""
-    x, y = points[cells].transpose(2, 0, 1)
-    x1, y1 = np.roll(x, -1, axis=1), np.roll(y, -1, axis=1)
-    c = x * y1 - x1 * y
-    sums = [c / 2, (x + x1) * c / 6, (y + y1) * c / 6,
-            (x**2 + x * x1 + x1**2) * c / 12, (y**2 + y * y1 + y1**2) * c / 12]  # fmt: skip
-    return np.array([part.sum() for part in sums])
-
-
-def moments_of_particles(body, chosen=slice(None)):
-    (x, y), volume = body.x[chosen].T, body.volume[chosen]
-    return np.array([(volume * f).sum() for f in (1, x, y, x * x, y * y)])
-
-
 def check(body, points, cells, tag):
     assert body.names == ("sand", "clay")
     for number, group in enumerate((SAND, CLAY)):
-        exact = moments(points, cells[tag == group])
-        found = moments_of_particles(body, body.material_of == number)
+        exact = moments.of_polygons(points[cells[tag == group]])
+        found = moments.of_particles(body, body.material_of == number)
         assert found == pytest.approx(exact, rel=1e-12, abs=1e-14)
     assert (body.volume > 0).all()
 
@@ -77,15 +61,15 @@ def check(body, points, cells, tag):
 def test_moments_of_each_group(kind):
     points, cells, tag = triangles() if kind.startswith("tri") else quads()
     if kind[-1].isdigit():
-        more, whole = second_order(points, cells)
-        body = tawami.mesh(grid_of(), made(more, kind, whole, tag, z=3.0), gauss=True)
+        nodes, elements = second_order(points, cells)
+        body = tawami.mesh(grid_of(), made(nodes, kind, elements, tag, z=3.0), gauss=True)
     else:
         body = tawami.mesh(grid_of(), made(points, kind, cells, tag), gauss=True)
     check(body, points, cells, tag)
 
 
 def gmsh_41(points, cells, tag):
-    """A file as Gmsh writes it: physical groups belong to entities, these to blocks of elements."""
+    """A file as written by Gmsh: blocks of elements name entities, and these their physical groups."""
     lines = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat", "$PhysicalNames", "2", f'2 {SAND} "sand"',
              f'2 {CLAY} "clay"', "$EndPhysicalNames", "$Entities", "0 0 2 0",
              f"1 -1 0 0 1 2 0 1 {SAND} 0", f"2 -1 0 0 1 2 0 1 {CLAY} 0", "$EndEntities", "$Nodes",
@@ -114,7 +98,7 @@ def test_files(tmp_path, format):
     else:
         meshio.write(path, mesh)
     body = tawami.mesh(grid_of(), path, gauss=True)
-    if not format.startswith("gmsh"):  # numbers only
+    if not format.startswith("gmsh"):  # these formats have numbers only
         assert body.names == ("3", "7")
         body = tawami.Body(body.x, body.volume, body.material_of, ("sand", "clay"))
     check(body, points, cells, tag)
@@ -127,23 +111,27 @@ def test_cell_sets_and_meshes_without_groups():
     check(body, points, cells, tag)
     plain = tawami.mesh(grid_of(), made(points, "quad", cells), gauss=True)
     assert plain.names == ()
-    assert moments_of_particles(plain) == pytest.approx(moments(points, cells), rel=1e-12)
+    assert moments.of_particles(plain) == pytest.approx(
+        moments.of_polygons(points[cells]), rel=1e-12
+    )
 
 
-def test_a_mesh_is_the_polygon_of_its_border():
+def test_a_mesh_has_the_moments_of_the_polygon_around_it():
     points, cells, _ = quads(nx=11, ny=7)
     corners = points[[0, 11, 12 * 8 - 1, 12 * 7]]
     grid = grid_of((8, 6), h=0.25)
     body = tawami.mesh(grid, made(points, "quad", cells))
     polygon = tawami.polygon(grid, corners)
-    assert moments_of_particles(body) == pytest.approx(moments_of_particles(polygon), rel=1e-12)
+    assert moments.of_particles(body) == pytest.approx(moments.of_particles(polygon), rel=1e-12)
 
 
 def test_concave_quadrilaterals_and_clockwise_ones():
-    points = np.array([[-0.9, 0.6], [0.2, 0.7], [-0.5, 0.9], [-0.6, 1.9]])  # node 2 is pushed in
+    points = np.array(
+        [[-0.9, 0.6], [0.2, 0.7], [-0.5, 0.9], [-0.6, 1.9]]
+    )  # node 2 is inside the triangle of the others
     body = tawami.mesh(grid_of(), made(points, "quad", np.array([[3, 2, 1, 0]])), gauss=True)
-    exact = moments(points, np.array([[0, 1, 2, 3]]))
-    assert moments_of_particles(body) == pytest.approx(exact, rel=1e-12)
+    exact = moments.of_polygons(points[[[0, 1, 2, 3]]])
+    assert moments.of_particles(body) == pytest.approx(exact, rel=1e-12)
 
 
 def test_materials_by_name_or_in_the_order_of_the_numbers():
@@ -156,13 +144,13 @@ def test_materials_by_name_or_in_the_order_of_the_numbers():
     )
     listed = tawami.Scene(grid, body, [sand, clay], density=[2e3, 1e3])
     for scene in (named, listed):
-        stiff = scene.constants["mu"] == sand.shear_modulus
+        stiff = scene.configuration.domain.constants["mu"] == sand.shear_modulus
         assert stiff.any()
         assert (stiff == (body.material_of == 0)).all()
-        areas = [moments(points, cells[tag == group])[0] for group in (SAND, CLAY)]
+        areas = [moments.of_polygons(points[cells[tag == group]])[0] for group in (SAND, CLAY)]
         assert scene.mass.sum() == pytest.approx(2e3 * areas[0] + 1e3 * areas[1])
     mine = tawami.Scene(grid, body, clay, material_of=np.zeros(len(body.x)))
-    assert np.ptp(mine.constants["mu"]) == 0
+    assert np.ptp(mine.configuration.domain.constants["mu"]) == 0
 
 
 @pytest.mark.parametrize(
@@ -177,7 +165,7 @@ def test_materials_by_name_or_in_the_order_of_the_numbers():
         ({"clay": 0, "sand": 0}, {"material_of": [0]}, "dictionary and material_of is given too"),
     ],
 )  # fmt: skip
-def test_names_without_a_material_and_the_reverse(material, options, message):
+def test_error_messages_of_materials_by_name(material, options, message):
     law = tawami.linear_elastic(E=1e5, nu=0.4)
     if isinstance(material, dict):
         material = dict.fromkeys(material, law)
@@ -197,12 +185,12 @@ def test_a_dictionary_for_a_body_without_names():
         tawami.Scene(grid, box, {"clay": law})
 
 
-def test_curved_sides_are_said_to_be_taken_as_straight():
+def test_warning_of_curved_sides():
     points, cells, _ = triangles()
-    more, whole = second_order(points, cells)
-    more[len(points)] += 0.01
+    nodes, elements = second_order(points, cells)
+    nodes[len(points)] += 0.01
     with pytest.warns(tawami.GeometryWarning, match=r"curved sides, by up to 0.04\d* of a side"):
-        body = tawami.mesh(grid_of(), made(more, "triangle6", whole), gauss=True)
+        body = tawami.mesh(grid_of(), made(nodes, "triangle6", elements), gauss=True)
     assert body.volume.sum() == pytest.approx(1.7 * 1.1, rel=1e-12)
 
 
@@ -213,7 +201,7 @@ def wrong(what):
     match what:
         case "outside":
             points[:, 0] += 0.8
-        case "inverted":  # a node pushed through the side opposite
+        case "inverted":  # a node is pushed through the opposite side
             points[8] += [0.9, 0.05]
         case "twice":
             cells, tag = np.concatenate([cells, cells[:1]]), np.append(tag, CLAY)
@@ -247,11 +235,11 @@ def wrong(what):
     [
         ("outside", r"element \d+ has a node at \(.*\) m, outside the grid, \[-1, 1\] x \[0.5, 2\]"),
         ("nan", r"element \d+ has a node at \(nan, nan\) m, outside the grid"),
-        ("inverted", r"elements \d+ and \d+ lie over each other near \(.*turned inside out"),
-        ("twice", r"elements 0 and 40 lie over each other near"),
-        ("two bodies", r"elements \d+ and \d+ lie over each other"),
-        ("flat", r"element 0 and \d+ others have no area"),
-        ("twisted", r"quadrilateral 0 and 19 others cross themselves"),
+        ("inverted", r"elements \d+ and \d+ overlap near \(.*turned inside out"),
+        ("twice", r"elements 0 and 40 overlap near"),
+        ("two bodies", r"elements \d+ and \d+ overlap"),
+        ("flat", r"\d+ of its triangles have no area, the first in element 0"),
+        ("twisted", r"20 of its quadrilaterals cross themselves, the first is element 0"),
         ("solid", r"holds elements 'tetra': expected triangles and quadrilaterals"),
         ("lines", r"holds line: expected triangles or quadrilaterals"),
         ("not plane", r"nodes have z from 0 to 0.5 m: expected a plane mesh"),
@@ -259,13 +247,13 @@ def wrong(what):
         ("two sets", r"elements are in the cell sets 'clay' and 'sand': expected each in one"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_with_a_mesh_is_said(what, message):
+def test_error_messages(what, message):
     with pytest.raises(tawami.InputError, match=message):
         tawami.mesh(grid_of(), wrong(what))
 
 
 def test_files_that_cannot_be_read(tmp_path):
-    with pytest.raises(tawami.InputError, match=r"'.*none.msh' is no file: expected a mesh"):
+    with pytest.raises(tawami.InputError, match=r"'.*none.msh' is not a file: expected a mesh"):
         tawami.mesh(grid_of(), tmp_path / "none.msh")
     for name in ("text.msh", "text.vtu", "text.unknown"):
         (tmp_path / name).write_text("no mesh")
@@ -279,7 +267,7 @@ def test_files_that_cannot_be_read(tmp_path):
         tawami.mesh(grid_of(), mesh, tags="layer")
 
 
-def test_many_elements_take_seconds():
+def test_time_for_many_elements():
     """50 000 triangles on 64 x 64 cells; `pytest -s` prints the time."""
     random = np.random.default_rng(0)
     points = random.uniform(-0.93, 0.93, (25000, 2))
@@ -292,6 +280,6 @@ def test_many_elements_take_seconds():
         body = tawami.mesh(grid, made(points, "triangle", cells, tag))
         seconds = perf_counter() - begin
     print(f"{len(cells)} triangles: {len(body.x)} particles in {seconds:.1f} s")
-    exact = moments(points, cells)[:3]
-    assert moments_of_particles(body)[:3] == pytest.approx(exact, rel=1e-11, abs=1e-11)
+    exact = moments.of_polygons(points[cells])[:3]
+    assert moments.of_particles(body)[:3] == pytest.approx(exact, rel=1e-11, abs=1e-11)
     assert seconds < 20

@@ -1,4 +1,4 @@
-"""One shape by several ways: the same solution; and linear fields through cells that shapes cut."""
+"""One shape made by several functions gives one solution; linear fields in cut cells are exact."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import meshio
 import numpy as np
 import pytest
 import shapely
-from conftest import grid_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
+from scenes import grid_of
 
 import tawami
 
@@ -17,7 +17,7 @@ MIDDLE, SIDE, TURN = np.array([1.04, 0.97]), 0.9, 0.3
 
 
 def corners(side=SIDE, turn=TURN):
-    """Of a square about the middle."""
+    """Corners of a square around the middle."""
     c, s = np.cos(turn), np.sin(turn)
     square = side / 2 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     return MIDDLE + square @ np.array([[c, s], [-s, c]])
@@ -44,7 +44,7 @@ def grid_of_two(n=16):
 
 
 def hanging(body, grid):
-    """Deflection under its weight of a body held at three points."""
+    """Deflection of a body under its weight, with three components of points held."""
     rubber = tawami.linear_elastic(E=1e5, nu=0.45)
     scene = tawami.Scene(grid, body, rubber, density=1e3)
     left, right = corners()[[3, 2]] * 0.9 + 0.1 * MIDDLE
@@ -55,7 +55,7 @@ def hanging(body, grid):
     return scene.solve().displacement(corners()[[0, 1]].mean(axis=0) * 0.9 + 0.1 * MIDDLE)
 
 
-def test_one_shape_one_solution():
+def test_all_functions_give_the_same_solution():
     grid = grid_of_two()
     polygon = hanging(tawami.polygon(grid, corners()), grid)
     assert polygon[1] < -1e-2
@@ -78,14 +78,14 @@ def joined(*bodies):
 
 
 def embedded(grid, kind):
-    """A shape, and what is around it, in a grid that both fill; the error that they may have."""
+    """A shape and its surroundings, which together fill the grid; the error that is allowed."""
     ends = ("left", "right", "bottom", "top")
     around = [(0, 0), (2, 0), (2, 2), (0, 2)]
     if kind == "square":
         hole = tawami.polygon(grid, around, holes=[corners()], gauss=True)
         return joined(tawami.polygon(grid, corners(), gauss=True), hole), 1e-11
     disc = tawami.disc(grid, MIDDLE, 0.6, gauss=True)
-    if kind == "ring":  # about a disc, and the rest of the square
+    if kind == "ring":  # a disc, a ring around it, and the rest of the square
         inside = tawami.disc(grid, MIDDLE, 0.3, gauss=True)
         ring = tawami.disc(grid, MIDDLE, 0.6, inner=0.3, gauss=True)
     hole = tawami.level_set(
@@ -99,7 +99,7 @@ def embedded(grid, kind):
     ("kind", "form"), [("square", "u"), ("square", "u_epsv"), ("disc", "u_epsv"), ("ring", "u_p")]
 )
 def test_patch_test_of_embedded_shapes(kind, form):
-    """A linear field on the edges of the grid is one everywhere, where cells are cut between bodies."""
+    """With a linear field on the edges, the strain is constant in cells that two bodies share too."""
     grid = grid_of_two(7)
     body, bound = embedded(grid, kind)
     law = tawami.linear_elastic(E=3.0, nu=0.45)
@@ -136,11 +136,11 @@ AREAS = {"disc": np.pi * 0.21, "polygon": SIDE**2 - 0.09, "mesh": SIDE**2, "leve
 @pytest.mark.parametrize("kind", AREAS)
 @settings(max_examples=4)
 @given(move=st.tuples(st.floats(-0.125, 0.125), st.floats(-0.125, 0.125)))
-def test_moved_by_part_of_a_cell_a_shape_has_the_same_area_and_centroid(kind, move):
+def test_area_and_centroid_of_shapes_moved_by_part_of_a_cell(kind, move):
     body = particles_of(kind, grid_of_two(), np.array(move))
     bound = 1e-4 if kind == "level set" else 1e-11
     if kind == "polygon":
-        bound = 1e-5  # vertices near lines are put on them
+        bound = 1e-5  # vertices near lines of the grid are moved onto them
     assert body.volume.sum() == pytest.approx(AREAS[kind], rel=bound)
     assert body.volume @ body.x / AREAS[kind] == pytest.approx(MIDDLE + move, rel=bound)
 
@@ -160,7 +160,7 @@ def test_geometries_of_shapely():
     ("shape", "options", "message"),
     [
         (shapely.Point(1, 1), {}, "it is a Point: expected a Polygon or MultiPolygon"),
-        (shapely.Polygon(), {}, "it is a Polygon that is empty: expected"),
+        (shapely.Polygon(), {}, "it is an empty Polygon: expected"),
         (shapely.box(0.1, 0.1, 3, 1), {}, r"vertex \d at \(3, \d\.?\d*\) m lies outside the grid"),
         (shapely.Polygon([(0, 0), (1, 1), (1, 0), (0, 1)]), {}, "sides cross or touch each other"),
         (shapely.box(0, 0, 1, 1), {"holes": [corners(0.1)]}, "has its own holes"),
@@ -169,22 +169,24 @@ def test_geometries_of_shapely():
         (corners(), {"holes": [corners(0.1)[:2]]}, r"holes\[0\] has shape \(2, 2\): expected three"),
     ],
 )  # fmt: skip
-def test_a_wrong_geometry_gets_one_sentence(shape, options, message):
+def test_error_messages_of_geometries(shape, options, message):
     with pytest.raises(tawami.InputError, match=message):
         tawami.polygon(grid_of_two(), shape, **options)
 
 
-def test_numbers_of_materials_come_with_the_body():
+def test_the_body_has_the_numbers_of_materials():
     grid = grid_of()
     box = tawami.box(grid, grid.origin, grid.upper)
     soft, stiff = (tawami.linear_elastic(E=E, nu=0.3) for E in (1.0, 2.0))
     body = tawami.Body(box.x, box.volume, (box.x[:, 0] > 0).astype(np.uint32))
     scene = tawami.Scene(grid, body, [soft, stiff])
-    assert ((scene.constants["mu"] == stiff.shear_modulus) == (box.x[:, 0] > 0)).all()
+    assert (
+        (scene.configuration.domain.constants["mu"] == stiff.shear_modulus) == (box.x[:, 0] > 0)
+    ).all()
 
 
-def test_what_is_round_off_of_a_cell_gets_no_particle():
-    """A side 1e-13 cells beyond a line of the grid: the body of the cells before it."""
+def test_parts_that_are_round_off_have_no_particles():
+    """A side that is 1e-13 cells beyond a line of the grid does not reach the next cell."""
     grid = grid_of_two(8)
     box = tawami.box(grid, (0.5, 0.5), (1.5, 1.5))
     beyond = 1.5 + 1e-14

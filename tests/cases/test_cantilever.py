@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import tawami
-from cases.cantilever import mpm
-from cases.cantilever.beam import V_THEORY, D, E, point_support_growth
+from cases.verification.cantilever import mpm
+from cases.verification.cantilever.beam import V_THEORY, D, E, point_support_growth
 
 ALPHAS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
 

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from cases.cantilever import fem
+from cases.verification.cantilever import fem
 
 
 @pytest.mark.parametrize(
@@ -35,5 +35,8 @@ def test_orders_on_the_smooth_beam(method):
 
 
 def test_it_imports_nothing_of_tawami():
-    code = "import sys, cases.cantilever.fem; sys.exit(any(m.startswith('tawami') for m in sys.modules))"
+    code = (
+        "import sys, cases.verification.cantilever.fem; "
+        "sys.exit(any(m.startswith('tawami') for m in sys.modules))"
+    )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

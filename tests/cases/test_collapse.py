@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cases import collapse
+from cases.showcase.collapse import pile, runout
 
 
 @pytest.fixture(scope="module")
 def runs():
-    return {form: collapse.solve(form, end=0.1) for form in collapse.FORMS}
+    return {form: pile.solve(form, end=0.1) for form in pile.FORMS}
 
 
 def test_every_step_converges_at_its_first_size(runs):
@@ -42,12 +42,12 @@ def test_energy_is_dissipated_and_the_pile_runs_out(runs):
 
 
 def test_two_step_sizes_run_out_alike(runs):
-    fine = collapse.solve("u_epsv_finite", end=0.1, dt=5e-4, every=40)
+    fine = pile.solve("u_epsv_finite", end=0.1, dt=5e-4, every=40)
     assert fine.runout[-1] == pytest.approx(runs["u_epsv_finite"].runout[-1], rel=0.02)
 
 
 def test_the_start_is_that_of_the_pile():
-    motion = collapse.build("u_epsv_finite")
+    motion = pile.build("u_epsv_finite")
     scene = motion.scene
     assert len(scene.particles) == 800
     assert motion.mass.sum() == pytest.approx(2040 * 0.2 * 0.1)
@@ -59,15 +59,15 @@ def test_the_start_is_that_of_the_pile():
 
 def test_roughness_tells_a_chequerboard_from_a_plane():
     x = np.stack(np.meshgrid(np.arange(20), np.arange(20)), axis=-1).reshape(-1, 2) * 0.5
-    assert collapse.roughness(x, 3.0 + x @ [1.0, -2.0], 1.0) < 1e-12
+    assert pile.roughness(x, 3.0 + x @ [1.0, -2.0], 1.0) < 1e-12
     board = (-1.0) ** (2 * x).sum(axis=1)
-    assert collapse.roughness(x, board, 1.0) > 0.5
+    assert pile.roughness(x, board, 1.0) > 0.5
 
 
 def test_a_higher_pile_runs_out_farther():
     """Coarsely: nearly in proportion to its height over its length while that is small."""
-    piles = [collapse.runout(a, 8, end=3.0) for a in (0.5, 1.0)]
+    piles = [runout.runout(a, 8, end=3.0) for a in (0.5, 1.0)]
     slope = np.log(piles[1].spread / piles[0].spread) / np.log(2)
     assert 0.8 < slope < 1.8
-    low, high = collapse.exponents([collapse.Runout(a, 2 * a**0.9) for a in (0.5, 1.5, 4.0)])
+    low, high = runout.exponents([runout.Runout(a, 2 * a**0.9) for a in (0.5, 1.5, 4.0)])
     assert (low, high) == pytest.approx((0.9, 0.9))

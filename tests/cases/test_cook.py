@@ -9,9 +9,9 @@ from math import log2
 
 import pytest
 
-from cases.cook import __main__ as study
-from cases.cook import fem, mpm
-from cases.cook.membrane import COLUMNS, REFERENCE, P
+from cases.verification.cook import __main__ as study
+from cases.verification.cook import fem, mpm
+from cases.verification.cook.membrane import COLUMNS, REFERENCE, P
 
 NU = 0.4999
 
@@ -31,7 +31,10 @@ def test_displacement_only_elements_lock():
 
 
 def test_the_elements_import_nothing_of_tawami():
-    code = "import sys, cases.cook.fem; sys.exit(any(m.startswith('tawami') for m in sys.modules))"
+    code = (
+        "import sys, cases.verification.cook.fem; "
+        "sys.exit(any(m.startswith('tawami') for m in sys.modules))"
+    )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
@@ -83,4 +86,6 @@ def test_the_study_writes_table_and_figures(tmp_path):
 def test_sizes_that_miss_the_ends_of_the_load_are_refused(capsys):
     with pytest.raises(SystemExit):
         study.main(["--sizes", "3"])
-    assert "--sizes 3: expected divisors of 4 such as 4,2,1,0.5" in capsys.readouterr().err
+    assert (
+        "argument --sizes: 3: expected divisors of 4 such as 4,2,1,0.5" in capsys.readouterr().err
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cases import elastica
+from cases.verification.elastica import mpm, strip
 
 
 @pytest.mark.parametrize(
@@ -14,16 +14,16 @@ from cases import elastica
 )
 def test_the_tip_is_where_the_tables_have_it(load, x, y):
     """The third is linear: y = -load/3, x = -load^2/15."""
-    assert elastica.tip(load) == pytest.approx([x, y], abs=5e-5)
-    end = elastica.curve(load, np.array([1.0]))[:, 0]
-    assert end[:2] == pytest.approx(elastica.tip(load) + np.array([1, 0]), abs=1e-8)
-    assert end[2] == pytest.approx(elastica.tip_angle(load), abs=1e-8)
+    assert strip.tip(load) == pytest.approx([x, y], abs=5e-5)
+    end = strip.curve(load, np.array([1.0]))[:, 0]
+    assert end[:2] == pytest.approx(strip.tip(load) + np.array([1, 0]), abs=1e-8)
+    assert end[2] == pytest.approx(strip.tip_angle(load), abs=1e-8)
     assert end[3] == pytest.approx(0.0, abs=1e-8)
 
 
 @pytest.fixture(scope="module")
 def far():
-    return elastica.solve(10.0)
+    return mpm.solve(10.0)
 
 
 def test_a_strip_bent_far_is_within_two_percent_at_four_cells(far):
@@ -31,12 +31,12 @@ def test_a_strip_bent_far_is_within_two_percent_at_four_cells(far):
     assert far.iterations < 5
     assert far.crossed > 100
     assert far.error < 2.0
-    assert elastica.solve(1.0).error < 0.8
+    assert mpm.solve(1.0).error < 0.8
 
 
 def test_near_incompressible_the_mean_stress_tells_who_locks():
     mixed, displacement = (
-        elastica.solve(1.0, form, 0.499, steps=10) for form in ("u_epsv_finite", "u_finite")
+        mpm.solve(1.0, form, 0.499, steps=10) for form in ("u_epsv_finite", "u_finite")
     )
     assert mixed.error < 0.8
     assert mixed.stress_error < 3.0
@@ -44,9 +44,9 @@ def test_near_incompressible_the_mean_stress_tells_who_locks():
 
 
 def test_the_error_grows_with_the_number_of_grids(far):
-    assert elastica.solve(10.0, steps=60).error > 1.2 * far.error
+    assert mpm.solve(10.0, steps=60).error > 1.2 * far.error
 
 
 def test_without_a_ghost_penalty_a_static_beam_stops_where_particles_enter_empty_cells():
-    run = elastica.solve(10.0, n=2, k=0.0)
+    run = mpm.solve(10.0, n=2, k=0.0)
     assert "of the load, with the smallest step" in run.stopped

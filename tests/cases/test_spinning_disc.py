@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cases import spinning_disc
-from cases.spinning_disc import KINDS, OMEGA, RHO, R
+from cases.verification.spinning_disc import disc
+from cases.verification.spinning_disc.disc import KINDS, OMEGA, RHO, R
 
 AFFINE_FLIP, TPIC, DISPLACEMENT, FLIP = KINDS
 
 
 def test_the_rings_have_volume_and_moments_of_the_disc():
-    body = spinning_disc.rings(7)
+    body = disc.rings(7)
     assert len(body.x) == 3 * 7**2
     assert body.volume == pytest.approx(np.full(147, np.pi * R**2 / 147))
     assert np.abs(body.volume @ body.x).max() < 1e-14
@@ -24,7 +24,7 @@ def test_the_closed_form_obeys_the_virial_theorem():
     """The integral of sigma_r + sigma_t is that of rho omega^2 r^2, for every nu."""
     r = np.linspace(0, R, 2001)
     for nu in (0.0, 0.3, 0.499):
-        stress = 3 / (1 + nu) * spinning_disc.mean_stress(r, nu)
+        stress = 3 / (1 + nu) * disc.mean_stress(r, nu)
         integral = np.trapezoid if hasattr(np, "trapezoid") else np.trapz
         assert integral(2 * np.pi * r * stress, r) == pytest.approx(
             np.pi / 2 * RHO * OMEGA**2 * R**4, rel=1e-6
@@ -37,7 +37,7 @@ def test_the_closed_form_obeys_the_virial_theorem():
     ids=lambda value: getattr(value, "name", str(value)),
 )
 def test_momentum_energy_and_shape_are_kept(kind, nu):
-    run = spinning_disc.solve(kind, n=4, turns=1, nu=nu)
+    run = disc.solve(kind, n=4, turns=1, nu=nu)
     assert max(run.linear) < 1e-13
     assert run.drift < 1e-3
     assert run.drift_of_transfer < 1e-4
@@ -47,14 +47,14 @@ def test_momentum_energy_and_shape_are_kept(kind, nu):
 
 
 def test_plain_flip_loses_the_rotation():
-    run = spinning_disc.solve(FLIP, n=4, turns=1)
+    run = disc.solve(FLIP, n=4, turns=1)
     assert max(run.linear) < 1e-13
     assert run.angular[-1] < 0.95
 
 
 @pytest.fixture(scope="module")
 def coarse_steps():
-    return spinning_disc.solve(n=4, turns=1, steps=60)
+    return disc.solve(n=4, turns=1, steps=60)
 
 
 def test_what_the_trapezoidal_rule_takes(coarse_steps):

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from cases.vibrating_beam import beam, fem, figures, mpm
+from cases.verification.vibrating_beam import beam, fem, figures, mpm
 from tawami.motion.dynamics import TRANSFERS
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import FINITE, FORMS
+from scenes import FINITE, FORMS
 from ufl import div, dot, grad, inner
 
 import tawami

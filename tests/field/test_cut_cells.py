@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import BASES, grid_of
 from mpi4py import MPI
+from scenes import BASES, grid_of
 from scipy.interpolate import BSpline
 
 import tawami
-from cases import cut_cells
-from tawami.field.reference import ghost
+from cases.showcase import cut_cells
+from tawami.field import ghost
 from tawami.form.form import Form
 
 GHOST = {"form": "u_epsv", "ghost_penalty": "on", "k": 0.5}
@@ -62,7 +62,7 @@ def spline(n, h, coefficients, x):
 def test_it_is_the_integral_of_the_jumps(corner):
     """sum over sides of k mu h^3 int [u,nn].[u,nn], and of -k K^2/mu h^3 int [eps_v,n]^2."""
     scene, matrix = penalty(corner)
-    grid, layout = scene.grid, scene.attached.layout
+    grid, layout = scene.grid, scene.configuration.domain.layout
     (nx, ny), h = grid.cells, grid.h
     random = np.random.default_rng(2)
     a, b = random.standard_normal(nx + 2), random.standard_normal(ny + 2)
@@ -75,7 +75,7 @@ def test_it_is_the_integral_of_the_jumps(corner):
     law = tawami.linear_elastic(E=2.0, nu=0.4)
     K, mu = law.bulk_modulus, law.shear_modulus
     expected = 0.0
-    for (i, j), (p, q), _ in ghost.sides(scene.attached.field.active):
+    for (i, j), (p, q), _ in ghost.sides(scene.configuration.domain.active):
         if p > i:
             bend = [second_derivative(nx, h, a, x) for x in (p * h - 1e-9, p * h + 1e-9)]
             along = spline(ny, h, b, j * h + points)
@@ -94,7 +94,7 @@ def test_it_is_the_integral_of_the_jumps(corner):
 def test_which_cells_are_partly_filled():
     active = np.ones((4, 5), dtype=bool)
     active[3, 4] = False
-    partly = ghost.partly_filled(active)
+    partly = ghost.partially_filled(active)
     assert np.argwhere(partly).tolist() == [[2, 3], [2, 4], [3, 3]]  # not those at the grid's end
     assert len(list(ghost.sides(active))) == 6
     assert not list(ghost.sides(np.ones((3, 3), dtype=bool)))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import BASES, FORMS, clouds
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenes import BASES, FORMS, clouds
 from scipy.interpolate import BSpline
 
 import tawami

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import BASES, FORMS, clouds, grid_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenes import BASES, FORMS, clouds, grid_of
 from scipy.sparse import csr_matrix, identity
 
 import tawami
@@ -45,9 +45,9 @@ def close(a, b):
 
 def reduced(scene, c):
     """P^T K P as the field side gives it to the solver, at increments c."""
-    reduction = scene.problem().reduction
-    scene.attached.newton.internal(c)
-    field, data = scene.attached.field, scene.attached.newton.data
+    reduction = scene.reduction()
+    scene.configuration.domain.newton.internal(c)
+    field, data = scene.configuration.domain.assembly, scene.configuration.domain.responses.data
     start, columns, values = field.tangent(c, data, reduction).getValuesCSR()
     return csr_matrix((values, columns, start), shape=(reduction.size,) * 2).toarray()
 
@@ -98,7 +98,7 @@ def test_any_cloud_of_particles(data):
 
 @pytest.mark.parametrize("support", ["paper", "exact", "clamped"])
 def test_the_beam(support):
-    from cases.cantilever import mpm
+    from cases.verification.cantilever import mpm
 
     rows = [mpm.solve("u_epsv", support, 8, 0.1, assembly=p)[0] for p in ("fast", "reference")]
     assert rows[0].deflection_m == pytest.approx(rows[1].deflection_m, rel=1e-12)
@@ -146,9 +146,10 @@ for basis in ("quadratic_spline", "bilinear", "biquadratic"):
         scene.hold((0.71, 0.1 * row + 0.06), "y")
     c = np.random.default_rng(0).standard_normal(scene.num_coefficients)
     total.update(scene.residual(c).tobytes() + scene.tangent(c).data.tobytes())
-    field, reduction = scene.attached.field, scene.problem().reduction
+    domain, reduction = scene.configuration.domain, scene.reduction()
     for _ in range(3):
-        total.update(field.tangent(c, scene.attached.newton.data, reduction).getValuesCSR()[2].tobytes())
+        matrix = domain.assembly.tangent(c, domain.responses.data, reduction)
+        total.update(matrix.getValuesCSR()[2].tobytes())
 grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.1, cells=(12, 8))
 sand = tawami.drucker_prager(tawami.linear_elastic(E=1e5, nu=0.3), phi=30.0, c=10.0)
 for form in ("u_epsv_finite", "u_bbar_finite"):
@@ -182,17 +183,21 @@ def test_one_field_with_several_reductions_in_turn(random_scene):
         scene.fix("left", "x")
         scene.hold((-0.9, 1.9), "y")
     close(*[reduced(scene, c) for scene in scenes])
-    reductions = [scene.problem().reduction for scene in scenes]
+    reductions = [scene.reduction() for scene in scenes]
     for scene in scenes:
         scene.hold((0.4, 1.3), "y")
     close(*[reduced(scene, c) for scene in scenes])
     values = []
     for scene, reduction in zip(scenes, reductions, strict=True):
-        matrix = scene.attached.field.tangent(c, scene.attached.newton.data, reduction)
+        matrix = scene.configuration.domain.assembly.tangent(
+            c, scene.configuration.domain.responses.data, reduction
+        )
         vector = matrix.createVecLeft()
         vector.set(3.0)
         matrix.diagonalScale(vector, vector)
-        again = scene.attached.field.tangent(c, scene.attached.newton.data, reduction)
+        again = scene.configuration.domain.assembly.tangent(
+            c, scene.configuration.domain.responses.data, reduction
+        )
         values.append(again.getValuesCSR()[2].sum())
     assert values[0] == pytest.approx(values[1], rel=1e-9)
 
@@ -216,13 +221,15 @@ def test_solving_again_with_other_supports():
 
 def test_arrays_that_do_not_fit_are_refused_and_never_panic(random_scene):
     scene = random_scene(form="u")
-    field, c = scene.attached.field, np.zeros(scene.num_coefficients)
+    field, c = scene.configuration.domain.assembly, np.zeros(scene.num_coefficients)
     scene.residual(c)
     (kernels, none), volume = field._of_tangent, scene.particles.volume
-    data = list(scene.attached.newton.data.values())
+    data = list(scene.configuration.domain.responses.data.values())
     with pytest.raises(RuntimeError, match="kernels of another rank"):
         field._assembler.vector(kernels, data, volume, c)
-    owner, address, rank, width, slots, constants = field._kernel(field.compiled.tangent[0])
+    owner, address, rank, width, slots, constants = field._kernel(
+        field.attachment.compiled.tangent[0]
+    )
     pattern = field._assembler.pattern(
         _selection(identity(len(c), format="csr"), np.arange(len(c)))
     )

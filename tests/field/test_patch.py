@@ -7,8 +7,8 @@ import warnings
 
 import numpy as np
 import pytest
-from conftest import FORMS, grid_of, linear_field
 from mpi4py import MPI
+from scenes import FORMS, grid_of, linear_field
 
 import tawami
 from tawami.grid.basis import BASES, extraction

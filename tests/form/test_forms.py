@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from conftest import FINITE, FORMS, grid_of
+from scenes import FINITE, FORMS, grid_of
 from ufl import SpatialCoordinate, div, dot, grad, inner, sym
 
 import tawami
@@ -71,7 +71,7 @@ def test_a_quantity_of_the_law_times_constants_of_the_particle(random_scene):
         return sum_p(sigma, grad(w))
 
     scenes = [random_scene(form=form_of(function)) for function in (scaled, plain)]
-    mu = scenes[0].constants["mu"]
+    mu = scenes[0].configuration.domain.constants["mu"]
     scenes[1].particles.volume[:] *= 2 * mu
     c = np.random.default_rng(0).standard_normal(scenes[0].num_coefficients)
     for function in (lambda s: s.residual(c), lambda s: s.tangent(c).toarray()):
@@ -166,11 +166,11 @@ def test_sums_at_vertices_are_row_sum_lumped(random_scene, assembly):
     form = form_of(lumped, BOTH, "mixed")
     scene = random_scene(form=form, assembly=assembly)
     c = np.zeros(scene.num_coefficients)
-    n = scene.attached.field.layout.num_displacement
+    n = scene.configuration.domain.layout.num_displacement
     block = scene.tangent(c).toarray()[n:, n:]
     grid = scene.grid
     s = (np.array(scene.particles.x) - grid.origin) / grid.h
-    weight = scene.particles.volume * scene.constants["K"]
+    weight = scene.particles.volume * scene.configuration.domain.constants["K"]
     hats = [np.maximum(0, 1 - np.abs(s[:, [k]] - np.arange(grid.cells[k] + 1))) for k in range(2)]
     expected = np.einsum("p,pj,pi->ji", weight, hats[1], hats[0]).ravel()
     assert np.abs(block - np.diag(expected)).max() < 1e-12 * expected.max()
@@ -316,7 +316,7 @@ def test_wrong_parameters(random_scene, given, message):
 
 def test_parameters_change_without_compiling_again(random_scene):
     a, b = (random_scene(form="u_epsv", alpha=alpha) for alpha in (0.1, 0.7))
-    assert a._compiled is b._compiled
+    assert a.configuration.model.compiled is b.configuration.model.compiled
     c = np.ones(a.num_coefficients)
     c[::3] = 0
     assert np.abs(a.residual(c) - b.residual(c)).max() > 1e-3

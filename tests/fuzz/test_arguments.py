@@ -22,14 +22,15 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
-from conftest import grid_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
+from scenes import grid_of
 
 import tawami
-from tawami.results.output import result_folder, whole_file, write_grid, write_particles
+from tawami.base.files import atomic_file, result_folder
 from tawami.results.plot import plot
+from tawami.results.single import write_grid, write_particles
 
 KINDS = ["?", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f2", "f4", "f8", "g", "c8", "c16", "O",
          "S3", "U3", "M8[s]", "m8[s]", [("a", "f8"), ("b", "i4")]]  # fmt: skip
@@ -130,7 +131,7 @@ def solved(scene: tawami.Scene, method: str) -> Callable[..., Any]:
 
     def call(**arguments: Any) -> None:
         getattr(scene, method)(**arguments)
-        if any(support.velocity is not None for support in scene.supports.all):
+        if any(support.velocity is not None for support in scene.configuration.supports.all):
             tawami.Dynamics(scene).step(0.01)
         else:
             scene.solve()
@@ -235,7 +236,7 @@ def observed(kind: Any) -> Callable[..., Any]:
 
 
 def whole(path: Any) -> None:
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         part.write_text("x")
 
 
@@ -270,8 +271,8 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         kind.__name__: (in_folder(observed(kind)), {
             "path": "output", "quantity": quantity, "every": 0.5, "phases": ["ramp"]} | more)
         for kind, quantity, more in (
-            (tawami.ParticleOutput, "stress", {"format": "vtu"}),
-            (tawami.GridOutput, "stress", {"format": "xdmf", "projection": "lumped"}),
+            (tawami.ParticleOutput, "stress", {"name": "points"}),
+            (tawami.GridOutput, "stress", {"projection": "lumped"}),
             (tawami.TableOutput, "run-out", {}))
     },
     "every_steps": (in_folder(observed(tawami.TableOutput)), {
@@ -325,12 +326,12 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         "name": "toy", "function": run_of, "knobs": {"n": (1, 2)}, "reference": {"x": 1.0},
         "finest": {"n": 3}, "beside": (), "colour": "n", "folder": None}),
     "Study.run": (studied, {"sample": 1, "seed": 0, "limit": 10.0, "quiet": True}),
-    "recommend": (tawami.recommend, {"study": Path("cases/trade/cook.csv"), "tolerance": 0.1,
+    "recommend": (tawami.recommend, {"study": Path("cases/costs/trade/cook.csv"), "tolerance": 0.1,
                                      "cost": "wall_s"}),
     "run, a driver": (tawami.run, {"main": lambda: None, "name": "toy"}),
     "write_particles": (in_folder(write_particles), {"path": "p.vtu", "solution": scene_of().solve()}),
     "write_grid": (in_folder(write_grid), {"path": "g.vtu", "solution": scene_of().solve()}),
-    "whole_file": (in_folder(whole), {"path": "x.csv"}),
+    "atomic_file": (in_folder(whole), {"path": "x.csv"}),
     "result_folder": (in_folder(result_folder), {"path": "results"}),
 }  # fmt: skip
 #: What a message calls an argument where it does not by its name.

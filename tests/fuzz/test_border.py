@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import grid_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenes import grid_of
 
 import tawami
 from tawami import _rust

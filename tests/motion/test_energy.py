@@ -13,9 +13,9 @@ def test_energy_that_nothing_gave_is_told_once():
         warnings.simplefilter("always")
         growth = Growth(1.0)
         for has in (1.0, 1.04, 1.2, 1.3):
-            growth.look(Energies(kinetic=has), 3, 0.1)
+            growth.check(Energies(kinetic=has), 3, 0.1)
         given = Growth(1.0)
-        given.given(0.3)
-        given.look(Energies(kinetic=1.2, elastic=0.5, external=0.4), 3, 0.1)
+        given.add(0.3)
+        given.check(Energies(kinetic=1.2, elastic=0.5, external=0.4), 3, 0.1)
     assert [w.category for w in caught] == [tawami.EnergyWarning]
     assert "after 3 steps, at 0.1 s, the body has 0.2 J/m more energy" in str(caught[0].message)

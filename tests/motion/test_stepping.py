@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import grid_of
 from mpi4py import MPI
+from scenes import grid_of
 
 import tawami
+from tawami.motion.observer import NullObserver
 from tawami.motion.pace import Pace
 from tawami.motion.stepping import march
-from tawami.results.phase import Unwatched
 
 ELASTIC = tawami.linear_elastic(E=100.0, nu=0.3)
 
@@ -34,7 +34,7 @@ def refusing(limit, calls):
 
 def test_sizes_are_halved_on_failure_and_grow_after_three():
     calls = []
-    steps = march(Pace(0.0, 0.25), 1.0, 1e-3, refusing(lambda _: 0.1, calls), Unwatched("s"))
+    steps = march(Pace(0.0, 0.25), 1.0, 1e-3, refusing(lambda _: 0.1, calls), NullObserver("s"))
     assert calls[:4] == [0.25, 0.125, 0.0625, 0.0625]
     assert 0.125 in calls[4:]  # tried again
     assert steps[-1].end == 1.0
@@ -49,14 +49,14 @@ def test_at_the_smallest_size_the_error_says_where():
             1.0,
             0.1,
             refusing(lambda end: 0.0 if end > 0.6 else 1.0, []),
-            Unwatched("s"),
+            NullObserver("s"),
         )
     assert error.value.__notes__ == ["at 0.5 s, with the smallest step of 0.125 s"]
 
 
 @pytest.mark.parametrize(("size", "count"), [(0.3, 4), (0.1, 10), (1.0, 1)])
 def test_the_end_is_met_exactly_and_without_a_crumb(size, count):
-    steps = march(Pace(0.0, size), 1.0, 0.0, refusing(lambda _: 1.0, []), Unwatched("s"))
+    steps = march(Pace(0.0, size), 1.0, 0.0, refusing(lambda _: 1.0, []), NullObserver("s"))
     assert len(steps) == count
     assert steps[-1].end == 1.0
 
@@ -109,7 +109,7 @@ def test_a_load_beyond_the_strength_stops_where_it_is_reached_and_can_go_on():
     reached = scene.particles.stress[:, 0].mean() / -2.0
     assert reached == pytest.approx(1 / np.sqrt(3), rel=0.01)
     assert "of the load, with the smallest step" in error.value.__notes__[0]
-    scene.loads.tractions.clear()
+    scene.configuration.loads.tractions.clear()
     assert scene.solve().reaction("left") == pytest.approx([0.0, 0.0], abs=1e-6)
 
 
@@ -170,7 +170,7 @@ def test_an_edge_does_not_move_the_body_away_from_its_functions():
 def test_a_point_of_the_border_is_held_on_its_way_and_found_by_its_names():
     """Half a cell further its cell has lost its particles, its functions have not."""
     scene = block()
-    scene.supports.all.clear()
+    scene.configuration.supports.all.clear()
     points = [(0.999, 0.1), (0.999, 0.9)]
     for point in points:
         scene.hold(point, "x", 0.2)
@@ -179,7 +179,7 @@ def test_a_point_of_the_border_is_held_on_its_way_and_found_by_its_names():
     assert len(steps) == 10
     assert scene.particles.displacement[:, 0] == pytest.approx(np.full(64, 0.2), abs=1e-8)
     solution = scene.solve()
-    x, y = scene.supports.all[0].place
+    x, y = scene.configuration.supports.all[0].place
     assert (x, y) == pytest.approx((1.199, 0.1), abs=1e-8)
     for place in (points[0], (x, y)):
         assert solution.reaction(place) == pytest.approx([0.0, 0.0], abs=1e-6)

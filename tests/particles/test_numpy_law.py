@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import grid_of, linear_field
+from scenes import grid_of, linear_field
 
 import tawami
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import FINITE, FORMS, grid_of
+from scenes import FINITE, FORMS, grid_of
 
 import tawami
 
@@ -77,7 +77,7 @@ def test_a_block_in_plane_compression_beyond_yield(form):
     scene.fix("bottom", "y")
     assert scene.particles.history_names == ["plastic_strain"]
     for k in range(1, 9):
-        del scene.supports.all[2:]  # the same edge, further
+        del scene.configuration.supports.all[2:]  # the same edge, further
         scene.fix("right", "x", -0.01 * k)
         solution = scene.solve()
     plastic = scene.particles.history("plastic_strain")

@@ -10,7 +10,7 @@ import venv
 from pathlib import Path
 
 import pytest
-from conftest import FINITE, FORMS
+from scenes import FINITE, FORMS
 
 from tawami.fem import environment
 from tawami.form.form import shipped
@@ -38,7 +38,7 @@ def test_a_missing_dolfinx_says_how_to_install_it():
 def test_a_missing_compiler_says_how_to_install_it(tmp_path):
     code = """
 import logging, os; logging.disable(logging.INFO)
-from cases.cantilever import mpm
+from cases.verification.cantilever import mpm
 os.environ["CC"] = "no-such-compiler"
 mpm.build("u", "paper", 2)
 """
@@ -52,7 +52,7 @@ mpm.build("u", "paper", 2)
 
 
 def test_a_closed_pipe_is_no_page_about_a_crash():
-    code = "from cases.cantilever import mpm; import sys; [print('x' * 200) for _ in range(9999)]"
+    code = "import tawami, sys; [print('x' * 200) for _ in range(9999)]"
     command = f"'{sys.executable}' -c \"{code}\" | head -n 1"
     run = subprocess.run(command, shell=True, cwd=ROOT, capture_output=True, text=True, check=True)
     assert "PETSC" not in run.stderr

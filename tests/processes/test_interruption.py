@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import grid_of
+from scenes import grid_of
 
 import tawami
 from tawami.base.signals import deferred
@@ -46,11 +46,12 @@ def state(motion: tawami.Dynamics) -> dict[str, Any]:
         name: particles.carried(name)
         for name in ("velocity", "acceleration", "velocity_gradient", "acceleration_gradient")
     }
-    (wall,) = scene.supports.walls
-    arrays |= {"touching": wall.state.touching, "slip": wall.state.slip, "total": scene._total}
-    arrays["cell"] = scene.attached.location.cell
+    (wall,) = scene.configuration.supports.walls
+    arrays |= {"touching": wall.state.touching, "slip": wall.state.slip}
+    arrays["total"] = scene.configuration.total
+    arrays["cell"] = scene.configuration.domain.location.cell
     balance = (energies.kinetic, energies.elastic, energies.dissipated, energies.left)
-    carried = scene.loads._carried_gravity[1]
+    carried = scene.configuration.loads.weight.carried[1]
     arrays["numbers"] = [motion.time, motion.steps, *balance, len(scene.left), carried]
     return {name: np.array(values) for name, values in arrays.items()}
 

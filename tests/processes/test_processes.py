@@ -9,7 +9,7 @@ import threading
 
 import numpy as np
 import pytest
-from conftest import grid_of
+from scenes import grid_of
 
 import tawami
 

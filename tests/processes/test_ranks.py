@@ -10,7 +10,7 @@ import meshio
 import numpy as np
 import pytest
 
-from tawami.base.ranks import mpirun
+from tawami.base.program import mpirun
 
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.mpi
@@ -164,7 +164,8 @@ except tawami.InputError as error:
 
 def test_a_driver_ends_with_one_line(tmp_path):
     code = (
-        "from cases.cantilever.__main__ import main; import tawami; tawami.run(main, 'cantilever')"
+        "import tawami; from cases.verification.cantilever.__main__ import main; "
+        "tawami.run(main, 'cantilever')"
     )
     file = tmp_path / "file"
     file.touch()
@@ -177,7 +178,7 @@ def test_output_is_written_and_printed_once(tmp_path):
     code = (
         SCENE
         + f"""
-from tawami.results.output import write_particles, write_grid
+from tawami.results.single import write_grid, write_particles
 def main():
     s = scene()
     s.traction("right", (0.0, 1e-3))
@@ -248,7 +249,9 @@ tawami.run(main, "driver")
 
 
 def test_the_study_on_two_ranks(tmp_path):
-    run = start(2, "-m", "cases.cantilever", "--cells", "2,4", "--results", str(tmp_path))
+    run = start(
+        2, "-m", "cases.verification.cantilever", "--cells", "2,4", "--results", str(tmp_path)
+    )
     assert run.returncode == 0, run.stderr
     assert run.stdout.count("66 computations") == 1
     written = {path.name for path in tmp_path.iterdir()}

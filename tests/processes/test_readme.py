@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import tawami
-from cases.cantilever import mpm
+from cases.verification.cantilever import mpm
 from tawami.form.form import Form
 
 TEXT = (Path(__file__).parents[2] / "README.md").read_text()

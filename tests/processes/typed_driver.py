@@ -13,7 +13,8 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 import tawami
-from tawami.results.output import result_folder, write_grid, write_particles
+from tawami.base.files import result_folder
+from tawami.results.single import write_grid, write_particles
 
 Array = npt.NDArray[np.float64]
 
@@ -79,7 +80,7 @@ def dynamics(comm: MPI.Comm) -> None:
     motion.run(end=1.0, dt=1e-3, smallest=1e-6)
     results = tawami.Results(
         Path("results") / "block",
-        tawami.ParticleOutput("stress", every=0.1, format="xdmf"),
+        tawami.ParticleOutput("stress", every=0.1),
         tawami.GridOutput("mean stress", every_steps=10, projection="consistent"),
         tawami.TableOutput("energies", phases=["motion"]),
         checkpoint_steps=100,
@@ -89,7 +90,7 @@ def dynamics(comm: MPI.Comm) -> None:
     tawami.ramp(scene, 0.1, results="results")  # wrong: arg-type
     tawami.Results("results", "stress")  # wrong: arg-type
     tawami.Results("results", existing="append")  # wrong: arg-type
-    tawami.ParticleOutput("stress", format="csv")  # wrong: arg-type
+    tawami.ParticleOutput("stress", every="often")  # wrong: arg-type
     ring: tawami.Body = tawami.disc(grid, (0.5, 0.5), 0.4, inner=0.1, gauss=True)
     tawami.level_set(grid, lambda x, y: np.hypot(x, y) - 0.4, ends=["left", "bottom"])
     tawami.level_set(grid, lambda x, y: x, ends=["north"])  # wrong: list-item

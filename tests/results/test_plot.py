@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 from PIL import Image
+from programs import python
+from runs import look
 
 import tawami
-from tawami.motion.observer import Moment
-from tawami.results import plot as pictures
+from tawami.results import film as pictures
 from tawami.results import provenance
+from tawami.results.frame import Frame
 from tawami.results.plot import plot
-from tawami.results.series import Frame
 
 
 @pytest.fixture(scope="module")
@@ -26,26 +25,26 @@ def scene():
     return tawami.Scene(grid, body, tawami.linear_elastic(E=1e3, nu=0.3), form="u_finite")
 
 
-def run_of(folder, scene, *, format="vtu", phases=("ramp", "motion"), frames=5):
-    """A block that moves to the right and is pressed more and more, without any solving."""
+def run_of(folder, scene, *, phases=("ramp", "motion"), frames=5):
+    """Write a block that moves to the right under a growing stress, without solving anything."""
     x = np.array(scene.particles.x)
-    output = tawami.ParticleOutput("stress", "mean stress", "displacement", format=format)
+    output = tawami.ParticleOutput("stress", "mean stress", "displacement")
     table = tawami.TableOutput("run-out", "particles", "Newton iterations")
     provenance.write(folder, scene)
     for phase in phases:
         for writer in (output, table):
-            writer.begin(folder / phase, scene, None, None)
+            writer.begin(folder / phase, scene, None)
         for step in range(frames):
             scene.particles.move_to(x + np.array([0.2 * step, 0.0]))
             scene.particles.stress[:, :2] = [-1e4 * step, -2e4 * step]
             scene.particles.stress[:, 3] = 3e4 * x[:, 1]
             for writer in (output, table):
-                writer.look(Moment(scene, None, None, 0.25 * step, step, step == frames - 1))
+                look(writer, scene, None, None, 0.25 * step, step, last=step == frames - 1)
     scene.particles.move_to(x)
 
 
 def test_a_run_is_drawn_from_its_files(scene, tmp_path):
-    run_of(tmp_path, scene, phases=("ramp",), format="xdmf")
+    run_of(tmp_path, scene, phases=("ramp",))
     run_of(tmp_path, scene, phases=("motion",))
     written = plot(tmp_path)
     expected = [f"{phase}-{what}" for phase in ("ramp", "motion")
@@ -58,7 +57,7 @@ def test_a_run_is_drawn_from_its_files(scene, tmp_path):
             assert getattr(image, "n_frames", 1) == (5 if name.endswith("gif") else 1)
 
 
-def test_colours_and_view_stay_and_the_body_moves(scene, tmp_path):
+def test_a_movie_has_one_scale_of_colours_and_one_view(scene, tmp_path):
     run_of(tmp_path, scene, phases=("motion",))
     film = next(path for path in plot(tmp_path) if path.suffix == ".gif")
     with Image.open(film) as image:
@@ -76,7 +75,7 @@ def test_colours_and_view_stay_and_the_body_moves(scene, tmp_path):
     np.testing.assert_allclose(steps, steps.mean(), rtol=0.05)
 
 
-def test_what_a_quantity_may_be(scene, tmp_path):
+def test_components_and_norms_can_be_drawn(scene, tmp_path):
     run_of(tmp_path, scene, phases=("motion",), frames=2)
     drawn = plot(tmp_path, quantity="stress xx", movie=None)
     assert [path.name for path in drawn] == ["motion-stress-xx.png", "motion-table.png"]
@@ -85,7 +84,7 @@ def test_what_a_quantity_may_be(scene, tmp_path):
         {"velocity [m/s]": np.array([[3.0, -4.0, 0.0], [0.0, 1.0, 0.0]]),
          "stress xx yy zz xy [Pa]": np.arange(8.0).reshape(2, 4), "eps_v [-]": np.ones(2)},
     )  # fmt: skip
-    found = {name: (unit, list(v)) for name, (unit, v) in pictures._fields(frame).items()}
+    found = {name: (unit, list(v)) for name, (unit, v) in pictures.scalars(frame).items()}
     assert found == {
         "velocity": ("m/s", [5, 1]), "velocity x": ("m/s", [3, 0]), "velocity y": ("m/s", [-4, 1]),
         "stress xx": ("Pa", [0, 4]), "stress yy": ("Pa", [1, 5]), "stress zz": ("Pa", [2, 6]),
@@ -98,15 +97,15 @@ def test_what_a_quantity_may_be(scene, tmp_path):
         plot(tmp_path, quantity="strss")
 
 
-def test_units_of_the_colours():
+def test_large_stresses_are_shown_in_kpa_or_mpa():
     assert pictures._scaled("Pa", 2.5e4) == ("kPa", 1e3)
     assert pictures._scaled("Pa", 2.5e6) == ("MPa", 1e6)
     assert pictures._scaled("Pa", 20.0) == ("Pa", 1.0)
     assert pictures._scaled("m/s", 2e4) == ("m/s", 1.0)
 
 
-def test_folders_that_cannot_be_drawn(scene, tmp_path):
-    with pytest.raises(tawami.InputError, match=r"holds no run.json: expected the folder of a run"):
+def test_a_folder_that_cannot_be_drawn_is_rejected(scene, tmp_path):
+    with pytest.raises(tawami.InputError, match="run.json. cannot be read .*: expected the folder"):
         plot(tmp_path)
     provenance.write(tmp_path, scene)
     with pytest.raises(
@@ -124,14 +123,14 @@ def test_folders_that_cannot_be_drawn(scene, tmp_path):
         plot(tmp_path)
 
 
-def test_what_is_missing_is_named(scene, tmp_path, monkeypatch):
+def test_a_missing_package_or_program_is_named(scene, tmp_path, monkeypatch):
     run_of(tmp_path, scene, phases=("motion",), frames=2)
     code = "import sys; sys.modules['matplotlib'] = None\nfrom tawami.results.plot import plot\n"
     code += f"plot({str(tmp_path)!r})"
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    run = python("-c", code)
     assert "MissingDependencyError: pictures need matplotlib: pip install" in run.stderr
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(
-        tawami.MissingDependencyError, match="'mp4' needs ffmpeg: install it, or tak"
+        tawami.MissingDependencyError, match="'mp4' needs ffmpeg: install it, or use"
     ):
         plot(tmp_path, movie="mp4")

@@ -1,15 +1,15 @@
-"""Fields of particles on the vertices of the grid."""
+"""Projection of particle fields to the vertices of the grid."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import clouds, grid_of
 from hypothesis import given
 from hypothesis import strategies as st
+from scenes import clouds, grid_of
 
 import tawami
-from cases import projection as case
+from cases.costs import projection as case
 from tawami.results.projection import nodal, vertices
 
 METHODS = ("lumped", "consistent")
@@ -20,8 +20,9 @@ def scene_of(grid, x, volume=None):
     return tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3), form="u")
 
 
+@pytest.mark.fuzz
 @given(cloud=clouds((4, 3), 30), seed=st.integers(0, 9))
-def test_constants_are_exact_and_a_mean_stays_in_range(cloud, seed):
+def test_constants_are_exact_and_means_stay_in_range(cloud, seed):
     grid, x = cloud
     random = np.random.default_rng(seed)
     scene = scene_of(grid, x, random.uniform(0.1, 1.0, len(x)))
@@ -40,14 +41,17 @@ def test_constants_are_exact_and_a_mean_stays_in_range(cloud, seed):
         assert (found[vertex] <= around.max(axis=0) + 1e-12).all()
 
 
+@pytest.mark.fuzz
 @given(seed=st.integers(0, 99), method=st.sampled_from(METHODS))
-def test_the_volume_integral_stays(seed, method):
+def test_the_volume_integral_is_conserved(seed, method):
     """sum_i (sum_p V_p M_i) f_i = sum_p V_p f_p, the functions M_i summing to 1."""
     random, grid = np.random.default_rng(seed), grid_of()
     x = grid.origin + grid.h * np.array(grid.cells) * random.random((25, 2))
     scene = scene_of(grid, x, random.uniform(0.1, 1.0, 25))
     values = random.standard_normal(25)
-    weight = scene.attached.sums(scene.particles.volume, np.ones((25, 1)), "bilinear")[:, 0]
+    weight = scene.configuration.domain.sums(scene.particles.volume, np.ones((25, 1)), "bilinear")[
+        :, 0
+    ]
     total = np.nansum(weight * nodal(scene, values, method))
     if method == "consistent":  # of the projected field at the particles
         assert total == pytest.approx(scene.particles.volume @ values, abs=1e-6)
@@ -73,15 +77,15 @@ def test_bilinear_fields_are_exact():
 
 
 def test_single_particles_keep_their_value():
-    """Where nothing tells of slopes the consistent projection is the lumped one."""
+    """Without slopes in the data the consistent projection equals the lumped one."""
     grid = grid_of((5, 4))
     x = np.array([[-0.9, 0.6], [0.8, 2.1]])
     found = nodal(scene_of(grid, x), np.array([4.0, -2.0]), "consistent")
     assert sorted(found[np.isfinite(found)]) == pytest.approx([-2.0] * 4 + [4.0] * 4)
 
 
-def test_the_errors_for_bending(capsys):
-    """The consistent projection equals its direct solution, converges, and its matrix is sound."""
+def test_the_consistent_projection_is_more_accurate_in_bending(capsys):
+    """It equals its direct solution, converges, and its matrix is well conditioned."""
     case.main([])
     lines = [line.split() for line in capsys.readouterr().out.splitlines()[1:]]
     found = {tuple(line[:3]): line[3:] for line in lines}
@@ -98,7 +102,7 @@ def test_the_errors_for_bending(capsys):
         assert float(found[particles, "16", "consistent"][2]) < 0.006
 
 
-def test_an_unknown_method():
+def test_an_unknown_method_is_rejected():
     grid = grid_of()
     with pytest.raises(tawami.InputError, match="projection = 'spr': expected 'lumped' or 'c"):
         nodal(scene_of(grid, [[0.0, 1.0]]), np.ones(1), "spr")

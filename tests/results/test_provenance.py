@@ -1,4 +1,4 @@
-"""Where results come from: run.json and its copies, for scripts, modules and code that is neither."""
+"""run.json and the copies beside it: what was run, for scripts, modules and code of a session."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ tawami.run(main, "driver")
 
 
 def started(folder: Path, *arguments: str, **variables: str) -> dict:
-    """Run Python in a folder and read its run.json."""
+    """Run Python in a folder and read the run.json that it writes."""
     environment = os.environ | {"GIT_CONFIG_NOSYSTEM": "1"} | variables
     command = [sys.executable, *arguments]
     subprocess.run(command, cwd=folder, env=environment, check=True, capture_output=True)
     return json.loads((folder / "results" / "run.json").read_text())
 
 
-def test_a_script(tmp_path):
+def test_a_script_is_described(tmp_path):
     script = tmp_path / "beam.py"
     script.write_text(SCRIPT)
     before = datetime.now(UTC)
@@ -70,7 +70,7 @@ def test_a_script(tmp_path):
     assert Path(run["python"]).samefile(sys.executable)
 
 
-def test_a_module_and_code_without_a_file(tmp_path):
+def test_a_module_is_described_and_code_without_a_file_is_not(tmp_path):
     package = tmp_path / "study"
     package.mkdir()
     (package / "__init__.py").touch()
@@ -92,7 +92,7 @@ def git(folder: Path, *words: str) -> str:
     ).stdout.strip()
 
 
-def test_git(tmp_path, monkeypatch):
+def test_the_revision_of_git_is_recorded(tmp_path, monkeypatch):
     assert provenance.git(tmp_path) is None
     git(tmp_path, "init", "--quiet")
     assert provenance.git(tmp_path) is None  # without a revision
@@ -110,7 +110,7 @@ def test_git(tmp_path, monkeypatch):
 
 
 def plain(u, w, sigma, sum_p, mu):
-    """A form of this file."""
+    """The residual of a form in this file."""
     return sum_p(sigma, grad(w))
 
 
@@ -128,7 +128,7 @@ def test_a_form_of_a_script_can_be_loaded_again(tmp_path):
     np.testing.assert_array_equal(again.residual(u), scene.residual(u))
 
 
-def test_a_form_without_source(tmp_path):
+def test_a_form_without_source_is_recorded_as_such(tmp_path):
     names: dict = {"grad": grad}
     exec("def residual(w, sigma, sum_p):\n    return sum_p(sigma, grad(w))", names)
     form = Form({"u": ("displacement", "w")}, "displacement", names["residual"])
@@ -141,7 +141,7 @@ def test_a_form_without_source(tmp_path):
     assert not (tmp_path / "form.py").exists()
 
 
-def test_a_folder_that_cannot_be_written(tmp_path):
+def test_a_folder_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").touch()
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.5, cells=(4, 2))
     body = tawami.box(grid, (0, 0), (2, 1))

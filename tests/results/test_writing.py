@@ -1,5 +1,5 @@
-"""Full disks, folders that cannot be written or are gone, processes that are killed: a sentence, nothing
-half written, and what was there is still there.
+"""Full disks, folders that cannot be written, processes that are killed: an error message, no half
+written file, and existing files unchanged.
 """
 
 from __future__ import annotations
@@ -16,11 +16,13 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import pytest
-from conftest import grid_of, small_files
+from programs import python, small_files
+from scenes import grid_of
 
 import tawami
-from cases import figure
-from tawami.results.output import result_folder, whole_file, write_grid, write_particles
+from cases.common import figure
+from tawami.base.files import atomic_file, result_folder
+from tawami.results.single import write_grid, write_particles
 from tawami.study import process
 from tawami.study.table import COSTS, Row, Table
 
@@ -53,11 +55,11 @@ def table() -> Table:
 
 
 def csv(path: Path) -> None:
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         part.write_text(table().as_csv())
 
 
-#: Every way in which a file is written whole: name, and how.
+#: Functions that write a whole file, by the name of the file.
 WRITERS = {
     "p.vtu": lambda path, solution: write_particles(path, solution),
     "g.vtu": lambda path, solution: write_grid(path, solution),
@@ -69,7 +71,7 @@ WRITERS = {
 
 @contextlib.contextmanager
 def nobody() -> Iterator[None]:
-    """Root may write anywhere."""
+    """Act as a user without rights: root may write anywhere."""
     if os.geteuid() != 0:
         yield
         return
@@ -82,7 +84,7 @@ def nobody() -> Iterator[None]:
 
 @pytest.fixture
 def folder() -> Iterator[Path]:
-    """A folder that others may read."""
+    """A folder that every user may read."""
     path = Path(tempfile.mkdtemp())
     path.chmod(0o755)
     yield path
@@ -91,8 +93,8 @@ def folder() -> Iterator[Path]:
 
 
 @pytest.mark.parametrize("name", WRITERS)
-def test_no_room(name, solution, folder):
-    """By the size of the file, and by a device that is full (/dev/full, in place of the part file)."""
+def test_a_full_disk_leaves_the_old_file(name, solution, folder):
+    """The size of files is limited, or the part file is /dev/full."""
     path, write = folder / name, WRITERS[name]
     path.write_text(BEFORE)
     for why in ("File too large", "No space left on device"):
@@ -105,14 +107,14 @@ def test_no_room(name, solution, folder):
             write(path, solution)
         assert path.read_text() == BEFORE
         assert list(folder.iterdir()) == [path]
-    write(path, solution)  # nothing is left behind that would be in the way
+    write(path, solution)  # no part file is left behind
     assert path.stat().st_size > 2000
 
 
 @pytest.mark.parametrize("name", ["p.vtu", "g.vtu", "figure.png", "study.csv"])
-def test_folders_that_cannot_be_written(name, solution, folder):
+def test_a_folder_that_cannot_be_written_is_named(name, solution, folder):
     write = WRITERS[name]
-    write(folder / name, solution)  # what is imported late is there
+    write(folder / name, solution)  # also imports what is imported late
     before = (folder / name).read_bytes()
     folder.chmod(0o555)
     with nobody(), pytest.raises(tawami.OutputError, match="cannot be written: Permission denied"):
@@ -138,7 +140,7 @@ def test_folders_that_cannot_be_written(name, solution, folder):
     assert sorted(p.name for p in folder.iterdir()) == sorted([name, "file", f"folder-{name}"])
 
 
-def test_a_result_folder_that_cannot_be_written(folder):
+def test_a_result_folder_that_cannot_be_made_is_named(folder):
     folder.chmod(0o555)
     with nobody(), pytest.raises(tawami.OutputError, match="cannot be written .Permission denied"):
         result_folder(folder)
@@ -148,12 +150,12 @@ def test_a_result_folder_that_cannot_be_written(folder):
 
 
 def runs(n: int) -> dict[str, float]:
-    """What the study below would run."""
+    """The function of the study below."""
     return {"x": 1.0 + 1 / n}
 
 
-def test_a_study_without_room(folder, monkeypatch):
-    """A line that does not fit is taken back; the runs before it are still there, and it goes on."""
+def test_a_study_keeps_its_runs_on_a_full_disk(folder, monkeypatch):
+    """A line that does not fit is removed; earlier runs are kept, and the study can be resumed."""
     outcome = {"values": runs(1)} | dict.fromkeys(COSTS, 1.0)
     monkeypatch.setattr(process, "measured", lambda *_: outcome)
     study = tawami.Study("toy", runs, {"n": (1,)}, {"x": 1.0}, folder=folder)
@@ -173,8 +175,8 @@ def test_a_study_without_room(folder, monkeypatch):
 KILLED = """
 import sys, time
 from pathlib import Path
-from tawami.results.output import whole_file
-with whole_file(sys.argv[1]) as part, part.open("w") as file:
+from tawami.base.files import atomic_file
+with atomic_file(sys.argv[1]) as part, part.open("w") as file:
     file.write("half of what")
     file.flush()
     print("now", flush=True)
@@ -182,7 +184,7 @@ with whole_file(sys.argv[1]) as part, part.open("w") as file:
 """
 
 
-def test_killed_while_writing(tmp_path):
+def test_a_killed_process_leaves_the_old_file(tmp_path):
     path = tmp_path / "x.csv"
     path.write_text(BEFORE)
     command = [sys.executable, "-c", KILLED, str(path)]
@@ -192,7 +194,7 @@ def test_killed_while_writing(tmp_path):
         child.send_signal(signal.SIGKILL)
     assert path.read_text() == BEFORE
     assert {p.name for p in tmp_path.iterdir()} == {"x.csv", f".{child.pid}-x.csv"}  # hidden
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         part.write_text("after")
     assert path.read_text() == "after"
 
@@ -200,7 +202,7 @@ def test_killed_while_writing(tmp_path):
 MADE = """
 import resource, sys
 import tawami
-from conftest import grid_of
+from scenes import grid_of
 def main():
     most = int(sys.argv[1])
     grid = grid_of((2, 2))
@@ -215,18 +217,9 @@ tawami.run(main, "scene")
 @pytest.mark.parametrize(
     ("place", "most", "why"), [("file", 0, "Not a directory"), (".", 500, "too large")]
 )
-def test_a_cache_of_compiled_forms_that_cannot_be_written(place, most, why, tmp_path):
+def test_a_cache_of_kernels_that_cannot_be_written_is_named(place, most, why, tmp_path):
     (tmp_path / "file").touch()
-    environment = os.environ | {
-        "XDG_CACHE_HOME": str(tmp_path / place), "PYTHONPATH": str(Path(__file__).parents[1]),
-    }  # fmt: skip
-    run = subprocess.run(
-        [sys.executable, "-c", MADE, str(most)],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    run = python("-c", MADE, most, variables={"XDG_CACHE_HOME": str(tmp_path / place)})
     assert run.returncode == 1
     said = run.stderr.splitlines()[-1]
     assert said.startswith("scene: the code of form 'u' cannot be compiled"), run.stderr

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import BASES, FINITE, greville, grid_of, linear_field
+from scenes import BASES, FINITE, greville, grid_of, linear_field
 from scipy.linalg import expm
 from scipy.optimize import root
 
 import tawami
-from cases import self_weight
+from cases.verification import self_weight
 from tawami.form.form import Form
 
 
@@ -109,17 +109,19 @@ def block(law, form):
 
 def check_step(scene, f):
     """Equilibrium is the homogeneous f, to 1e-8; stored, with the particles left inside the grid."""
-    step = scene.attached.newton.solve(scene.problem().reduction, scene.external())
+    step = scene.configuration.domain.newton.solve(
+        scene.reduction(), scene.configuration.external()
+    )
     fields = scene.split(step.coefficients)
     u = linear_field(scene.grid, scene.basis, np.zeros(2), f - np.eye(2))
     assert np.abs(fields[0] - u).max() < 1e-8
-    scene.attached.stage.commit(*fields)
+    scene.configuration.domain.stage.commit(*fields)
 
 
 def move(scene, generator, steps=8):
     """The motion exp(generator) along all edges, in equal steps; its deformation gradient."""
     f = expm(np.array(generator) / steps)
-    scene.supports.all.clear()
+    scene.configuration.supports.all.clear()
     for edge in ("left", "right", "bottom", "top"):
         for component, (a, b) in zip("xy", f - np.eye(2), strict=True):
             scene.fix(edge, component, lambda x, y, a=a, b=b: a * x + b * y)

@@ -6,10 +6,10 @@ import gc
 
 import numpy as np
 import pytest
-from conftest import grid_of
 from hypothesis import given
 from hypothesis import strategies as st
 from mpi4py import MPI
+from scenes import grid_of
 
 import tawami
 from tawami import _rust
@@ -152,7 +152,7 @@ def test_boxes():
         tawami.box(grid, (-1.0, 0.5), (0.3, 2.0))
     with pytest.raises(tawami.InputError, match="must lie on lines of the grid"):
         tawami.box(grid, (-1.0, 0.5), (2.0, 2.0))
-    with pytest.raises(tawami.InputError, match="a body without particles"):
+    with pytest.raises(tawami.InputError, match="so the body has no particles"):
         tawami.box(grid, (0.0, 0.5), (0.0, 2.0))
     with pytest.raises(tawami.InputError, match="per_axis = 0"):
         tawami.box(grid, (-1.0, 0.5), (0.0, 2.0), per_axis=0)
@@ -299,7 +299,7 @@ def test_only_the_arrays_that_a_scene_needs_exist():
                 _ = scene.particles.eps_v
         else:
             assert scene.particles.eps_v.shape == scene.particles.volume.shape
-        assert scene._compiled.traction is not None
+        assert scene.configuration.model.compiled.traction is not None
     assert bytes_of == {"u": 80, "u_epsv": 88}
 
 
@@ -333,16 +333,16 @@ def test_internal_shapes_are_checked_at_the_border_and_never_panic():
     grid = grid_of()
     scene = tawami.Scene(grid, body_of(grid), tawami.linear_elastic(**ELASTIC))
     with pytest.raises(RuntimeError, match="wrong number of grid coefficients"):
-        scene.attached.stage.commit(np.zeros(3), None)
+        scene.configuration.domain.stage.commit(np.zeros(3), None)
     with pytest.raises(tawami.InputError, match="coefficients: expected an array of real"):
         scene.split(None)
     u, v = scene.split(np.zeros(scene.num_coefficients))
     data = np.zeros((len(scene.particles), 2))
     requests = _rust.Requests([[("sigma", "value", 0, None)]])
     with pytest.raises(RuntimeError, match="outside the particle data"):
-        scene.attached.stage.evaluate(u, v, requests, [data])
+        scene.configuration.domain.stage.evaluate(u, v, requests, [data])
     with pytest.raises(RuntimeError, match="row of no active cell"):
         _rust.densities(
-            scene.attached.location, scene.particles.volume, data, [(0, 0)], False,
+            scene.configuration.domain.location, scene.particles.volume, data, [(0, 0)], False,
             np.array([999], dtype=np.uint32), [0], 0, np.zeros((1, 1)),
         )  # fmt: skip

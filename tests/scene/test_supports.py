@@ -8,14 +8,15 @@ import sys
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from conftest import greville, grid_of
 from hypothesis import given
 from hypothesis import strategies as st
 from mpi4py import MPI
+from scenes import greville, grid_of
 
 import tawami
 from tawami import _rust
 from tawami.base.errors import SupportError
+from tawami.field import constraints
 from tawami.field.reduction import Reduction
 from tawami.grid import edges
 from tawami.grid.basis import values_1d
@@ -41,17 +42,17 @@ def test_point_constraint_by_elimination_is_that_by_multiplier(basis, point, val
     # the same with Lagrange multipliers, by scipy
     n = scene.num_coefficients
     matrix = scene.tangent(np.zeros(n))
-    cells, layout = scene.attached.field.active, scene.attached.layout
-    held = edges.held_edge(scene.grid, basis, cells, "left", 0, 1e-3)
+    cells, layout = scene.configuration.domain.active, scene.configuration.domain.layout
+    held = constraints.held_edge(scene.grid, basis, cells, "left", 0, 1e-3)
     rows = [sp.csr_matrix(([1.0], ([0], [k])), shape=(1, n)) for k in held.indices]
     values = list(held.values)
     for place, v in ((point, value), ((0.3, 0.9), -value)):
-        p = edges.held_point(scene.grid, basis, cells, place, 1, v, layout.active)
+        p = constraints.held_point(scene.grid, basis, cells, place, 1, v, layout.active)
         rows.append(sp.csr_matrix((p.weights, (np.zeros(len(p.indices)), p.indices)), shape=(1, n)))
         values.append(v)
     b = sp.vstack(rows)
     saddle = sp.bmat([[matrix, b.T], [b, None]], format="csc")
-    right = np.concatenate([scene.external(), values])
+    right = np.concatenate([scene.configuration.external(), values])
     expected = np.linalg.solve(saddle.toarray(), right)[:n]
     mine = np.concatenate([solution.u, solution.volumetric])
     assert np.abs(mine - expected).max() < 1e-9 * np.abs(expected).max()
@@ -64,7 +65,7 @@ def test_a_number_is_its_own_projection(basis):
     active[:, 3] = False  # no particles there
     for between in (None, (-0.5, 1.5)):
         number, function = (
-            edges.held_edge(grid, basis, active, "top", 1, value, between)
+            constraints.held_edge(grid, basis, active, "top", 1, value, between)
             for value in (-0.7, lambda x, y: -0.7 + 0 * x)
         )
         np.testing.assert_array_equal(number.indices, function.indices)
@@ -73,18 +74,18 @@ def test_a_number_is_its_own_projection(basis):
 
 def test_profiles_are_projected_in_l2_and_reproduced_where_the_basis_can(basis):
     scene = beam(basis=basis)
-    linear = edges.held_edge(
-        scene.grid, basis, scene.attached.field.active, "top", 0, lambda x, y: 2 + 3 * x
+    linear = constraints.held_edge(
+        scene.grid, basis, scene.configuration.domain.active, "top", 0, lambda x, y: 2 + 3 * x
     )
     width = len(linear.indices)
-    u = np.zeros(scene.attached.field.layout.num_displacement)
+    u = np.zeros(scene.configuration.domain.layout.num_displacement)
     u[linear.indices] = linear.values
     for x in np.linspace(-1, 1, 7):
         location = edges.locate_point(scene.grid, (x, scene.grid.upper[1]), "test")
         assert _rust.interpolate(location, basis, 2, u)[0, 0] == pytest.approx(2 + 3 * x, abs=1e-13)
     # a cubic is not in the space: the error of the projection is orthogonal to it
-    active = scene.attached.field.active
-    cubic = edges.held_edge(scene.grid, basis, active, "top", 0, lambda x, y: x**3)
+    active = scene.configuration.domain.active
+    cubic = constraints.held_edge(scene.grid, basis, active, "top", 0, lambda x, y: x**3)
     t, w = np.polynomial.legendre.leggauss(6)
     total = np.zeros(width)
     for cell in range(4):
@@ -233,7 +234,7 @@ def test_a_traction_adds_up_to_its_integral(edge, basis):
     body = tawami.box(grid, lower, upper, per_axis=3)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3), form="u", basis=basis)
     scene.traction(edge, (lambda x, y: 1 + x * y + x**2 + y**2, lambda x, y: -2 * x + y))
-    force = scene.external().reshape(-1, 2)
+    force = scene.configuration.external().reshape(-1, 2)
     along = 1 if edge in ("left", "right") else 0
     t, w = np.polynomial.legendre.leggauss(4)
     half = (upper[along] - lower[along]) / 2
@@ -261,7 +262,7 @@ def test_many_solves_do_not_keep_their_factorisations():
     """Memory after 30 more solves of 32 x 16 cells: a factorisation takes about 20 MB."""
     code = """
 import logging, resource; logging.disable(logging.INFO)
-from cases.cantilever import mpm
+from cases.verification.cantilever import mpm
 def peak(): return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 for k in range(40):
     scene = mpm.build("u_epsv", "paper", 16)
@@ -363,9 +364,11 @@ def test_hold_anywhere_holds_there(a, b):
 
 def test_reduction_selects_active_unsupported_coefficients_once():
     scene = beam()
-    layout = scene.attached.field.layout
-    held = [edges.held_edge(scene.grid, scene.basis, scene.attached.field.active, "left", k, 0.0)
-            for k in range(2)]  # fmt: skip
+    layout = scene.configuration.domain.layout
+    active = scene.configuration.domain.active
+    held = [
+        constraints.held_edge(scene.grid, scene.basis, active, "left", k, 0.0) for k in range(2)
+    ]
     reduction = Reduction(layout, held, [], np.zeros(layout.size))
     assert reduction.size == layout.size - 2 * (3 + 2)
     assert (reduction.selection.sum(axis=0) == 1).all()
@@ -379,10 +382,10 @@ def test_a_part_of_an_edge_is_loaded_and_held():
     scene.fix("bottom", "x", between=(-1.0, 0.0))
     scene.fix("bottom", "y", between=(-1.0, 0.0))
     scene.traction("top", (0.0, -3.0), between=(-0.5, 0.5))
-    force = scene.external()[: 2 * 20].reshape(-1, 2)
+    force = scene.configuration.external()[: 2 * 20].reshape(-1, 2)
     assert force[:, 1].sum() == pytest.approx(-3.0)
     assert np.flatnonzero(force[15:, 1]).tolist() == [1, 2, 3]
-    reduction = scene.problem().reduction
+    reduction = scene.reduction()
     assert np.flatnonzero(reduction.fixed).tolist() == [0, 1, 2, 3, 4, 5]
     assert scene.solve().reaction("bottom") == pytest.approx([0.0, 3.0], abs=1e-5)
 

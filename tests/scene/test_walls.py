@@ -7,6 +7,7 @@ import pytest
 from mpi4py import MPI
 
 import tawami
+from tawami.scene.contact import ActiveSet
 from tawami.scene.walls import Wall
 
 G = 10.0
@@ -102,24 +103,25 @@ def test_the_reaction_of_a_wall_is_the_weight():
 def test_states_that_contradict_are_changed():
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=1.0, cells=(3, 2))
     wall = Wall(grid, "bilinear", "bottom", 0.5, True)
+    contact = ActiveSet([wall], [np.zeros((4, 2), dtype=bool)])
     active, gap = np.ones(12, dtype=bool), np.zeros((12, 2))
     forces, u = np.zeros((12, 2)), np.zeros((12, 2))
     forces[0] = [0.4, 1.0]  # within the cone
     forces[1] = [-0.6, 1.0]  # beyond it
     forces[2] = [0.0, -1.0]  # pulls
     forces[3] = [0.5, 1.0]
-    assert wall.adapt(forces, u, gap, active)
+    assert contact.adapt(forces, u, gap, active)
     assert wall.state.touching.tolist() == [True, True, False, True]
     assert wall.state.slip.tolist() == [0, -1, 0, 0]
-    assert wall.friction_of(forces)[1] == pytest.approx([-0.5, 0.0])
+    assert contact.friction(forces)[1] == pytest.approx([-0.5, 0.0])
     u[1, 0], u[2, 1] = -1.0, -1.0  # back the way friction points, and into the wall
     forces[1, 0] = -0.5
     forces[2] = 0.0
     gap[2, 1] = 1.5
-    assert wall.adapt(forces, u, gap, active)
+    assert contact.adapt(forces, u, gap, active)
     assert wall.state.touching.tolist() == [True, True, False, True]  # it is above it still
     gap[2, 1] = 0.0
-    assert wall.adapt(forces, u, gap, active)
+    assert contact.adapt(forces, u, gap, active)
     assert wall.state.touching.all()
     assert wall.state.slip.tolist() == [0, 0, 0, 0]
 
@@ -137,22 +139,23 @@ def test_wrong_walls_get_a_sentence():
     with pytest.raises(tawami.InputError, match=r"release\('top'\): no such support.*bottom"):
         scene.release("top")
     scene.release("bottom")
-    assert not scene.supports.walls
+    assert not scene.configuration.supports.walls
 
 
-def test_a_function_that_goes_round_in_circles_is_let_go():
+def test_a_function_that_keeps_coming_back_is_released():
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=1.0, cells=(3, 2))
     wall = Wall(grid, "bilinear", "bottom", 0.0, True)
+    contact = ActiveSet([wall], [np.zeros((4, 2), dtype=bool)])
     active, zero = np.ones(12, dtype=bool), np.zeros((12, 2))
     pulls, falls = zero.copy(), zero.copy()
     pulls[1, 1], falls[1, 1] = -1.0, -1.0
     changes = 0
-    while wall.adapt(pulls, zero, zero, active) or wall.adapt(zero, falls, zero, active):
+    while contact.adapt(pulls, zero, zero, active) or contact.adapt(zero, falls, zero, active):
         changes += 1
         assert changes < 10
     assert not wall.state.touching[1]
     wall.begin()
-    assert wall.adapt(zero, falls, zero, active)
+    assert contact.adapt(zero, falls, zero, active)
 
 
 @pytest.mark.parametrize("form", ["u_epsv", "u_epsv_finite"])
@@ -182,7 +185,7 @@ def test_a_wall_looks_at_the_gap_where_particles_do_not_move():
     scene.wall("bottom", 0.3)
     points = [(x, 0.45) for x in (0.05, 0.45)]
     for y, expected in ((1e-3, 0.0), (0.5e-3, 0.0), (-1e-4, 1.0)):
-        scene.supports.all.clear()
+        scene.configuration.supports.all.clear()
         for point in points:
             scene.hold(point, "y", y)
         scene.hold(points[0], "x")

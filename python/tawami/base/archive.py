@@ -1,14 +1,14 @@
-"""Checkpoints: the state of a run in one file, which is there whole or not at all.
+"""Checkpoint files: the state of a run in one file, written atomically.
 
-A file is an archive of NumPy (.npz): each array of the state under its path ('scene.particles.stress'),
-the rest of it, and what the run is (`identity`), as JSON. The archive's checksums tell a damaged file.
+A file is an archive of NumPy (.npz). Each array of the state is stored under its path, as
+'scene.particles.stress'; all else is JSON: the state without its arrays, and the identity of the run.
+The checksums of the archive detect damage.
 """
 
 from __future__ import annotations
 
 import io
 import json
-import math
 import os
 import re
 import zipfile
@@ -19,19 +19,23 @@ from typing import Any
 import numpy as np
 
 from tawami.base.errors import CheckpointError
-from tawami.base.files import whole_file
+from tawami.base.files import atomic_file, reason
 
-#: Changes with what a state holds.
-FORMAT = 1
+#: Version of the content of a state.
+FORMAT = 2
+#: Entry of the archive with the JSON.
 ABOUT = "about.json"
-#: Numbers that tell a run from another are compared to this share of them.
-ALIKE = 1e-9
-#: In the folder of results.
+#: Folder of the checkpoints in the folder of a run.
 FOLDER = "checkpoints"
 
 
+def name_of(number: int, phase: str, steps: int) -> str:
+    """Name of the checkpoint of a phase after a number of steps."""
+    return f"{number:02d}-{phase}-{steps:08d}.npz"
+
+
 def files(folder: Path) -> list[Path]:
-    """The checkpoints of a folder of results, oldest first: in the order of phases, then of steps."""
+    """Checkpoints in the folder of a run, in the order of phases and steps."""
     named = (
         (re.fullmatch(r"(\d+)-.*-(\d+)\.npz", p.name), p) for p in (folder / FOLDER).glob("*.npz")
     )
@@ -48,99 +52,75 @@ def write(path: Path, identity: Mapping[str, Any], state: Mapping[str, Any]) -> 
 
     Args:
         path: The file.
-        identity: What the run is, as JSON can hold it: `read` compares it.
+        identity: Facts that identify the run, as JSON can hold them.
         state: Dictionaries, lists, numbers, texts and arrays.
 
     Raises:
-        OutputError: It cannot be written; what was there before still is.
+        OutputError: The file cannot be written; an older one of that name is kept.
     """
     arrays: dict[str, Any] = {}
-    about = {"format": FORMAT, "identity": identity, "state": _packed(state, "", arrays)}
-    archive = io.BytesIO()  # NumPy leaves an archive open that it cannot write to the end
-    np.savez(archive, **{ABOUT: np.frombuffer(json.dumps(about).encode(), np.uint8)}, **arrays)
-    with whole_file(path) as part, part.open("wb") as file:
-        file.write(archive.getbuffer())
+    about = {"format": FORMAT, "identity": identity, "state": _pack(state, "", arrays)}
+    content = io.BytesIO()  # in memory: NumPy does not close a file whose disk is full
+    np.savez(content, **{ABOUT: np.frombuffer(json.dumps(about).encode(), np.uint8)}, **arrays)
+    with atomic_file(path) as part, part.open("wb") as file:
+        file.write(content.getbuffer())
         file.flush()
         os.fsync(file.fileno())
 
 
-def read(path: Path, identity: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """The state in a file.
+def read(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Read a checkpoint.
 
-    Args:
-        path: The file.
-        identity: What the run is that asks; None for whoever only looks.
+    Returns:
+        The identity of its run, and the state.
 
     Raises:
-        CheckpointError: It cannot be read, is damaged, or is of another run.
+        CheckpointError: The file cannot be read, is damaged, or has another format.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
-            damaged = archive.testzip()
+        with zipfile.ZipFile(path) as content:
+            damaged = content.testzip()
         if damaged is not None:
             raise ValueError(f"wrong checksum of '{damaged}'")
         with np.load(path, allow_pickle=False) as arrays:
             about = json.loads(arrays[ABOUT].tobytes())
-            found, written = about["format"], about["identity"]
-            state = _unpacked(about["state"], arrays) if found == FORMAT else {}
+            found, identity = about["format"], about["identity"]
+            state = _unpack(about["state"], arrays) if found == FORMAT else {}
     except Exception as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise CheckpointError(
-            f"checkpoint '{path}' cannot be read ({reason}): it is damaged or not one of tawami's"
+            f"checkpoint '{path}' cannot be read ({reason(error)}): it is damaged, or no checkpoint of "
+            "tawami"
         ) from None
     if found != FORMAT:
         raise CheckpointError(
             f"checkpoint '{path}' has format {found!r}: this version of tawami reads format {FORMAT}"
         )
-    for name, own in (identity or {}).items():
-        other = written.get(name)
-        if not _same(other, own):
-            raise CheckpointError(
-                f"checkpoint '{path}' is of another run: {name} {_short(other)} there, {_short(own)} "
-                "here. Expected the same scene; start anew with existing='replace'"
-            )
-    result: dict[str, Any] = state
-    return result
+    return identity, state
 
 
-def _packed(value: Any, path: str, arrays: dict[str, Any]) -> Any:
-    """The value as JSON can hold it, its arrays apart."""
+def _pack(value: Any, path: str, arrays: dict[str, Any]) -> Any:
+    """The value as JSON can hold it; its arrays are added to `arrays`."""
     if isinstance(value, np.ndarray):
         arrays[path] = value
         return {"array": path}
     if isinstance(value, Mapping):
         return {
             "items": {
-                name: _packed(item, f"{path}.{name}" if path else name, arrays)
+                name: _pack(item, f"{path}.{name}" if path else name, arrays)
                 for name, item in value.items()
             }
         }
     if isinstance(value, list | tuple):
-        return [_packed(item, f"{path}.{k}", arrays) for k, item in enumerate(value)]
+        return [_pack(item, f"{path}.{k}", arrays) for k, item in enumerate(value)]
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _unpacked(value: Any, arrays: Mapping[str, Any]) -> Any:
+def _unpack(value: Any, arrays: Mapping[str, Any]) -> Any:
+    """The reverse of :func:`_pack`."""
     if isinstance(value, list):
-        return [_unpacked(item, arrays) for item in value]
+        return [_unpack(item, arrays) for item in value]
     if not isinstance(value, dict):
         return value
     if "array" in value:
         return arrays[value["array"]]
-    return {name: _unpacked(item, arrays) for name, item in value["items"].items()}
-
-
-def _same(one: Any, other: Any) -> bool:
-    """Whether two values are alike; numbers to the round-off of a run on several ranks."""
-    if isinstance(one, float) and isinstance(other, float):
-        return math.isclose(one, other, rel_tol=ALIKE) or (math.isnan(one) and math.isnan(other))
-    if isinstance(one, list) and isinstance(other, list):
-        return len(one) == len(other) and all(map(_same, one, other))
-    if isinstance(one, dict) and isinstance(other, dict):
-        return one.keys() == other.keys() and all(_same(one[k], other[k]) for k in one)
-    return bool(one == other)
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return {name: _unpack(item, arrays) for name, item in value["items"].items()}

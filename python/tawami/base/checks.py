@@ -1,4 +1,4 @@
-"""Checks of what a driver script passes: each returns the value in its proper type, or raises."""
+"""Checks of input: each returns the value in its proper type, or raises an InputError."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ import numpy.typing as npt
 from tawami.base.errors import InputError
 
 Array = npt.NDArray[np.float64]
-#: The least number above 0.
+#: The smallest number above 0.
 LEAST = sys.float_info.min
 #: Characters of a value that a message shows.
 SHOWN = 200
-#: What is no sequence of numbers though Python calls it one.
+#: Sequences of Python that are no sequences of numbers.
 TEXT = (str, bytes, bytearray, memoryview)
 
 
 def shown(value: Any) -> str:
-    """A value in a message: its beginning where it is long, its type where it cannot be shown."""
+    """A value as text for a message, cut off if it is long; its type if it has no text."""
     try:
         text = repr(value)
-    except Exception:  # whole numbers of thousands of digits, objects of others
+    except Exception:  # integers of thousands of digits, objects of other packages
         return f"<{type(value).__name__}>"
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
 
@@ -90,10 +90,10 @@ def pair(name: str, value: Any, what: str) -> tuple[Any, Any]:
 
 
 def choice(name: str, value: Any, known: Collection[str], wrong: str = "") -> Any:
-    """One of the names that are known.
+    """One of the known names.
 
     Raises:
-        InputError: Anything else; `wrong` says why, where that is not plain.
+        InputError: Anything else; `wrong` says why, if that is not obvious.
     """
     if not one_of(value, known):
         *others, last = map(repr, known)
@@ -105,7 +105,7 @@ def choice(name: str, value: Any, known: Collection[str], wrong: str = "") -> An
 
 
 def names(name: str, value: Any, known: Collection[str]) -> tuple[str, ...]:
-    """Some of the names that are known.
+    """Some of the known names.
 
     Raises:
         InputError: Anything else.
@@ -128,7 +128,7 @@ def point(name: str, value: Any) -> tuple[float, float]:
 
 
 def one_of(value: Any, names: Collection[Any]) -> bool:
-    """Whether it is one of some names; anything else than a name is not."""
+    """Whether a value is one of some names."""
     return isinstance(value, str) and value in names
 
 
@@ -144,10 +144,10 @@ def switch(name: str, value: Any) -> bool:
 
 
 def function(name: str, value: Any, what: str) -> Any:
-    """Something to call, or None.
+    """A function, or None.
 
     Raises:
-        InputError: Anything else; `what` says what it is called with.
+        InputError: Anything else; `what` says what its arguments are.
     """
     if value is not None and not callable(value):
         raise InputError(f"{name} = {shown(value)}: expected a function {what}")
@@ -155,7 +155,7 @@ def function(name: str, value: Any, what: str) -> Any:
 
 
 def profile(name: str, value: Any) -> float | Callable[..., Any]:
-    """A number, or a function of position, whose values are looked at where it is called.
+    """A number, or a function of position; its values are checked when it is called.
 
     Raises:
         InputError: Anything else.
@@ -168,7 +168,7 @@ def profile(name: str, value: Any) -> float | Callable[..., Any]:
 
 
 def instance(name: str, value: Any, kind: Any, expected: str) -> None:
-    """Whether an object is of a class.
+    """Check that an object is of a class.
 
     Raises:
         InputError: It is not.
@@ -178,17 +178,24 @@ def instance(name: str, value: Any, kind: Any, expected: str) -> None:
 
 
 def path(name: str, value: Any) -> Path:
-    """A path that the system can take.
+    """A path, as text or Path; whether it exists is checked by `tawami.base.files`.
 
     Raises:
-        InputError: Anything else.
+        InputError: Anything else, or characters that no path has.
     """
     try:
-        if isinstance(value, TEXT[1:]) or "\0" in os.fspath(value):
+        if isinstance(value, TEXT[1:]):
             raise TypeError
         os.fsencode(value)
-    except (TypeError, ValueError):
+        if "\0" in os.fspath(value):
+            raise ValueError
+    except TypeError:
         raise InputError(f"{name} = {shown(value)}: expected a path, as text or Path") from None
+    except ValueError:
+        raise InputError(
+            f"{name} = {shown(value)}: expected a path without NUL and characters that the file system "
+            "cannot encode"
+        ) from None
     return Path(value)
 
 
@@ -203,23 +210,23 @@ def array(name: str, values: Any, dimensions: int) -> Array:
         raise InputError(f"{name}: expected an array of real numbers: it holds {raw.dtype}")
     if raw.ndim != dimensions:
         raise InputError(f"{name} has shape {raw.shape}: expected {dimensions} dimensions")
-    with np.errstate(over="ignore"):  # of longer floating-point numbers: infinite, and said so
+    with np.errstate(over="ignore"):  # longer floating-point numbers become infinite
         return np.ascontiguousarray(raw, dtype=np.float64)
 
 
 def any_array(name: str, values: Any) -> npt.NDArray[Any]:
-    """What NumPy makes an array of.
+    """Any array of NumPy.
 
     Raises:
-        InputError: It makes none, or entries are masked.
+        InputError: NumPy makes no array of it, or entries are masked.
     """
     try:
         masked = np.ma.is_masked(values)  # type: ignore[no-untyped-call]
         made = np.asarray(values)
-    except Exception as error:  # ragged lists, objects of others
+    except Exception as error:  # ragged lists, objects of other packages
         raise InputError(f"{name}: expected an array of real numbers: {error}") from None
     if masked:
-        raise InputError(f"{name} has masked entries: expected an array with all its numbers")
+        raise InputError(f"{name} has masked entries: expected an array without a mask")
     return made
 
 
@@ -241,23 +248,23 @@ def numbering(name: str, values: Any, length: int) -> npt.NDArray[np.uint32]:
 
 
 def room(what: str, count: int, each: float, advice: str) -> None:
-    """Whether this machine has the memory for so many of something, before it is taken.
+    """Check that the memory of this machine is enough, before it is allocated.
 
     Args:
-        what: What there is to be.
-        count: How many.
-        each: Memory that one takes [bytes].
+        what: Input that decides the number of objects.
+        count: Number of objects.
+        each: Memory of one object [bytes].
         advice: What to do.
 
     Raises:
-        InputError: It has not; the message says how much that would be.
+        InputError: It is not enough; the message says how much is needed.
     """
-    there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    available = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    there = there if limit == resource.RLIM_INFINITY else min(there, limit)
+    available = available if limit == resource.RLIM_INFINITY else min(available, limit)
     size = float(min(count, 10**300)) * each
-    if size > there:
+    if size > available:
         raise InputError(
-            f"{what} would take about {size / 2**30:.3g} GB of memory, and there are "
-            f"{there / 2**30:.3g} GB: {advice}"
+            f"{what} needs about {size / 2**30:.3g} GB of memory, of which there are "
+            f"{available / 2**30:.3g} GB: {advice}"
         )

@@ -1,33 +1,32 @@
-"""What can go wrong: every message says which input, what came, what was expected, what to do.
+"""Errors and warnings. A message names the input, its value, what is expected, and what to do.
 
-A mistake in a driver script raises a `TawamiError`, whatever it passes to tawami; `tawami.run` and
-`tawami run` make one line of it. Anything else that comes out of tawami is a fault of tawami, or of
-a function of the driver script that tawami called.
+Wrong input from a driver script raises a `TawamiError`; `tawami.run` and `tawami run` print it as one
+line. Any other exception is a fault of tawami, or of a function of the driver script that tawami calls.
 
 ========================= ========================================================================
 TawamiError               base of all of them
-  InputError              an argument, a value or a file that is wrong
+  InputError              a wrong argument, value or file
     NotModelledError      an attribute that this scene does not have (also an AttributeError)
-  FormError               a weak form that cannot be used as it stands
+  FormError               a weak form that cannot be used
   SupportError            supports that leave a rigid motion free, contradict each other, miss the body
-  SingularError           a tangent that cannot be solved
+  SingularError           a singular tangent
   ConvergenceError        an iteration that did not converge, with its history
   OutputError             a result that cannot be written
   CheckpointError         a checkpoint that cannot be used
-  MissingDependencyError  a package that is not there (also an ImportError)
+  MissingDependencyError  a package that is not installed (also an ImportError)
 
-TawamiWarning             base of what is computed and should not be trusted (a UserWarning)
+TawamiWarning             base of warnings about results that should not be trusted (a UserWarning)
   CheckpointWarning       a checkpoint that was not used, or not written
-  EnergyWarning           energy that nothing gave
-  GeometryWarning         a body that is not quite of the shape that was given
+  EnergyWarning           spurious energy
+  GeometryWarning         a body whose shape differs from the given one
   InexactSumWarning       a `sum_p` that is not exactly the sum over the particles
   InstabilityWarning      an option that is not stable for this body
   LockingWarning          a form that locks
   ParameterWarning        a parameter beyond its usual range
-  QuadratureWarning       particles that integrate badly
+  QuadratureWarning       particles with large integration errors
 ========================= ========================================================================
 
-After an error of a step nothing is lost: the particles are as they were before it.
+When a step fails, the particles are as they were before it.
 """
 
 from __future__ import annotations
@@ -36,11 +35,11 @@ from tawami._rust import InputError, TawamiError
 
 
 class FormError(TawamiError):
-    """A weak form that cannot be used as it stands."""
+    """A weak form that cannot be used."""
 
 
 class NotModelledError(InputError, AttributeError):
-    """An attribute that this scene does not model; the message names the switch that does."""
+    """An attribute that this scene does not model; the message names the switch that adds it."""
 
 
 class SupportError(TawamiError):
@@ -48,19 +47,19 @@ class SupportError(TawamiError):
 
 
 class TawamiWarning(UserWarning):
-    """Base of every warning about what is computed."""
+    """Base of all warnings about results."""
 
 
 class EnergyWarning(TawamiWarning):
-    """A motion whose energy has grown by what no load and no support gave."""
+    """A motion whose energy grew without work of loads or supports."""
 
 
 class GeometryWarning(TawamiWarning):
-    """A body that is not quite of the shape that was given."""
+    """A body whose shape differs from the given one."""
 
 
 class InexactSumWarning(TawamiWarning):
-    """A `sum_p` of an expression of too high a degree to be the sum over the particles."""
+    """A `sum_p` of an expression whose degree is too high for the exact sum over the particles."""
 
 
 class InstabilityWarning(TawamiWarning):
@@ -68,26 +67,26 @@ class InstabilityWarning(TawamiWarning):
 
 
 class LockingWarning(TawamiWarning):
-    """A form without a field for the volume, where that makes its mean stress useless."""
+    """A form without a field for the volume, in a case where its mean stress is useless."""
 
 
 class ParameterWarning(TawamiWarning):
-    """A parameter of a form beyond its usual range, where answers are far off."""
+    """A parameter of a form beyond its usual range, where results are far off."""
 
 
 class QuadratureWarning(TawamiWarning):
-    """Particles that do not integrate over the cells that they fill."""
+    """Particles whose volumes integrate badly over the cells that they fill."""
 
 
 class SingularError(TawamiError):
-    """A tangent that cannot be solved; the message names the cells."""
+    """A singular tangent; the message names the cells."""
 
 
 class ConvergenceError(TawamiError):
-    """A Newton iteration that did not converge. `history` holds its measures.
+    """A Newton iteration that did not converge.
 
     Attributes:
-        history: One (measure of momentum, measure of volume or None) per residual evaluated.
+        history: (measure of momentum, measure of volume or None) of every residual.
     """
 
     def __init__(self, message: str, history: list[tuple[float, float | None]]) -> None:
@@ -95,7 +94,7 @@ class ConvergenceError(TawamiError):
         self.history = history
 
     def __reduce__(self) -> tuple[type, tuple[str, list[tuple[float, float | None]]]]:
-        """Travels between ranks with its history."""
+        """Keep the history when the error is sent between ranks."""
         return type(self), (str(self), self.history)
 
 
@@ -112,7 +111,7 @@ class CheckpointWarning(TawamiWarning):
 
 
 class MissingDependencyError(TawamiError, ImportError):
-    """A package that tawami needs is not there; the message says how to install it."""
+    """A package that is not installed; the message says how to install it."""
 
 
 __all__ = [

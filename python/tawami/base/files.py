@@ -1,21 +1,56 @@
-"""Files and folders of results: a file appears when it is whole, or not at all."""
+"""Files and folders: paths checked before use, files written atomically."""
 
 from __future__ import annotations
 
+import errno
 import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from tawami.base import checks
-from tawami.base.errors import OutputError
+from tawami.base.errors import InputError, OutputError
+
+
+def reason(error: BaseException) -> str:
+    """Why something failed, in the words of the system where it has some."""
+    return getattr(error, "strerror", None) or str(error) or type(error).__name__
+
+
+def unreadable(path: Path) -> str | None:
+    """Why a path is not a regular file that can be read; None if it is one."""
+    try:
+        check_regular(path)
+        with path.open("rb"):
+            return None
+    except (OSError, ValueError) as error:
+        return reason(error)
+
+
+def readable_file(what: str, path: str | Path, expected: str) -> Path:
+    """The path of a regular file that can be read.
+
+    Args:
+        what: What messages call the file, as 'script'.
+        path: Its path.
+        expected: What messages say after 'expected'.
+
+    Raises:
+        InputError: No path, or not that of such a file.
+    """
+    file = checks.path(what, path)
+    problem = unreadable(file)
+    if problem is not None:
+        raise InputError(f"{what} '{file}' cannot be read ({problem}): expected {expected}")
+    return file
 
 
 def result_folder(path: str | Path) -> Path:
-    """A folder that can be written, made if it is not there.
+    """A folder that can be written; created if it does not exist.
 
     Raises:
-        OutputError: It cannot be made or written.
+        OutputError: It cannot be created or written.
     """
     folder = checks.path("result folder", path)
     probe = folder / f".probe-{os.getpid()}"
@@ -27,28 +62,86 @@ def result_folder(path: str | Path) -> Path:
         with suppress(OSError):
             probe.unlink(missing_ok=True)
         raise OutputError(
-            f"result folder '{folder}' cannot be written ({error.strerror}): expected a folder with "
+            f"result folder '{folder}' cannot be written ({reason(error)}): expected a folder with "
             "write permission; choose another one"
         ) from error
     return folder
 
 
 @contextmanager
-def whole_file(path: str | Path) -> Iterator[Path]:
-    """A temporary path beside `path` that takes its name when the block ends well.
+def atomic_file(path: str | Path) -> Iterator[Path]:
+    """A temporary path in the folder of `path`; it is renamed to `path` when the block succeeds.
 
     Raises:
-        OutputError: The file cannot be written; what was at `path` before is still there.
+        OutputError: The file cannot be written; an older file at `path` is kept.
     """
     target = checks.path("path", path)
     if not target.name:
         raise OutputError(f"'{target}': expected the name of a file")
     part = target.with_name(f".{os.getpid()}-{target.name}")
+    with writing(target):
+        try:
+            check_regular(target, new=True)
+            yield part
+            part.replace(target)
+        finally:
+            with suppress(OSError):  # it was never created, or its folder is gone
+                part.unlink(missing_ok=True)
+
+
+def append_line(path: Path, line: str, *, sync: bool = False) -> None:
+    """Append a line to a file; a line before it that was cut off is ended first.
+
+    Args:
+        path: The file; created if it does not exist.
+        line: Text without a line end.
+        sync: Wait until it is on the disk.
+
+    Raises:
+        OutputError: The file cannot be written; it is as it was before.
+    """
+    with writing(path):
+        check_regular(path, new=True)
+        with path.open("a+b", buffering=0) as file:
+            size = file.seek(0, os.SEEK_END)
+            if size:
+                file.seek(-1, os.SEEK_END)
+                line = line if file.read(1) == b"\n" else "\n" + line
+            try:
+                rest = (line + "\n").encode()
+                while rest:
+                    rest = rest[file.write(rest) :]
+                if sync:
+                    os.fsync(file.fileno())
+            except OSError:
+                with suppress(OSError):
+                    file.truncate(size)
+                raise
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """The block writes a file: errors of the system are raised as OutputError."""
     try:
-        yield part
-        part.replace(target)
+        yield
     except OSError as error:
-        raise OutputError(f"'{target}' cannot be written: {error.strerror or error}") from error
-    finally:
-        with suppress(OSError):  # where it could not be made, in a folder that is gone, ...
-            part.unlink(missing_ok=True)
+        raise OutputError(f"'{path}' cannot be written: {reason(error)}") from error
+
+
+def check_regular(path: Path, *, new: bool = False) -> None:
+    """Check before a file is opened: to open a pipe would wait for ever.
+
+    Args:
+        path: Of the file.
+        new: Whether it need not exist.
+
+    Raises:
+        OSError: The path is that of a folder, a pipe, a socket, ...
+    """
+    if new and not os.path.exists(path):
+        return
+    mode = path.stat().st_mode
+    if stat.S_ISDIR(mode):
+        raise OSError(errno.EISDIR, os.strerror(errno.EISDIR))
+    if not stat.S_ISREG(mode):
+        raise OSError(errno.EINVAL, "Not a regular file")

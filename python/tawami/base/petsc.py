@@ -1,4 +1,4 @@
-"""PETSc objects: who frees them, and how SciPy's matrices become theirs."""
+"""PETSc objects: who frees them, and conversion between SciPy's matrices and theirs."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from petsc4py import PETSc
 
 
 class Handles(dict[str, Any]):
-    """PETSc objects by name; petsc4py frees them late or never, so we do.
+    """PETSc objects by name, freed with their owner: petsc4py frees them late or never.
 
-    Each of petsc4py's handles (`getPC()`, `getFactorMatrix()`, ...) keeps the object behind it.
+    Every handle of petsc4py (`getPC()`, `getFactorMatrix()`, ...) keeps its object alive.
 
     Args:
-        owner: When Python drops it, the handles go too.
+        owner: The handles are freed when Python frees this object.
         comm: Communicator of the objects.
     """
 
@@ -25,7 +25,7 @@ class Handles(dict[str, Any]):
         weakref.finalize(owner, self._abandon, comm.size)
 
     def free(self, *names: str) -> None:
-        """Free those of these names that are there; all of them if none is named. A call for all
+        """Free the objects of these names that exist; all objects if no name is given. A call for all
         ranks, which wait for each other.
         """
         for name in names or list(self):
@@ -33,8 +33,10 @@ class Handles(dict[str, Any]):
                 self.pop(name).destroy()
 
     def _abandon(self, ranks: int) -> None:
-        """Python drops objects when it pleases, not on all ranks together: on several ranks PETSc
-        keeps a list of what is dropped, for :func:`clean_up`.
+        """Free the objects of an owner that no longer exists.
+
+        Python frees the owners at other times on other ranks: on several ranks PETSc keeps a list of
+        these objects for :func:`clean_up`.
         """
         if ranks == 1:
             self.free()
@@ -42,28 +44,28 @@ class Handles(dict[str, Any]):
             self.clear()
 
 
-#: One object on every communicator of several ranks: PETSc's own copy of a communicator is made and
-#: dropped with the first and last object on it, and making it waits for all ranks.
-_staying: list[Any] = []
+#: One object on every communicator of several ranks. PETSc copies a communicator for the first object
+#: on it and frees the copy with the last one; to make a copy, it waits for all ranks.
+_kept: list[Any] = []
 
 
-def stay(comm: Any) -> None:
-    """Keep PETSc's copy of a communicator; a call for all ranks."""
-    _staying.append(PETSc.Vec().createMPI((1, PETSc.DETERMINE), comm=comm))
+def keep_communicator(comm: Any) -> None:
+    """Keep the copy that PETSc makes of a communicator; a call for all ranks."""
+    _kept.append(PETSc.Vec().createMPI((1, PETSc.DETERMINE), comm=comm))
 
 
 def clean_up(comm: Any) -> None:
-    """Free what was dropped on all ranks; a call for all of them."""
+    """Free objects that are no longer used on any rank; a call for all ranks."""
     if comm.size > 1:
         PETSc.garbage_cleanup(comm)
 
 
 def aij(comm: Any, rows: sp.spmatrix, own_columns: int) -> Any:
-    """A distributed matrix from this rank's rows.
+    """A distributed matrix.
 
     Args:
         comm: Communicator.
-        rows: Rows of this rank, columns counted over all ranks.
+        rows: Rows of this rank, with columns numbered over all ranks.
         own_columns: Number of columns that this rank owns.
     """
     csr: sp.csr_matrix = sp.csr_matrix(rows)
@@ -74,7 +76,7 @@ def aij(comm: Any, rows: sp.spmatrix, own_columns: int) -> Any:
 
 
 def rows_of(matrix: Any) -> sp.csr_matrix:
-    """This rank's rows of a PETSc matrix, columns counted over all ranks."""
+    """Rows of a PETSc matrix on this rank, with columns numbered over all ranks."""
     start, columns, values = matrix.getValuesCSR()
     shape = (len(start) - 1, matrix.getSize()[1])
     return sp.csr_matrix((np.array(values), columns, start), shape=shape)

@@ -1,4 +1,4 @@
-"""Objects that cannot be doubled, and processes that are doubles."""
+"""Objects that cannot be copied, and processes that were forked."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ os.register_at_fork(after_in_child=lambda: _forked.append(os.getpid()))
 
 
 class Unique:
-    """What holds objects of MPI and PETSc: it cannot be copied, pickled or sent to another process."""
+    """Base of objects that hold MPI and PETSc objects: no copy, no pickle."""
 
     def __reduce_ex__(self, protocol: object) -> NoReturn:
-        """Asked for by `copy`, `deepcopy` and `pickle`."""
+        """Raise an error; `copy`, `deepcopy` and `pickle` call this."""
         raise InputError(
             f"a {type(self).__name__} cannot be copied, pickled or sent to another process: it holds "
             "objects of MPI and PETSc. Build another one there, and send its input or NumPy arrays"
@@ -23,14 +23,14 @@ class Unique:
 
 
 def check_process() -> None:
-    """Whether this process was started, and not forked from one that uses MPI and threads.
+    """Check that this process was not forked from one that uses MPI and threads.
 
     Raises:
-        InputError: It was forked: what is called there may wait for ever.
+        InputError: It was forked; calls could wait for ever.
     """
     if os.getpid() in _forked:
         raise InputError(
-            "this process was forked from one with tawami in it, and neither MPI nor the threads of "
-            "the particles survive that: expected multiprocessing.get_context('spawn'), or a process "
-            "of its own as tawami.Study starts them"
+            "this process was forked from one that uses tawami, where neither MPI nor the threads of "
+            "the particles work: expected multiprocessing.get_context('spawn'), or a process started "
+            "as tawami.Study starts its own"
         )

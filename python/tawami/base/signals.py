@@ -1,6 +1,4 @@
-"""Signals: those that must not arrive in the middle of something wait for its end; SIGTERM and Ctrl-C
-are noted so that a run can end in order.
-"""
+"""Signals: deferred while a step is stored; SIGTERM and Ctrl-C noted, so that a run ends in order."""
 
 from __future__ import annotations
 
@@ -11,7 +9,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-#: Those that people, batch systems and timers send.
+#: Signals that users, batch systems and timers send.
 SIGNALS = (
     signal.SIGINT,
     signal.SIGTERM,
@@ -24,16 +22,15 @@ SIGNALS = (
 
 @contextmanager
 def deferred() -> Iterator[None]:
-    """What a driver handles in Python is handled when the block is done, also where its handler raises,
-    as that of Ctrl-C does.
+    """Defer Python's handlers of signals to the end of the block, also those that raise as Ctrl-C does.
 
-    Handlers run in the main thread only, and so do their exceptions: in another thread nothing is to
-    be done. Masks of signals would not do: the system would give the signal to another thread.
+    Handlers and their exceptions run in the main thread only, so that nothing is done in other threads.
+    Signal masks would not help: the system would deliver the signal to another thread.
     """
-    came: list[int] = []
+    arrived: list[int] = []
 
     def note(number: int, _: FrameType | None) -> None:
-        came.append(number)
+        arrived.append(number)
 
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -46,12 +43,12 @@ def deferred() -> Iterator[None]:
         yield
     finally:
         _restore(handlers)
-        for one in dict.fromkeys(came):
+        for one in dict.fromkeys(arrived):
             signal.raise_signal(one)
 
 
 def _restore(handlers: list[tuple[signal.Signals, Any]]) -> None:
-    """All of them, also where one that is there again raises at once."""
+    """Restore all handlers, even if one of them is called and raises in between."""
     left = list(handlers)
     while left:
         number, handler = left.pop()
@@ -63,12 +60,12 @@ def _restore(handlers: list[tuple[signal.Signals, Any]]) -> None:
 
 
 class Interruption:
-    """Within a block, SIGTERM and the first Ctrl-C are noted; a second Ctrl-C acts at once.
+    """Context manager that notes SIGTERM and the first Ctrl-C; a second Ctrl-C interrupts at once.
 
-    Outside the main thread signals stay as they are.
+    Outside the main thread it does nothing.
 
     Attributes:
-        signal: What has come; None so far.
+        signal: The signal that arrived; None so far.
     """
 
     def __init__(self) -> None:
@@ -92,7 +89,7 @@ class Interruption:
         self.signal = signal.Signals(number)
 
     def end(self) -> None:
-        """End as the signal would have."""
+        """End the program as the signal would have done."""
         if self.signal is signal.SIGINT:
             raise KeyboardInterrupt
         raise SystemExit(128 + signal.SIGTERM)

@@ -13,8 +13,8 @@ class Stopwatch:
 
     Attributes:
         seconds: Wall time of each stage so far.
-        cpu: Processor time of each stage so far, of all threads.
-        laps: What `seconds` was at the start of the last step and after each of its Newton iterations.
+        cpu: Processor time of each stage so far, over all threads.
+        laps: Copies of `seconds` at the start of the last step and after each of its Newton iterations.
     """
 
     def __init__(self) -> None:
@@ -33,24 +33,24 @@ class Stopwatch:
             self.cpu[stage] = self.cpu.get(stage, 0.0) + process_time() - busy
 
     def start(self) -> None:
-        """A step begins."""
+        """Begin a step."""
         self.laps = [dict(self.seconds)]
 
     def lap(self) -> None:
-        """A Newton iteration ends."""
+        """End a Newton iteration."""
         self.laps.append(dict(self.seconds))
 
 
 @dataclass
 class Tally:
-    """Counts since the start or the last :meth:`reset`.
+    """Counts since the start of the process or the last :meth:`reset`.
 
     Attributes:
         steps: Converged steps.
-        newton_iterations: Linear solves, those of steps that failed too.
-        unknowns: Reduced unknowns, the most that were solved for.
-        compiling_s: Seconds of turning forms into kernels, which later runs find on disk.
-        compiling_cpu_s: Processor time of the same.
+        newton_iterations: Linear solves, with those of failed steps.
+        unknowns: Largest number of reduced unknowns.
+        compiling_s: Wall time of compiling forms [s]; later runs find the kernels on disk.
+        compiling_cpu_s: Processor time of the same [s].
     """
 
     steps: int = 0
@@ -60,13 +60,13 @@ class Tally:
     compiling_cpu_s: float = 0.0
 
     def reset(self) -> None:
-        """Begin anew."""
+        """Set all counts to 0."""
         for field in fields(self):
             setattr(self, field.name, field.default)
 
     @contextmanager
     def compiling(self) -> Iterator[None]:
-        """The block turns a form into kernels."""
+        """Count the time of the block as compiling."""
         start, busy = perf_counter(), process_time()
         try:
             yield

@@ -1,1 +1,1 @@
-"""Shapes that are filled with particles; a body knows no material and no form."""
+"""Shapes -> particles: `box`, `disc`, `polygon`, `level_set` and `mesh` return a `Body`."""

@@ -1,4 +1,4 @@
-"""Elements of a mesh: checks, and what of them lies in which cell of the grid."""
+"""Elements of a mesh: their checks, and their parts in each cell of the grid."""
 
 from __future__ import annotations
 
@@ -6,45 +6,46 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 import numpy as np
-import numpy.typing as npt
 
 from tawami.base.errors import InputError
-from tawami.body import cut_cells
-from tawami.body.cut_cells import ROUND_OFF, Numbers, Points, areas, on_lines
+from tawami.body import clipping
+from tawami.body.points import ROUND_OFF, Array, Numbers, Points, areas, in_triangles
 from tawami.grid.grid import Grid
 
-Array = npt.NDArray[np.float64]
-#: A cell covered but for this share is full; one covered by this share more has an overlap.
+#: A cell is full if less than this share is not covered. More than this share above 1 is an overlap.
 COVERED = 1e-9
 
 
 @dataclass(frozen=True)
 class Elements:
-    """Triangles of a mesh; a quadrilateral is two.
+    """Triangles of a mesh; a quadrilateral is two triangles.
 
     Attributes:
-        corners: Counter-clockwise [cells], n x 3 x 2.
+        corners: Positions [cells], counter-clockwise, n x 3 x 2.
         nodes: Their numbers in the mesh, n x 3.
-        number: Of the element in the mesh, counted over the elements that are taken.
-        tag: Number of the material of each.
+        number: Number of the element among the elements that are used, n.
+        material: Number of the material of each triangle, n.
     """
 
     corners: Array
     nodes: Numbers
     number: Numbers
-    tag: Numbers
+    material: Numbers
 
 
-def triangles(grid: Grid, x: Array, blocks: list[Numbers], tag: Numbers) -> Elements:
+def triangles(grid: Grid, x: Array, blocks: list[Numbers], material: Numbers) -> Elements:
     """The elements of a mesh as triangles.
 
     Args:
         grid: The grid.
         x: Positions of the nodes [m].
         blocks: Nodes of triangles (n x 3) and quadrilaterals (n x 4).
-        tag: Number of the group of each element.
+        material: Number of the material of each element.
+
+    Raises:
+        InputError: An element is outside the grid, has no area, or crosses itself.
     """
-    scaled = on_lines((x - grid.origin) / grid.h)
+    scaled = clipping.on_lines(grid, x)
     nodes, number, first = list[Numbers](), list[Numbers](), 0
     for block in blocks:
         count = np.arange(first, first + len(block))
@@ -61,12 +62,12 @@ def triangles(grid: Grid, x: Array, blocks: list[Numbers], tag: Numbers) -> Elem
     flat = np.flatnonzero(np.abs(area) <= ROUND_OFF)
     if len(flat):
         raise InputError(
-            f"mesh: element {all_numbers[flat[0]]} and {len(flat) - 1} others have no area: expected "
-            "none that is flat"
+            f"mesh: {len(flat)} of its triangles have no area, the first in element "
+            f"{all_numbers[flat[0]]}: expected elements that are not flat"
         )
     turned = area < 0
     all_nodes[turned] = all_nodes[turned][:, ::-1]
-    return Elements(scaled[all_nodes], all_nodes, all_numbers, tag[all_numbers])
+    return Elements(scaled[all_nodes], all_nodes, all_numbers, material[all_numbers])
 
 
 def _check_nodes(grid: Grid, x: Array, scaled: Array, block: Numbers, first: int) -> None:
@@ -82,14 +83,14 @@ def _check_nodes(grid: Grid, x: Array, scaled: Array, block: Numbers, first: int
 
 
 def _halves(x: Array, quads: Numbers, first: int) -> tuple[Numbers, Numbers]:
-    """Two triangles of each quadrilateral, on that diagonal which is inside of it."""
+    """Two triangles of each quadrilateral, divided along a diagonal that is inside it."""
     along = (quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]), (quads[:, [1, 2, 3]], quads[:, [1, 3, 0]])
     signs = [np.sign(areas(x[a])) * np.sign(areas(x[b])) for a, b in along]
     twisted = np.flatnonzero((signs[0] <= 0) & (signs[1] <= 0))
     if len(twisted):
         raise InputError(
-            f"mesh: quadrilateral {first + twisted[0]} and {len(twisted) - 1} others cross themselves: "
-            "expected their corners in order around them"
+            f"mesh: {len(twisted)} of its quadrilaterals cross themselves, the first is element "
+            f"{first + twisted[0]}: expected their corners in order around them"
         )
     take = (signs[0] > 0)[:, None]
     a, b = (np.where(take, along[0][k], along[1][k]) for k in range(2))
@@ -97,8 +98,13 @@ def _halves(x: Array, quads: Numbers, first: int) -> tuple[Numbers, Numbers]:
 
 
 def check_apart(grid: Grid, elements: Elements) -> None:
-    """Whether no element lies over another: no side with two on the same side of it, no middle of one
-    in another, no border across another.
+    """Check that no two elements overlap.
+
+    They do if both lie on the same side of a common side, if the middle of one is in another, or if
+    sides of the border cross.
+
+    Raises:
+        InputError: Two elements overlap.
     """
     import shapely
 
@@ -126,49 +132,46 @@ def check_apart(grid: Grid, elements: Elements) -> None:
 
 
 def _overlap(grid: Grid, elements: Elements, a: int, b: int) -> NoReturn:
-    x, y = grid.origin + grid.h * elements.corners[a].mean(axis=0)
+    x, y = grid.in_metres(elements.corners[a].mean(axis=0))
     raise InputError(
-        f"mesh: elements {elements.number[a]} and {elements.number[b]} lie over each other near "
-        f"({x:g}, {y:g}) m: one is turned inside out, or is there twice; expected every point in one "
-        "element"
+        f"mesh: elements {elements.number[a]} and {elements.number[b]} overlap near ({x:g}, {y:g}) m: "
+        "one is turned inside out, or both are the same; expected every point in one element"
     )
 
 
-def by_cells(
-    grid: Grid, elements: Elements, groups: int
-) -> tuple[Numbers, Numbers, Points, Numbers]:
-    """Cells that a group fills and the group, points that integrate over the rest and their group.
+def by_cells(grid: Grid, elements: Elements, num_materials: int) -> tuple[Numbers, Numbers, Points]:
+    """The parts of elements in each cell.
 
-    The points of a group in a cell have a cell of their own, (cell, group), to be thinned out alone.
+    Returns:
+        Numbers of the cells that are filled by one material; this material; points that integrate over
+        the other parts.
+
+    Raises:
+        InputError: Elements cover more than a cell.
     """
-    (nx, ny), groups = grid.cells, max(groups, 1)
-    triangles, of = _cut(elements.corners, grid.cells)
+    triangles, of = _cut(elements.corners)
     area = areas(triangles)
     large = area > 0
     triangles, of, area = triangles[large], of[large], area[large]
-    cell = np.floor(triangles.mean(axis=1)).astype(np.int64)
-    key = (cell @ [1, nx]) * groups + elements.tag[of]
-    covered = np.bincount(key, area, minlength=nx * ny * groups)
-    in_cell = covered.reshape(-1, groups).sum(axis=1)
+    cell = grid.cell_numbers(grid.cell_at(triangles.mean(axis=1)))
+    key = cell * num_materials + elements.material[of]
+    covered = np.bincount(key, area, minlength=grid.num_cells * num_materials)
+    in_cell = covered.reshape(-1, num_materials).sum(axis=1)
     worst = int(in_cell.argmax())
     if in_cell[worst] > 1 + COVERED:
-        x, y = grid.origin + grid.h * (np.array([worst % nx, worst // nx]) + 0.5)
+        x, y = grid.in_metres(grid.cell_indices(np.array(worst)) + 0.5)
         raise InputError(
             f"mesh: its elements cover {in_cell[worst]:.6g} times the cell at ({x:g}, {y:g}) m: "
             "expected every point in one element"
         )
     full = np.flatnonzero(covered > 1 - COVERED)
     rest = covered[key] <= 1 - COVERED
-    points = cut_cells.in_triangles(
-        triangles[rest], np.column_stack([key[rest], np.zeros_like(key[rest])])
-    )
-    group = np.repeat(elements.tag[of[rest]], len(points.x) // max(rest.sum(), 1))
-    place = full // groups
-    return np.column_stack([place % nx, place // nx]), full % groups, points, group
+    cut = in_triangles(triangles[rest], cell[rest], elements.material[of[rest]])
+    return full // num_materials, full % num_materials, cut
 
 
-def _cut(corners: Array, cells: tuple[int, int]) -> tuple[Array, Numbers]:
-    """Triangles cut by cells into triangles, and which one each is a part of."""
+def _cut(corners: Array) -> tuple[Array, Numbers]:
+    """Triangles cut by the cells into triangles, and the triangle that each is a part of."""
     import shapely
 
     low = np.floor(corners.min(axis=1)).astype(np.int64)
@@ -181,9 +184,8 @@ def _cut(corners: Array, cells: tuple[int, int]) -> tuple[Array, Numbers]:
     count = size[many].prod(axis=1)
     of = np.repeat(many, count)
     step = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    cell = low[of] + np.column_stack([step % size[of, 0], step // size[of, 0]])
-    boxes = shapely.box(*cell.T, *(cell + 1).T)
-    parts = shapely.intersection(shapely.polygons(corners)[of], boxes)
+    cell = low[of] + np.column_stack([step % size[of, 0], step // size[of, 0]])  # x fastest
+    parts = shapely.intersection(shapely.polygons(corners)[of], clipping.squares(cell))
     some = shapely.area(parts) > 0
     parts, of = parts[some], of[some]
     fans, of_fan = _fans(parts)
@@ -194,7 +196,7 @@ def _cut(corners: Array, cells: tuple[int, int]) -> tuple[Array, Numbers]:
 
 
 def _fans(parts: Any) -> tuple[Array, Numbers]:
-    """Triangles of convex polygons, counter-clockwise, and which one each is of."""
+    """Triangles of convex polygons, counter-clockwise, and the polygon of each."""
     import shapely
 
     x, of = shapely.get_coordinates(shapely.normalize(parts), return_index=True)

@@ -7,25 +7,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from tawami.base.checks import one_of, shown
 from tawami.base.errors import GeometryWarning, InputError
-from tawami.body import cut_cells, elements
+from tawami.body import elements
 from tawami.body.body import Body
-from tawami.body.cut_cells import Numbers
+from tawami.body.filling import Filling
+from tawami.body.points import Array, Numbers
 from tawami.grid.grid import Grid
 
 if TYPE_CHECKING:
     import meshio
 
-Array = npt.NDArray[np.float64]
-#: Corners of the elements that are taken, and of those that are passed over: sides and points.
+#: Corners of the elements that are used.
 CORNERS = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4, "quad9": 4}
-SIDES = ("vertex", "line", "line3", "line4", "line5")
-#: What Gmsh calls the array of the physical groups.
+#: Elements that are ignored: points and lines.
+IGNORED = ("vertex", "line", "line3", "line4", "line5")
+#: Name that Gmsh gives to the array of the physical groups.
 PHYSICAL = "gmsh:physical"
-#: Nodes in the middle of sides that are off by this share of the side make it curved.
+#: A side is curved if its middle node is off by more than this share of its length.
 STRAIGHT = 1e-6
 
 
@@ -37,52 +37,46 @@ def mesh(
     per_axis: int = 2,
     gauss: bool = False,
 ) -> Body:
-    """The elements of a mesh filled with particles, each group of elements of a material of its own.
+    """The elements of a mesh filled with particles; each group of elements has its own material.
 
-    Triangles and quadrilaterals of any size beside the cells of the grid, linear or quadratic; these
-    with straight sides between their corners, and a warning where they have others. A cell that one
-    group fills gets `per_axis` x `per_axis` particles; of what a group has of another cell there are
-    at most 28, whose volumes and moments up to degree 6 are those of its elements, to round-off.
+    The elements are triangles and quadrilaterals of any size, linear or quadratic. The sides of
+    quadratic elements are taken as straight, with a warning if they are not. A cell that one group
+    fills gets `per_axis` x `per_axis` particles. In any other cell each group gets at most 28, which
+    have the volume and the moments up to degree 6 of its elements, to round-off.
 
     Args:
         grid: The grid.
-        source: A file of any format that meshio reads (Gmsh's .msh, .vtu, .vtk, .inp, ...), or its
-            Mesh. A third coordinate must be the same everywhere.
-        tags: What tells the groups: the name of an array of cell data with whole numbers, or 'sets'
-            for the cell sets of the mesh; by default Gmsh's physical groups where there are some,
-            else the cell sets where there are some, else one group of all elements. `Body.names`
-            are their names, or their numbers where they have none, in the order of the numbers.
+        source: A mesh of meshio, or a file that meshio reads (Gmsh's .msh, .vtu, .vtk, .inp, ...). If
+            it has a third coordinate, this must be the same everywhere.
+        tags: What tells the groups apart: the name of an array of cell data with whole numbers, or
+            'sets' for the cell sets of the mesh. By default Gmsh's physical groups if there are any,
+            else the cell sets if there are any, else all elements are one group. `Body.names` are the
+            names of the groups in the order of their numbers, or the numbers if they have no names.
         per_axis: Particles per full cell and axis.
-        gauss: Put those at the Gauss points, with the Gauss weights, instead of evenly.
+        gauss: Place the particles of full cells at the Gauss points with the Gauss weights.
 
     Raises:
-        InputError: A file that is not there or cannot be read; no triangles or quadrilaterals, or
-            solids; elements outside the grid, without an area, turned inside out or one over another;
-            a tag that is not there.
+        InputError: The file does not exist or cannot be read; it has no triangles or quadrilaterals,
+            or has solids; elements are outside the grid, have no area, are turned inside out or
+            overlap; or the tags do not exist.
 
     Warns:
-        GeometryWarning: Quadratic elements with curved sides.
+        GeometryWarning: Quadratic elements have curved sides.
     """
-    cut_cells.check("mesh", grid, per_axis, gauss)
+    filling = Filling("mesh", grid, per_axis, gauss)
     read = _read(source)
     x = _plane(read)
     blocks = _blocks(read)
-    tag, names = _tags(read, blocks, tags)
+    material, names = _materials(read, blocks, tags)
     _warn_of_curved_sides(read, blocks, x)
-    parts = elements.triangles(grid, x, [b.data[:, : CORNERS[b.type]] for _, b in blocks], tag)
+    corners = [b.data[:, : CORNERS[b.type]] for _, b in blocks]
+    parts = elements.triangles(grid, x, corners, material)
     elements.check_apart(grid, parts)
-    full, of_full, cut, of_cut = elements.by_cells(grid, parts, len(names))
-    whole = cut_cells.in_full_cells(full, per_axis, gauss)
-    thin, weight, first = cut_cells.thinned(cut, len(full))
-    positions = np.concatenate([whole.x, thin])
-    volume = np.concatenate([whole.weight, weight])
-    material = np.concatenate([np.repeat(of_full, per_axis**2), of_cut[first]])
-    return Body(
-        grid.origin + grid.h * positions, grid.h**2 * volume, material.astype(np.uint32), names
-    )
+    full, of_full, cut = elements.by_cells(grid, parts, max(len(names), 1))
+    return filling.body(full, cut, material=of_full, names=names)
 
 
-# -- what the file holds -----------------------------------------------------
+# -- reading the mesh ----------------------------------------------------------
 
 
 def _read(source: Any) -> Any:
@@ -95,14 +89,14 @@ def _read(source: Any) -> Any:
             f"mesh: source = {shown(source)}: expected the path of a mesh file or a meshio.Mesh"
         )
     if not Path(source).is_file():
-        raise InputError(f"mesh: '{source}' is no file: expected a mesh that meshio reads")
+        raise InputError(f"mesh: '{source}' is not a file: expected a mesh that meshio reads")
     try:
         return meshio.read(source)
-    except (Exception, SystemExit) as error:  # meshio ends the program where no reader fits
-        said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    except (Exception, SystemExit) as error:  # meshio ends the program if no reader fits
+        reason = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
         raise InputError(
-            f"mesh: meshio cannot read '{source}' ({said}): expected a format that it knows, by the "
-            "ending of the name; convert it with `meshio convert`"
+            f"mesh: meshio cannot read '{source}' ({reason}): expected a format that it recognises by "
+            "the extension of the name; convert it with `meshio convert`"
         ) from error
 
 
@@ -122,13 +116,13 @@ def _plane(read: Any) -> Array:
 
 
 def _blocks(read: Any) -> list[tuple[int, Any]]:
-    """The blocks of plane elements with their numbers among all blocks."""
+    """The blocks of plane elements, each with its number among all blocks."""
     found = [(k, block) for k, block in enumerate(read.cells) if len(block.data)]
-    others = [b.type for _, b in found if b.type not in CORNERS and b.type not in SIDES]
+    others = [b.type for _, b in found if b.type not in CORNERS and b.type not in IGNORED]
     if others:
         raise InputError(
             f"mesh: it holds elements '{others[0]}': expected triangles and quadrilaterals, linear or "
-            "quadratic (points and lines are passed over)"
+            "quadratic (points and lines are ignored)"
         )
     blocks = [(k, block) for k, block in found if block.type in CORNERS]
     if not blocks:
@@ -139,10 +133,10 @@ def _blocks(read: Any) -> list[tuple[int, Any]]:
     return blocks
 
 
-def _tags(
+def _materials(
     read: Any, blocks: list[tuple[int, Any]], tags: str | None
 ) -> tuple[Numbers, tuple[str, ...]]:
-    """Number of the group of each element, and the names of the groups."""
+    """Number of the material of each element, and the names of the materials."""
     sets = {name: s for name, s in read.cell_sets.items() if not name.startswith("gmsh:")}
     if tags is None:
         used = PHYSICAL if PHYSICAL in read.cell_data else "sets" if sets else None
@@ -172,7 +166,7 @@ def _tags(
 def _of_sets(
     sets: dict[str, Any], blocks: list[tuple[int, Any]]
 ) -> tuple[Numbers, tuple[str, ...]]:
-    """As `_tags`, from cell sets; those without plane elements are passed over."""
+    """The same from cell sets; sets without plane elements are ignored."""
     group = [np.full(len(block.data), -1) for _, block in blocks]
     names = list[str]()
     for name, of_block in sets.items():
@@ -188,14 +182,15 @@ def _of_sets(
                 )
             mine[chosen] = len(names)
         names.append(name)
-    whole = np.concatenate(group)
-    if (whole < 0).any():
+    of_element = np.concatenate(group)
+    without = np.flatnonzero(of_element < 0)
+    if len(without):
         raise InputError(
-            f"mesh: {(whole < 0).sum()} elements, the first is {np.flatnonzero(whole < 0)[0]}, are in "
-            f"none of the cell sets ({', '.join(map(repr, sets)) or 'there are none'}): expected each "
-            "in one; name an array of cell data with tags=..."
+            f"mesh: {len(without)} elements, the first is {without[0]}, are in none of the cell sets "
+            f"({', '.join(map(repr, sets)) or 'there are none'}): expected each in one; name an array "
+            "of cell data with tags=..."
         )
-    return whole, tuple(names)
+    return of_element, tuple(names)
 
 
 def _warn_of_curved_sides(read: Any, blocks: list[tuple[int, Any]], x: Array) -> None:

@@ -10,15 +10,14 @@ import numpy.typing as npt
 
 from tawami.base.checks import array, shown
 from tawami.base.errors import InputError
-from tawami.body import cut_cells
+from tawami.body import clipping
 from tawami.body.body import Body
-from tawami.body.cut_cells import ROUND_OFF, on_lines
+from tawami.body.filling import Filling
+from tawami.body.points import ROUND_OFF, Array, in_triangles
 from tawami.grid.grid import Grid
 
 if TYPE_CHECKING:
     import shapely
-
-Array = npt.NDArray[np.float64]
 
 
 def polygon(
@@ -31,33 +30,32 @@ def polygon(
 ) -> Body:
     """A polygon filled with particles; its sides may cut cells of the grid.
 
-    A full cell gets `per_axis` x `per_axis` particles, as `box` puts them. What the polygon leaves of
-    another cell is divided into triangles, with the 12 points of a Gauss rule in each; more than 28 in
-    a cell are thinned out to at most 28. However little is left, volumes are positive and moments up
-    to degree 6 exact: the area to 1e-12 of it, but for what vertices move that are within 1e-6 cells
-    of a line of the grid, and are put on it.
+    A full cell gets `per_axis` x `per_axis` particles, placed as by `box`. The part of a cut cell that
+    the polygon covers is divided into triangles with the 12 points of a Gauss rule in each. More than
+    28 points in a cell are replaced by at most 28. However small the part, volumes are positive and
+    moments up to degree 6 are exact. The area is exact to 1e-12, but a vertex within 1e-6 cells of a
+    line of the grid is moved onto this line.
 
     Args:
         grid: The grid.
-        shape: Corners [m] in order, n x 2, either way round; or a Polygon or MultiPolygon of shapely,
-            as its set operations and `buffer` give them, with the holes that it has.
-        holes: Corners of each hole of a polygon that is given by its corners [m].
+        shape: Corners [m] in order, n x 2, in either orientation; or a Polygon or MultiPolygon of
+            shapely with its holes, for example the result of a union or of `buffer`.
+        holes: Corners [m] of each hole, if the polygon is given by its corners.
         per_axis: Particles per full cell and axis.
-        gauss: Put those at the Gauss points, with the Gauss weights, instead of evenly.
+        gauss: Place the particles of full cells at the Gauss points with the Gauss weights.
 
     Raises:
-        InputError: Fewer than three vertices, all on a line, sides that cross or touch, a hole outside
-            the polygon, a vertex outside the grid, or a geometry without an area.
+        InputError: The polygon has fewer than three vertices or no area, its sides cross or touch, a
+            hole is not inside it, or a vertex is outside the grid.
     """
-    cut_cells.check("polygon", grid, per_axis, gauss)
-    found = _valid(grid, _geometry(grid, shape, holes))
-    full, triangles, cell = cut_cells.clipped(found)
-    cut = cut_cells.in_triangles(triangles, cell)
-    return Body(*cut_cells.to_body(grid, full, cut, per_axis, gauss))
+    filling = Filling("polygon", grid, per_axis, gauss)
+    valid = _valid(grid, _geometry(grid, shape, holes))
+    full, triangles, cell = clipping.clipped(grid, valid)
+    return filling.body(full, in_triangles(triangles, cell))
 
 
 def _geometry(grid: Grid, shape: Any, holes: Sequence[npt.ArrayLike]) -> Any:
-    """In cells from the origin; round-off must not leave slivers beyond a line."""
+    """The polygon in cells from the origin."""
     import shapely
 
     listed = isinstance(holes, list | tuple) or (isinstance(holes, np.ndarray) and holes.ndim > 0)
@@ -69,8 +67,8 @@ def _geometry(grid: Grid, shape: Any, holes: Sequence[npt.ArrayLike]) -> Any:
     if not isinstance(shape, shapely.Geometry):
         return shapely.Polygon(_ring(grid, shape, "vertices"), inner)
     if not isinstance(shape, shapely.Polygon | shapely.MultiPolygon) or shape.is_empty:
-        what = f"a {shape.geom_type}" + (" that is empty" if shape.is_empty else "")
-        raise InputError(f"polygon: it is {what}: expected a Polygon or MultiPolygon with an area")
+        kind = f"an empty {shape.geom_type}" if shape.is_empty else f"a {shape.geom_type}"
+        raise InputError(f"polygon: it is {kind}: expected a Polygon or MultiPolygon with an area")
     if inner:
         raise InputError("polygon: a geometry of shapely has its own holes: expected no holes=")
     scaled = _in_cells(grid, shapely.get_coordinates(shape))
@@ -87,7 +85,8 @@ def _ring(grid: Grid, given: npt.ArrayLike, what: str) -> Array:
 
 
 def _in_cells(grid: Grid, corners: Array, of: str = "") -> Array:
-    scaled = on_lines((corners - grid.origin) / grid.h)
+    """Corners in cells, on a line of the grid if they are near: else round-off would leave slivers."""
+    scaled = clipping.on_lines(grid, corners)
     outside = np.flatnonzero(~((scaled >= 0) & (scaled <= grid.cells)).all(axis=1))
     if len(outside):
         x, y = corners[outside[0]]
@@ -99,17 +98,17 @@ def _in_cells(grid: Grid, corners: Array, of: str = "") -> Array:
 
 
 def _valid(grid: Grid, shape: Any) -> Any:
+    """The polygon, if it is simple and has an area."""
     import shapely
 
     if shape.convex_hull.area < ROUND_OFF:
         raise InputError(
-            "polygon: its vertices lie on a line: a body without particles. Expected an area"
+            "polygon: its vertices lie on a line, so the body has no particles: expected an area"
         )
     if not shape.is_valid:
-        in_metres = shapely.transform(shape, lambda x: grid.origin + grid.h * x)
-        where = shapely.is_valid_reason(in_metres)
+        where = shapely.is_valid_reason(shapely.transform(shape, grid.in_metres))
         raise InputError(
             f"polygon: its sides cross or touch each other ({where} m): expected a simple polygon, "
-            "its vertices in order around it, and holes inside of it"
+            "with its vertices in order and its holes inside"
         )
     return shape

@@ -16,7 +16,8 @@ from mpi4py import MPI
 
 from tawami import _rust
 from tawami.base.errors import InputError, SingularError
-from tawami.body.body import Body, box
+from tawami.body.body import Body
+from tawami.body.box import box
 from tawami.form.form import Form
 from tawami.grid.basis import Basis
 from tawami.grid.edges import Component
@@ -100,7 +101,7 @@ def rigid_motion(form: Form, given: Settings) -> float:
     stretch of the same size.
     """
     scene = cloud(form, given)
-    points = scene.attached.layout.greville - np.array(scene.grid.origin)
+    points = scene.configuration.domain.layout.greville - np.array(scene.grid.origin)
     turn = form.strain.rotation(1.0)
 
     def force(u: Array) -> float:
@@ -205,10 +206,10 @@ def inf_sup(form: Form, given: Settings) -> float:
     for edge in EDGES:
         scene.fix(edge, "x")
         scene.fix(edge, "y")
-    selection = scene.problem().reduction.selection
-    unknowns = scene.problem().reduction.unknowns
+    selection = scene.reduction().selection
+    unknowns = scene.reduction().unknowns
     tangent = (selection.T @ scene.tangent(np.zeros(scene.num_coefficients)) @ selection).toarray()
-    of_u = unknowns < scene.attached.layout.num_displacement
+    of_u = unknowns < scene.configuration.domain.layout.num_displacement
     A, B = tangent[of_u][:, of_u], tangent[~of_u][:, of_u]
     # in p = K eps_v, and each equation of the volume without its K
     to_p = RATIO if form.kinematics.has_eps_v else 1.0

@@ -18,10 +18,10 @@ from time import perf_counter
 from mpi4py import MPI
 
 from tawami.base.errors import TawamiError
+from tawami.base.text import labelled
 from tawami.check import scenes
 from tawami.fem import environment, kernels
 from tawami.form.form import Form
-from tawami.scene.description import labelled
 
 MEMORY = Path("/proc/meminfo")
 #: Packages that only some things need: name, what for.

@@ -22,7 +22,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from tawami.base import ranks
+from tawami.base import program
 from tawami.base.errors import InputError
 from tawami.results.provenance import RUN, SCRIPT
 from tawami.results.results import EXISTING
@@ -138,7 +138,7 @@ def _on_ranks(script: Script, number: int) -> int:
             f"--ranks {number} needs mpirun, which was not found: on Debian: apt install openmpi-bin"
         )
     own = [sys.executable, "-m", "tawami", "run", *script.command, "--", *script.arguments]
-    command, variables = ranks.mpirun(number, own)
+    command, variables = program.mpirun(number, own)
     process, interrupted = subprocess.Popen(command, env=variables), False
     while process.poll() is None:
         try:
@@ -154,9 +154,9 @@ def _on_ranks(script: Script, number: int) -> int:
 def _here(script: Script) -> int:
     """Run it under the rules of `tawami.run`."""
     try:
-        ranks.run(lambda: _as_main(script), script.name)
+        program.run(lambda: _as_main(script), script.name)
     except Exception as error:
-        ranks.stop("".join(traceback.format_exception(_from_script(error))))
+        program.stop("".join(traceback.format_exception(_from_script(error))))
     return 0
 
 
@@ -175,7 +175,7 @@ def _as_main(script: Script) -> None:
 
 def _from_script(error: Exception) -> Exception:
     """An error whose traceback begins in the script: how it was started is not its matter."""
-    ours = {__name__, ranks.__name__, "runpy", "tawami.command.main"}
+    ours = {__name__, program.__name__, "runpy", "tawami.command.main"}
     trace: TracebackType | None = error.__traceback__
     while trace is not None and trace.tb_frame.f_globals.get("__name__") in ours:
         trace = trace.tb_next

@@ -125,7 +125,7 @@ def _add_run(commands: Any) -> None:
         "examples:\n"
         "  tawami run pile.py\n"
         "  tawami run pile.py --ranks 4 --replace -- --friction 0.3\n"
-        "  tawami run -m cases.collapse"
+        "  tawami run -m cases.showcase.collapse"
     ))  # fmt: skip
     what = run.add_mutually_exclusive_group(required=True)
     what.add_argument("script", nargs="?", metavar="SCRIPT", help="a Python file")

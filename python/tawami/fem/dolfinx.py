@@ -1,4 +1,4 @@
-"""The imports of dolfinx, basix and FFCx, and the elements: versions 0.5.2, 0.9 and 0.11.
+"""The imports of dolfinx, basix and FFCx and the elements: versions 0.5.2, 0.9 and 0.11.
 
 The modules of this room take `basix`, `cpp`, `dolfinx`, `jit` and `ufl` from here, after the checks that
 tell a user what is missing. Nothing outside this room imports them.
@@ -6,10 +6,8 @@ tell a user what is missing. Nothing outside this room imports them.
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import logging
-import sys
 import warnings
 from collections.abc import Sequence
 from typing import Any
@@ -17,20 +15,13 @@ from typing import Any
 import numpy as np
 
 from tawami.base.arrays import Array
-from tawami.base.errors import MissingDependencyError
+from tawami.base.dependencies import report_missing
 
 __all__ = [
-    "BILINEAR_DOFS", "DISPLACEMENT_DOFS", "MPI", "OLD", "IntegralType", "at_points", "at_vertices",
+    "BILINEAR_DOFS", "DISPLACEMENT_DOFS", "OLD", "IntegralType", "at_points", "at_vertices",
     "basix", "cpp", "dolfinx", "domain", "function_space", "jit", "lagrange", "mixed", "per_cell",
     "reference_nodes", "version",
 ]  # fmt: skip
-
-if "petsc4py" not in sys.modules:
-    # PETSc's signal handler reports a closed pipe (| head) as a crash and aborts MPI
-    with contextlib.suppress(ImportError):
-        import petsc4py
-
-        petsc4py.init(["tawami", "-no_signal_handler"])
 
 _showwarning = warnings.showwarning
 
@@ -39,30 +30,12 @@ try:
     import dolfinx
     import ufl
     from dolfinx import cpp, jit
-    from mpi4py import MPI
-    from petsc4py import PETSc
 except ImportError as error:  # pragma: no cover - exercised in a subprocess by the tests
-    raise MissingDependencyError(
-        f"tawami needs dolfinx with real PETSc, and importing it failed: {error}. On Debian or "
-        "Ubuntu: apt install python3-dolfinx-real python3-petsc4py-real python3-mpi4py, and run "
-        "Python from a virtual environment made by /usr/bin/python3 -m venv --system-site-packages"
-    ) from error
+    report_missing(error)
 
 if warnings.showwarning is not _showwarning:
     # FFCx from 0.9 on sends all warnings of the process to a log, ours included
     logging.captureWarnings(False)
-
-if np.dtype(PETSc.ScalarType) != np.float64:
-    raise MissingDependencyError(
-        f"tawami needs PETSc with real numbers, but its scalars are {np.dtype(PETSc.ScalarType)}. "
-        "On Debian: apt install python3-dolfinx-real python3-petsc4py-real, and unset PETSC_DIR"
-    )
-
-if np.dtype(PETSc.IntType) != np.int32:
-    raise MissingDependencyError(
-        f"tawami needs PETSc with 32-bit indices, but its are {np.dtype(PETSc.IntType)}. On Debian: "
-        "apt install python3-dolfinx-real python3-petsc4py-real, and unset PETSC_DIR"
-    )
 
 version: str = dolfinx.__version__
 #: Degrees of freedom of a cell: biquadratic displacement (9 nodes), bilinear field.

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from mpi4py import MPI
 
 from tawami.base.arrays import Array
-from tawami.fem.dolfinx import MPI, OLD, IntegralType, cpp, dolfinx, function_space, version
+from tawami.fem.dolfinx import OLD, IntegralType, cpp, dolfinx, function_space, version
 from tawami.fem.kernels import Kernel, quiet
 
 Integers = npt.NDArray[np.int32]

@@ -32,6 +32,7 @@ The method). The tangent is derived (`tawami.form.compilation`).
 from __future__ import annotations
 
 import functools
+import hashlib
 import importlib.util
 import inspect
 import math
@@ -217,6 +218,13 @@ class Form:
     def source(self) -> str:
         """Text of the residual."""
         return source_of(self.residual)
+
+    def identity(self) -> dict[str, Any]:
+        """What tells it from another form, for checkpoints."""
+        return {
+            "form": self.name,
+            "form source": hashlib.sha256(self.source.encode()).hexdigest(),
+        }
 
     def settings(self, given: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, str]]:
         """Parameters and options of this form, defaults filled in.

@@ -1,1 +1,1 @@
-"""The background grid: cells, edges and one-dimensional bases, before there are any particles."""
+"""The background grid before there are particles: `Grid`, `Space`, edges and one-dimensional bases."""

@@ -1,27 +1,30 @@
-"""Bases on the grid as subspaces of continuous Lagrange elements: the extraction matrices.
+"""One-dimensional bases on a row of cells, and the extraction matrix of the grid.
 
-Quadratic splines, bilinear and biquadratic Lagrange functions are all biquadratic on a cell, so the
-field problem is assembled once, on biquadratic nodes: nodal values = E coefficients. E is the
-Kronecker product of one-dimensional matrices whose rows sum to 1.
+Quadratic splines, bilinear and biquadratic Lagrange functions are all biquadratic on a cell. The field
+problem is therefore assembled on the nodes of a continuous Lagrange element: nodal values = E
+coefficients. The extraction matrix E is the Kronecker product of one-dimensional matrices, whose rows
+sum to 1.
 """
 
 from __future__ import annotations
 
-from typing import Literal
+from functools import reduce
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
 from tawami import _rust
+from tawami.grid.space import Counts
 
 Array = npt.NDArray[np.float64]
 Basis = Literal["quadratic_spline", "bilinear", "biquadratic"]
-BASES: tuple[Basis, ...] = ("quadratic_spline", "bilinear", "biquadratic")
+BASES: tuple[Basis, ...] = get_args(Basis)
 
 
 def values_1d(basis: Basis, n: int, cell: npt.ArrayLike, t: npt.ArrayLike) -> sp.csr_matrix:
-    """Values of the functions on a row of `n` cells: positions x functions.
+    """Values of the functions on a row of `n` cells, positions x functions.
 
     Args:
         basis: Name of the basis.
@@ -41,20 +44,20 @@ def values_1d(basis: Basis, n: int, cell: npt.ArrayLike, t: npt.ArrayLike) -> sp
 
 
 def extraction_1d(basis: Basis, n: int, degree: int) -> sp.csr_matrix:
-    """Values at the Lagrange nodes (`degree` per cell) of a row of `n` cells."""
+    """Values at the Lagrange nodes (`degree` per cell) of a row of `n` cells, nodes x functions."""
     node = np.arange(degree * n + 1)
     cell = np.minimum(node // degree, n - 1)
     return values_1d(basis, n, cell, (node - degree * cell) / degree)
 
 
-def extraction(basis: Basis, cells: tuple[int, int], degree: int) -> sp.csr_matrix:
-    """E of a scalar field: nodes x functions, x fastest in both."""
-    ex, ey = (extraction_1d(basis, n, degree) for n in cells)
-    return sp.kron(ey, ex, format="csr")
+def extraction(basis: Basis, cells: Counts, degree: int) -> sp.csr_matrix:
+    """The extraction matrix E of a scalar field, nodes x functions; x fastest in both."""
+    along = [extraction_1d(basis, n, degree) for n in cells]
+    return reduce(lambda inner, outer: sp.kron(outer, inner, format="csr"), along)
 
 
 def greville_1d(basis: Basis, n: int) -> Array:
-    """Greville points in cells: the coefficients of the function x, by which it is reproduced."""
+    """Greville points [cells]: the coefficients that reproduce the function x."""
     if basis == "quadratic_spline":
         return np.concatenate([[0.0], np.arange(n) + 0.5, [float(n)]])
     return np.linspace(0.0, n, _rust.basis_len(basis, n))

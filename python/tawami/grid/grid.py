@@ -1,44 +1,52 @@
-"""The background grid: squares on a communicator, and its dolfinx mesh."""
+"""The background grid: cells of one size on a communicator, and its dolfinx mesh."""
 
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
 from tawami import _rust
-from tawami.base import ranks
+from tawami.base import program, ranks
 from tawami.base.checks import number, one_of, pair, point, room, shown, whole_number
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
 from tawami.fem import mesh
+from tawami.grid.space import PLANE, Counts, Position
 
 Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.int64]
 Edge = Literal["left", "right", "bottom", "top"]
-EDGES: tuple[Edge, ...] = ("left", "right", "bottom", "top")
-#: Cells from (0, 0) to the origin of a grid from which on positions are off by more than 1e-7 cells.
-FAR = 1e9
-#: Sides of a cell [m] whose squares, and what is divided by these, are numbers.
+EDGES: tuple[Edge, ...] = get_args(Edge)
+#: A position is on a line of the grid if it is this near to it [cells].
+ON_LINE = 1e-6
+#: Largest distance of the origin from (0, 0) [cells]: beyond it, positions are off by over 1e-7 cells.
+FARTHEST = 1e9
+#: Limits of the side of a cell [m]: its powers, and quotients by them, stay finite and above 0.
 SMALLEST, LARGEST = 1e-100, 1e100
-#: Memory that a cell takes in the mesh and in what a scene keeps of it, measured [bytes].
-CELL = 600.0
+#: Memory of a cell in the mesh and in the arrays of a scene, measured [bytes].
+BYTES_PER_CELL = 600.0
 
 
 class Grid(Unique):
     """Uniform grid of squares; all scenes on it share its dolfinx mesh.
 
+    Attributes:
+        space: Dimension, names of components and units.
+
     Args:
-        comm: Communicator, as MPI.COMM_WORLD; the cells are shared out among its ranks.
+        comm: Communicator, such as MPI.COMM_WORLD; its ranks share the cells.
         origin: Lower left corner [m].
         h: Side of a cell [m].
         cells: Number of cells in x and y.
 
     Raises:
-        InputError: A parameter out of its range, or no communicator.
+        InputError: A parameter is out of its range, or `comm` is not a communicator.
     """
 
     def __init__(
@@ -46,38 +54,47 @@ class Grid(Unique):
     ) -> None:
         if not isinstance(comm, MPI.Comm) or comm == MPI.COMM_NULL:
             raise InputError(
-                f"comm = {shown(comm)}: expected a communicator, as mpi4py's MPI.COMM_WORLD"
+                f"comm = {shown(comm)}: expected a communicator, such as mpi4py's MPI.COMM_WORLD"
             )
         check_process()
-        ranks.watch(comm)
+        program.watch(comm)
         self.comm = comm
+        self.space = PLANE
         self.origin = point("origin", origin)
         self.h = number("h", h)
         self.cells = _cells(cells)
-        nx, ny = self.cells
         advice = "expected fewer cells, or more ranks"
-        room(f"cells = {shown(cells)}", nx * ny, CELL / comm.size, advice)
+        room(f"cells = {shown(cells)}", self.num_cells, BYTES_PER_CELL / comm.size, advice)
         self.rust = _rust.Grid(self.origin, self.h, self.cells)
         number("h", h, low=SMALLEST, high=LARGEST)
-        if max(map(abs, self.origin)) > FAR * self.h:
+        if max(map(abs, self.origin)) > FARTHEST * self.h:
             raise InputError(
-                f"origin = {self.origin}: expected at most {FAR:g} cells of {self.h:g} m from (0, 0): "
-                "farther away positions have too few digits; move body and grid nearer"
+                f"origin = {self.origin}: expected at most {FARTHEST:g} cells of {self.h:g} m from "
+                "(0, 0): farther away, positions have too few digits; move body and grid nearer"
             )
         self._rectangle: mesh.Rectangle | None = None
-        self._spaces: dict[int, mesh.FunctionSpace] = {}
+        self._function_spaces: dict[int, mesh.FunctionSpace] = {}
 
     @property
-    def upper(self) -> tuple[float, float]:
+    def num_cells(self) -> int:
+        """Number of all cells."""
+        return math.prod(self.cells)
+
+    @property
+    def upper(self) -> Position:
         """Upper right corner [m]."""
-        (x, y), (nx, ny) = self.origin, self.cells
-        return (x + self.h * nx, y + self.h * ny)
+        corner = (x + self.h * n for x, n in zip(self.origin, self.cells, strict=True))
+        return cast(Position, tuple(corner))
 
     @property
     def extent(self) -> str:
-        """Its range in words [m]."""
-        (x, y), (x1, y1) = self.origin, self.upper
-        return f"[{x:g}, {x1:g}] x [{y:g}, {y1:g}]"
+        """Its range along each axis [m], as text."""
+        ends = zip(self.origin, self.upper, strict=True)
+        return " x ".join(f"[{low:g}, {high:g}]" for low, high in ends)
+
+    def identity(self) -> dict[str, Any]:
+        """What distinguishes it from another grid, for checkpoints."""
+        return {"grid": [list(self.origin), self.h, list(self.cells)]}
 
     @property
     def rectangle(self) -> mesh.Rectangle:
@@ -87,18 +104,17 @@ class Grid(Unique):
         return self._rectangle
 
     @functools.cached_property
-    def rank_of_cell(self) -> npt.NDArray[np.int64]:
-        """The rank that each cell, and the particles in it, live on; x fastest."""
-        ij = self.rectangle.ij
-        rank = np.zeros(self.cells[0] * self.cells[1], dtype=np.int64)
-        rank[ij[:, 0] + self.cells[0] * ij[:, 1]] = self.comm.rank
+    def rank_of_cell(self) -> Indices:
+        """The rank that owns each cell and the particles in it, by number of the cell."""
+        rank = np.zeros(self.num_cells, dtype=np.int64)
+        rank[self.cell_numbers(self.rectangle.ij)] = self.comm.rank
         return ranks.sum_of(self.comm, rank)
 
-    def space(self, num_fields: int, element: Any) -> mesh.FunctionSpace:
+    def function_space(self, num_fields: int, element: Any) -> mesh.FunctionSpace:
         """The function space of displacement and `num_fields - 1` bilinear fields."""
-        if num_fields not in self._spaces:
-            self._spaces[num_fields] = mesh.FunctionSpace(self.rectangle, element)
-        return self._spaces[num_fields]
+        if num_fields not in self._function_spaces:
+            self._function_spaces[num_fields] = mesh.FunctionSpace(self.rectangle, element)
+        return self._function_spaces[num_fields]
 
     def edge(self, name: Edge) -> tuple[int, int]:
         """Axis normal to an edge of the grid, and 0 for its lower or -1 for its upper end.
@@ -114,7 +130,41 @@ class Grid(Unique):
         """Coordinates [m] along an axis of positions `t` (0 to 1) in cells."""
         return np.asarray(self.origin[axis] + self.h * (np.asarray(cell) + np.asarray(t)))
 
+    def cells_between(self, axis: int, low: float, high: float) -> tuple[int, int] | None:
+        """First cell of a range along an axis [m], and the cell after its last one.
 
-def _cells(cells: Sequence[int]) -> tuple[int, int]:
+        None if the range does not go from one line of the grid to another.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            ends = (np.array([low, high]) - self.origin[axis]) / self.h
+            first, last = np.rint(ends)
+            on_lines = np.abs(ends - [first, last]).max() <= ON_LINE
+        if not (on_lines and first >= 0 and last <= self.cells[axis]):
+            return None
+        return int(first), int(last)
+
+    def in_cells(self, x: Array) -> Array:
+        """Positions [m], of shape (..., dim), in cells from the origin."""
+        return (x - self.origin) / self.h
+
+    def in_metres(self, x: Array) -> Array:
+        """Positions in cells from the origin, of shape (..., dim), in metres."""
+        return self.origin + self.h * x
+
+    def cell_at(self, x: Array) -> Indices:
+        """Indices (i, j) of the cells that hold positions in cells, points x dim."""
+        return np.clip(np.floor(x), 0, np.subtract(self.cells, 1)).astype(np.int64)
+
+    def cell_numbers(self, index: Indices) -> Indices:
+        """Numbers of cells, given their indices (i, j), cells x dim; x fastest."""
+        strides = np.cumprod((1, *self.cells[:-1]))
+        return index @ strides
+
+    def cell_indices(self, number: Indices) -> Indices:
+        """Indices (i, j) of cells, cells x dim, given their numbers."""
+        return np.stack(np.unravel_index(number, self.cells, order="F"), axis=-1)
+
+
+def _cells(cells: Sequence[int]) -> Counts:
     nx, ny = pair("cells", cells, "whole numbers")
     return whole_number("cells[0]", nx, low=1), whole_number("cells[1]", ny, low=1)

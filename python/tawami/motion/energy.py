@@ -1,21 +1,30 @@
-"""Where the energy of a motion goes, from its start on [J per metre depth].
+"""The energy balance of a motion from its start on [J per metre depth].
 
     kinetic + elastic + dissipated + friction + left = start + external - transfer - impact - integration
 
-all of them measured but the last, which is what the balance leaves: the error of the time integration,
-and what the stabilisation of the form stores and takes (1/2 alpha h^2 sum V K^2/mu |grad eps_v|^2).
+All are measured but the last, which closes the balance: the error of the time integration, and what the
+stabilisation of the form stores and takes (1/2 alpha h^2 sum V K^2/mu |grad eps_v|^2).
 """
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
-from tawami.base.errors import EnergyWarning
+import numpy as np
+import numpy.typing as npt
 
-#: Share of the most energy that a body had, from which a warning tells of what nothing gave it.
+from tawami.base import ranks
+from tawami.base.errors import EnergyWarning
+from tawami.base.warn import warn
+from tawami.motion.carried import Carried
+from tawami.scene.configuration import Configuration
+from tawami.scene.step import Accepted
+
+Array = npt.NDArray[np.float64]
+
+#: Spurious energy is reported from this share of the most energy that the body had.
 GROWN = 0.05
 
 
@@ -32,7 +41,7 @@ class Energies:
         transfer: Kinetic energy lost on the way from the particles to the grid and back.
         impact: Kinetic energy lost where supports stop the grid.
         left: Kinetic and elastic energy of the particles that left the grid.
-        integration: The rest.
+        integration: What closes the balance.
     """
 
     kinetic: float = 0.0
@@ -50,7 +59,7 @@ class Energies:
 
 
 class Growth:
-    """Warns, once, of a body with more energy than it was given.
+    """Warns, once, of spurious energy: a body that has more than it was given.
 
     Args:
         energy: That it has at the start [J per metre depth].
@@ -61,19 +70,19 @@ class Growth:
         self._warned = False
 
     def state(self) -> dict[str, Any]:
-        """What it was given, the most it had, and whether it has warned."""
+        """The energy it was given, the most it had, and whether it has warned."""
         return dict(vars(self))
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`state`."""
         vars(self).update(state)
 
-    def given(self, energy: float) -> None:
-        """It gets this much from outside the balance."""
+    def add(self, energy: float) -> None:
+        """Count energy that the body is given from outside the balance."""
         self._given += energy
 
-    def look(self, energies: Energies, steps: int, time: float) -> None:
-        """At the end of a step.
+    def check(self, energies: Energies, steps: int, time: float) -> None:
+        """Warn at the end of a step if the body has more energy than it was given.
 
         Args:
             energies: The balance.
@@ -86,10 +95,114 @@ class Growth:
         if self._warned or not grown > GROWN * self._most:
             return
         self._warned = True
-        warnings.warn(
+        warn(
             f"after {steps} steps, at {time:g} s, the body has {grown:.3g} J/m more energy than it was "
-            f"given, {100 * grown / self._most:.2g} % of the most it had: its stress is not to be "
-            "trusted. Take shorter steps or more particles; motion.energies is the balance",
+            f"given, {100 * grown / self._most:.2g} % of the most it had: its stress cannot be trusted. "
+            "Take shorter steps or more particles; motion.energies is the balance",
             EnergyWarning,
-            stacklevel=6,
         )
+
+
+class Balance:
+    """The energy balance of a motion.
+
+    Args:
+        configuration: The body.
+        carried: What its particles carry.
+
+    Attributes:
+        energies: The balance since the start.
+    """
+
+    def __init__(self, configuration: Configuration, carried: Carried) -> None:
+        self._now, self._carried = configuration, carried
+        self.energies = Energies(kinetic=self.kinetic, elastic=self.elastic)
+        self._growth = Growth(self.energies.kinetic + self.energies.elastic)
+        #: Kinetic energy of the particles when the last step was stored.
+        self._stored_kinetic = self.energies.kinetic
+
+    def sum(self, value: float) -> float:
+        """A sum over the ranks."""
+        return float(ranks.sum_of(self._now.model.grid.comm, np.array([value]))[0])
+
+    @property
+    def kinetic(self) -> float:
+        """1/2 sum m v^2 of the particles [J per metre depth]."""
+        v = self._carried.velocity
+        return self.sum(0.5 * self._now.domain.mass @ (v**2).sum(axis=1))
+
+    @property
+    def elastic(self) -> float:
+        """Energy that the laws store [J per metre depth]."""
+        return self.sum(self._now.domain.stage.elastic_energy())
+
+    def begin(self) -> None:
+        """Start a step: count what velocities that the script wrote into the particles have added."""
+        kinetic = self.kinetic
+        self._growth.add(kinetic - self._stored_kinetic)
+        self._stored_kinetic = kinetic
+
+    def of_step(
+        self, mass: Array, velocities: tuple[Array, Array, Array], accepted: Accepted
+    ) -> Energies:
+        """Terms that a step adds to the balance on the grid, and the kinetic energy at its end.
+
+        Args:
+            mass: Lumped mass of each function [kg per metre depth].
+            velocities: As mapped from the particles, with the supports imposed, and at the end of the
+                step, functions x 2 [m/s].
+            accepted: The step.
+        """
+        mapped, imposed, end = (0.5 * float(mass @ (v**2).sum(axis=1)) for v in velocities)
+        friction, u = accepted.friction, accepted.u
+        work = accepted.problem.external[: u.size].reshape(-1, 2) + accepted.forces_at_end
+        return Energies(
+            kinetic=end,
+            external=float((work - friction).ravel() @ u.ravel()),
+            friction=-float(friction.ravel() @ u.ravel()),
+            transfer=self.energies.kinetic - mapped,
+            impact=mapped - imposed,
+        )
+
+    def store(self, step: Energies, dissipated: float, steps: int, time: float) -> None:
+        """Add a step to the balance, once the particles have their stress and velocity of its end.
+
+        Args:
+            step: As :meth:`of_step` gave it.
+            dissipated: What the laws dissipated on this rank [J per metre depth].
+            steps: Steps so far.
+            time: At the end of the step [s].
+        """
+        self._stored_kinetic = self.kinetic
+        before = self.energies
+        kinetic = self._stored_kinetic if self._now.model.moves else step.kinetic
+        step.dissipated = self.sum(dissipated)
+        step.transfer += step.kinetic - kinetic
+        elastic = self.elastic
+        gained = kinetic + elastic - before.kinetic - before.elastic
+        lost = step.dissipated + step.friction + step.transfer + step.impact
+        step.integration = step.external - gained - lost
+        sums = {f.name: getattr(before, f.name) + getattr(step, f.name) for f in fields(Energies)}
+        self.energies = Energies(**sums | {"kinetic": kinetic, "elastic": elastic})
+        if self._now.model.grid.comm.rank == 0:
+            self._growth.check(self.energies, steps, time)
+
+    def remove_left(self) -> None:
+        """Move the energy of particles that have left the grid to its own term."""
+        e, kinetic, elastic = self.energies, self.kinetic, self.elastic
+        gone = e.kinetic + e.elastic - kinetic - elastic
+        self.energies = replace(e, kinetic=kinetic, elastic=elastic, left=e.left + gone)
+
+    def state(self) -> dict[str, Any]:
+        """The balance for a checkpoint."""
+        return {
+            "energies": asdict(self.energies),
+            "growth": self._growth.state(),
+            "stored_kinetic": self._stored_kinetic,
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """The reverse of :meth:`state`."""
+        self.energies = Energies(**state["energies"])
+        self._growth.restore(state["growth"])
+        self._stored_kinetic = state["stored_kinetic"]

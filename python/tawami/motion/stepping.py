@@ -6,9 +6,8 @@ from collections.abc import Callable
 
 from tawami.base import checks
 from tawami.base.errors import ConvergenceError, InputError, SingularError
+from tawami.motion.observer import Observer, Recorder, observed
 from tawami.motion.pace import Pace, Step
-from tawami.results.phase import Unwatched
-from tawami.results.results import Results, phase
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
 
@@ -18,7 +17,7 @@ def march(
     end: float,
     smallest: float,
     attempt: Callable[[float, float], Solution],
-    watched: Unwatched,
+    observer: Observer,
     each: Callable[[Solution], None] | None = None,
 ) -> list[Step]:
     """Steps to an end.
@@ -29,14 +28,14 @@ def march(
         end: Where they end.
         smallest: Size below which no step is tried again.
         attempt: Takes a step to a place, of a size; raises and leaves everything as it was if it fails.
-        watched: What observes them.
+        observer: What observes them.
         each: Called with each accepted step.
 
     Raises:
         ConvergenceError, SingularError: At the smallest size.
     """
     largest, steps = pace.size, list[Step]()
-    watched.begin(pace, steps)
+    observer.begin(pace, steps)
     while end - pace.at > 1e-9 * largest:
         now = min(pace.size, end - pace.at)
         # no crumb is left for the last step
@@ -46,20 +45,20 @@ def march(
         except (ConvergenceError, SingularError) as error:
             pace.size, pace.good = now / 2, 0
             if pace.size < smallest:
-                unit = watched.unit
+                unit = observer.unit
                 error.add_note(f"at {pace.at:g} {unit}, with the smallest step of {now:g} {unit}")
                 raise
-            watched.halved(error, pace)
+            observer.failed(error)
             continue
         steps.append(Step(target, target - pace.at, solution.history, solution.krylov))
         pace.at = target
         pace.good += 1
         if pace.good >= 3 and pace.size < largest:
             pace.size, pace.good = min(2 * pace.size, largest), 0
-        watched.accepted(solution, pace, steps, last=end - pace.at <= 1e-9 * largest)
+        observer.accepted(solution, last=end - pace.at <= 1e-9 * largest)
         if each is not None:
             each(solution)
-        watched.keep()
+        observer.checkpoint()
     return steps
 
 
@@ -69,7 +68,7 @@ def ramp(
     *,
     smallest: float | None = None,
     each: Callable[[Solution], None] | None = None,
-    results: Results | None = None,
+    results: Recorder | None = None,
 ) -> list[Step]:
     """Bring up, without inertia, the loads and prescribed displacements that are new to a scene.
 
@@ -97,13 +96,13 @@ def ramp(
     each = checks.function("each", each, "of a solution")
     pace = Pace(0.0, size)
     try:
-        with phase(results, "ramp", scene, None, 1.0, "of the load") as watched:
+        with observed(results, "ramp", scene, 1.0, "of the load") as observer:
             return march(
-                pace, 1.0, least, lambda part, _size: scene.solve_part(part), watched, each
+                pace, 1.0, least, lambda part, _size: scene.solve_part(part), observer, each
             )
     finally:
         if pace.at < 1.0:
-            scene.accept(pace.at)
+            scene.configuration.accept(pace.at)
 
 
 def settle(
@@ -111,7 +110,7 @@ def settle(
     *,
     tolerance: float = 1e-10,
     max_resets: int = 200,
-    results: Results | None = None,
+    results: Recorder | None = None,
 ) -> list[Step]:
     """Solve under the present loads, the grid reset each time, until nothing is out of balance.
 
@@ -135,20 +134,20 @@ def settle(
         )
     pace, steps = Pace(0.0, 1.0), list[Step]()
     with (
-        scene.tolerance_of(max(0.1 * tolerance, 1e-14)),
-        phase(results, "settle", scene, None, max_resets, "resets") as watched,
+        scene.configuration.tolerance(max(0.1 * tolerance, 1e-14)),
+        observed(results, "settle", scene, max_resets, "resets") as observer,
     ):
-        watched.begin(pace, steps)
-        while pace.at < max_resets and not watched.finished:
+        observer.begin(pace, steps)
+        while pace.at < max_resets and not observer.finished:
             solution = scene.solve()
             steps.append(Step(1.0, 0.0, solution.history, solution.krylov))
             pace.at += 1.0
             settled = solution.history[0][0] < tolerance
-            watched.accepted(solution, pace, steps, last=settled)
-            watched.keep()
+            observer.accepted(solution, last=settled)
+            observer.checkpoint()
             if settled:
                 return steps
-        if watched.finished:
+        if observer.finished:
             return steps
         raise ConvergenceError(
             f"settle: {steps[-1].history[0][0]:.1e} of the forces are out of balance after {max_resets} "

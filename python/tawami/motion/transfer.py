@@ -19,7 +19,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from tawami.scene.domain import Attached
+from tawami.scene.domain import Domain
 
 Array = npt.NDArray[np.float64]
 TransferName = Literal["affine_flip", "flip", "apic", "tpic", "pic"]
@@ -27,74 +27,84 @@ TransferName = Literal["affine_flip", "flip", "apic", "tpic", "pic"]
 
 @dataclass(frozen=True)
 class Transfer:
-    """How velocities travel.
+    """How velocities are transferred between particles and grid.
 
     Attributes:
+        name: As a script chooses it.
         gradient: Where C_p comes from: grad v1, the moments of v1, or nowhere.
         flip: Whether particles get the grid's change of velocity, or its velocity.
     """
 
+    name: str
     gradient: Literal["none", "field", "moments"]
     flip: bool
 
+    def __str__(self) -> str:
+        return self.name
+
 
 TRANSFERS: dict[str, Transfer] = {
-    "affine_flip": Transfer("field", flip=True),
-    "flip": Transfer("none", flip=True),
-    "apic": Transfer("moments", flip=False),
-    "tpic": Transfer("field", flip=False),
-    "pic": Transfer("none", flip=False),
+    transfer.name: transfer
+    for transfer in (
+        Transfer("affine_flip", "field", flip=True),
+        Transfer("flip", "none", flip=True),
+        Transfer("apic", "moments", flip=False),
+        Transfer("tpic", "field", flip=False),
+        Transfer("pic", "none", flip=False),
+    )
 }
 
 
-def to_grid(attached: Attached, mass: Array, values: Array, gradient: Array) -> Array:
+def to_grid(domain: Domain, mass: Array, values: Array, gradient: Array) -> Array:
     """Momentum per component of a particle field and its gradient: functions x 2.
 
     Args:
-        attached: The particles where they are.
+        domain: The particles where they are.
         mass: Their masses [kg per metre depth].
         values: v_p or a_p, particles x 2.
         gradient: Its gradient, particles x 2 x 2.
     """
-    points, at = _positions(attached)
+    points, at = _positions(domain)
     at_origin = values - np.einsum("pij,pj->pi", gradient, at)
-    sums = attached.sums(mass, np.column_stack([at_origin, gradient.reshape(-1, 4)]))
+    sums = domain.sums(mass, np.column_stack([at_origin, gradient.reshape(-1, 4)]))
     return np.asarray(sums[:, :2] + np.einsum("ikl,il->ik", sums[:, 2:].reshape(-1, 2, 2), points))
 
 
-def gradient_of(transfer: Transfer, attached: Attached, field: Array, f: Array) -> Array:
+def gradient_of(transfer: Transfer, domain: Domain, field: Array, f: Array) -> Array:
     """C_p of a field of the grid at the end of the step: particles x 2 x 2.
 
     Args:
-        transfer: Which.
-        attached: The particles where they were.
+        transfer: How.
+        domain: The particles where they were at the start of the step.
         field: v1 or a1, functions x 2.
         f: I + grad u of the step.
     """
     if transfer.gradient == "none":
         return np.zeros_like(f)
-    gradient = attached.gradients(field).copy()
+    gradient = domain.gradients(field).copy()
     if transfer.gradient == "moments":
-        spread = _moments(attached, None)
-        # at the ends of the grid, and on its lines with bilinear functions, nothing is spread
-        enough = np.linalg.det(spread) > 1e-8 * attached.layout.grid.h**4
-        moments = _moments(attached, field)[enough]
+        spread = _moments(domain, None)
+        # at the ends of the grid, and on its lines with bilinear functions, D_p is singular
+        enough = np.linalg.det(spread) > 1e-8 * domain.model.grid.h**4
+        moments = _moments(domain, field)[enough]
         gradient[enough] = moments @ np.linalg.inv(spread[enough])
     return np.asarray(gradient @ np.linalg.inv(f))
 
 
-def _positions(attached: Attached) -> tuple[Array, Array]:
-    """x_i and x_p [m] from the corner of the grid, x_p as the functions have it: away from the sides of
-    cells by what moving particles are kept off them.
+def _positions(domain: Domain) -> tuple[Array, Array]:
+    """x_i and x_p [m] from the corner of the grid.
+
+    x_p is where the functions are evaluated: moving particles keep a small distance from the sides of
+    cells.
     """
-    points = attached.layout.greville - np.asarray(attached.layout.grid.origin)
-    return points, attached.at_particles(points)
+    points = domain.layout.greville - np.asarray(domain.model.grid.origin)
+    return points, domain.at_particles(points)
 
 
-def _moments(attached: Attached, field: Array | None) -> Array:
+def _moments(domain: Domain, field: Array | None) -> Array:
     """sum_i N_i field_i (x_i - x_p)^T; the field is x_i - x_p where none is given."""
-    points, at = _positions(attached)
+    points, at = _positions(domain)
     given = points if field is None else field
-    mean = at if field is None else attached.at_particles(field)
-    columns = [attached.at_particles(given * points[:, [k]]) for k in range(2)]
+    mean = at if field is None else domain.at_particles(field)
+    columns = [domain.at_particles(given * points[:, [k]]) for k in range(2)]
     return np.asarray(np.stack(columns, axis=-1) - mean[:, :, None] * at[:, None, :])

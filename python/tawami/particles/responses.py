@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
+from mpi4py import MPI
 
 from tawami import _rust
 from tawami.base import ranks
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.timing import Stopwatch
 from tawami.fem.rules import Rule
@@ -17,7 +18,8 @@ from tawami.form.compilation import CompiledForm
 from tawami.form.quantities import Density, LawQuantity, ParticleScalar
 from tawami.particles.numpy_law import NumpyStage
 
-Array = npt.NDArray[np.float64]
+#: K/mu beyond which a larger bulk modulus makes forces no larger.
+LOCKED = 1e4
 #: Law quantity, value or derivative, first column, and constants that multiply it.
 Request = tuple[str, str, int, Array | None]
 
@@ -37,7 +39,10 @@ class Responses:
         stopwatch: Measures the time of the laws.
 
     Attributes:
+        form: The form.
         data: Particle data of each rule, particles x columns; :meth:`evaluate` writes them.
+        stiffest: Largest modulus of the body [Pa]; a bulk modulus counts up to `LOCKED` mu.
+        largest_mu: Largest shear modulus of the body [Pa].
 
     Raises:
         InputError: A constant that the form names is not finite.
@@ -53,8 +58,8 @@ class Responses:
         comm: Any,
         stopwatch: Stopwatch,
     ) -> None:
-        self.compiled, self.particles, self.location = compiled, particles, location
-        self.stage, self.constants = stage, constants
+        self.form, self.stage, self.constants = compiled.form, stage, constants
+        self.particles, self.location = particles, location
         self._comm, self._stopwatch = comm, stopwatch
         self.data: dict[Rule, Array] = {
             rule: np.zeros((len(particles), compiled.columns(rule))) for rule in compiled.densities
@@ -71,6 +76,11 @@ class Responses:
         #: Particle data with law quantities, and these quantities.
         self._written = [self.data[rule] for rule, of_rule in requests.items() if of_rule]
         self._requests = _rust.Requests([of_rule for of_rule in requests.values() if of_rule])
+        softer = np.minimum(constants["K"], LOCKED * constants["mu"])
+        self.stiffest, self.largest_mu = (
+            comm.allreduce(float(modulus.max(initial=0.0)), op=MPI.MAX)
+            for modulus in (softer, constants["mu"])
+        )
 
     def _request(self, density: Density, column: int) -> Request:
         quantity = density.quantity
@@ -88,7 +98,7 @@ class Responses:
             p = bad[0]
             K, mu = (self.constants[name][p] for name in ("K", "mu"))
             raise InputError(
-                f"form {self.compiled.form.name}: '{scalar.text}' is not finite at particle "
+                f"form {self.form.name}: '{scalar.text}' is not finite at particle "
                 f"{self.particles.number[p]}, where K = {K:g} and mu = {mu:g} Pa; with nu = 0.5 (K "
                 "infinite) use form 'u_p', or nu < 0.5"
             )

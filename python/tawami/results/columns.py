@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -16,13 +15,10 @@ from tawami.base import checks
 from tawami.base.errors import InputError, NotModelledError
 from tawami.grid import edges
 from tawami.motion.energy import Energies
-from tawami.motion.observer import Moment
+from tawami.motion.observer import Motion, Snapshot, Subject
 from tawami.results.quantities import body_view
-from tawami.scene.solution import supported_edge, supported_edges
-
-if TYPE_CHECKING:
-    from tawami.motion.dynamics import Dynamics
-    from tawami.scene.scene import Scene
+from tawami.scene.reactions import supported_edge
+from tawami.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 #: Particles whose displacements a linear fit around a point takes, where strains are finite.
@@ -39,7 +35,7 @@ class Columns:
     """
 
     labels: tuple[str, ...]
-    of: Callable[[Moment, float], Sequence[float]]
+    of: Callable[[Snapshot, float], Sequence[float]]
 
 
 #: What is known, as messages list it.
@@ -49,29 +45,33 @@ KNOWN = (
 )  # fmt: skip
 
 
-def columns(names: Iterable[str], scene: Scene, motion: Dynamics | None) -> list[Columns]:
+def columns(names: Iterable[str], subject: Subject) -> list[Columns]:
     """Columns by the names of quantities.
 
     Raises:
         NotModelledError: One that the scene does not have; the message names the switch that adds it.
         InputError: An unknown name, a point outside the grid, an edge that nothing supports.
     """
-    return [_columns(name, scene, motion) for name in names]
+    return [_columns(name, subject) for name in names]
 
 
-def usual_columns(motion: Dynamics | None) -> tuple[str, ...]:
+def usual_columns(subject: Subject) -> tuple[str, ...]:
     """What a table has where nothing is asked for."""
-    return (*(("energies",) if motion is not None else ()), "Newton iterations", "step size")
+    return (
+        *(("energies",) if subject.motion is not None else ()),
+        "Newton iterations",
+        "step size",
+    )
 
 
-def _columns(name: str, scene: Scene, motion: Dynamics | None) -> Columns:
+def _columns(name: str, subject: Subject) -> Columns:
     if name == "energies":
         names = [field.name for field in fields(Energies)]
         labels = tuple(f"energy {part} [J/m]" for part in names)
-        _ = (motion or scene).energies  # or its sentence
+        _ = getattr(subject, name)  # or the error of the scene that has none
         return Columns(labels, lambda now, _: [getattr(_moving(now).energies, n) for n in names])
     if name in ("momentum", "angular momentum"):
-        return _momentum(name, scene, motion)
+        return _momentum(name, subject)
     if name == "run-out":
         return Columns(("run-out [m]",), lambda now, _: [_farthest(now.scene)])
     if name == "particles":
@@ -79,25 +79,26 @@ def _columns(name: str, scene: Scene, motion: Dynamics | None) -> Columns:
     if name == "Newton iterations":
         return Columns(("Newton iterations [-]",), lambda now, _: [_iterations(now)])
     if name == "step size":
-        unit = "-" if motion is None else "s"
+        unit = "-" if subject.motion is None else "s"
         return Columns((f"step size [{unit}]",), lambda _, size: [size])
     kind, _, rest = name.partition(" ")
     if kind == "reaction" and rest:
-        return _reaction(name, rest, scene)
+        return _reaction(name, rest, subject.scene)
     if kind == "displacement" and rest:
-        return _displacement(name, _point(name, rest), scene)
+        return _displacement(name, _point(name, rest), subject.scene)
     raise InputError(f"table: '{name}' is unknown: expected one of {', '.join(KNOWN)}")
 
 
-def _moving(now: Moment) -> Dynamics:
-    assert now.motion is not None
-    return now.motion
+def _moving(now: Snapshot) -> Motion:
+    motion = now.subject.motion
+    assert motion is not None
+    return motion
 
 
-def _momentum(name: str, scene: Scene, motion: Dynamics | None) -> Columns:
-    if motion is None:
+def _momentum(name: str, subject: Subject) -> Columns:
+    if subject.motion is None:
         try:
-            _ = scene.velocity
+            _ = subject.scene.velocity
         except NotModelledError as error:
             raise NotModelledError(f"{name} needs a {error}") from None
     if name == "momentum":
@@ -117,7 +118,7 @@ def _present(scene: Scene) -> float:
     return float(scene.num_particles - len(scene.left))
 
 
-def _iterations(now: Moment) -> float:
+def _iterations(now: Snapshot) -> float:
     return 0 if now.solution is None else now.solution.iterations
 
 
@@ -125,13 +126,13 @@ def _reaction(name: str, place: str, scene: Scene) -> Columns:
     at: str | tuple[float, float] = place
     if place.startswith("("):
         at = _point(name, place)
-        held = [s for s in scene.supports.all if not isinstance(s.place, str)]
+        held = [s for s in scene.configuration.supports.all if not isinstance(s.place, str)]
         if not any(np.allclose(at, known) for s in held for known in (s.place, s.given)):
             raise InputError(f"{name}: no point is held there: expected hold({at}, ...) before")
     else:
-        supported_edge(place, supported_edges(scene.supports))
+        supported_edge(place, scene.configuration.supports.supported_edges)
 
-    def of(now: Moment, _: float) -> list[float]:
+    def of(now: Snapshot, _: float) -> list[float]:
         if now.solution is None:
             return [np.nan, np.nan]  # not known before anything is solved
         return list(now.solution.reaction(at))
@@ -153,10 +154,10 @@ def _displacement(name: str, point: tuple[float, float], scene: Scene) -> Column
     if moves:
         displacement_near(scene, point, name)
 
-    def of(now: Moment, _: float) -> list[float]:
+    def of(now: Snapshot, _: float) -> list[float]:
         if moves:
             return list(displacement_near(now.scene, point, name))
-        u = now.scene.split(now.scene.gap)[0]
+        u = now.scene.split(now.scene.configuration.before)[0]
         return list(_rust.interpolate(location, now.scene.basis, 2, u)[0])
 
     return Columns((f"{name} x [m]", f"{name} y [m]"), of)
@@ -169,7 +170,7 @@ def displacement_near(scene: Scene, point: tuple[float, float], what: str) -> Ar
     Raises:
         InputError: No particle was within a cell of it.
     """
-    view = body_view(scene, None)
+    view = body_view(scene)
     u = view("displacement")
     offset = view("x") - u - np.asarray(point)
     distance = np.linalg.norm(offset, axis=1)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tawami.base.errors import MissingDependencyError
-from tawami.base.files import whole_file
+from tawami.base.files import atomic_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,5 +34,5 @@ def save(figure: Figure, path: str | Path, *, dpi: int = 160) -> None:
     Raises:
         OutputError: The file cannot be written.
     """
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         figure.savefig(part, dpi=dpi, format="png")

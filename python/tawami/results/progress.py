@@ -1,4 +1,4 @@
-"""One live line at a terminal, and a log file with the whole history of a run."""
+"""Progress of a run: a live line at a terminal, and a log file with the whole history."""
 
 from __future__ import annotations
 
@@ -14,38 +14,42 @@ from time import monotonic
 from typing import Any, TextIO
 
 from tawami.base.errors import InputError
+from tawami.base.files import check_regular, writing
+from tawami.motion.pace import Step
 
 log = logging.getLogger("tawami")
-#: Level from which the log is shown on standard error too, as in TAWAMI_LOG_LEVEL=INFO.
+#: The log file in the folder of a run.
+LOG = "log.txt"
+#: Environment variable with the level from which the log appears on standard error, as INFO.
 LOG_LEVEL = "TAWAMI_LOG_LEVEL"
-FORM = logging.Formatter("%(asctime)s %(levelname)s %(message)s")
-#: Seconds between two states of the live line.
-OFTEN = 0.1
+LEVELS = ("DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL")
+FORMAT = logging.Formatter("%(asctime)s %(levelname)s %(message)s")
+#: Seconds between two updates of the live line.
+INTERVAL = 0.1
 
 
 class Line:
-    """A line that is written over and over.
+    """A line of a terminal that is written over and over.
 
     Args:
-        stream: Where to.
-        shown: Whether it is; where the stream is a terminal by default.
+        shown: Whether it appears; None: only if standard error is a terminal.
     """
 
-    def __init__(self, shown: bool | None, stream: TextIO | None = None) -> None:
-        self.stream = sys.stderr if stream is None else stream
+    def __init__(self, shown: bool | None) -> None:
+        self.stream: TextIO = sys.stderr
         self._shown = self.stream.isatty() if shown is None else shown
-        self._last, self._written = -OFTEN, False
+        self._last, self._written = -INTERVAL, False
 
     def show(self, text: str, *, now: bool = False) -> None:
-        """Write a state of the line, unless the last one is too young."""
-        if not self._shown or (not now and monotonic() - self._last < OFTEN):
+        """Update the line, unless the last update was just before."""
+        if not self._shown or (not now and monotonic() - self._last < INTERVAL):
             return
         self._last, self._written = monotonic(), True
         width = shutil.get_terminal_size().columns - 1
         self._write(f"\r{text[:width]:{width}}")
 
     def end(self) -> None:
-        """Leave it as it is, what follows stands below."""
+        """Leave the line as it is; later output begins below it."""
         if self._written:
             self._write("\n")
         self._written = False
@@ -54,31 +58,60 @@ class Line:
         try:
             self.stream.write(text)
             self.stream.flush()
-        except (OSError, ValueError):  # a terminal that is gone
+        except (OSError, ValueError):  # the terminal was closed
             self._shown = False
 
 
-class Remaining:
-    """How long a run will take, by how far it has come since this began.
+class Progress:
+    """What a phase reports of its steps, in the log and in the live line.
 
     Args:
-        at: Where it begins.
-        end: Where it ends.
+        phase: Name of the phase.
+        end: Time [s] or share at which it ends.
+        unit: Of that.
+        shown: Whether the live line appears; see :class:`Line`.
     """
 
-    def __init__(self, at: float, end: float) -> None:
-        self._start, self._end, self._began = at, end, monotonic()
+    def __init__(self, phase: str, end: float, unit: str, shown: bool | None) -> None:
+        self.phase, self.end, self.unit, self.line = phase, end, unit, Line(shown)
+        self.begin(0.0)
 
-    def text(self, at: float) -> str:
-        """In words; empty as long as nothing is known."""
+    def begin(self, at: float) -> None:
+        """Measure times from now on."""
+        self._start, self._began = at, monotonic()
+
+    @property
+    def seconds(self) -> float:
+        """Wall time since :meth:`begin`."""
+        return monotonic() - self._began
+
+    def step(self, number: int, at: float, step: Step, particles: int, *, last: bool) -> None:
+        """Report an accepted step that ends at a time or share `at`."""
+        momentum, volume = step.history[-1]
+        measures = f"{momentum:.1e}" if volume is None else f"{momentum:.1e}, {volume:.1e}"
+        log.info(
+            "%s: step %d to %g %s, size %g, %d Newton iterations to %s, %d particles",
+            self.phase, number, at, self.unit, step.size, step.iterations, measures, particles,
+        )  # fmt: skip
+        parts = (
+            f"{self.phase} {at:.6g} of {self.end:g} {self.unit}",
+            f"step {number} ({step.size:.3g})",
+            f"Newton {step.iterations}: {measures}",
+            f"{particles} particles",
+            self._remaining(at),
+        )
+        self.line.show(" | ".join(part for part in parts if part), now=last)
+
+    def _remaining(self, at: float) -> str:
+        """Estimate of the time to the end; empty before the first step."""
         if not at > self._start:
             return ""
-        seconds = (monotonic() - self._began) * max(self._end - at, 0.0) / (at - self._start)
+        seconds = self.seconds * max(self.end - at, 0.0) / (at - self._start)
         return f"{duration(seconds)} left"
 
 
 def duration(seconds: float) -> str:
-    """Seconds in words of two units at most."""
+    """Seconds as text with two units at most."""
     whole = round(seconds)
     for size, unit, small, part in ((86400, "d", 3600, "h"), (3600, "h", 60, "min")):
         if whole >= size:
@@ -90,42 +123,47 @@ def level() -> int:
     """Level of the log on standard error.
 
     Raises:
-        InputError: The variable names no level.
+        InputError: The environment variable names no level.
     """
     name = os.environ.get(LOG_LEVEL, "WARNING").upper()
-    levels = ("DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL")
-    if name not in levels:
-        raise InputError(f"{LOG_LEVEL} = '{name}': expected one of {', '.join(levels)}")
+    if name not in LEVELS:
+        raise InputError(f"{LOG_LEVEL} = '{name}': expected one of {', '.join(LEVELS)}")
     return logging.getLevelNamesMapping()[name]
 
 
 @contextmanager
 def logged(path: Path | None) -> Iterator[None]:
-    """Within the block the log, with what Python warns of, goes to a file and to standard error.
+    """Within the block the log, with the warnings of Python, goes to a file and to standard error.
 
     Args:
-        path: The file, which is continued; None on ranks that write nothing.
+        path: The file; an existing one is continued. None on ranks that write nothing.
+
+    Raises:
+        OutputError: The file cannot be written.
+        InputError: See :func:`level`.
     """
     if path is None:
         yield
         return
     shown = level()
-    handlers: list[logging.Handler] = [logging.FileHandler(path, encoding="utf-8")]
+    with writing(path):
+        check_regular(path, new=True)
+        handlers: list[logging.Handler] = [logging.FileHandler(path, encoding="utf-8")]
     if LOG_LEVEL in os.environ:
         handlers.append(logging.StreamHandler())
         handlers[-1].setLevel(shown)
     before, show = (log.level, log.propagate), warnings.showwarning
 
-    def noted(message: Any, category: Any, *rest: Any, **more: Any) -> None:
+    def show_and_log(message: Any, category: Any, *rest: Any, **more: Any) -> None:
         log.warning("%s: %s", category.__name__, message)
         show(message, category, *rest, **more)
 
     for handler in handlers:
-        handler.setFormatter(FORM)
+        handler.setFormatter(FORMAT)
         log.addHandler(handler)
     log.setLevel(min(logging.INFO, shown))
-    log.propagate = False  # others configure the root logger, and would print every step
-    warnings.showwarning = noted
+    log.propagate = False  # the root logger may be configured by others, and would print every step
+    warnings.showwarning = show_and_log
     try:
         yield
     finally:

@@ -6,22 +6,21 @@
 `lumped` stays within the range of the particles around a vertex; at the border of a body, where they
 stand on one side of it, it is off by the slope. `consistent`, the projection in L2, is exact for
 bilinear fields and may overshoot elsewhere. Its matrix is singular where a cell holds fewer than four
-particles; conjugate gradients from `lumped` leave there what no particle sees (`cases/projection.py`:
-errors of both). Vertices without particles in their cells have no value: NaN.
+particles; conjugate gradients from `lumped` leave there what no particle sees
+(`cases/costs/projection.py`: errors of both). Vertices without particles in their cells have no
+value: NaN.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks
-
-if TYPE_CHECKING:
-    from tawami.scene.scene import Scene
+from tawami.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 Projection = Literal["lumped", "consistent"]
@@ -75,7 +74,7 @@ def nodal(scene: Scene, values: Array, method: Projection = "lumped") -> Array:
 
 def _sums(scene: Scene, data: Array) -> Array:
     """sum_p V_p M_i data_p, vertices x columns."""
-    return scene.attached.sums(np.asarray(scene.particles.volume), data, "bilinear")
+    return scene.configuration.domain.sums(np.asarray(scene.particles.volume), data, "bilinear")
 
 
 def _conjugate_gradients(scene: Scene, start: Array, weight: Array, right: Array) -> Array:
@@ -83,7 +82,7 @@ def _conjugate_gradients(scene: Scene, start: Array, weight: Array, right: Array
 
     Every rank has whole vectors and takes the same steps.
     """
-    location = scene.attached.location
+    location = scene.configuration.domain.location
 
     def product(f: Array) -> Array:
         at_particles = [

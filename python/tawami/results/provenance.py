@@ -11,17 +11,14 @@ import sys
 import textwrap
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from tawami.base import ranks
-from tawami.base.files import result_folder, whole_file
+from tawami.base import program, ranks
+from tawami.base.files import atomic_file, result_folder
 from tawami.fem import environment
 from tawami.form.form import Form
 from tawami.form.kinematics import Kinematics, StrainMeasure
-
-if TYPE_CHECKING:
-    from tawami.motion.dynamics import Dynamics
-    from tawami.scene.scene import Scene
+from tawami.motion.observer import Subject
 
 #: What is written: the record, and copies of the driver script and of the form.
 RUN, SCRIPT, FORM = "run.json", "script.py", "form.py"
@@ -29,7 +26,7 @@ RUN, SCRIPT, FORM = "run.json", "script.py", "form.py"
 PATIENCE = 10
 
 
-def write(folder: str | Path, scene: Scene, motion: Dynamics | None = None) -> None:
+def write(folder: str | Path, subject: Subject) -> None:
     """Write run.json, and beside it form.py and script.py where these can be read; a call for all ranks.
 
     run.json holds: script (path, or null), module (as in `python -m`, or null), arguments, directory,
@@ -40,8 +37,8 @@ def write(folder: str | Path, scene: Scene, motion: Dynamics | None = None) -> N
     Raises:
         OutputError: The folder cannot be written.
     """
+    scene, header = subject.scene, subject.header()
     comm = scene.grid.comm
-    header = scene.header() if motion is None else motion.header()
     with ranks.raise_together(comm):
         if comm.rank == 0:
             home = result_folder(folder)
@@ -104,7 +101,7 @@ def git(folder: Path) -> dict[str, Any] | None:
         command = ["git", "-C", str(folder), *words]
         run = subprocess.run(
             command, capture_output=True, text=True, check=True, timeout=PATIENCE,
-            stdin=subprocess.DEVNULL, env=ranks.own_environment(),
+            stdin=subprocess.DEVNULL, env=program.own_environment(),
         )  # fmt: skip
         return run.stdout.strip()
 
@@ -161,5 +158,5 @@ def _bytes(path: Path) -> bytes | None:
 
 def _write(path: Path, content: bytes | None) -> None:
     if content is not None:
-        with whole_file(path) as part:
+        with atomic_file(path) as part:
             part.write_bytes(content)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -20,15 +19,12 @@ from tawami.base.errors import InputError, NotModelledError
 from tawami.form.kinematics import FIELD_UNITS
 from tawami.grid import edges
 from tawami.grid.basis import extraction, greville_1d, values_1d
-from tawami.motion.observer import Moment
+from tawami.motion.observer import Snapshot, Subject
 from tawami.motion.transfer import to_grid
 from tawami.particles import placement
 from tawami.results.projection import Projection, nodal
+from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
-
-if TYPE_CHECKING:
-    from tawami.motion.dynamics import Dynamics
-    from tawami.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 #: Arrays of the particles by name.
@@ -86,13 +82,13 @@ def _history(name: str) -> Quantity:
     return Quantity(f"{name} [-]", _stored(name))
 
 
-def local_view(scene: Scene, motion: Dynamics | None) -> View:
+def local_view(subject: Subject) -> View:
     """The particles of this rank."""
-    particles = scene.particles
+    particles = subject.scene.particles
 
     def view(name: str) -> Array:
         if name in ("velocity", "acceleration"):
-            return np.asarray(getattr(motion or scene, name))
+            return np.asarray(getattr(subject, name))  # or the error of the scene that has none
         if name not in PARTICLES and name != "x":
             return np.asarray(particles.history(name))
         return np.asarray(getattr(particles, name))
@@ -100,9 +96,9 @@ def local_view(scene: Scene, motion: Dynamics | None) -> View:
     return view
 
 
-def body_view(scene: Scene, motion: Dynamics | None) -> View:
+def body_view(subject: Subject) -> View:
     """The particles of all ranks in the order of their numbers; calls for all ranks."""
-    local, comm = local_view(scene, motion), scene.grid.comm
+    local, comm = local_view(subject), subject.scene.grid.comm
     whole = placement.in_order(comm, local("number"))
     known: dict[str, Array] = {}
 
@@ -120,15 +116,15 @@ def solution_view(solution: Solution) -> View:
     return lambda name: np.asarray(getattr(solution, other.get(name, name)))
 
 
-def of_particles(names: Iterable[str], scene: Scene, motion: Dynamics | None) -> list[Quantity]:
+def of_particles(names: Iterable[str], subject: Subject) -> list[Quantity]:
     """Fields of the particles by their names.
 
     Raises:
         NotModelledError: One that the scene does not have; the message names the switch that adds it.
         InputError: An unknown name.
     """
-    known = PARTICLES | {name: _history(name) for name in scene.particles.history_names}
-    view, found = local_view(scene, motion), []
+    known = PARTICLES | {name: _history(name) for name in subject.scene.particles.history_names}
+    view, found = local_view(subject), []
     for name in names:
         if name not in known and name not in HISTORY:
             raise InputError(_unknown("particles", name, known))
@@ -139,11 +135,11 @@ def of_particles(names: Iterable[str], scene: Scene, motion: Dynamics | None) ->
     return found
 
 
-def usual_of_particles(scene: Scene, motion: Dynamics | None) -> tuple[str, ...]:
+def usual_of_particles(subject: Subject) -> tuple[str, ...]:
     """What is written where nothing is asked for."""
-    names = ["displacement", "stress", "mean stress"]
+    scene, names = subject.scene, ["displacement", "stress", "mean stress"]
     names += ["eps_v"] if scene.form.kinematics.has_eps_v else []
-    names += ["velocity"] if motion is not None else []
+    names += ["velocity"] if subject.motion is not None else []
     return (*names, *scene.particles.history_names)
 
 
@@ -174,18 +170,19 @@ class GridQuantity:
     """
 
     label: str
-    of: Callable[[Moment], Array]
+    of: Callable[[Snapshot], Array]
     cells: bool = False
 
 
 def on_grid(
-    names: Iterable[str], scene: Scene, motion: Dynamics | None, projection: Projection = "lumped"
+    names: Iterable[str], subject: Subject, projection: Projection = "lumped"
 ) -> list[GridQuantity]:
     """Fields of the grid by their names: its own, or those of particles, projected.
 
     Raises:
         NotModelledError, InputError: As `of_particles`.
     """
+    scene = subject.scene
     own = _of_grid(scene)
     histories = {name: _history(name) for name in scene.particles.history_names}
     projected = [name for name, quantity in (PARTICLES | histories).items() if quantity.nodal]
@@ -197,10 +194,10 @@ def on_grid(
             )
         if name in own:
             if name == "velocity":
-                of_particles([name], scene, motion)
+                of_particles([name], subject)
             found.append(own[name])
         elif name in projected or name in HISTORY:
-            found.append(_projected(of_particles([name], scene, motion)[0], projection))
+            found.append(_projected(of_particles([name], subject)[0], projection))
         else:
             raise InputError(_unknown("grid", name, dict.fromkeys([*own, *projected])))
     return found
@@ -227,8 +224,8 @@ def _of_grid(scene: Scene) -> dict[str, GridQuantity]:
 
 
 def _projected(quantity: Quantity, projection: Projection) -> GridQuantity:
-    def of(now: Moment) -> Array:
-        return nodal(now.scene, quantity.of(local_view(now.scene, now.motion)), projection)
+    def of(now: Snapshot) -> Array:
+        return nodal(now.scene, quantity.of(local_view(now.subject)), projection)
 
     return GridQuantity(quantity.label, of)
 
@@ -238,22 +235,22 @@ def _at_vertices(scene: Scene, coefficients: Array) -> Array:
     return np.asarray(matrix @ coefficients.reshape(-1, 2))
 
 
-def _displacement(now: Moment) -> Array:
+def _displacement(now: Snapshot) -> Array:
     """Since the start, and of the last step where strains are finite."""
     scene, solution = now.scene, now.solution
-    u = scene.split(scene.gap)[0] if solution is None else solution.u
+    u = scene.split(scene.configuration.before)[0] if solution is None else solution.u
     return _at_vertices(scene, u)
 
 
-def _bilinear(now: Moment) -> Array:
+def _bilinear(now: Snapshot) -> Array:
     scene, solution = now.scene, now.solution
-    values = scene.split(scene.gap)[1] if solution is None else solution.volumetric
+    values = scene.split(scene.configuration.before)[1] if solution is None else solution.volumetric
     return np.asarray(values)
 
 
-def _velocity(now: Moment) -> Array:
+def _velocity(now: Snapshot) -> Array:
     """That of the particles with its gradient, by their mass; NaN where there are none."""
-    motion, attached = now.motion, now.scene.attached
+    motion, attached = now.subject.motion, now.scene.configuration.domain
     assert motion is not None
     kept = motion.on_grid
     if kept is not None:  # a grid that stays has its own
@@ -265,7 +262,7 @@ def _velocity(now: Moment) -> Array:
     return np.where(near, _at_vertices(now.scene, v), np.nan)
 
 
-def _reaction(now: Moment) -> Array:
+def _reaction(now: Snapshot) -> Array:
     """Forces of supports and walls [N per metre depth], shared out to the vertices of the cell where
     they act, with their sum and moment; not known before a solution.
     """

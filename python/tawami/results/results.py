@@ -1,53 +1,44 @@
-"""A run with a folder: what it writes there, its checkpoints, and how it goes on after it was stopped.
+"""Results of a run: its folder, its outputs, its checkpoints.
 
-Each `ramp`, `settle` or `Dynamics.run` that is given the results is a phase of the run. A script that
-is started again with `existing='resume'` is executed from its top; phases that had come to their end are
-not solved again, their end is loaded, and the one that was stopped goes on from its newest checkpoint.
+Each `ramp`, `settle` or `Dynamics.run` with `results=` is a phase of the run. To resume a run, start its
+script again with `existing='resume'`: it is executed from its top, finished phases are not solved again
+but loaded, and the interrupted phase continues from its newest checkpoint.
 """
 
 from __future__ import annotations
 
-import json
-import logging
 import os
-import shutil
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Literal, get_args
 
-from tawami.base import archive, checks
-from tawami.base.errors import InputError, OutputError
-from tawami.base.files import result_folder, whole_file
+from tawami.base import checks
+from tawami.base.errors import InputError
 from tawami.base.ranks import raise_together
+from tawami.motion.observer import Subject
 from tawami.results import provenance
-from tawami.results.output import PHASES, Output
-from tawami.results.phase import LOG, Phase, Unwatched
-from tawami.results.provenance import FORM, RUN, SCRIPT
-
-if TYPE_CHECKING:
-    from tawami.motion.dynamics import Dynamics
-    from tawami.scene.scene import Scene
+from tawami.results.checkpoints import Checkpoints, Schedule
+from tawami.results.folder import RunFolder
+from tawami.results.output import Output
+from tawami.results.phase import Phase
 
 Existing = Literal["stop", "replace", "resume"]
-#: Takes precedence over `existing`: how `tawami resume` starts a script.
+#: Environment variable that takes precedence over `existing`: how `tawami resume` starts a script.
 EXISTING = "TAWAMI_EXISTING"
-COPIES = (SCRIPT, FORM)
-log = logging.getLogger("tawami")
 
 
 class Results:
-    """The folder of a run, and what observes it.
+    """Folder, outputs and checkpoints of a run.
 
     Args:
-        folder: Made if it is not there.
+        folder: Created if it does not exist.
         outputs: What is written: `ParticleOutput`, `GridOutput`, `TableOutput`.
         checkpoint_steps: Accepted steps between checkpoints; None for none by number.
-        checkpoint_minutes: Wall time between checkpoints [min]; None for none by time. The end of a
-            phase, SIGTERM, Ctrl-C and an error that ends the run write one in any case.
+        checkpoint_minutes: Wall time between checkpoints [min]; None for none by time. One is always
+            written at the end of a phase, on SIGTERM and Ctrl-C, and on an error that ends the run.
         keep: Checkpoints of a phase that are kept.
-        existing: Where the folder holds a run: 'stop' with an error, 'replace' it, or 'resume' it. The
-            environment variable TAWAMI_EXISTING takes precedence.
-        progress: One live line on standard error; None for where that is a terminal.
+        existing: What to do with a run in the folder: 'stop' with an error, 'replace' it, or 'resume'
+            it. The environment variable TAWAMI_EXISTING takes precedence.
+        progress: Show a live line on standard error; by default if that is a terminal.
 
     Raises:
         InputError: A parameter out of its range.
@@ -77,152 +68,43 @@ class Results:
                 "would be the same: expected another name for one, as ParticleOutput(..., name='fine')"
             )
         self.folder, self.outputs = checks.path("folder", folder), outputs
-        self.checkpoint_steps = (
-            None
-            if checkpoint_steps is None
-            else checks.whole_number("checkpoint_steps", checkpoint_steps, low=1)
-        )
-        self.checkpoint_minutes = (
-            None
-            if checkpoint_minutes is None
-            else checks.number("checkpoint_minutes", checkpoint_minutes, low=0.0)
-        )
-        self.keep = checks.whole_number("keep", keep, low=1)
+        self.schedule = Schedule(checkpoint_steps, checkpoint_minutes, keep)
         variable = os.environ.get(EXISTING)
-        self.existing = existing if variable is None else variable
-        name = "existing" if variable is None else EXISTING
-        checks.choice(name, self.existing, get_args(Existing))
+        chosen = checks.choice(
+            "existing" if variable is None else EXISTING,
+            existing if variable is None else variable,
+            get_args(Existing),
+        )
         self.progress = None if progress is None else checks.switch("progress", progress)
+        self._run = RunFolder(self.folder, chosen)
         self._phases: list[str] = []
-        #: Whether the run goes on from where an earlier one was.
-        self.resumes = False
+        self._resumes = False
 
     @property
     def checkpoints(self) -> list[Path]:
-        """The checkpoints that there are, oldest first."""
-        return archive.files(self.folder)
+        """Checkpoints in the folder, oldest first."""
+        return self._run.checkpoints
 
-    def phase(
-        self, kind: str, scene: Scene, motion: Dynamics | None, end: float, unit: str
-    ) -> Phase:
-        """The next phase of the run, for a with statement; a call for all ranks.
-
-        Args:
-            kind: 'ramp', 'settle' or 'motion'.
-            scene: The scene.
-            motion: Its motion; None without inertia.
-            end: Where it ends.
-            unit: Of that.
+    def phase(self, kind: str, subject: Subject, end: float, unit: str) -> Phase:
+        """Observer of the next phase; see `tawami.motion.observer.Recorder`.
 
         Raises:
             InputError: The folder holds a run, and `existing` is 'stop'.
-            OutputError: It cannot be written.
+            OutputError: The folder cannot be written.
         """
+        comm = subject.scene.grid.comm
         if not self._phases:
-            with raise_together(scene.grid.comm):
-                if scene.grid.comm.rank == 0:
-                    self._open()
-            self.resumes = scene.grid.comm.bcast(self.resumes)
-            if not self.resumes:
-                provenance.write(self.folder, scene, motion)
+            with raise_together(comm):
+                if comm.rank == 0:
+                    self._resumes = self._run.open()
+            self._resumes = comm.bcast(self._resumes)
+            if not self._resumes:
+                provenance.write(self.folder, subject)
         before = sum(name.partition("-")[0] == kind for name in self._phases)
-        self._phases.append(f"{kind}-{before + 1}" if before else kind)
-        return Phase(self, len(self._phases), self._phases[-1], scene, motion, end, unit)
-
-    def _open(self) -> None:
-        result_folder(self.folder)
-        run, known = self.folder / RUN, self._known()
-        # an attempt that was refused before its first step is no run
-        nothing = known and not known.get("phases")
-        if self.checkpoints or (run.exists() and not nothing):
-            if self.existing == "stop":
-                raise InputError(
-                    f"Results('{self.folder}'): the folder holds a run{self._reached()}. Expected "
-                    "another folder, existing='resume' to go on with it, or existing='replace' to "
-                    "write over it"
-                )
-            wanted = self.existing == "resume"
-            self.resumes = wanted and bool(self.checkpoints)
-            finished = [one["name"] for one in known.get("phases", []) if "finished" in one]
-            if wanted and not self.resumes and finished:
-                raise InputError(
-                    f"Results('{self.folder}'): the folder holds a run that finished {finished[-1]}, "
-                    "and no checkpoint to go on from: expected its checkpoints, or existing='replace' "
-                    "to start anew"
-                )
-            if not self.resumes:
-                self._clear()
-        elif not run.exists():
-            others = [name for name in COPIES if self._is_other(self.folder / name)]
-            if others:
-                raise InputError(
-                    f"Results('{self.folder}'): the folder holds '{others[0]}', which is of no run: "
-                    "expected a folder of its own for the results"
-                )
-        result_folder(self.folder / archive.FOLDER)
-
-    @staticmethod
-    def _is_other(path: Path) -> bool:
-        """Whether a file is there, and not the script that runs."""
-        script, _ = provenance.driver()
-        return path.exists() and not (script is not None and path.resolve() == script)
-
-    def _known(self) -> dict[str, Any]:
-        """What run.json holds; nothing where it cannot be read."""
-        try:
-            known = json.loads((self.folder / RUN).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            return {}
-        return known if isinstance(known, dict) else {}
-
-    def _reached(self) -> str:
-        """How far the run in the folder has come, for a message."""
-        files = self.checkpoints
-        return f", last checkpoint '{files[-1].name}'" if files else ""
-
-    def _clear(self) -> None:
-        """Remove what a run wrote here, and nothing else."""
-        try:
-            for path in (self.folder / name for name in (RUN, LOG, *COPIES)):
-                if self._is_other(path):
-                    path.unlink()
-            for place in self.folder.iterdir():
-                kind, _, number = place.name.partition("-")
-                own = kind in PHASES and (number.isdigit() or place.name == kind)
-                if place.is_dir() and (own or place.name == archive.FOLDER):
-                    shutil.rmtree(place)
-        except OSError as error:
-            raise OutputError(
-                f"'{error.filename}' cannot be removed: {error.strerror}: expected a folder that can be "
-                "written"
-            ) from error
-
-    def note(self, phase: str, facts: Mapping[str, Any]) -> None:
-        """Add to what run.json knows of a phase; a call for the first rank."""
-        run, known = self.folder / RUN, self._known()
-        if not known:
-            log.warning("'%s' cannot be read, and does not tell of %s", run, phase)
-            return
-        phases = {one["name"]: one for one in known.get("phases", [])}
-        phases[phase] = phases.get(phase, {"name": phase}) | facts
-        known["phases"] = list(phases.values())
-        with whole_file(run) as part:
-            part.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
-
-
-def phase(
-    results: Results | None,
-    kind: str,
-    scene: Scene,
-    motion: Dynamics | None,
-    end: float,
-    unit: str,
-) -> Unwatched:
-    """The next phase of a run, with results or without; see `Results.phase`."""
-    if results is None:
-        return Unwatched(unit)
-    if not isinstance(results, Results):
-        raise InputError(
-            f"results = {checks.shown(results)}: expected tawami.Results(folder, ...), or None"
+        name = f"{kind}-{before + 1}" if before else kind
+        self._phases.append(name)
+        checkpoints = Checkpoints(
+            self.folder, len(self._phases), name, subject, self.schedule, resumes=self._resumes
         )
-    return results.phase(kind, scene, motion, end, unit)
+        outputs = [o for o in self.outputs if o.phases is None or kind in o.phases]
+        return Phase(self._run, name, subject, end, unit, outputs, checkpoints, self.progress)

@@ -1,20 +1,19 @@
-"""Whether particles, as they are given, integrate over the cells that they fill.
+"""Whether the particles of a body integrate over the cells that they fill.
 
 A cell is filled where its particles have its area. There they must not crowd on one side or at the
-border, and not differ from cell to cell: sums over them are no integrals then, and stress comes out
-wrong by half of it or by any amount (`python -m cases.extremes --only particles`).
+border, and must not differ from cell to cell. Otherwise sums over them are not integrals, and stress can
+be wrong by any amount (`python -m cases.extremes --only particles`).
 """
 
 from __future__ import annotations
-
-import warnings
 
 import numpy as np
 import numpy.typing as npt
 
 from tawami.base import ranks
 from tawami.base.errors import QuadratureWarning
-from tawami.scene.domain import Attached
+from tawami.base.warn import warn
+from tawami.scene.domain import Domain
 
 Array = npt.NDArray[np.float64]
 #: Part of a cell by which one that counts as filled may miss its area or go beyond it.
@@ -28,27 +27,27 @@ SPREAD = 0.15
 UNLIKE = 0.2
 
 
-def warn(attached: Attached, volume: Array) -> None:
-    """Say which cell is filled worst, if one is filled badly; a call for all ranks."""
-    fault = _fault(*_moments(attached, volume))
-    if fault is None or attached.layout.grid.comm.rank:
+def warn_of_faults(domain: Domain) -> None:
+    """Warn of the cell that the particles integrate worst, if any is bad; a call for all ranks."""
+    fault = _fault(*_moments(domain))
+    if fault is None or domain.model.grid.comm.rank:
         return
     (j, i), what = fault
-    warnings.warn(
-        f"the particles integrate badly: cell ({i}, {j}) {what}. Stress may be far off; "
-        "expected particles spread over the cells that they fill, as box(...) and polygon(...) put them",
+    warn(
+        f"the particles integrate badly: cell ({i}, {j}) {what}. Stress may be far off; expected "
+        "particles spread over the cells that they fill, as box(...) and polygon(...) place them",
         QuadratureWarning,
-        stacklevel=4,
     )
 
 
-def _moments(attached: Attached, volume: Array) -> tuple[Array, Array, Array]:
-    """Area (ny x nx) [cells], first and second moments about the centre (ny x nx x 2) of each cell's
-    particles, the moments over the area; NaN in cells without any.
+def _moments(domain: Domain) -> tuple[Array, Array, Array]:
+    """Area (ny x nx) [cells], first and second moments about the centre (ny x nx x 2) of the particles
+    of each cell, divided by the area; NaN in cells without any.
     """
-    location, grid = attached.location, attached.layout.grid
+    location, grid = domain.location, domain.model.grid
     off = np.asarray(location.xi) - 0.5
-    columns = np.column_stack([np.ones(len(off)), off, off**2]) * np.asarray(volume)[:, None]
+    columns = np.column_stack([np.ones(len(off)), off, off**2])
+    columns *= np.asarray(domain.particles.volume)[:, None]
     sums = np.zeros((grid.cells[0] * grid.cells[1], 5))
     np.add.at(sums, np.asarray(location.cell), columns / grid.h**2)
     sums = ranks.sum_of(grid.comm, sums).reshape(*grid.cells[::-1], 5)

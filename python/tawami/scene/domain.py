@@ -1,10 +1,7 @@
-"""The particles where they are: field side, laws and Newton's method from one reset of the grid to the
-next.
-"""
+"""The particles in their present cells, from one reset of the grid to the next."""
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,62 +9,132 @@ import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import ranks
-from tawami.base.errors import InstabilityWarning
-from tawami.field.reduction import Layout
-from tawami.field.reference import Field
+from tawami.base.errors import InputError, InstabilityWarning
+from tawami.base.timing import Stopwatch
+from tawami.base.warn import warn
+from tawami.field.assembly import Assembly
+from tawami.field.attachment import Attachment
+from tawami.field.fast import FastAssembly
+from tawami.field.layout import Layout
+from tawami.field.reference import ReferenceAssembly
+from tawami.field.tractions import Tractions
 from tawami.grid.basis import Basis
 from tawami.particles.numpy_law import NumpyStage
+from tawami.particles.responses import Responses
+from tawami.scene.model import Model
 from tawami.solve.newton import Newton
+from tawami.solve.numerics import Numerics
 
 Array = npt.NDArray[np.float64]
-#: Part of a cell that is as good as all of it, to forms that need whole cells.
+ASSEMBLIES: dict[str, type[FastAssembly | ReferenceAssembly]] = {
+    "fast": FastAssembly,
+    "reference": ReferenceAssembly,
+}
+#: Share of a cell that a form which needs whole cells takes for a whole one.
 WHOLE = 0.5
 
 
-@dataclass(frozen=True)
-class Attached:
-    """What belongs to the present cells of this rank's particles.
+@dataclass(frozen=True, eq=False)
+class Domain:
+    """This rank's particles with all that belongs to their present cells.
 
     Attributes:
-        location: Where they are.
-        field: The field side.
-        stage: Their laws.
+        model: What the scene is made of.
+        particles: The particles of this rank.
+        location: Their cells and positions in them.
+        assembly: Assembly of the form over these cells.
+        tractions: Its term on the edges of the grid.
+        stage: The material laws of the particles.
+        responses: Their responses, as the form reads them.
         newton: The nonlinear problem of a step.
     """
 
+    model: Model
+    particles: _rust.Particles
     location: _rust.Location
-    field: Field
+    assembly: Assembly
+    tractions: Tractions
     stage: _rust.Stage | NumpyStage
+    responses: Responses
     newton: Newton
+
+    @classmethod
+    def attach(
+        cls,
+        model: Model,
+        particles: _rust.Particles,
+        location: _rust.Location,
+        numerics: Numerics,
+        stopwatch: Stopwatch,
+    ) -> Domain:
+        """Attach the form and the laws to particles at their present location."""
+        form, law = model.form, model.law
+        with stopwatch("set-up"):
+            attachment = Attachment(
+                model.grid, model.compiled, model.basis, location, particles.volume, model.values,
+                stopwatch,
+            )  # fmt: skip
+            assembly = ASSEMBLIES[numerics.assembly](attachment)
+        rust = _rust.Stage(
+            particles,
+            location,
+            list(model.materials),
+            form.kinematics.name,
+            model.moves,
+            model.basis,
+        )
+        stage = rust if law is None else NumpyStage(rust, particles, law)
+        responses = Responses(
+            model.compiled, particles, location, stage, _constants(model, particles),
+            model.grid.comm, stopwatch,
+        )  # fmt: skip
+        newton = Newton(assembly, responses, numerics, stopwatch)
+        return cls(
+            model, particles, location, assembly, Tractions(attachment), stage, responses, newton
+        )
 
     @property
     def layout(self) -> Layout:
-        """Where the coefficients stand."""
-        return self.field.layout
+        """Where the coefficients of each field stand."""
+        return self.assembly.layout
+
+    @property
+    def active(self) -> npt.NDArray[np.bool_]:
+        """Whether each cell holds particles, on any rank, ny x nx."""
+        return self.assembly.attachment.active
+
+    @property
+    def constants(self) -> dict[str, Array]:
+        """K and mu [Pa] of each particle."""
+        return _constants(self.model, self.particles)
+
+    @property
+    def is_elastic(self) -> npt.NDArray[np.bool_]:
+        """Whether the law of each particle has no history."""
+        mask: npt.NDArray[np.bool_] = self.model.without_history[self.particles.material]
+        return mask
+
+    @property
+    def mass(self) -> Array:
+        """Mass of each particle [kg per metre depth].
+
+        Raises:
+            InputError: The scene has no density.
+        """
+        if self.model.density is None:
+            raise InputError("mass needs Scene(..., density=...) [kg/m3]")
+        return np.asarray(self.model.density[self.particles.material] * self.particles.volume)
 
     def sums(self, weight: Array, data: Array, basis: Basis | None = None) -> Array:
-        """Sums over all particles of the body on the functions of a basis, that of the displacement
-        by default: sum_p weight_p data_p N_i, functions x columns.
+        """Sums over all particles of the body, sum_p weight_p data_p N_i: functions x columns.
+
+        Args:
+            weight: One number per particle of this rank.
+            data: Particles x columns.
+            basis: Whose functions N_i are; that of the displacement by default.
         """
         sums = _rust.nodal_sums(self.location, weight, data, basis or self.layout.basis)
-        return ranks.sum_of(self.layout.grid.comm, sums)
-
-    def warn_of_parts(self, volume: Array, option: str) -> None:
-        """Warn of cells that the body fills in part, for an option of the form that needs whole ones."""
-        grid = self.layout.grid
-        areas = np.bincount(self.location.cell, volume, minlength=grid.cells[0] * grid.cells[1])
-        areas = ranks.sum_of(grid.comm, areas)
-        parts = np.where(areas > 0, areas / grid.h**2, 1.0)
-        c = int(parts.argmin())
-        if parts[c] < WHOLE and not grid.comm.rank:
-            i, j = c % grid.cells[0], c // grid.cells[0]
-            warnings.warn(
-                f"'{option}' is not stable in cells that the body fills in part: cell ({i}, {j}) holds "
-                f"{parts[c]:.2g} of its area, expected at least {WHOLE:g}; use another option of the "
-                "form, or a grid whose lines follow the body",
-                InstabilityWarning,
-                stacklevel=2,
-            )
+        return ranks.sum_of(self.model.grid.comm, sums)
 
     def at_particles(self, values: Array) -> Array:
         """A displacement field (functions x 2) at this rank's particles, particles x 2."""
@@ -79,3 +146,42 @@ class Attached:
         flat = np.ascontiguousarray(values).ravel()
         gradients = _rust.gradients(self.location, self.layout.basis, flat)
         return np.asarray(gradients).reshape(-1, 2, 2)
+
+    @property
+    def particles_per_cell(self) -> npt.NDArray[np.int64]:
+        """Number of particles in each cell, x fastest; a call for all ranks."""
+        nx, ny = self.model.grid.cells
+        counts = np.bincount(self.location.cell, minlength=nx * ny)
+        return ranks.sum_of(self.model.grid.comm, counts)
+
+    def warn_of_partial_cells(self) -> None:
+        """Warn of partially filled cells if an option of the form needs whole ones.
+
+        A call for all ranks.
+        """
+        form, options = self.model.form, self.model.options
+        for option in options.values():
+            if option in form.whole_cells:
+                self._warn_of_partial_cells(option)
+
+    def _warn_of_partial_cells(self, option: str) -> None:
+        grid = self.model.grid
+        areas = np.bincount(
+            self.location.cell, self.particles.volume, minlength=grid.cells[0] * grid.cells[1]
+        )
+        areas = ranks.sum_of(grid.comm, areas)
+        shares = np.where(areas > 0, areas / grid.h**2, 1.0)
+        c = int(shares.argmin())
+        if shares[c] < WHOLE and not grid.comm.rank:
+            i, j = c % grid.cells[0], c // grid.cells[0]
+            warn(
+                f"'{option}' is not stable in partially filled cells: cell ({i}, {j}) holds "
+                f"{shares[c]:.2g} of its area, expected at least {WHOLE:g}; use another option of the "
+                "form, or a grid whose lines follow the body",
+                InstabilityWarning,
+            )
+
+
+def _constants(model: Model, particles: _rust.Particles) -> dict[str, Array]:
+    of_particle = model.moduli[particles.material]
+    return {"K": of_particle[:, 0].copy(), "mu": of_particle[:, 1].copy()}

@@ -1,13 +1,13 @@
-"""Fields of the particles that a scene begins with, and whether they fit each other and the laws.
+"""Initial fields of the particles, and whether they fit each other and the laws.
 
-Stress is what the laws go on from; the increments of a step add to it. eps_v and the displacement of
-the particles are sums of increments that enter no equation. In a mixed form of an elastic law
-sigma_m = K eps_v, for both are counted from no stress: an initial stress keeps that.
+The laws add the increments of a step to the initial stress. eps_v and the displacement of the particles
+are sums of increments that enter no equation. In a mixed form with an elastic law sigma_m = K eps_v,
+since both are counted from the state without stress: an initial stress keeps that.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -17,52 +17,52 @@ from tawami.base import checks, ranks
 from tawami.base.errors import InputError
 from tawami.form import quantities
 from tawami.scene import sources
+from tawami.scene.configuration import Configuration
+from tawami.scene.domain import Domain
 from tawami.scene.sources import Earlier, Source
-
-if TYPE_CHECKING:
-    from tawami.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 Beyond = Literal["stop", "return"]
-#: Stress beyond the yield surface by no more than this share is round-off; and, at finite strain, what
-#: is lost of small elastic strains, over mu.
+#: Stress beyond the yield surface by no more than this share is round-off; at finite strain another
+#: share, of mu, is lost in small elastic strains.
 ON_SURFACE, LOST = 1e-9, 1e-13
 #: Share by which sigma_m / K may differ from eps_v.
 FITS = 1e-6
 COMPONENTS = {"stress": ("xx yy zz xy", "Pa"), "displacement": ("x y", "m")}
 
 
-def give(scene: Scene, name: str, given: Source, beyond: Beyond) -> None:
-    """See `Scene.initial`."""
-    _check(scene, name, beyond)
-    with ranks.raise_together(scene.grid.comm):
-        found = sources.values(scene, name, given, *COMPONENTS.get(name, ("value", "")))
+def set_field(now: Configuration, name: str, given: Source, beyond: Beyond) -> None:
+    """Set a field of the particles; see `Scene.initial`."""
+    _check(now, name, beyond)
+    domain = now.domain
+    with ranks.raise_together(domain.model.grid.comm):
+        found = sources.values(domain, name, given, *COMPONENTS.get(name, ("value", "")))
         if name == "eps_v" and not isinstance(given, Earlier):
-            _check_volume(scene, found[:, 0])
+            _check_volume(domain, found[:, 0])
         if name == "plastic_strain" and (found < 0).any():
             p = int(found[:, 0].argmin())
             raise InputError(
-                f"plastic_strain of particle {scene.particles.number[p]} is {found[p, 0]:g}: expected "
+                f"plastic_strain of particle {domain.particles.number[p]} is {found[p, 0]:g}: expected "
                 "0 or more"
             )
-    array = _array(scene, name)
+    array = _array(domain, name)
     before = array.copy()
     array[:] = found.reshape(array.shape)
     try:
-        with ranks.raise_together(scene.grid.comm):
-            if name == "stress" or name in scene.particles.history_names:
-                _to_surface(scene, beyond)
+        with ranks.raise_together(domain.model.grid.comm):
+            if name == "stress" or name in domain.particles.history_names:
+                _to_surface(domain, beyond)
     except InputError:
         array[:] = before
         raise
-    if name == "stress" and scene.form.kinematics.has_eps_v:
-        scene.particles.eps_v[:] = _mean(scene) / scene.constants["K"]
+    if name == "stress" and domain.model.form.kinematics.has_eps_v:
+        domain.particles.eps_v[:] = _mean(domain) / domain.constants["K"]
 
 
-def _check(scene: Scene, name: str, beyond: Beyond) -> None:
+def _check(now: Configuration, name: str, beyond: Beyond) -> None:
     checks.choice("beyond", beyond, ("stop", "return"))
-    known = [*COMPONENTS, *scene.particles.history_names]
-    if scene.form.kinematics.has_eps_v:
+    known = [*COMPONENTS, *now.domain.particles.history_names]
+    if now.model.form.kinematics.has_eps_v:
         known.append("eps_v")
     if not checks.one_of(name, known):
         moves = checks.one_of(name, ("velocity",))
@@ -71,69 +71,69 @@ def _check(scene: Scene, name: str, beyond: Beyond) -> None:
             f"initial({checks.shown(name)}): expected one of {', '.join(map(repr, known))}, which this "
             f"scene has{more}"
         )
-    if scene.begun or "velocity" in dict(scene.particles.arrays):
+    if now.begun or "velocity" in dict(now.domain.particles.arrays):
         raise InputError(
             f"initial('{name}') after the scene was solved or set in motion: expected it before; to go "
             "on from a state make another scene with it, as tawami.earlier(...) reads it"
         )
 
 
-def _array(scene: Scene, name: str) -> Array:
+def _array(domain: Domain, name: str) -> Array:
     """The storage of a field, a view."""
-    if name in scene.particles.history_names:
-        return scene.particles.history(name)
-    array: Array = getattr(scene.particles, name)
+    if name in domain.particles.history_names:
+        return domain.particles.history(name)
+    array: Array = getattr(domain.particles, name)
     return array
 
 
-def _mean(scene: Scene) -> Array:
-    return np.asarray(scene.particles.stress[:, :3].mean(axis=1))
+def _mean(domain: Domain) -> Array:
+    return np.asarray(domain.particles.stress[:, :3].mean(axis=1))
 
 
-def _check_volume(scene: Scene, eps_v: Array) -> None:
+def _check_volume(domain: Domain, eps_v: Array) -> None:
     """Whether eps_v fits the stress of elastic particles, or is counted from their state."""
-    mean, elastic = _mean(scene), scene.constants["K"] * eps_v
+    mean, elastic = _mean(domain), domain.constants["K"] * eps_v
     off = np.abs(elastic - mean) > FITS * np.maximum(np.abs(mean), np.abs(elastic))
-    off &= scene.elastic & bool(eps_v.any())
+    off &= domain.is_elastic & bool(eps_v.any())
     if off.any():
         p = np.flatnonzero(off)[0]
         raise InputError(
-            f"eps_v of particle {scene.particles.number[p]} is {eps_v[p]:g}, with which an elastic law "
+            f"eps_v of particle {domain.particles.number[p]} is {eps_v[p]:g}, with which an elastic law "
             f"has a mean stress of {elastic[p]:g} Pa, and it has {mean[p]:g} Pa: expected 0, or "
             "initial('stress', ...) alone, which sets eps_v too"
         )
 
 
-def _to_surface(scene: Scene, beyond: Beyond) -> None:
+def _to_surface(domain: Domain, beyond: Beyond) -> None:
     """Stress beyond the yield surface: an error, or returned to it as the law returns it."""
-    stress, mu = scene.particles.stress, scene.constants["mu"]
-    borne = _borne(scene)
-    size = np.maximum(_norm(stress), _norm(borne))
-    off = _norm(borne - stress)
+    stress, mu = domain.particles.stress, domain.constants["mu"]
+    returned = _returned(domain)
+    size = np.maximum(_norm(stress), _norm(returned))
+    off = _norm(returned - stress)
     wrong = np.flatnonzero(off > ON_SURFACE * size + LOST * mu)
     if not len(wrong):
         return
     if beyond == "return":
-        stress[wrong] = borne[wrong]
+        stress[wrong] = returned[wrong]
         return
     p = wrong[(off[wrong] / size[wrong]).argmax()]
-    (x, y), number = scene.particles.x[p], scene.particles.number[p]
+    (x, y), number = domain.particles.x[p], domain.particles.number[p]
     raise InputError(
-        f"stress of particle {number} at ({x:g}, {y:g}) m is ({_row(stress[p])}) Pa, beyond what its "
-        f"law bears by {off[p]:.3g} Pa, {100 * off[p] / size[p]:.2g} % of it, and {len(wrong) - 1} "
-        "others are too: expected stress within the yield surface; the law returns it to "
-        f"({_row(borne[p])}) Pa, as beyond='return' takes it"
+        f"stress of particle {number} at ({x:g}, {y:g}) m is ({_row(stress[p])}) Pa, beyond the "
+        f"yield surface by {off[p]:.3g} Pa, {100 * off[p] / size[p]:.2g} % of it, as are "
+        f"{len(wrong) - 1} others: expected stress within the yield surface; beyond='return' takes the "
+        f"stress on it to which the law returns it, ({_row(returned[p])}) Pa"
     )
 
 
-def _borne(scene: Scene) -> Array:
-    """What the laws answer to no strain [Pa], xx, yy, zz, xy."""
-    layout = scene.attached.layout
+def _returned(domain: Domain) -> Array:
+    """Stress after a zero strain increment, on the yield surface or inside [Pa]: xx, yy, zz, xy."""
+    layout = domain.layout
     fields = layout.split(np.zeros(layout.size))
-    strain = scene.form.strain
+    strain = domain.model.form.strain
     wanted = [(strain.mean, "value", 0, None), (strain.stress, "value", 1, None)]
-    data = np.zeros((len(scene.particles), 1 + quantities.COMPONENTS[strain.stress]))
-    scene.attached.stage.evaluate(*fields, _rust.Requests([wanted]), [data])
+    data = np.zeros((len(domain.particles), 1 + quantities.COMPONENTS[strain.stress]))
+    domain.stage.evaluate(*fields, _rust.Requests([wanted]), [data])
     mean, components = data[:, 0], data[:, 1:]
     xx, yy, xy = components[:, strain.stress_xx_yy_xy].T
     return np.column_stack([xx, yy, 3 * mean - xx - yy, xy])

@@ -1,37 +1,42 @@
 """Loads of a scene: weight, tractions on edges of the grid, forces on particles that move with them.
 
-What is new since the last step that was solved in full comes by a share `part` from 0 to 1; what was
-there already stays.
+Loads that are new since the last full solve grow with a part from 0 to 1; the others stay.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tawami import _rust
 from tawami.base import checks
-from tawami.base.errors import CheckpointError, InputError, SupportError
+from tawami.base.errors import InputError, SupportError
+from tawami.base.identity import text
+from tawami.base.text import listed
 from tawami.grid import edges
 from tawami.grid.edges import Interval, Profile
 from tawami.grid.grid import Edge, Grid
-from tawami.scene.domain import Attached
+from tawami.scene.domain import Domain
+from tawami.scene.share import Share, check_same_number
 
 Array = npt.NDArray[np.float64]
 
 
 @dataclass
 class Traction:
-    """A traction (t_x, t_y) [Pa] on an edge of the grid; `carried` is 1 once the body has borne it."""
+    """A traction (t_x, t_y) [Pa] on an edge of the grid."""
 
     edge: Edge
     value: tuple[Profile, Profile]
     between: Interval | None = None
-    carried: float = 0.0
+    share: Share = field(default_factory=Share)
+
+    def __str__(self) -> str:
+        return f"traction(edge='{self.edge}')"
 
 
 @dataclass
@@ -39,20 +44,10 @@ class Forces:
     """Forces [N per metre depth] on particles of the body, particles of the body x 2."""
 
     force: Array
-    carried: float = 0.0
+    share: Share = field(default_factory=Share)
 
-
-def check_alike(what: str, there: int, here: int) -> None:
-    """Whether a stored state has as many loads or supports as the script has made.
-
-    Raises:
-        CheckpointError: It has not.
-    """
-    if there != here:
-        raise CheckpointError(
-            f"the run had {there} {what}s of a kind when it was stored, and the script has made {here}: "
-            f"they were changed while it ran (each=). Expected {what}s to change between two phases"
-        )
+    def __str__(self) -> str:
+        return f"force on {np.count_nonzero(self.force.any(axis=1))} particles"
 
 
 class Loads:
@@ -61,37 +56,40 @@ class Loads:
     Args:
         grid: The grid.
         num_particles: Number of particles of the body.
+
+    Attributes:
+        weight: Acceleration of gravity (b_x, b_y) [m/s2], which grows like the other loads.
     """
 
     def __init__(self, grid: Grid, num_particles: int) -> None:
         self.grid, self.num_particles = grid, num_particles
-        self.gravity, self._carried_gravity = np.zeros(2), np.zeros(2)
+        self.weight = Share(np.zeros(2), np.zeros(2), np.zeros(2))
         self.tractions: list[Traction] = []
         self.forces: list[Forces] = []
 
     @property
+    def gravity(self) -> Array:
+        """The acceleration that the script asked for [m/s2]."""
+        return np.asarray(self.weight.target)
+
+    @gravity.setter
+    def gravity(self, acceleration: Array) -> None:
+        self.weight.target = acceleration
+
+    @property
     def signature(self) -> tuple[Any, ...]:
-        """Another one once the loads are others."""
+        """A value that differs once the loads are others."""
         return (*self.gravity, *map(id, self.tractions), *map(id, self.forces))
 
-    def state(self) -> dict[str, Any]:
-        """What of them the body bears already."""
-        return {
-            "gravity": self._carried_gravity,
-            "target": self.gravity,
-            "tractions": [traction.carried for traction in self.tractions],
-            "forces": [forces.carried for forces in self.forces],
-        }
-
-    def restore(self, state: Mapping[str, Any]) -> None:
-        """The reverse of :meth:`state`, of the same loads."""
-        check_alike("load", len(state["tractions"]), len(self.tractions))
-        check_alike("load", len(state["forces"]), len(self.forces))
-        self._carried_gravity, self.gravity = state["gravity"], state["target"]
-        for traction, carried in zip(self.tractions, state["tractions"], strict=True):
-            traction.carried = carried
-        for forces, carried in zip(self.forces, state["forces"], strict=True):
-            forces.carried = carried
+    def add_traction(
+        self, edge: Edge, value: tuple[Profile, Profile], between: Interval | None
+    ) -> None:
+        """Load an edge of the grid with a traction [Pa]."""
+        what = f"traction(edge='{edge}')"
+        t_x, t_y = checks.pair(what, value, "components (t_x, t_y)")
+        components = checks.profile(f"{what}: t_x", t_x), checks.profile(f"{what}: t_y", t_y)
+        edges.cells_between(self.grid, edge, between)
+        self.tractions.append(Traction(edge, components, between))
 
     def add_forces(self, particles: npt.ArrayLike, force: Sequence[float]) -> None:
         """Share a force [N per metre depth] out among particles of the body, a mask or numbers."""
@@ -112,64 +110,90 @@ class Loads:
         each[chosen] = total / len(chosen)
         self.forces.append(Forces(each))
 
-    def external(
-        self,
-        attached: Attached,
-        particles: _rust.Particles,
-        mass: Callable[[], Array],
-        part: float,
-    ) -> Array:
+    def external(self, domain: Domain, part: float) -> Array:
         """External forces on all coefficients.
 
         Args:
-            attached: The particles where they are.
-            particles: The particles of this rank.
-            mass: Gives their masses [kg per metre depth]; called where there is gravity only.
+            domain: The particles where they are.
             part: Share of the loads that are new.
         """
-        gravity = self._gravity_at(part)
-        external = np.zeros(attached.layout.size)
+        gravity, particles = self.weight.at(part), domain.particles
+        external = np.zeros(domain.layout.size)
         if self.forces or gravity.any():
             on_particles = np.zeros((len(particles), 2))
             if gravity.any():
-                on_particles += mass()[:, None] * gravity
+                on_particles += domain.mass[:, None] * gravity
             for forces in self.forces:
-                on_particles += _share(forces, part) * forces.force[particles.number]
-            sums = attached.sums(np.ones(len(particles)), on_particles)
+                on_particles += forces.share.at(part) * forces.force[particles.number]
+            sums = domain.sums(np.ones(len(particles)), on_particles)
             external[: sums.size] = sums.ravel()
         for traction in self.tractions:
-            external += _share(traction, part) * self._on_edge(attached, traction)
+            external += traction.share.at(part) * self._on_edge(domain, traction)
         return external
 
-    def _on_edge(self, attached: Attached, traction: Traction) -> Array:
-        edge, what = traction.edge, f"traction(edge='{traction.edge}')"
-        nodes, loaded = attached.field.edge_nodes(edge), self._cells(attached, traction)
+    def _on_edge(self, domain: Domain, traction: Traction) -> Array:
+        """Forces of the whole traction on all coefficients."""
+        edge = traction.edge
+        nodes, loaded = domain.tractions.nodes(edge), self._cells(domain, traction)
         if not loaded.any():
             raise SupportError(
-                f"{what}: no cell along that edge of the grid holds particles; let the grid end where "
-                "the body is loaded, or use load(particles, force)"
+                f"{traction}: no cell along that edge of the grid holds particles; let the grid end "
+                "where the body is loaded, or use load(particles, force)"
             )
         x, y = nodes[..., 0].ravel(), nodes[..., 1].ravel()
-        values = [edges.evaluate(component, x, y, what) for component in traction.value]
+        values = [edges.evaluate(component, x, y, f"{traction}") for component in traction.value]
         at_nodes = np.stack(values, axis=-1).reshape(nodes.shape)
-        return attached.field.traction(edge, np.where(loaded[:, None, None], at_nodes, 0.0))
+        return domain.tractions.forces(edge, np.where(loaded[:, None, None], at_nodes, 0.0))
 
-    def _cells(self, attached: Attached, traction: Traction) -> npt.NDArray[np.bool_]:
+    def _cells(self, domain: Domain, traction: Traction) -> npt.NDArray[np.bool_]:
         """Which cells with particles along its edge a traction loads."""
         part = edges.cells_between(self.grid, traction.edge, traction.between)
-        mask: npt.NDArray[np.bool_] = part[attached.field.along(traction.edge)]
+        mask: npt.NDArray[np.bool_] = part[domain.tractions.cells(traction.edge)]
         return mask
 
     def accept(self, part: float) -> None:
-        """This share of what is new is there now."""
-        self._carried_gravity = self._gravity_at(part)
-        loads: list[Traction | Forces] = [*self.tractions, *self.forces]
-        for load in loads:
-            load.carried = _share(load, part)
+        """Later parts grow from this share of what is new."""
+        for share in self._shares:
+            share.accept(part)
 
-    def _gravity_at(self, part: float) -> Array:
-        return np.asarray(self._carried_gravity + part * (self.gravity - self._carried_gravity))
+    @property
+    def _shares(self) -> Iterator[Share]:
+        yield self.weight
+        yield from (traction.share for traction in self.tractions)
+        yield from (forces.share for forces in self.forces)
 
+    # -- header, identity, checkpoints ---------------------------------------
 
-def _share(load: Traction | Forces, part: float) -> float:
-    return load.carried + part * (1.0 - load.carried)
+    @property
+    def line(self) -> str:
+        """The loads in words, for the header of a run."""
+        b_x, b_y = self.gravity
+        texts = [f"gravity ({b_x:g}, {b_y:g}) m/s2"] if self.gravity.any() else []
+        return listed([*texts, *map(str, self.tractions), *map(str, self.forces)])
+
+    def identity(self) -> list[Any]:
+        """What decides the results of a run, as JSON holds it."""
+        return [
+            list(map(float, self.gravity)),
+            *([t.edge, *map(text, t.value), text(t.between)] for t in self.tractions),
+            *(hashlib.sha256(f.force.tobytes()).hexdigest() for f in self.forces),
+        ]
+
+    def state(self) -> dict[str, Any]:
+        """How much of each load the body carries."""
+        return {
+            "tractions": len(self.tractions),
+            "forces": len(self.forces),
+            "shares": [share.state() for share in self._shares],
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """The reverse of :meth:`state`, for the same loads.
+
+        Raises:
+            CheckpointError: The script has made another number of loads.
+        """
+        check_same_number("load", state["tractions"], len(self.tractions))
+        check_same_number("load", state["forces"], len(self.forces))
+        for share, values in zip(self._shares, state["shares"], strict=True):
+            share.restore(values)

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import copy
-import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
@@ -16,78 +12,38 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from tawami import _rust
-from tawami.base import checks, ranks, signals
-from tawami.base.errors import ConvergenceError, InputError, LockingWarning, ParameterWarning
+from tawami.base import checks
+from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
+from tawami.base.sealed import Sealed
 from tawami.base.timing import Stopwatch
 from tawami.body.body import Body
 from tawami.fem.rules import TangentRule
-from tawami.field.fast import FastField
 from tawami.field.reduction import Reduction
-from tawami.field.reference import Field
-from tawami.form.compilation import check_used, compile_form
 from tawami.form.form import Form
-from tawami.grid.basis import BASES, Basis
-from tawami.grid.edges import Component, Interval, Profile, cells_between
+from tawami.grid.basis import Basis
+from tawami.grid.edges import Component, Interval, Profile
 from tawami.grid.grid import Edge, Grid
-from tawami.particles import assignment, placement
-from tawami.particles.numpy_law import NumpyStage
-from tawami.particles.responses import Responses
-from tawami.scene import coverage, description, initial
-from tawami.scene.domain import Attached
-from tawami.scene.loads import Loads, Traction
+from tawami.particles import assignment
+from tawami.scene import description, initial
+from tawami.scene.absent import Elsewhere
+from tawami.scene.configuration import Configuration
+from tawami.scene.model import build
 from tawami.scene.solution import Solution
 from tawami.scene.sources import Source
-from tawami.scene.supports import Support, Supports, Velocity
-from tawami.solve.inertia import Inertia
-from tawami.solve.newton import Converged, Newton
+from tawami.scene.statics import StaticStep
+from tawami.scene.supports import Velocity
 from tawami.solve.numerics import Assembly, Factorise, Numerics, SolverName
 
 Array = npt.NDArray[np.float64]
-FIELDS: dict[str, type[Field]] = {"fast": FastField, "reference": Field}
-#: K/mu from which displacement-only forms lock: nu = 0.49. At 0.495 the mean stress of the cantilever
-#: has 4 times the error that it has at 0.3, at 0.49995 70 times (`python -m cases.extremes`).
-LOCKS = 50.0
-#: Times that a step is solved with other states of the walls before it is given up.
-PASSES = 40
 
 
-@dataclass(frozen=True)
-class Problem:
-    """One step to solve; see `Newton.solve`, and `Supports.stay_on_edges` for the ways."""
-
-    reduction: Reduction
-    external: Array
-    inertia: Inertia | None = None
-    guess: Array | None = None
-    ways: Mapping[int, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Accepted:
-    """A step that was solved, with the particles still where they were.
-
-    Attributes:
-        step: What Newton found.
-        u: Increments of the displacement, functions x 2.
-        acceleration: At the end of a dynamic step, functions x 2 [m/s2].
-        forces: What supports and walls give, functions x 2 [N per metre depth].
-        smooth: The same without their impulse at the beginning of the step.
-    """
-
-    step: Converged
-    u: Array
-    acceleration: Array | None
-    forces: Array
-    smooth: Array
-
-
-class Scene(description.Elsewhere, Unique):
+class Scene(Elsewhere, Sealed, Unique):
     """Particles on a grid with a weak form, supports and loads.
 
-    By itself it is static; `ramp` brings its loads up in steps, `Dynamics` sets it in motion. With a
-    form of finite strain every step moves the particles and resets the grid; their stress is
-    Kirchhoff's then.
+    By itself it is static; `ramp` applies its loads in steps, `Dynamics` sets it in motion. With a
+    form of finite strain every step moves the particles and resets the grid; their stress is then
+    Kirchhoff's.
 
     Args:
         grid: The background grid.
@@ -102,23 +58,19 @@ class Scene(description.Elsewhere, Unique):
         tolerance, max_iterations, assembly, tangent_rule, factorise, linear_solver: How a step is
             solved; see `tawami.solve.numerics.Numerics`.
         density: Mass density at the start [kg/m3], one for all materials or one each (a list or a
-            dictionary as that of the materials); gravity needs it.
+            dictionary as for the materials); gravity needs it.
         leaving: What to do with particles that leave the grid: 'stop' with an error before they do, or
             'remove' them; `left` says which and where.
         parameters: What the form names: alpha, stabilisation, ...
 
     Attributes:
-        particles: The particles on this rank: those in its cells; `number` says which of the body
-            they are. Where particles change rank or leave the grid this is another object after a
-            step. Their arrays are views of the storage, not copies: `x` [m], `material` and
-            `number`, which cannot be written, `volume` [m2], `stress` [Pa] (xx, yy, zz, xy; tension
-            positive), `displacement` [m], and `eps_v` with forms that have that field.
-        num_particles: Number of particles of the body, on all ranks.
-        left: Number, position [m] and time [s] (NaN in a static scene) of the particles that left.
-        supports, loads: As fix(...), gravity(...) and their like have made them.
-        parameters, options: Of the form, as they are used.
-        begun: Whether it has been solved, or moves: initial fields come before.
+        grid, form, basis: As given.
         numerics: How a step is solved.
+        parameters, options: Of the form, as they are used. They cannot be changed.
+        num_particles: Number of particles of the body, on all ranks.
+        stopwatch: Where the time goes.
+        configuration: Particles, supports and loads as the solver sees them. Its attributes may change
+            between versions.
 
     Raises:
         InputError: Particles outside the grid, a body without particles, NaN, an incompressible
@@ -126,8 +78,8 @@ class Scene(description.Elsewhere, Unique):
         FormError: A form that cannot be used as it stands.
 
     Warns:
-        LockingWarning: A form without a field for the volume, and a material nearly incompressible.
-        InstabilityWarning: When solving: cells filled in part, and an option that needs whole ones.
+        LockingWarning: A form without a field for the volume, and a nearly incompressible material.
+        InstabilityWarning: When solving: partially filled cells, and an option that needs whole ones.
         ParameterWarning: A parameter of the form beyond its usual range.
         QuadratureWarning: When first solving: particles that do not integrate over the cells they fill.
     """
@@ -151,140 +103,107 @@ class Scene(description.Elsewhere, Unique):
         leaving: Literal["stop", "remove"] = "stop",
         **parameters: Any,
     ) -> None:
-        if not checks.one_of(basis, BASES):
-            names = ", ".join(map(repr, BASES))
-            raise InputError(f"basis {checks.shown(basis)}: expected one of {names}")
-        checks.choice("leaving", leaving, ("stop", "remove"))
-        if not isinstance(grid, Grid) or not isinstance(body, Body):
-            raise InputError(
-                f"Scene({type(grid).__name__}, {type(body).__name__}, ...): expected a tawami.Grid and "
-                "a tawami.Body"
-            )
         check_process()
-        self.numerics = Numerics(
+        numerics = Numerics(
             tolerance, max_iterations, assembly, tangent_rule, factorise, linear_solver
         )
-        self.grid, self.basis = grid, basis
-        self.form = Form.load(form)
-        values, options = self.form.settings(parameters)
-        for sentence in [] if grid.comm.rank else self.form.unusual(values):
-            warnings.warn(sentence, ParameterWarning, stacklevel=2)
-        self._whole_cells = [o for o in options.values() if o in self.form.whole_cells]
-        x, volume = checks.array("x", body.x, 2), checks.array("volume", body.volume, 1)
-        assigned = assignment.assigned(material, material_of, body, len(x))
-        materials, law, numbers = assigned.materials, assigned.law, assigned.number
-        whole = _rust.Particles(x, volume, numbers)
-        whole.check_materials(materials, self.form.kinematics.name, self.form.strain.finite)
-        whole.add_history(materials)
-        self._materials, self._law, self._values = materials, law, values
-        self._moduli = np.array([(m.bulk_modulus, m.shear_modulus) for m in materials])
-        self._densities = assignment.densities(density, len(materials), body.names)
-        self._finite = self.form.strain.finite
-        if self._finite and law is not None:
-            raise InputError(
-                f"form {self.form.name} has finite strains: expected a law in Rust, a NumpyLaw has "
-                "small ones only"
-            )
-        self._warn_of_locking(whole)
-        self.num_particles = len(whole)
-        self.particles, location = placement.distributed(grid, whole, moving=self._finite)
-        self._compiled = compile_form(grid.comm, self.form, options, tangent_rule)
-        check_used(self._compiled, options, parameters)
-        self.options = options
-        self.parameters = {name: values[name] for name in values if name in self._compiled.used}
-        if self.form.kinematics.has_eps_v:
-            self.particles.add_eps_v()
-        self.stopwatch = Stopwatch()
-        self._leaving, self.left = leaving, list[tuple[int, tuple[float, float], float]]()
-        self.attached = self._attach(location)
-        self.supports, self.loads = Supports(grid, basis), Loads(grid, self.num_particles)
-        self._total = np.zeros(self.num_coefficients)
-        self._looked_at = self.begun = False
+        model, particles = build(
+            grid,
+            body,
+            material,
+            material_of,
+            form,
+            basis,
+            density,
+            leaving,
+            tangent_rule,
+            parameters,
+        )
+        self.configuration = Configuration(model, particles, numerics)
+        self.grid, self.form, self.basis = model.grid, model.form, model.basis
+        self.parameters, self.options = model.parameters, model.options
+        self.num_particles = model.num_particles
+        self.stopwatch: Stopwatch = self.configuration.stopwatch
+        self.seal()
 
-    def _warn_of_locking(self, particles: _rust.Particles) -> None:
-        bulk, mu = self._moduli[particles.material].T
-        p = int(np.argmax(bulk / mu))
-        if not self.form.kinematics.locks or bulk[p] < LOCKS * mu[p] or self.grid.comm.rank:
-            return
-        warnings.warn(
-            f"form {self.form.name} has no field for the volume, and K/mu = {bulk[p] / mu[p]:.3g} at "
-            f"particle {p}: it locks, and its mean stress is useless where K/mu is large. Expected "
-            f"K/mu below {LOCKS:g} (nu < 0.49); use form 'u_epsv' or 'u_epsv_finite'",
-            LockingWarning,
-            stacklevel=3,
+    def how_to_set(self, name: str) -> str:
+        """What to do instead of setting an attribute."""
+        if name in self.form.parameters or name in self.form.options:
+            return f"the form's parameters are fixed when a scene is made: Scene(..., {name}=...)"
+        if name == "particles":
+            return "write into its arrays, as scene.particles.stress[:] = ..., or use scene.initial(...)"
+        return "a scene is given by Scene(...) and changed by its methods (fix, traction, gravity, ...)"
+
+    def __repr__(self) -> str:
+        nx, ny = self.grid.cells
+        return (
+            f"Scene({self.num_particles} particles on {nx} x {ny} cells of {self.grid.h:g} m, form "
+            f"{self.form.name}, {', '.join(dict.fromkeys(self.configuration.model.laws))})"
         )
 
-    def _attach(self, location: _rust.Location) -> Attached:
-        """Field side, laws and Newton's method for the particles in these places."""
-        with self.stopwatch("set-up"):
-            field = FIELDS[self.numerics.assembly](
-                self.grid, self._compiled, self.basis, location, self.particles.volume,
-                self._values, self.stopwatch,
-            )  # fmt: skip
-        kinematics, law = self.form.kinematics.name, self._law
-        rust = _rust.Stage(
-            self.particles, location, self._materials, kinematics, self._finite, self.basis
-        )
-        stage = rust if law is None else NumpyStage(rust, self.particles, law)
-        responses = Responses(
-            self._compiled, self.particles, location, stage, self.constants, self.grid.comm,
-            self.stopwatch,
-        )  # fmt: skip
-        newton = Newton(field, responses, self.stopwatch, self.numerics)
-        return Attached(location, field, stage, newton)
+    # -- the body ------------------------------------------------------------
+
+    @property
+    def particles(self) -> _rust.Particles:
+        """The particles on this rank: those in its cells.
+
+        Their arrays are views of the storage, not copies: `x` [m], `material` and `number` (which of
+        the body they are), which cannot be written, `volume` [m2], `stress` [Pa] (xx, yy, zz, xy;
+        tension positive), `displacement` [m], and `eps_v` with forms that have that field. Where
+        particles change rank or leave the grid this is another object after a step.
+        """
+        return self.configuration.domain.particles
+
+    @property
+    def left(self) -> list[tuple[int, tuple[float, float], float]]:
+        """Number, position [m] and time [s] (NaN in a static scene) of the particles that left."""
+        return self.configuration.left
+
+    @property
+    def numerics(self) -> Numerics:
+        """How a step is solved."""
+        return self.configuration.numerics
 
     @property
     def laws(self) -> list[str]:
-        """Names of the laws, each with its history variables."""
-        if self._law is not None:
-            return ["NumpyLaw"]
-        histories = [(m.name, ", ".join(m.history_names)) for m in self._materials]
-        return [f"{name} ({history})" if history else name for name, history in histories]
-
-    @property
-    def law_texts(self) -> list[str]:
-        """The laws with their parameters."""
-        return [repr(law) for law in self._materials] + (
-            [] if self._law is None else [self._law.source]
-        )
-
-    @property
-    def constants(self) -> dict[str, Array]:
-        """K and mu [Pa] of each particle."""
-        of_particle = self._moduli[self.particles.material]
-        return {"K": of_particle[:, 0].copy(), "mu": of_particle[:, 1].copy()}
-
-    @property
-    def elastic(self) -> npt.NDArray[np.bool_]:
-        """Whether each particle's law has no history."""
-        plain = [self._law is None and not m.history_names for m in self._materials]
-        return np.array(plain)[self.particles.material]
+        """Names of the material laws, each with its history variables."""
+        return self.configuration.model.laws
 
     @property
     def mass(self) -> Array:
         """Mass of each particle [kg per metre depth].
 
         Raises:
-            InputError: No density.
+            InputError: The scene has no density.
         """
-        if self._densities is None:
-            raise InputError("mass needs Scene(..., density=...) [kg/m3]")
-        return np.asarray(self._densities[self.particles.material] * self.particles.volume)
+        return self.configuration.domain.mass
 
     @property
-    def has_density(self) -> bool:
-        """Whether the scene has a density."""
-        return self._densities is not None
+    def particles_per_cell(self) -> npt.NDArray[np.int64]:
+        """Number of particles in each cell, x fastest; a call for all ranks."""
+        return self.configuration.domain.particles_per_cell
 
-    @property
-    def densities(self) -> list[float] | None:
-        """Density of each material [kg/m3]; None without any."""
-        return None if self._densities is None else self._densities.tolist()
+    def initial(self, name: str, source: Source, *, beyond: initial.Beyond = "stop") -> None:
+        """Give the particles an initial field, before anything is solved; loads and supports act on
+        top of it. A call for all ranks.
 
-    @property
-    def least_density(self) -> float:
-        """The smallest density of a material [kg/m3]; 0 without any."""
-        return 0.0 if self._densities is None else float(self._densities.min())
+        'stress' is where the laws start: (xx, yy, zz, xy) [Pa], Kirchhoff's per V0 at finite strain.
+        With a field eps_v it sets that too, to sigma_m / K, the elastic part. 'eps_v' (larger than this
+        part, by plastic strain; or 0: counted from this state) and 'displacement' [m] are records that
+        enter no equation: positions stay. History variables of the laws have their own names.
+
+        Args:
+            name: 'stress', 'displacement', 'eps_v', or a history variable.
+            source: Numbers, the same for all or one row a particle of the body; a function f(x, y) on
+                arrays that returns the components; `tawami.table(...)` or `tawami.earlier(...)`.
+            beyond: What to do with stress beyond the yield surface: 'stop' with an error, or 'return'
+                it to the surface as the law does.
+
+        Raises:
+            InputError: An unknown name, another shape, a number that is not finite, stress beyond the
+                yield surface, eps_v that does not fit an elastic stress, or a scene that was solved.
+        """
+        initial.set_field(self.configuration, name, source, beyond)
 
     # -- supports and loads --------------------------------------------------
 
@@ -311,7 +230,7 @@ class Scene(description.Elsewhere, Unique):
         Raises:
             InputError: An unknown edge or component, or a part that is not one of whole cells.
         """
-        self.supports.fix(edge, component, value, velocity, between)
+        self.configuration.supports.fix(edge, component, value, velocity, between)
 
     def hold(
         self,
@@ -333,10 +252,10 @@ class Scene(description.Elsewhere, Unique):
         Raises:
             InputError: A point outside the grid, or an unknown component.
         """
-        self.supports.hold(point, component, value, velocity)
+        self.configuration.supports.hold(point, component, value, velocity)
 
     def wall(self, edge: Edge, friction: float = 0.0, *, separates: bool = True) -> None:
-        """A wall along an edge of the grid, with Coulomb friction.
+        """Put a wall with Coulomb friction along an edge of the grid.
 
         Args:
             edge: 'left', 'right', 'bottom' or 'top'.
@@ -344,21 +263,21 @@ class Scene(description.Elsewhere, Unique):
             separates: Whether the body may leave the wall.
 
         Raises:
-            InputError: An unknown edge, a negative friction, or a wall that is there already.
+            InputError: An unknown edge, a negative friction, or an edge that has a wall already.
         """
-        self.supports.wall(edge, friction, separates)
+        self.configuration.supports.wall(edge, friction, separates)
 
     def release(self, place: Edge | Sequence[float], component: Component | None = None) -> None:
-        """Take away what `fix`, `hold` or `wall` made.
+        """Remove supports that `fix`, `hold` or `wall` made.
 
         Args:
             place: Name of the edge, or point (x, y) [m].
             component: 'x' or 'y'; both, and a wall, by default.
 
         Raises:
-            InputError: Nothing of the kind is there.
+            InputError: There is no such support.
         """
-        self.supports.release(place, component)
+        self.configuration.supports.release(place, component)
 
     def traction(
         self,
@@ -379,20 +298,16 @@ class Scene(description.Elsewhere, Unique):
             InputError: An unknown edge or part of it, or a form without a term `dot(t, w) * ds`.
         """
         self.grid.edge(edge)
-        what = f"traction(edge='{edge}')"
-        if self._compiled.traction is None:
+        if self.configuration.model.compiled.traction is None:
             raise InputError(
-                f"{what}: form {self.form.name} has no edge term; add "
+                f"traction(edge='{edge}'): form {self.form.name} has no edge term; add "
                 "- dot(t, w) * ds to its residual"
             )
-        t_x, t_y = checks.pair(what, value, "components (t_x, t_y)")
-        components = checks.profile(f"{what}: t_x", t_x), checks.profile(f"{what}: t_y", t_y)
-        cells_between(self.grid, edge, between)
-        self.loads.tractions.append(Traction(edge, components, between))
+        self.configuration.loads.add_traction(edge, value, between)
 
     def load(self, particles: npt.ArrayLike, force: Sequence[float]) -> None:
         """Load particles of the body, wherever they move: a traction on a surface that is not an edge
-        of the grid, in a direction that stays.
+        of the grid. Its direction is fixed.
 
         Args:
             particles: A mask of the particles of the body, or their numbers.
@@ -401,102 +316,22 @@ class Scene(description.Elsewhere, Unique):
         Raises:
             InputError: No particle, or others than those of the body.
         """
-        self.loads.add_forces(particles, force)
+        self.configuration.loads.add_forces(particles, force)
 
     def gravity(self, acceleration: Sequence[float]) -> None:
         """Load the body by its weight.
 
         Args:
-            acceleration: (b_x, b_y) [m/s2], in place of what was set before.
+            acceleration: (b_x, b_y) [m/s2], in place of an earlier one.
 
         Raises:
             InputError: No density, or not two finite numbers.
         """
-        if self._densities is None:
+        if self.configuration.model.density is None:
             raise InputError("gravity(...) needs Scene(..., density=...) [kg/m3]")
-        self.loads.gravity = np.array(checks.point("gravity", acceleration))
+        self.configuration.loads.gravity = np.array(checks.point("gravity", acceleration))
 
-    def initial(self, name: str, source: Source, *, beyond: initial.Beyond = "stop") -> None:
-        """Give the particles a field to begin with, before anything is solved; loads and supports act
-        on top of it. A call for all ranks.
-
-        'stress' is what the laws go on from: (xx, yy, zz, xy) [Pa], Kirchhoff's per V0 at finite
-        strain. With a field eps_v it sets that too, to sigma_m / K, the elastic part. 'eps_v' (more
-        than this part, by plastic strain; or 0: counted from this state) and 'displacement' [m] are
-        records that enter no equation: positions stay. Then the history variables of the laws by name.
-
-        Args:
-            name: 'stress', 'displacement', 'eps_v', or a history variable.
-            source: Numbers, the same for all or one row a particle of the body; a function f(x, y) on
-                arrays that returns the components; `tawami.table(...)` or `tawami.earlier(...)`.
-            beyond: What to do with stress beyond the yield surface: 'stop' with an error, or 'return'
-                it to the surface as the law does.
-
-        Raises:
-            InputError: An unknown name, another shape, a number that is not finite, stress beyond the
-                yield surface, eps_v that does not fit an elastic stress, or a scene that was solved.
-        """
-        initial.give(self, name, source, beyond)
-
-    # -- what it is made of --------------------------------------------------
-
-    def header(self) -> str:
-        """What the scene models and what it does not, with the switches that would add it: lines for
-        the start of a run, with the arrays of the particles, their bytes, and the unknowns.
-
-        A call for all ranks.
-
-        Raises:
-            SupportError: A point is held that no particle is near.
-        """
-        return description.header(self)
-
-    def split(self, coefficients: Array) -> tuple[Array, Array | None]:
-        """Coefficients of the displacement and of the bilinear field (None if there is none).
-
-        Raises:
-            InputError: Not the coefficients of all fields.
-        """
-        return self.attached.field.layout.split(self._coefficients(coefficients))
-
-    @property
-    def particles_per_cell(self) -> npt.NDArray[np.int64]:
-        """Number of particles in each cell, x fastest; a call for all ranks."""
-        nx, ny = self.grid.cells
-        counts = np.bincount(self.attached.location.cell, minlength=nx * ny)
-        return ranks.sum_of(self.grid.comm, counts)
-
-    def residual(self, coefficients: Array) -> Array:
-        """The form's integrals over particles and cells, for every test function, before supports.
-
-        Args:
-            coefficients: Increments of all fields: displacement (two per function, x fastest),
-                then the bilinear field, as `split` takes them apart.
-        """
-        return self.attached.newton.internal(self._coefficients(coefficients))
-
-    def tangent(self, coefficients: Array) -> sp.csr_matrix:
-        """Derivative of :meth:`residual` as the form's tangent gives it, before supports."""
-        coefficients = self._coefficients(coefficients)
-        self.attached.newton.internal(coefficients)
-        return self.attached.field.unreduced_tangent(coefficients, self.attached.newton.data)
-
-    def _coefficients(self, values: Array) -> Array:
-        coefficients = checks.array("coefficients", values, 1)
-        if len(coefficients) != self.num_coefficients:
-            raise InputError(
-                f"coefficients has {len(coefficients)} entries: expected {self.num_coefficients}, the "
-                "num_coefficients of this scene"
-            )
-        return coefficients
-
-    @property
-    def num_coefficients(self) -> int:
-        """Number of coefficients of all fields, supports and empty cells included."""
-        size: int = self.attached.field.layout.size
-        return size
-
-    # -- steps ---------------------------------------------------------------
+    # -- solving -------------------------------------------------------------
 
     def solve(self) -> Solution:
         """Find equilibrium under the present supports and loads, and store it in the particles.
@@ -513,197 +348,96 @@ class Scene(description.Elsewhere, Unique):
         return self.solve_part(1.0)
 
     def solve_part(self, part: float) -> Solution:
-        """As :meth:`solve`, under this share of the loads and prescribed displacements that are new
-        since all of them were solved for; `ramp` takes it from 0 to 1.
+        """Find equilibrium under a part, from 0 to 1, of the loads and prescribed displacements that
+        are new since the last full solve, as :meth:`solve` does; `ramp` takes it from 0 to 1.
         """
-        for support in self.supports.all:
+        for support in self.configuration.supports.all:
             if support.velocity is not None:
                 raise InputError(
                     f"{support} has a velocity, and solve() knows no time: expected a value, or "
                     "Dynamics(scene)"
                 )
-        if not self._looked_at:
-            coverage.warn(self.attached, self.particles.volume)
-            self._looked_at = True
-        return self.advance(lambda: self.problem(part), done=lambda: self.carry(part))
+        self.configuration.check_coverage()
+        outcome = self.configuration.advance(StaticStep(self.configuration, part))
+        return Solution(self, outcome)
 
-    def problem(self, part: float = 1.0) -> Problem:
-        """The static problem under this share of what is new, in the present states of the walls."""
-        start = np.zeros_like(self._total) if self._finite else self._total
+    def header(self) -> str:
+        """Lines for the start of a run: what the scene models and what it does not, with the switches
+        that would add it, the arrays of the particles, their bytes, and the unknowns.
 
-        def amount(support: Support) -> float:
-            return support.at(part) - (support.applied if self._finite else 0.0)
+        A call for all ranks.
 
-        with self.stopwatch("set-up"):
-            ways = self.supports.stay_on_edges(amount) if self._finite else {}
-            reduction = self.supports.reduction(
-                self.attached, amount, start, self.gap, moving=False
-            )
-            return Problem(reduction, self.external(part), ways=ways)
+        Raises:
+            SupportError: A point is held that no particle is near.
+        """
+        return description.header(self.configuration)
+
+    # -- as the subject of a run ---------------------------------------------
 
     @property
-    def gap(self) -> Array:
-        """Coefficients since the start of the scene where particles do not move, 0 where they do."""
-        return np.zeros_like(self._total) if self._finite else self._total
+    def scene(self) -> Scene:
+        """Itself: observers find the scene in the same way in a scene and in its `Dynamics`."""
+        return self
 
-    def carry(self, part: float) -> None:
-        """This share of what was new is what the scene bears now."""
-        for support in self.supports.all:
-            support.applied = support.at(part)
-        if part == 1.0:
-            self.accept(1.0)
+    @property
+    def motion(self) -> None:
+        """None: a scene by itself is static."""
 
-    def accept(self, part: float) -> None:
-        """What is new from now on is what is missing to all of the loads and prescribed values, of
-        which this share is there.
-        """
-        for support in self.supports.all:
-            support.carried = support.at(part)
-        self.loads.accept(part)
-
-    def external(self, part: float = 1.0) -> Array:
-        """External forces on all coefficients [N per metre depth]."""
-        return self.loads.external(self.attached, self.particles, lambda: self.mass, part)
-
-    @contextmanager
-    def tolerance_of(self, tolerance: float) -> Iterator[None]:
-        """Newton's tolerance within a block."""
-        before = self.numerics
-        try:
-            self.numerics = self.attached.newton.numerics = replace(before, tolerance=tolerance)
-            yield
-        finally:
-            self.numerics = self.attached.newton.numerics = before
-
-    def advance(
-        self,
-        problem: Callable[[], Problem],
-        also: Callable[[Accepted], Callable[[float], None]] | None = None,
-        time: float = np.nan,
-        done: Callable[[], None] = lambda: None,
-    ) -> Solution:
-        """One step: find it, store it in the particles, move them where strains are finite. Ctrl-C ends
-        it before anything is stored, or after all of it is.
-
-        Args:
-            problem: Makes the problem for the present states of the walls.
-            also: Gets the step and returns what stores it elsewhere, called with what the laws
-                dissipate [J per metre depth] after the particles have their stress and before they
-                move; what may fail comes first.
-            time: At its end [s].
-            done: What else belongs to a step that is stored.
-        """
-        check_process()
-        with ranks.raise_together(self.grid.comm):
-            self.particles.check()
-        for option in self._whole_cells:
-            self.attached.warn_of_parts(self.particles.volume, option)
-        walls = [copy.deepcopy(wall.state) for wall in self.supports.walls]
-        committed = False
-        try:
-            step, settled = self._settled(problem)
-            u = self.split(step.coefficients)[0].reshape(-1, 2)
-            moved = None
-            if self._finite:
-                moved = np.asarray(self.particles.x + self.attached.at_particles(u))
-                stop = self._leaving == "stop"
-                placement.check_staying(self.grid, self.particles, moved, time, stop=stop)
-            n = u.size
-            forces = step.forces[:n]
-            inertia = settled.inertia
-            smooth = forces if inertia is None else forces - inertia.impulse
-            a = None if step.acceleration is None else step.acceleration.reshape(-1, 2)
-            accepted = Accepted(step, u, a, forces.reshape(-1, 2), smooth.reshape(-1, 2))
-            store = also(accepted) if also is not None else None
-            with signals.deferred():
-                with self.stopwatch("commit"), ranks.raise_together(self.grid.comm):
-                    dissipated = self.attached.stage.commit(*self.split(step.coefficients))
-                committed = True
-                if store is not None:
-                    store(dissipated)
-                solution = self._stored(settled, step, u, moved, time)
-                done()
-                return solution
-        except BaseException:  # Ctrl-C too
-            if not committed:
-                for wall, state in zip(self.supports.walls, walls, strict=True):
-                    wall.state = state
-            raise
-
-    def _stored(
-        self, settled: Problem, step: Converged, u: Array, moved: Array | None, time: float
-    ) -> Solution:
-        """The scene after a step that the laws have accepted: where particles move, they do."""
-        self.begun = True
-        if moved is None:
-            self._total = self._total + step.coefficients
-            return Solution(self, step, settled.reduction, self._total)
-        self.supports.follow(u, settled.reduction.points)
-        for number, way in settled.ways.items():
-            self.supports.all[number].way = way
-        self.particles.move_to(moved)
-        solution = Solution(self, step, settled.reduction, step.coefficients)
-        self.particles, gone = placement.removed(self.grid, self.particles)
-        self.left += [(number, x, time) for number, x in gone]
-        self.particles, location = placement.migrated(self.grid, self.particles)
-        self.attached = self._attach(location)
-        return solution
+    def identity(self) -> dict[str, Any]:
+        """What tells it from another scene, for checkpoints; a call for all ranks."""
+        return self.configuration.identity()
 
     def state(self) -> dict[str, Any]:
-        """All that it carries from one step to the next, of all ranks, for a checkpoint; a call for all
-        ranks.
-        """
-        return {
-            "particles": placement.gathered(self.grid, self.particles),
-            "total": self._total,
-            "left": self.left,
-            "looked_at": self._looked_at,
-            "supports": self.supports.state(),
-            "loads": self.loads.state(),
-            "newton": self.attached.newton.state(),
-        }
+        """All that is carried from one step to the next, for checkpoints; a call for all ranks."""
+        return self.configuration.state()
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """The reverse of :meth:`state`, of a scene that was made in the same way; a call for all ranks.
+        """The reverse of :meth:`state`; a call for all ranks.
 
         Raises:
             CheckpointError: Particles with other arrays.
         """
-        self.particles, location = placement.scattered(
-            self.grid, self.particles, state["particles"], moving=self._finite
-        )
-        self._total = state["total"]
-        self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
-        self._looked_at, self.begun = state["looked_at"], True
-        self.supports.restore(state["supports"])
-        self.loads.restore(state["loads"])
-        self.attached = self._attach(location)
-        self.attached.newton.keep()
-        self.attached.newton.restore(state["newton"])
+        self.configuration.restore(state)
 
-    def _settled(self, problem: Callable[[], Problem]) -> tuple[Converged, Problem]:
-        """A step in which no wall pulls, is passed through, or gives more friction than it has."""
-        newton, supports, step = self.attached.newton, self.supports, None
-        active = self.attached.layout.active[: self.attached.layout.num_displacement : 2]
-        friction = supports.friction if supports.walls else None
-        n = self.attached.layout.num_displacement
-        gap = self.gap[:n].reshape(-1, 2)
-        for wall in supports.walls:
-            wall.begin()
-        for _ in range(PASSES):
-            now = problem()
-            guess = now.guess if step is None else step.coefficients
-            found = newton.solve(now.reduction, now.external, now.inertia, guess, friction)
-            if step is not None:
-                history, krylov = step.history + found.history[1:], step.krylov + found.krylov
-                found = replace(found, history=history, krylov=krylov)
-            step = found
-            forces, u = (part[:n].reshape(-1, 2) for part in (step.forces, step.coefficients))
-            if not supports.adapt(forces, u, gap, active):
-                return step, now
-        assert step is not None
-        raise ConvergenceError(
-            f"contact and friction of the walls did not settle in {PASSES} solves. Nothing was changed "
-            "in the particles. Take a smaller step",
-            step.history,
-        )
+    # -- the discrete problem ------------------------------------------------
+
+    @property
+    def num_coefficients(self) -> int:
+        """Number of coefficients of all fields, supports and empty cells included."""
+        return self.configuration.domain.layout.size
+
+    def split(self, coefficients: Array) -> tuple[Array, Array | None]:
+        """Coefficients of the displacement and of the bilinear field (None if there is none).
+
+        Raises:
+            InputError: Not the coefficients of all fields.
+        """
+        return self.configuration.domain.layout.split(self._coefficients(coefficients))
+
+    def reduction(self) -> Reduction:
+        """What the present supports leave free: coefficients = selection @ unknowns + offset."""
+        return StaticStep(self.configuration).problem().reduction
+
+    def residual(self, coefficients: Array) -> Array:
+        """The form's integrals over particles and cells, for every test function, before supports.
+
+        Args:
+            coefficients: Increments of all fields: displacement (two per function, x fastest),
+                then the bilinear field, as `split` separates them.
+        """
+        return self.configuration.domain.newton.internal(self._coefficients(coefficients))
+
+    def tangent(self, coefficients: Array) -> sp.csr_matrix:
+        """Derivative of :meth:`residual` as the form's tangent gives it, before supports."""
+        coefficients, domain = self._coefficients(coefficients), self.configuration.domain
+        domain.newton.internal(coefficients)
+        return domain.assembly.unreduced_tangent(coefficients, domain.responses.data)
+
+    def _coefficients(self, values: Array) -> Array:
+        coefficients = checks.array("coefficients", values, 1)
+        if len(coefficients) != self.num_coefficients:
+            raise InputError(
+                f"coefficients has {len(coefficients)} entries: expected {self.num_coefficients}, the "
+                "num_coefficients of this scene"
+            )
+        return coefficients

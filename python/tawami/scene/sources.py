@@ -9,7 +9,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -17,9 +17,7 @@ import numpy.typing as npt
 from tawami.base import archive, checks
 from tawami.base.errors import InputError
 from tawami.body.body import Body
-
-if TYPE_CHECKING:
-    from tawami.scene.scene import Scene
+from tawami.scene.domain import Domain
 
 Array = npt.NDArray[np.float64]
 Numbers = npt.NDArray[Any]
@@ -188,7 +186,8 @@ def earlier(path: str | Path, *, outside: Outside = "stop") -> Earlier:
             "checkpoint, ending in .npz, or a folder of results with checkpoints"
         )
     if file.suffix == ".npz":
-        arrays = archive.read(file)["scene"]["particles"]
+        _, state = archive.read(file)
+        arrays = state["scene"]["particles"]
         number = arrays["number"][:, 0].astype(np.int64)
         return Earlier(name, arrays["x"], number, arrays, outside)
     import meshio
@@ -209,13 +208,13 @@ def _check_outside(outside: Any) -> None:
     checks.choice("outside", outside, get_args(Outside))
 
 
-def values(scene: Scene, name: str, source: Any, components: str, unit: str) -> Array:
+def values(domain: Domain, name: str, source: Any, components: str, unit: str) -> Array:
     """A field of this rank's particles.
 
     Args:
-        scene: Their scene.
-        name: What messages call it, and what it is called in the file of an earlier run.
-        source: Where it comes from.
+        domain: The particles.
+        name: What messages call the field, and its name in the file of an earlier run.
+        source: Where the values come from.
         components: Of the field, as 'x y'.
         unit: What messages say after the numbers.
 
@@ -223,15 +222,15 @@ def values(scene: Scene, name: str, source: Any, components: str, unit: str) -> 
         Particles x components.
 
     Raises:
-        InputError: Another shape, numbers that are not finite, or what the source says.
+        InputError: Another shape, numbers that are not finite, or an error of the source.
     """
-    x, number = np.asarray(scene.particles.x), np.asarray(scene.particles.number)
+    x, number = np.asarray(domain.particles.x), np.asarray(domain.particles.number)
     width = len(components.split())
-    given = isinstance(source, Earlier | Table) or callable(source)
-    if given and not len(x):  # a rank without particles
+    at_positions = isinstance(source, Earlier | Table) or callable(source)
+    if at_positions and not len(x):  # a rank without particles
         return np.empty((0, width))
     if isinstance(source, Earlier):
-        found = source.at(name, x, number, width, scene.grid.h, name)
+        found = source.at(name, x, number, width, domain.model.grid.h, name)
     elif isinstance(source, Table):
         if source.values.shape[1] != width:
             raise InputError(
@@ -242,9 +241,9 @@ def values(scene: Scene, name: str, source: Any, components: str, unit: str) -> 
     elif callable(source):
         found = _of_function(source, x, name, components)
     else:
-        whole = _of_numbers(source, scene.num_particles, width, name)
-        _check_finite(whole, np.arange(len(whole)), name, unit)
-        found = whole[number]
+        of_body = _of_numbers(source, domain.model.num_particles, width, name)
+        _check_finite(of_body, np.arange(len(of_body)), name, unit)
+        found = of_body[number]
     _check_finite(found, number, name, unit)
     return found
 

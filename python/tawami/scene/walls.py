@@ -17,17 +17,19 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from tawami.field.constraints import Held
 from tawami.grid.basis import Basis
-from tawami.grid.edges import Held, edge_functions
+from tawami.grid.edges import edge_functions
 from tawami.grid.grid import Edge, Grid
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-#: Forces and displacements that count as none, relative to the largest on the wall and to h.
+#: Forces and displacements below which they are round-off, relative to the largest force on the wall
+#: and to h.
 FORCE, GAP = 1e-6, 1e-12
 #: Times that a function may come back to the wall, or to rest, in one step.
-TURNS = 4
+RETURNS = 4
 
 
 @dataclass
@@ -56,9 +58,8 @@ class Wall:
 
     Attributes:
         functions: Displacement functions along it.
-        state: Their state.
-        taken: Whether other supports prescribe their components, functions x 2.
-        turns: How often each came back to the wall or to rest in this step.
+        state: Their states of contact.
+        returns: How often each came back to the wall or to rest in this step.
     """
 
     grid: Grid
@@ -68,8 +69,7 @@ class Wall:
     separates: bool
     functions: npt.NDArray[np.int64] = field(init=False)
     state: Contact = field(init=False)
-    taken: Mask = field(init=False)
-    turns: npt.NDArray[np.int64] = field(init=False)
+    returns: npt.NDArray[np.int64] = field(init=False)
 
     def __post_init__(self) -> None:
         self.functions = edge_functions(self.grid, self.basis, self.edge)
@@ -77,12 +77,11 @@ class Wall:
         # without friction nothing sticks; the sign does not matter then
         slip = np.full(n, 1 if self.friction == 0 else 0, dtype=np.int8)
         self.state = Contact(np.ones(n, dtype=bool), slip)
-        self.taken = np.zeros((n, 2), dtype=bool)
         self.begin()
 
     def begin(self) -> None:
-        """A new step."""
-        self.turns = np.zeros(len(self.functions), dtype=np.int64)
+        """Start a step: forget how often functions came back in the last one."""
+        self.returns = np.zeros(len(self.functions), dtype=np.int64)
 
     @property
     def _axes(self) -> tuple[int, int, int]:
@@ -96,63 +95,72 @@ class Wall:
         across, _, _ = self._axes
         return 2 * self.functions[self.state.touching] + across
 
-    def held(self, active: Mask, fixed: Mask, start: Array, gap: Array) -> list[Held]:
+    def prescribed(self, fixed: Mask) -> Mask:
+        """Whether other supports prescribe its components, functions x 2.
+
+        Args:
+            fixed: Whether other supports prescribe each displacement coefficient.
+        """
+        mask: Mask = fixed[2 * self.functions[:, None] + np.arange(2)]
+        return mask
+
+    def held(self, active: Mask, prescribed: Mask, start: Array, before: Array) -> list[Held]:
         """What the wall prescribes in the present states.
 
         Args:
             active: Whether each displacement coefficient has particles.
-            fixed: Whether other supports prescribe it; then the wall does not.
+            prescribed: As :meth:`prescribed` gives it; the wall leaves these to the other supports.
             start: Coefficients that are there already, which the values include.
-            gap: Displacement coefficients since the body touched the wall.
+            before: Displacement coefficients since the body touched the wall.
         """
         across, along, _ = self._axes
-        self.taken = fixed[2 * self.functions[:, None] + np.arange(2)]
         touching, supports = self.state.touching, []
         for axis, mask in ((across, touching), (along, touching & (self.state.slip == 0))):
-            indices = 2 * self.functions[mask & ~self.taken[:, axis]] + axis
+            indices = 2 * self.functions[mask & ~prescribed[:, axis]] + axis
             indices = indices[active[indices]]
-            values = start[indices] - (gap[indices] if axis == across else 0.0)
+            values = start[indices] - (before[indices] if axis == across else 0.0)
             supports.append(Held(indices, values))
         return supports
 
-    def friction_of(self, forces: Array) -> Array:
-        """Friction on the body (functions x 2), from what the wall has to give to hold it."""
+    def friction_of(self, forces: Array, prescribed: Mask) -> Array:
+        """Friction on the body (functions x 2) from what the wall has to exert to hold it."""
         across, along, inward = self._axes
         friction = np.zeros_like(forces)
-        sliding = self.state.touching & (self.state.slip != 0) & ~self.taken[:, along]
+        sliding = self.state.touching & (self.state.slip != 0) & ~prescribed[:, along]
         f = self.functions[sliding]
         push = np.maximum(inward * forces[f, across], 0.0)
         friction[f, along] = self.friction * push * self.state.slip[sliding] if self.friction else 0
         return friction
 
-    def adapt(self, forces: Array, u: Array, gap: Array, active: Mask) -> bool:
-        """Change the states that contradict a solution; whether there were any.
+    def adapt(self, forces: Array, u: Array, before: Array, active: Mask, prescribed: Mask) -> bool:
+        """Change the states that contradict a solution; returns whether there were any.
 
-        A function that comes back to the wall, or to rest, too often in one step goes round in
-        circles and is let go.
+        A function that comes back to the wall, or to rest, more than RERETURNS times in one step
+        keeps its state: otherwise the search could repeat the same states for ever.
 
         Args:
-            forces: Reactions that supports and walls give, functions x 2.
+            forces: What supports and walls exert on the body, functions x 2.
             u: Displacement increments, functions x 2.
-            gap: Displacement before them since the body touched the wall.
+            before: Displacement before them since the body touched the wall, functions x 2.
             active: Whether each function has particles.
+            prescribed: As :meth:`prescribed` gives it.
         """
         across, along, inward = self._axes
-        f, state, nowhere = self.functions, self.state, GAP * self.grid.h
-        here, loose = active[f], ~self.taken
+        f, state, no_distance = self.functions, self.state, GAP * self.grid.h
+        here, free_of_supports = active[f], ~prescribed
         push, moved = inward * forces[f, across], u[f, along]
-        none = FORCE * np.abs(forces[f]).max(initial=0.0)
-        below = inward * (gap + u)[f, across] < -nowhere
-        free = here & loose[:, across]
-        leaves = free & state.touching & self.separates & (push < -none)
-        meets = free & ~state.touching & below & (self.turns < TURNS)
+        no_force = FORCE * np.abs(forces[f]).max(initial=0.0)
+        below = inward * (before + u)[f, across] < -no_distance
+        free = here & free_of_supports[:, across]
+        leaves = free & state.touching & self.separates & (push < -no_force)
+        meets = free & ~state.touching & below & (self.returns < RETURNS)
         slides, sticks = np.zeros_like(here), np.zeros_like(here)
         if self.friction > 0:
-            held = here & state.touching & ~leaves & loose[:, along]
+            held = here & state.touching & ~leaves & free_of_supports[:, along]
             bound = self.friction * np.maximum(push, 0.0) if np.isfinite(self.friction) else np.inf
-            slides = held & (state.slip == 0) & (np.abs(forces[f, along]) > bound + none)
-            sticks = held & (state.slip * moved > nowhere) & (self.turns < TURNS)
-        self.turns += meets | sticks
+            slides = held & (state.slip == 0) & (np.abs(forces[f, along]) > bound + no_force)
+            sticks = held & (state.slip * moved > no_distance) & (self.returns < RETURNS)
+        self.returns += meets | sticks
         state.touching = (state.touching & ~leaves) | meets
         state.slip[slides] = np.sign(forces[f, along][slides]).astype(np.int8)
         if self.friction > 0:

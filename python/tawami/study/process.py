@@ -25,7 +25,7 @@ import numpy as np
 
 from tawami.base import checks
 from tawami.base.errors import InputError, OutputError, TawamiError
-from tawami.base.ranks import own_environment
+from tawami.base.program import own_environment
 from tawami.base.timing import tally
 from tawami.fem.environment import peak_memory
 

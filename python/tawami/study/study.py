@@ -20,7 +20,7 @@ from mpi4py import MPI
 
 from tawami.base import checks
 from tawami.base.errors import InputError, OutputError
-from tawami.results.output import result_folder, whole_file
+from tawami.base.files import atomic_file, result_folder
 from tawami.study import process
 from tawami.study.table import COSTS, Row, Table, error_of, text_of
 
@@ -289,7 +289,7 @@ class Study:
                     file=sys.stderr, flush=True,
                 )  # fmt: skip
         table = self.table()
-        with whole_file(folder / f"{self.name}.csv") as part:
+        with atomic_file(folder / f"{self.name}.csv") as part:
             part.write_text(table.as_csv())
         if not table.quantities:
             print(f"study '{self.name}': no run succeeded", file=sys.stderr)

@@ -9,7 +9,8 @@ from pathlib import Path
 from mpi4py import MPI
 
 import tawami
-from tawami.results.output import result_folder, write_grid, write_particles
+from tawami.base.files import result_folder
+from tawami.results.single import write_grid, write_particles
 
 RESULTS = Path("results") / Path(__file__).stem
 CELLS_OVER_THE_HEIGHT = 16

@@ -1,0 +1,1 @@
+"""What the cases share: program, tables, figures and finite elements."""

@@ -1,5 +1,0 @@
-"""Cook's membrane: mixed u-eps_v MPM beside B-bar, displacement only and FEM.
-
-python -m cases.cook          the whole study: table and figures
-python -m cases.cook.fem      finite elements alone, in plain dolfinx
-"""

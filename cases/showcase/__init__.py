@@ -1,0 +1,1 @@
+"""Cases that show what the method can do."""

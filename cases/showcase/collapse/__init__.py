@@ -1,0 +1,4 @@
+"""A pile of aluminium rods collapses under its own weight.
+
+python -m cases.showcase.collapse
+"""

@@ -1,0 +1,109 @@
+"""Programs on several ranks: how they start, and how an error on one rank ends all of them.
+
+An error that nothing catches is printed once and ends all ranks (:func:`watch`); without that the
+others would wait for ever.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, NoReturn
+
+from mpi4py import MPI
+
+from tawami.base import checks
+from tawami.base.errors import TawamiError
+from tawami.base.petsc import clean_up, keep_communicator
+
+#: Seconds that a rank gives each rank before it to print its message first, and the longest wait.
+COURTESY, LONGEST = 1.0, 4.0
+
+
+def watch(comm: Any) -> None:
+    """Let an uncaught error on one rank end all ranks, and share the processors among the ranks."""
+    if comm.size == 1 or sys.excepthook is _end_all:
+        return
+    sys.excepthook = _end_all
+    os.environ.setdefault("RAYON_NUM_THREADS", str(_processors(comm)))
+    # at exit PETSc frees dropped objects in a call for all ranks: every rank must make it
+    keep_communicator(comm)
+    atexit.register(clean_up, comm)
+
+
+def _processors(comm: Any) -> int:
+    """Processors of this rank; those shared with other ranks of the machine count in part."""
+    machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    all_of_them = machine.allgather(os.sched_getaffinity(0))
+    machine.Free()
+    sharing = [sum(cpu in other for other in all_of_them) for cpu in os.sched_getaffinity(0)]
+    return max(1, int(sum(1 / count for count in sharing) + 1e-9))
+
+
+def _end_all(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    _abort("".join(traceback.format_exception(kind, error, trace)))
+
+
+def _abort(text: str) -> NoReturn:
+    """Print a message, unless a lower rank does, and end all ranks."""
+    comm = MPI.COMM_WORLD
+    time.sleep(min(COURTESY * comm.rank, LONGEST))
+    sys.stderr.write(text)
+    sys.stderr.flush()
+    comm.Abort(1)
+    raise SystemExit(1)
+
+
+def own_environment() -> dict[str, str]:
+    """The environment without the variables of MPI: a child process is not a rank of this program."""
+    own = ("OMPI_", "PMIX_", "PRTE_")
+    return {k: v for k, v in os.environ.items() if not k.startswith(own)}
+
+
+def mpirun(number: int, command: list[str]) -> tuple[list[str], dict[str, str]]:
+    """Command and environment that start several ranks, also from a process that is a rank itself.
+
+    There may be more ranks than processors, and root may start them, as in containers.
+    """
+    environment = own_environment() | {
+        "OMPI_ALLOW_RUN_AS_ROOT": "1",
+        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+        "OMPI_MCA_rmaps_base_oversubscribe": "1",
+        "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
+    }
+    return ["mpirun", "-n", str(number), *command], environment
+
+
+def stop(text: str) -> NoReturn:
+    """Print a message once and end all ranks with exit code 1."""
+    if MPI.COMM_WORLD.size > 1:
+        _abort(text)
+    sys.exit(text.removesuffix("\n"))
+
+
+def run(main: Callable[[], None], name: str) -> None:
+    """Run a driver; an error of tawami becomes one line and exit code 1, on all ranks.
+
+    Args:
+        main: Function without arguments. On several ranks only the first one prints.
+        name: First word of the line.
+    """
+    comm = MPI.COMM_WORLD
+    checks.instance("run: main", main, Callable, "a function without arguments")
+    watch(comm)
+    if comm.rank > 0:
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - until the end of the process
+    try:
+        main()
+    except TawamiError as error:
+        notes = getattr(error, "__notes__", [])  # as the time of a step that failed
+        stop(f"{name}: {'; '.join([str(error), *notes])}\n")
+    except SystemExit as end:  # sys.exit on one rank: the others would wait for it
+        if comm.size == 1 or end.code in (0, None):
+            raise
+        _abort(f"{end.code}\n" if isinstance(end.code, str) else "")

@@ -1,0 +1,34 @@
+"""Lines of text with a label, as the headers of runs have them."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+
+WIDTH, LABEL = 100, 13
+#: Names that a line lists before it counts the rest.
+MOST = 6
+
+
+def labelled(label: str, text: str) -> str:
+    """A text after its label, wrapped and indented."""
+    return textwrap.fill(
+        f"{label:{LABEL}} {text}",
+        WIDTH,
+        subsequent_indent=" " * (LABEL + 1),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def listed(texts: Sequence[str]) -> str:
+    """The first few texts, and the number of the others."""
+    if not texts:
+        return "none"
+    more = [f"{len(texts) - MOST} others"] if len(texts) > MOST else []
+    return ", ".join([*texts[:MOST], *more])
+
+
+def size(number: int) -> str:
+    """A number of bytes."""
+    return f"{number / 1e6:.3g} MB" if number >= 1e6 else f"{number / 1e3:.3g} kB"

@@ -1,0 +1,56 @@
+"""Polygons clipped by the cells of the grid.
+
+shapely is imported in the functions that need it: a scene without such bodies does not load it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tawami.body.points import ROUND_OFF, Array, Numbers
+from tawami.grid.grid import ON_LINE, Grid
+from tawami.grid.space import lattice
+
+
+def on_lines(grid: Grid, x: Array) -> Array:
+    """Positions [m] in cells; those within ON_LINE of a line of the grid are moved onto it."""
+    scaled = grid.in_cells(x)
+    near = np.isclose(scaled, np.rint(scaled), rtol=0, atol=ON_LINE)
+    return np.where(near, np.rint(scaled), scaled)
+
+
+def squares(index: Numbers) -> Any:
+    """Cells as boxes of shapely, given their indices (i, j), n x 2."""
+    import shapely
+
+    return shapely.box(*index.T, *(index + 1).T)
+
+
+def clipped(grid: Grid, shape: Any) -> tuple[Numbers, Array, Numbers]:
+    """A polygon or multipolygon in cells, clipped by the cells.
+
+    Returns:
+        Numbers of the cells that it fills; triangles (n x 3 x 2) of its parts in other cells; the cell
+        of each triangle.
+    """
+    import shapely
+
+    bounds = np.array(shape.bounds)
+    lower, upper = np.floor(bounds[:2]).astype(int), np.ceil(bounds[2:]).astype(int)
+    index = lattice([np.arange(a, b) for a, b in zip(lower, upper, strict=True)])
+    cell, boxes = grid.cell_numbers(index), squares(index)
+    shapely.prepare(shape)
+    full = shapely.covers(shape, boxes)
+    rest = np.flatnonzero(~full & shapely.intersects(shape, boxes))
+    parts = shapely.intersection(shape, boxes[rest])
+    area = shapely.area(parts)
+    full[rest[area > 1 - ROUND_OFF]] = True
+    cut = (area > 0) & ~full[rest]
+    triangles, of_part = shapely.get_parts(
+        shapely.constrained_delaunay_triangles(parts[cut]), return_index=True
+    )
+    large = shapely.area(triangles) > ROUND_OFF * min(1.0, shape.area)
+    corners = shapely.get_coordinates(triangles[large]).reshape(-1, 4, 2)[:, :3]
+    return cell[full], corners, cell[rest[cut][of_part[large]]]

@@ -1,0 +1,145 @@
+"""Full and cut cells filled with particles.
+
+A full cell gets per_axis x per_axis particles. The part of a cut cell that a shape covers is divided
+into triangles, with the points of a Gauss rule in each. Where these are more than 28, they are replaced
+by at most 28 that have the same moments (`moment_fitting`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from tawami import _rust
+from tawami.base.checks import instance, room, shown, switch, whole_number
+from tawami.base.errors import InputError
+from tawami.body.body import Body
+from tawami.body.moment_fitting import fewer
+from tawami.body.points import ROUND_OFF, Array, Mask, Numbers, Points, joined
+from tawami.grid.grid import Grid
+from tawami.grid.space import lattice, tensor_product
+
+#: Largest Gauss rule along an axis.
+MOST_POINTS = 1000
+#: Memory of a particle while a body is filled and in the arrays of a scene [bytes].
+BYTES_PER_PARTICLE = 128.0
+
+
+class Filling:
+    """How the cells of a grid are filled with particles: the arguments that all shapes share.
+
+    Attributes:
+        grid: The grid.
+        per_axis: Particles per full cell and axis.
+        points: Their positions along an axis, in a cell from 0 to 1.
+        weights: Their weights along an axis.
+
+    Args:
+        shape: Name of the shape, for error messages.
+        grid: The grid.
+        per_axis: Particles per full cell and axis.
+        gauss: Whether they are at the Gauss points with the Gauss weights.
+
+    Raises:
+        InputError: An argument is of another type or out of its range, or memory does not suffice.
+    """
+
+    def __init__(self, shape: str, grid: Any, per_axis: int, gauss: bool) -> None:
+        instance(f"{shape}: grid", grid, Grid, "a tawami.Grid")
+        self.grid: Grid = grid
+        self.per_axis = whole_number("per_axis", per_axis, low=1)
+        self.check_memory(1)
+        n = self.per_axis
+        if switch("gauss", gauss):
+            self.points, self.weights = _rust.gauss(
+                whole_number("per_axis", n, low=1, high=MOST_POINTS)
+            )
+        else:
+            self.points, self.weights = (np.arange(n) + 0.5) / n, np.full(n, 1 / n)
+
+    @property
+    def per_cell(self) -> int:
+        """Particles per full cell."""
+        return int(self.per_axis**self.grid.space.dim)
+
+    def check_memory(self, cells: int) -> None:
+        """Check that there is memory for the particles of so many full cells.
+
+        Raises:
+            InputError: There is not.
+        """
+        what = f"per_axis = {shown(self.per_axis)} in {cells} cell{'s' if cells > 1 else ''}"
+        room(what, cells * self.per_cell, BYTES_PER_PARTICLE, "expected fewer particles")
+
+    def in_full_cells(self, cell: Numbers, material: Numbers) -> Points:
+        """The particles of full cells, given the numbers of cells and of their materials."""
+        self.check_memory(max(len(cell), 1))
+        dim = self.grid.space.dim
+        corner = self.grid.cell_indices(cell)
+        return Points(
+            (corner[:, None] + lattice([self.points] * dim)).reshape(-1, dim),
+            np.tile(tensor_product([self.weights] * dim), len(cell)),
+            np.repeat(cell, self.per_cell),
+            np.repeat(material, self.per_cell),
+        )
+
+    def body(
+        self,
+        full: Numbers,
+        cut: Points,
+        *,
+        material: Numbers | None = None,
+        names: tuple[str, ...] | None = None,
+        allowed: Callable[[Array], Mask] | None = None,
+    ) -> Body:
+        """The particles of full and of cut cells.
+
+        Args:
+            full: Numbers of the full cells.
+            cut: Points that integrate over parts of cells.
+            material: Number of the material of each full cell.
+            names: Names of the materials; None for a body of one material.
+            allowed: Tells which positions (n x dim) are inside the shape; by default all are.
+
+        Raises:
+            InputError: There is no particle.
+        """
+        material = np.zeros_like(full) if material is None else material
+        parts = joined([self.in_full_cells(full, material), self._thinned(cut, len(full), allowed)])
+        if not len(parts.x):
+            raise InputError("the body has no particles: expected a shape with an area")
+        x, volume = (
+            self.grid.in_metres(parts.x),
+            self.grid.space.measure(self.grid.h) * parts.weight,
+        )
+        if names is None:
+            return Body(x, volume)
+        return Body(x, volume, parts.material.astype(np.uint32), names)
+
+    def _thinned(
+        self, points: Points, full: int, allowed: Callable[[Array], Mask] | None
+    ) -> Points:
+        """At most 28 points for each material in each cell; none for parts that are round-off.
+
+        Args:
+            points: Points that integrate over parts of cells.
+            full: Number of full cells, to judge what is round-off.
+            allowed: As in `body`.
+        """
+        num_materials = int(points.material.max(initial=0)) + 1
+        key = points.cell * num_materials + points.material
+        order = np.argsort(key, kind="stable")
+        starts = np.flatnonzero(np.diff(key[order], prepend=-1))
+        least = ROUND_OFF * min(1.0, full + float(points.weight.sum()))
+        parts = [points[order[:0]]]
+        for group in np.split(order, starts)[1:]:
+            x, weight = points.x[group], points.weight[group]
+            if weight.sum() <= least:
+                continue
+            inside = np.ones(len(x), dtype=bool) if allowed is None else allowed(x)
+            x, weight = fewer(x, weight, inside)
+            first = np.full(len(x), group[0])
+            parts.append(Points(x, weight, points.cell[first], points.material[first]))
+        return joined(parts)

@@ -1,0 +1,103 @@
+"""The space that bodies and fields live in: its dimension, names of components, cell measure, units.
+
+This is the only place that says that the grid is plane. Code that is not about the plane itself
+(clipping polygons, discs) asks `grid.space`, and never writes 2, 4, "xy" or h**2. A grid in three
+dimensions needs a second `Space`, a second form of `Position` and `Counts`, and that code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import reduce
+from itertools import combinations, product
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami.base.checks import one_of, shown
+from tawami.base.errors import InputError
+
+Scalar = TypeVar("Scalar", bound=np.generic)
+#: One number per axis [m], and one count per axis.
+Position = tuple[float, float]
+Counts = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Space:
+    """A space of some dimension.
+
+    Material laws are three-dimensional in every space: plane strain keeps the component zz.
+
+    Attributes:
+        axes: Names of the axes.
+        volume: Unit of the volume of a particle or a cell, in text.
+        depth: What extensive quantities refer to, in text after their unit.
+    """
+
+    axes: tuple[str, ...]
+    volume: str
+    depth: str
+
+    @property
+    def dim(self) -> int:
+        """Number of axes, and of components of a vector."""
+        return len(self.axes)
+
+    @property
+    def tensor(self) -> tuple[str, ...]:
+        """Names of the components of a symmetric tensor, in the order of `rust/tensor.rs`."""
+        return ("xx", "yy", "zz", *("".join(pair) for pair in combinations(self.axes, 2)))
+
+    @property
+    def gradient(self) -> tuple[str, ...]:
+        """Names of the components of the gradient of a vector: component, then derivative."""
+        return tuple("".join(pair) for pair in product(self.axes, repeat=2))
+
+    @property
+    def num_vertices(self) -> int:
+        """Vertices of a cell."""
+        return 1 << self.dim
+
+    def measure(self, h: float) -> float:
+        """Area or volume of a cell of side `h` [m]."""
+        return h**self.dim
+
+    def unit(self, unit: str) -> str:
+        """Unit of an extensive quantity: 'N per metre depth'."""
+        return unit + self.depth
+
+    def axis(self, component: str) -> int:
+        """Number of the axis with that name.
+
+        Raises:
+            InputError: No such axis.
+        """
+        if not one_of(component, self.axes):
+            expected = " or ".join(map(repr, self.axes))
+            raise InputError(f"component {shown(component)}: expected {expected}")
+        return self.axes.index(component)
+
+    def other_axes(self, axis: int) -> tuple[int, ...]:
+        """All axes but one: those along an edge that is normal to it."""
+        return tuple(k for k in range(self.dim) if k != axis)
+
+
+#: Plane strain.
+PLANE = Space(
+    axes=("x", "y"),
+    volume="m2",
+    depth=" per metre depth",
+)
+
+
+def lattice(along: Sequence[npt.NDArray[Scalar]]) -> npt.NDArray[Scalar]:
+    """Points of a lattice, points x axes, given its coordinates along each axis; x fastest."""
+    return np.stack([c.ravel(order="F") for c in np.meshgrid(*along, indexing="ij")], axis=-1)
+
+
+def tensor_product(along: Sequence[npt.NDArray[np.float64]]) -> npt.NDArray[np.float64]:
+    """Products of weights along each axis at the points of a lattice; x fastest."""
+    return reduce(lambda inner, outer: np.outer(outer, inner).ravel(), along)

@@ -1,0 +1,135 @@
+"""What particles carry in a motion, and its way to the grid and back.
+
+At small strain particles do not move: velocity and acceleration stay on the grid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami.base import ranks
+from tawami.motion.transfer import Transfer, gradient_of, to_grid
+from tawami.scene.configuration import Configuration
+
+Array = npt.NDArray[np.float64]
+#: Arrays of the particles with their numbers of components per particle.
+ARRAYS = {"velocity": 2, "acceleration": 2, "velocity_gradient": 4, "acceleration_gradient": 4}
+
+
+class Carried:
+    """Velocities and accelerations of the particles of a scene.
+
+    Args:
+        configuration: The body.
+        transfer: How velocities are transferred.
+        damping: Time in which velocities of FLIP relax towards those of PIC [s].
+    """
+
+    def __init__(self, configuration: Configuration, transfer: Transfer, damping: float) -> None:
+        self._now, self.transfer, self.damping = configuration, transfer, damping
+        particles = configuration.domain.particles
+        for name, width in ARRAYS.items():
+            particles.carry(name, width)
+            particles.carried(name)[:] = 0.0
+        #: v and a of a grid that stays (functions x 2), and the velocities that the particles got.
+        self._stationary: tuple[Array, Array, Array] | None = None
+
+    @property
+    def velocity(self) -> Array:
+        """v_p [m/s], a view: particles x 2."""
+        return self._view("velocity")
+
+    @property
+    def acceleration(self) -> Array:
+        """a_p [m/s2], a view: particles x 2."""
+        return self._view("acceleration")
+
+    @property
+    def velocity_gradient(self) -> Array:
+        """C_p [1/s], a view: particles x 2 x 2."""
+        return self._view("velocity_gradient").reshape(-1, 2, 2)
+
+    @property
+    def acceleration_gradient(self) -> Array:
+        """Gradient of the acceleration [1/s2], a view: particles x 2 x 2."""
+        return self._view("acceleration_gradient").reshape(-1, 2, 2)
+
+    def _view(self, name: str) -> Array:
+        return self._now.domain.particles.carried(name)
+
+    @property
+    def on_grid(self) -> tuple[Array, Array] | None:
+        """v and a of a grid that stays, functions x 2; None once velocities were written."""
+        if self._stationary is None:
+            return None
+        v, a, given = self._stationary
+        written = np.array([not np.array_equal(given, self.velocity)])
+        return None if ranks.any_of(self._now.model.grid.comm, written)[0] else (v, a)
+
+    def mapped(self, mass: Array) -> tuple[Array, Array]:
+        """v and a of the grid at the start of a step, functions x 2.
+
+        Args:
+            mass: Lumped mass of each function [kg per metre depth].
+        """
+        stationary = self.on_grid
+        if stationary is not None:
+            return stationary
+        domain = self._now.domain
+        v, a = (
+            divided(to_grid(domain, domain.mass, values, gradient), mass[:, None])
+            for values, gradient in (
+                (self.velocity, self.velocity_gradient),
+                (self.acceleration, self.acceleration_gradient),
+            )
+        )
+        return v, a
+
+    def at_end(self, u: Array, before: Array, v1: Array, a1: Array, dt: float) -> dict[str, Array]:
+        """The arrays of the particles at the end of a step, by name.
+
+        Args:
+            u: Increments of the displacement, functions x 2 [m].
+            before: Velocity of the grid as mapped from the particles.
+            v1, a1: Velocity and acceleration of the grid at the end of the step.
+            dt: Length of the step [s].
+        """
+        domain = self._now.domain
+        velocity = pic = domain.at_particles(v1)
+        if self.transfer.flip and self._now.model.moves:
+            flip = self.velocity + domain.at_particles(v1 - before)
+            velocity = pic + np.exp(-dt / self.damping) * (flip - pic)
+        f = np.eye(2) + domain.gradients(u)
+        return {
+            "velocity": velocity,
+            "acceleration": domain.at_particles(a1),
+            "velocity_gradient": gradient_of(self.transfer, domain, v1, f),
+            "acceleration_gradient": gradient_of(self.transfer, domain, a1, f),
+        }
+
+    def store(self, arrays: Mapping[str, Array], v1: Array, a1: Array) -> None:
+        """Store the arrays of :meth:`at_end`, and v and a where the grid stays."""
+        for name, values in arrays.items():
+            array = self._view(name)
+            array[:] = values.reshape(array.shape)
+        if not self._now.model.moves:
+            self._stationary = v1, a1, np.array(self.velocity)
+
+    def state(self) -> dict[str, Any]:
+        """What is not in the particles, for a checkpoint."""
+        stationary = self.on_grid
+        return {"on_grid": None if stationary is None else list(stationary)}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """The reverse of :meth:`state`, after the particles were restored."""
+        on_grid = state["on_grid"]
+        self._stationary = None if on_grid is None else (*on_grid, np.array(self.velocity))
+
+
+def divided(sums: Array, weights: Array) -> Array:
+    """Means from weighted sums; 0 for functions without particles."""
+    return np.asarray(np.divide(sums, weights, out=np.zeros_like(sums), where=weights > 0))

@@ -1,0 +1,211 @@
+"""One step of Newmark's method on the grid.
+
+    a1 = (u - dt v - dt^2 (1/2 - beta) a) / (beta dt^2),   v1 = v + dt ((1 - gamma) a + gamma a1)
+
+v and a are mapped from the particles (`tawami.motion.transfer`) and obey the supports, by an impulse of
+these; at the end of the step prescribed values replace v1 and a1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami.field.reduction import Reduction
+from tawami.motion.carried import Carried, divided
+from tawami.motion.energy import Balance, Energies
+from tawami.scene.configuration import Configuration
+from tawami.scene.contact import ActiveSet
+from tawami.scene.step import Accepted, Problem
+from tawami.scene.supports import Support
+from tawami.solve.inertia import Inertia
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass
+class Clock:
+    """Time and number of steps of a motion, and the loads that its accelerations belong to.
+
+    Attributes:
+        time: [s]
+        steps: Number of accepted steps.
+        loads: Signature of loads and supports when the last step was stored.
+    """
+
+    time: float = 0.0
+    steps: int = 0
+    loads: tuple[object, ...] = ()
+
+
+@dataclass(frozen=True)
+class Start:
+    """v and a that a step starts from, functions x 2, with the supports imposed.
+
+    Attributes:
+        v, a: [m/s], [m/s2]
+        reduction: The supports.
+        inertia: The inertia made of them.
+    """
+
+    v: Array
+    a: Array
+    reduction: Reduction
+    inertia: Inertia
+
+
+class NewmarkStep:
+    """A dynamic step of length dt.
+
+    Args:
+        configuration: The body.
+        carried: Velocities and accelerations of its particles.
+        balance: Its energy balance.
+        clock: Its time.
+        gamma, beta: Newmark's parameters.
+        dt: [s]
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        carried: Carried,
+        balance: Balance,
+        clock: Clock,
+        gamma: float,
+        beta: float,
+        dt: float,
+    ) -> None:
+        self._now, self._carried, self._balance, self._clock = (
+            configuration, carried, balance, clock
+        )  # fmt: skip
+        self._gamma, self._beta, self._dt, self.end = gamma, beta, dt, clock.time + dt
+        domain = configuration.domain
+        self._loads = signature(configuration)
+        self._mass = domain.sums(domain.mass, np.ones((len(domain.particles), 1)))[:, 0]
+        self._masses = np.repeat(self._mass, 2)
+        self._external = configuration.external()
+        self._mapped = carried.mapped(self._mass)
+        self._speed = self._prescribed(lambda support: support.velocity_at(clock.time))
+        self._speed1 = self._prescribed(lambda support: support.velocity_at(self.end))
+        self._speed_rate = (self._speed1 - self._speed) / dt
+
+    def _constraints(self, amount: Callable[[Support], float]) -> tuple[Reduction, ActiveSet]:
+        now, zero = self._now, np.zeros(self._now.domain.layout.size)
+        return now.supports.constraints(now.domain, amount, zero, now.before, moving=True)
+
+    def _prescribed(self, rate: Callable[[Support], float]) -> Array:
+        """Prescribed velocities on all coefficients [m/s]."""
+        if not any(support.velocity is not None for support in self._now.supports.all):
+            return np.zeros(self._now.domain.layout.size)
+        return self._constraints(rate)[0].offset
+
+    def _displacement(self, support: Support) -> float:
+        """Displacement that a support prescribes in the step [m]."""
+        start, end = (support.velocity_at(time) for time in (self._clock.time, self.end))
+        return 0.5 * self._dt * (start + end)
+
+    def problem(self) -> Problem:
+        """The problem in the present states of the walls."""
+        now, dt = self._now, self._dt
+        crossings = now.supports.crossings(self._displacement) if now.model.moves else {}
+        reduction, contact = self._constraints(self._displacement)
+        v, a = self._mapped
+        if self._loads != self._clock.loads:  # a belongs to other loads
+            a = self._first_acceleration(a)
+        v = reduction.imposed(v.ravel(), self._masses, self._speed).reshape(-1, 2)
+        a = reduction.imposed(a.ravel(), self._masses, self._speed_rate).reshape(-1, 2)
+        slope = 1 / (self._beta * dt**2)
+        back = (0.5 / self._beta - 1) * a.ravel()
+        impulse = self._masses * (v - self._mapped[0]).ravel() / dt
+        inertia = Inertia(self._masses, slope, dt * v.ravel(), back, impulse)
+        self._start = Start(v, a, reduction, inertia)
+        return Problem(
+            reduction, contact, self._external, inertia, self._guess(dt * v.ravel()), crossings
+        )
+
+    def _first_acceleration(self, like: Array) -> Array:
+        """Acceleration by the momentum equation: g in free fall, 0 at rest."""
+        domain = self._now.domain
+        internal = domain.newton.internal(np.zeros(domain.layout.size))
+        force = (self._external - internal)[: like.size].reshape(-1, 2)
+        return divided(force, self._mass[:, None])
+
+    def _guess(self, u: Array) -> Array:
+        """First iterate: u = dt v, eps_v the lumped projection of its div u (ln det f)."""
+        domain = self._now.domain
+        guess = np.zeros(domain.layout.size)
+        n = u.size
+        guess[:n] = u
+        if domain.model.form.kinematics.has_eps_v:
+            ln_j = domain.stage.volume_strains(guess[:n], None)[:, 0]
+            weight = domain.constants["K"] * domain.particles.volume
+            # a guess that halves a particle or inverts it is limited
+            data = np.column_stack([np.fmax(ln_j, np.log(0.5)), np.ones(len(weight))])
+            sums = domain.sums(weight, data, "bilinear")
+            guess[n:] = divided(sums[:, 0], sums[:, 1])
+        return guess
+
+    def accept(self, accepted: Accepted) -> NewmarkUpdate:
+        """Velocities, accelerations and energies at the end of the step."""
+        assert accepted.acceleration is not None
+        start, dt, a1 = self._start, self._dt, accepted.acceleration
+        v1 = start.v + dt * ((1 - self._gamma) * start.a + self._gamma * a1)
+        v1 = start.reduction.imposed(v1.ravel(), self._masses, self._speed1).reshape(-1, 2)
+        a1 = start.reduction.imposed(a1.ravel(), self._masses, self._speed_rate).reshape(-1, 2)
+        before = self._mapped[0]
+        arrays = self._carried.at_end(accepted.u, before, v1, a1, dt)
+        energies = self._balance.of_step(self._mass, (before, start.v, v1), accepted)
+        given = float(start.inertia.impulse @ start.v.ravel()) * dt
+        energies.external += given
+        energies.impact += given
+        clock = Clock(self.end, self._clock.steps + 1, self._loads)
+        return NewmarkUpdate(
+            self._now, self._carried, self._balance, self._clock, clock, arrays, (v1, a1), energies,
+            len(self._now.left),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class NewmarkUpdate:
+    """What a dynamic step stores; nothing in it fails.
+
+    Attributes:
+        configuration, carried, balance, clock: What it changes.
+        time: The clock at the end of the step.
+        arrays: Of the particles.
+        on_grid: v1 and a1, functions x 2.
+        energies: Terms of the balance.
+        left: Number of particles that had left the grid before.
+    """
+
+    configuration: Configuration
+    carried: Carried
+    balance: Balance
+    clock: Clock
+    time: Clock
+    arrays: dict[str, Array]
+    on_grid: tuple[Array, Array]
+    energies: Energies
+    left: int
+
+    def store(self, dissipated: float) -> None:
+        """After the particles have their stress and before they move."""
+        self.carried.store(self.arrays, *self.on_grid)
+        vars(self.clock).update(vars(self.time))
+        self.balance.store(self.energies, dissipated, self.clock.steps, self.clock.time)
+
+    def finish(self) -> None:
+        """After the particles have moved."""
+        self.configuration.accept(1.0)
+        if len(self.configuration.left) > self.left:
+            self.balance.remove_left()
+
+
+def signature(configuration: Configuration) -> tuple[object, ...]:
+    """A value that differs once loads or supports are others."""
+    supports = configuration.supports
+    return (*configuration.loads.signature, *map(id, supports.all), *map(id, supports.walls))

@@ -1,0 +1,132 @@
+"""Folder of a run: what it holds, and `run.json`, the record of the run."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from tawami.base import archive
+from tawami.base.errors import InputError, OutputError
+from tawami.base.files import atomic_file, reason, result_folder
+from tawami.results import provenance
+from tawami.results.output import PHASES
+from tawami.results.progress import LOG
+from tawami.results.provenance import FORM, RUN, SCRIPT
+
+#: Copies that belong to a run.
+COPIES = (SCRIPT, FORM)
+log = logging.getLogger("tawami")
+
+
+class RunFolder:
+    """The folder of a run; its methods are for the first rank.
+
+    Args:
+        path: Of the folder.
+        existing: What to do with a run in it: 'stop', 'replace' or 'resume'.
+    """
+
+    def __init__(self, path: Path, existing: str) -> None:
+        self.path, self.existing = path, existing
+
+    @property
+    def checkpoints(self) -> list[Path]:
+        """Its checkpoints, oldest first."""
+        return archive.files(self.path)
+
+    def open(self) -> bool:
+        """Prepare the folder for a run; whether an earlier run in it is resumed.
+
+        Raises:
+            InputError: It holds a run and `existing` is 'stop', a finished run that cannot be resumed,
+                or files that are not of a run.
+            OutputError: It cannot be written.
+        """
+        result_folder(self.path)
+        known, recorded = self._record(), os.path.exists(self.path / RUN)
+        phases = known.get("phases", [])
+        # a run that was refused before its first step has no phases
+        begun = recorded and not (known and not phases)
+        resumes = False
+        if self.checkpoints or begun:
+            if self.existing == "stop":
+                raise InputError(
+                    f"Results('{self.path}'): the folder holds a run{self._reached()}. Expected another "
+                    "folder, existing='resume' to resume it, or existing='replace' to replace it"
+                )
+            resumes = self.existing == "resume" and bool(self.checkpoints)
+            finished = [one["name"] for one in phases if "finished" in one]
+            if self.existing == "resume" and finished and not resumes:
+                raise InputError(
+                    f"Results('{self.path}'): the folder holds a run that finished {finished[-1]}, and "
+                    "no checkpoint to resume it from: expected its checkpoints, or existing='replace' "
+                    "to start anew"
+                )
+            if not resumes:
+                self._clear()
+        elif not recorded:
+            others = [name for name in COPIES if self._is_foreign(self.path / name)]
+            if others:
+                raise InputError(
+                    f"Results('{self.path}'): the folder holds '{others[0]}', which is of no run: "
+                    "expected a folder of its own for the results"
+                )
+        result_folder(self.path / archive.FOLDER)
+        return resumes
+
+    def note(self, phase: str, facts: Mapping[str, Any]) -> None:
+        """Add facts about a phase to run.json.
+
+        Raises:
+            OutputError: It cannot be written.
+        """
+        run, known = self.path / RUN, self._record()
+        if not known:
+            log.warning("'%s' cannot be read; nothing about %s is added", run, phase)
+            return
+        phases = {one["name"]: one for one in known.get("phases", [])}
+        phases[phase] = phases.get(phase, {"name": phase}) | facts
+        known["phases"] = list(phases.values())
+        with atomic_file(run) as part:
+            part.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
+
+    @staticmethod
+    def _is_foreign(path: Path) -> bool:
+        """Whether a file exists, and is not the script that runs now."""
+        script, _ = provenance.driver()
+        return os.path.exists(path) and not (script is not None and path.resolve() == script)
+
+    def _record(self) -> dict[str, Any]:
+        """Content of run.json; empty if it cannot be read."""
+        try:
+            known = json.loads((self.path / RUN).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return known if isinstance(known, dict) else {}
+
+    def _reached(self) -> str:
+        """How far the run in the folder has come, for a message."""
+        files = self.checkpoints
+        return f", last checkpoint '{files[-1].name}'" if files else ""
+
+    def _clear(self) -> None:
+        """Remove the files of a run, and nothing else."""
+        try:
+            for path in (self.path / name for name in (RUN, LOG, *COPIES)):
+                if self._is_foreign(path):
+                    path.unlink()
+            for path in self.path.iterdir():
+                kind, _, number = path.name.partition("-")
+                of_phase = kind in PHASES and (number.isdigit() or path.name == kind)
+                if path.is_dir() and (of_phase or path.name == archive.FOLDER):
+                    shutil.rmtree(path)
+        except OSError as error:
+            raise OutputError(
+                f"'{error.filename}' cannot be removed ({reason(error)}): expected a folder with write "
+                "permission; choose another one"
+            ) from error

@@ -1,0 +1,104 @@
+"""Outputs of particles and grid as series of VTU files.
+
+ParaView and pyvista open a series by its index (.pvd). A vertex of the grid without particles around
+it has no stress: NaN, which ParaView draws in its NaN colour. A threshold of `particles [-]` from 1
+leaves the cells of the body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from tawami.base.ranks import raise_together
+from tawami.motion.observer import Snapshot, Subject
+from tawami.results.frame import Frame, grid_frame, particle_frame
+from tawami.results.output import Output
+from tawami.results.projection import Projection, check_projection
+from tawami.results.quantities import (
+    body_view,
+    of_particles,
+    on_grid,
+    usual_of_particles,
+    usual_on_grid,
+)
+from tawami.results.series import Series
+
+
+class _SeriesOutput(Output):
+    """One file a snapshot, and an index of them."""
+
+    def _open(self, folder: Path, last: int | None, subject: Subject) -> None:
+        self._series = Series(folder, self.name)
+        self._series.begin(last)
+
+    def _write(self, snapshot: Snapshot, size: float) -> None:
+        frame, comm = self._frame(snapshot), snapshot.scene.grid.comm
+        with raise_together(comm):
+            if comm.rank == 0:
+                self._series.write(snapshot.step, snapshot.time, frame)
+
+    def _frame(self, snapshot: Snapshot) -> Frame:
+        raise NotImplementedError
+
+
+class ParticleOutput(_SeriesOutput):
+    """Particles as points, in the order of their numbers.
+
+    Args:
+        names: 'displacement', 'stress', 'mean stress', 'deviatoric stress q' (Kirchhoff's at finite
+            strain), 'volume' (at the start), 'eps_v', 'velocity', 'acceleration', 'material',
+            'number', or a history variable of the laws; by default the usual quantities of the scene.
+        every, every_steps: When; see `Output`. Every step by default.
+        name: Of index and folder.
+        phases: As in `Output`.
+    """
+
+    def __init__(
+        self,
+        *names: str,
+        every: float | None = None,
+        every_steps: int | None = None,
+        name: str = "particles",
+        phases: Sequence[str] | None = None,
+    ) -> None:
+        super().__init__(names, every, every_steps, name, phases)
+
+    def _resolve(self, subject: Subject) -> None:
+        self._quantities = of_particles(self.names or usual_of_particles(subject), subject)
+
+    def _frame(self, snapshot: Snapshot) -> Frame:
+        return particle_frame(self._quantities, body_view(snapshot.subject))
+
+
+class GridOutput(_SeriesOutput):
+    """Cells of the grid.
+
+    Args:
+        names: 'displacement' (of the last step at finite strain), 'velocity', 'eps_v' or 'p' (since
+            the start, without an initial stress), 'particles' (in each cell), 'reaction' (of supports
+            and walls, distributed to the vertices with the same sum and moment), or, projected from
+            the particles, 'stress', 'mean stress', 'deviatoric stress q', a history variable, and at
+            finite strain 'eps_v'.
+        every, every_steps, name, phases: As in `ParticleOutput`.
+        projection: 'lumped' or 'consistent'; see `tawami.results.projection`.
+    """
+
+    def __init__(
+        self,
+        *names: str,
+        every: float | None = None,
+        every_steps: int | None = None,
+        name: str = "grid",
+        phases: Sequence[str] | None = None,
+        projection: Projection = "lumped",
+    ) -> None:
+        super().__init__(names, every, every_steps, name, phases)
+        self._projection = check_projection(projection)
+
+    def _resolve(self, subject: Subject) -> None:
+        names = self.names or usual_on_grid(subject.scene)
+        self._quantities = on_grid(names, subject, self._projection)
+
+    def _frame(self, snapshot: Snapshot) -> Frame:
+        return grid_frame(self._quantities, snapshot)

@@ -1,0 +1,275 @@
+"""The body in its present configuration, under its supports and loads: what a step starts from.
+
+A step either changes all of it or nothing.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami import _rust
+from tawami.base import ranks, signals
+from tawami.base.errors import ConvergenceError
+from tawami.base.identity import fingerprint
+from tawami.base.process import check_process
+from tawami.base.timing import Stopwatch
+from tawami.particles import placement
+from tawami.scene import coverage
+from tawami.scene.domain import Domain
+from tawami.scene.loads import Loads
+from tawami.scene.model import Model
+from tawami.scene.reactions import Reactions
+from tawami.scene.step import Accepted, Problem, StepKind
+from tawami.scene.supports import Supports
+from tawami.solve.newton import Converged
+from tawami.solve.numerics import Numerics
+
+Array = npt.NDArray[np.float64]
+#: Arrays of particles whose values are lengths, or lengths per time.
+LENGTHS = ("x", "displacement", "velocity", "acceleration")
+#: Solves of one step with other states of the walls, after which it has failed.
+PASSES = 40
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A step that was stored.
+
+    Attributes:
+        accepted: The step.
+        coefficients: Of all fields: since the start where particles do not move, of the step where
+            they do.
+        reactions: Forces of supports and walls.
+        particles: Arrays of the whole body at the end of the step, in the order of the numbers.
+    """
+
+    accepted: Accepted
+    coefficients: Array
+    reactions: Reactions
+    particles: Mapping[str, Array]
+
+
+class Configuration:
+    """Particles, supports and loads of one scene between two steps.
+
+    Args:
+        model: What the scene is made of.
+        particles: The particles of the whole body, on every rank.
+        numerics: How a step is solved.
+
+    Attributes:
+        domain: The particles where they are; another object after a step that moves them.
+        supports, loads: As the driver script made them.
+        total: Coefficients of all fields since the start, where particles do not move.
+        left: Number, position [m] and time [s] of the particles that left the grid.
+        begun: Whether a step was stored.
+        stopwatch: Where the time goes.
+    """
+
+    def __init__(self, model: Model, particles: _rust.Particles, numerics: Numerics) -> None:
+        self.model, self.numerics, self.stopwatch = model, numerics, Stopwatch()
+        mine, location = placement.distributed(model.grid, particles, moving=model.moves)
+        if model.form.kinematics.has_eps_v:
+            mine.add_eps_v()
+        self._attach(mine, location)
+        self.supports = Supports(model.grid, model.basis)
+        self.loads = Loads(model.grid, model.num_particles)
+        self.total = np.zeros(self.domain.layout.size)
+        self.left = list[tuple[int, tuple[float, float], float]]()
+        self.begun = self._coverage_checked = False
+
+    def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
+        self.domain = Domain.attach(self.model, particles, location, self.numerics, self.stopwatch)
+
+    @property
+    def before(self) -> Array:
+        """Coefficients since the start where particles do not move, 0 where they do."""
+        return np.zeros_like(self.total) if self.model.moves else self.total
+
+    def external(self, part: float = 1.0) -> Array:
+        """External forces on all coefficients [N per metre depth], under this part of what is new."""
+        return self.loads.external(self.domain, part)
+
+    def accept(self, part: float) -> None:
+        """Let later parts of loads and prescribed displacements grow from this one."""
+        for support in self.supports.all:
+            support.share.accept(part)
+        self.loads.accept(part)
+
+    @contextmanager
+    def tolerance(self, tolerance: float) -> Iterator[None]:
+        """Newton's tolerance within a block."""
+        usual = self.numerics
+        try:
+            self.numerics = self.domain.newton.numerics = replace(usual, tolerance=tolerance)
+            yield
+        finally:
+            self.numerics = self.domain.newton.numerics = usual
+
+    def check_coverage(self) -> None:
+        """Warn, once, of particles that do not integrate over the cells they fill."""
+        if not self._coverage_checked:
+            coverage.warn_of_faults(self.domain)
+            self._coverage_checked = True
+
+    # -- one step ------------------------------------------------------------
+
+    def advance(self, kind: StepKind) -> Outcome:
+        """Solve a step, store it in the particles, and move them where strains are finite.
+
+        Ctrl-C ends it before anything is stored, or after everything is.
+
+        Raises:
+            ConvergenceError, SingularError, SupportError, InputError: Nothing has changed.
+        """
+        check_process()
+        with ranks.raise_together(self.model.grid.comm):
+            self.domain.particles.check()
+        self.domain.warn_of_partial_cells()
+        walls = [copy.deepcopy(wall.state) for wall in self.supports.walls]
+        committed = False
+        try:
+            accepted = self._solve(kind)
+            moved = self._moved(accepted, kind.end)
+            update = kind.accept(accepted)
+            with signals.deferred():
+                with self.stopwatch("commit"), ranks.raise_together(self.model.grid.comm):
+                    fields = self.domain.layout.split(accepted.step.coefficients)
+                    dissipated = self.domain.stage.commit(*fields)
+                committed = True
+                update.store(dissipated)
+                outcome = self._store(accepted, moved, kind.end)
+                update.finish()
+                return outcome
+        except BaseException:  # Ctrl-C too
+            if not committed:
+                for wall, state in zip(self.supports.walls, walls, strict=True):
+                    wall.state = state
+            raise
+
+    def _solve(self, kind: StepKind) -> Accepted:
+        """A step in which no wall pulls, is passed through, or exceeds its friction."""
+        layout, supports = self.domain.layout, self.supports
+        n, step = layout.num_displacement, None
+        active, before = layout.active[:n:2], self.before[:n].reshape(-1, 2)
+        for wall in supports.walls:
+            wall.begin()
+        for _ in range(PASSES):
+            problem = kind.problem()
+            step = self._newton(problem, step)
+            forces, u = (part[:n].reshape(-1, 2) for part in (step.forces, step.coefficients))
+            if not problem.contact.adapt(forces, u, before, active):
+                a = step.acceleration
+                return Accepted(problem, step, u, None if a is None else a.reshape(-1, 2))
+        assert step is not None
+        raise ConvergenceError(
+            f"contact and friction of the walls did not settle in {PASSES} solves. Nothing was changed "
+            "in the particles. Take a smaller step",
+            step.history,
+        )
+
+    def _newton(self, problem: Problem, last: Converged | None) -> Converged:
+        """Solve a problem, from the solution for the last states of the walls if there is one."""
+        guess = problem.guess if last is None else last.coefficients
+        friction = problem.contact.friction if problem.contact.walls else None
+        found = self.domain.newton.solve(
+            problem.reduction, problem.external, problem.inertia, guess, friction
+        )
+        if last is None:
+            return found
+        history, krylov = last.history + found.history[1:], last.krylov + found.krylov
+        return replace(found, history=history, krylov=krylov)
+
+    def _moved(self, accepted: Accepted, time: float) -> Array | None:
+        """Positions at the end of the step [m]; None where particles do not move.
+
+        Raises:
+            InputError: A particle would leave the grid, and must not.
+        """
+        if not self.model.moves:
+            return None
+        particles = self.domain.particles
+        moved = np.asarray(particles.x + self.domain.at_particles(accepted.u))
+        stop = self.model.leaving == "stop"
+        placement.check_staying(self.model.grid, particles, moved, time, stop=stop)
+        return moved
+
+    def _store(self, accepted: Accepted, moved: Array | None, time: float) -> Outcome:
+        """Store a step that the laws have committed, and move the particles."""
+        self.begun = True
+        coefficients = accepted.step.coefficients
+        if moved is None:
+            coefficients = self.total = self.total + coefficients
+            return self._outcome(accepted, coefficients)
+        problem, grid = accepted.problem, self.model.grid
+        self.supports.follow(accepted.u, problem.reduction.points, problem.crossings)
+        self.domain.particles.move_to(moved)
+        outcome = self._outcome(accepted, coefficients)
+        particles, gone = placement.removed(grid, self.domain.particles)
+        self.left += [(number, x, time) for number, x in gone]
+        self._attach(*placement.migrated(grid, particles))
+        return outcome
+
+    def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:
+        particles, comm = self.domain.particles, self.model.grid.comm
+        names = ["number", "x", "volume", "stress", "displacement"]
+        names += ["eps_v"] if self.model.form.kinematics.has_eps_v else []
+        in_order = placement.in_order(comm, particles.number)
+        arrays = {name: in_order(getattr(particles, name)) for name in names}
+        reactions = Reactions.of(accepted, self.supports)
+        return Outcome(accepted, coefficients, reactions, arrays)
+
+    # -- checkpoints ---------------------------------------------------------
+
+    def identity(self) -> dict[str, Any]:
+        """What tells it from another one, for checkpoints; a call for all ranks."""
+        grid = self.model.grid
+        sizes = {"stress": self.domain.responses.stiffest} | dict.fromkeys(LENGTHS, grid.h)
+        arrays = placement.gathered(grid, self.domain.particles)
+        particles = {
+            f"'{name}' of the particles at its start": fingerprint(values, sizes.get(name, 1.0))
+            for name, values in arrays.items()
+        }
+        facts = {
+            "tolerance": self.numerics.tolerance,
+            "supports": self.supports.identity(),
+            "loads": self.loads.identity(),
+        }
+        return self.model.identity() | facts | particles
+
+    def state(self) -> dict[str, Any]:
+        """All that is carried from one step to the next, of all ranks; a call for all ranks."""
+        return {
+            "particles": placement.gathered(self.model.grid, self.domain.particles),
+            "total": self.total,
+            "left": self.left,
+            "coverage_checked": self._coverage_checked,
+            "supports": self.supports.state(),
+            "loads": self.loads.state(),
+            "newton": self.domain.newton.state(),
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """The reverse of :meth:`state`, for a scene that was made in the same way; a call for all ranks.
+
+        Raises:
+            CheckpointError: Particles with other arrays.
+        """
+        particles, location = placement.scattered(
+            self.model.grid, self.domain.particles, state["particles"], moving=self.model.moves
+        )
+        self.total = state["total"]
+        self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
+        self._coverage_checked, self.begun = state["coverage_checked"], True
+        self.supports.restore(state["supports"])
+        self.loads.restore(state["loads"])
+        self._attach(particles, location)
+        self.domain.newton.record()
+        self.domain.newton.restore(state["newton"])

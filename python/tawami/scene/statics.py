@@ -1,0 +1,60 @@
+"""A static step: equilibrium under a part of the loads and prescribed displacements that are new."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tawami.scene.configuration import Configuration
+from tawami.scene.step import Accepted, Problem
+from tawami.scene.supports import Support
+
+
+@dataclass(frozen=True)
+class StaticStep:
+    """Equilibrium under a part of what is new.
+
+    Attributes:
+        configuration: What it starts from.
+        part: From 0 to 1.
+    """
+
+    configuration: Configuration
+    part: float = 1.0
+
+    @property
+    def end(self) -> float:
+        """Statics has no time."""
+        return np.nan
+
+    def problem(self) -> Problem:
+        """The problem in the present states of the walls."""
+        now, moves = self.configuration, self.configuration.model.moves
+
+        def amount(support: Support) -> float:
+            """Factor of a value: all of it where coefficients are totals, what is missing elsewhere."""
+            share = support.share
+            return float(share.at(self.part) - (share.applied if moves else 0.0))
+
+        with now.stopwatch("set-up"):
+            crossings = now.supports.crossings(amount) if moves else {}
+            reduction, contact = now.supports.constraints(
+                now.domain, amount, now.before, now.before, moving=False
+            )
+            external = now.external(self.part)
+        return Problem(reduction, contact, external, crossings=crossings)
+
+    def accept(self, accepted: Accepted) -> StaticStep:
+        """Nothing is to be prepared."""
+        return self
+
+    def store(self, dissipated: float) -> None:
+        """Nothing is to be stored before the particles move."""
+
+    def finish(self) -> None:
+        """Record that the body is in equilibrium with this part."""
+        for support in self.configuration.supports.all:
+            support.share.apply(self.part)
+        if self.part == 1.0:
+            self.configuration.accept(1.0)

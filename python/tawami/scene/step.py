@@ -1,0 +1,102 @@
+"""One accepted step of a scene: what is solved, what comes out, and what is stored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami.field.reduction import Reduction
+from tawami.scene.contact import ActiveSet
+from tawami.solve.inertia import Inertia
+from tawami.solve.newton import Converged
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One step to solve; see `Newton.solve`.
+
+    Attributes:
+        reduction: What the supports leave free.
+        contact: The walls in their present states.
+        external: External forces on all coefficients [N per metre depth].
+        inertia: Of a dynamic step.
+        guess: Increments of all fields to start from.
+        crossings: How far supports will have moved the body across their edges [m], by the number of
+            the support.
+    """
+
+    reduction: Reduction
+    contact: ActiveSet
+    external: Array
+    inertia: Inertia | None = None
+    guess: Array | None = None
+    crossings: Mapping[int, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """A step that was solved, with the particles still where they were.
+
+    Attributes:
+        problem: What was solved.
+        step: What Newton's method found.
+        u: Increments of the displacement, functions x 2 [m].
+        acceleration: At the end of a dynamic step, functions x 2 [m/s2].
+    """
+
+    problem: Problem
+    step: Converged
+    u: Array
+    acceleration: Array | None
+
+    @property
+    def forces(self) -> Array:
+        """What supports and walls exert on the body, functions x 2 [N per metre depth]."""
+        return self.step.forces[: self.u.size].reshape(-1, 2)
+
+    @property
+    def forces_at_end(self) -> Array:
+        """The same without the impulse of the supports at the beginning of the step."""
+        inertia = self.problem.inertia
+        if inertia is None:
+            return self.forces
+        return self.forces - inertia.impulse.reshape(-1, 2)
+
+    @property
+    def friction(self) -> Array:
+        """Friction of the walls on the body, functions x 2 [N per metre depth]."""
+        return self.problem.contact.friction(self.forces)
+
+
+class Update(Protocol):
+    """What a kind of step stores once its solution is accepted; it must not fail."""
+
+    def store(self, dissipated: float) -> None:
+        """After the particles have their stress and before they move.
+
+        Args:
+            dissipated: What the laws dissipated on this rank [J per metre depth].
+        """
+
+    def finish(self) -> None:
+        """After the particles have moved."""
+
+
+class StepKind(Protocol):
+    """A static or a dynamic step."""
+
+    @property
+    def end(self) -> float:
+        """Time at its end [s]; NaN in statics."""
+
+    def problem(self) -> Problem:
+        """The problem in the present states of the walls; asked again whenever these change."""
+
+    def accept(self, accepted: Accepted) -> Update:
+        """Prepare what is to be stored; may fail, and then nothing has changed."""

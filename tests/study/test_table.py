@@ -1,0 +1,74 @@
+"""Tables of studies: front, knee, effect of each knob, recommended setting; with known errors."""
+
+from __future__ import annotations
+
+import pytest
+
+import tawami
+from tawami.study import Row, Table
+from tawami.study.table import error_of
+
+
+def table_of(*points: tuple[float, float], **knobs: tuple) -> Table:
+    """A table of runs with these costs and errors."""
+    rows = []
+    for k, (cost, error) in enumerate(points):
+        setting = {name: values[k] for name, values in knobs.items()} or {"n": k}
+        costs = {"wall_s": cost, "cpu_s": cost, "peak_MB": 1.0, "newton_iterations": 1,
+                 "steps": 1, "unknowns": 1}  # fmt: skip
+        rows.append(Row("MPM", setting, {"x": error}, {"x": error}, costs))
+    return Table("toy", rows)
+
+
+def test_no_run_of_the_front_is_worse_in_cost_and_error():
+    table = table_of((1, 1e-1), (2, 2e-1), (2, 1e-2), (4, 1e-2), (8, 1e-3), (9, 5e-3))
+    assert [row.knobs["n"] for row in table.front("x")] == [0, 2, 4]
+
+
+def test_the_knee_is_the_corner_of_an_l():
+    table = table_of((1, 1.0), (1.1, 0.1), (1.2, 1e-2), (2, 1e-3), (10, 8e-4), (100, 7e-4))
+    assert table.knee("x").knobs["n"] == 3
+    # a straight line has no corner but its ends
+    line = table_of(*((2.0**k, 4.0**-k) for k in range(5)))
+    assert {row.knobs["n"] for row in line.knees("x")} >= {0, 4}
+
+
+def test_changes_compare_pairs_that_differ_in_one_knob():
+    table = table_of(
+        (1, 0.1), (2, 0.01), (3, 0.2), (12, 0.005), (5, 0.3),
+        n=(1, 2, 1, 2, 1), form=("a", "a", "b", "b", "c"),
+    )  # fmt: skip
+    (of_n,) = (c for c in table.changes("x") if c.knob == "n")
+    assert (of_n.pairs, of_n.before, of_n.after) == (2, 1, 2)
+    assert of_n.error == pytest.approx((0.1 * 0.025) ** 0.5)
+    assert of_n.cost == pytest.approx((2 * 4) ** 0.5)
+    assert ("form", "c") in table.dominated("x")
+    assert ("form", "a") not in table.dominated("x")
+    assert "Accuracy is bought by n 1 to 2" in table.in_words("x")
+
+
+def test_a_table_is_read_from_its_file(tmp_path):
+    table = table_of((1, 0.1), (2, 0.01), n=(1, 2), form=("a", "b"), fast=(True, False))
+    path = tmp_path / "toy.csv"
+    path.write_text(table.as_csv())
+    assert Table.read(path) == table
+
+
+def test_the_cheapest_setting_within_a_tolerance_is_recommended(tmp_path):
+    table = table_of((1, 0.1), (2, 0.01), (3, 0.02), (4, 1e-3))
+    assert tawami.recommend(table, 0.05).knobs == {"n": 1}
+    assert tawami.recommend(table, {"x": 5e-3}).knobs == {"n": 3}
+    with pytest.raises(tawami.InputError, match=r"within x 1e-06: the nearest is MPM: n 3: errors"):
+        tawami.recommend(table, 1e-6)
+    with pytest.raises(tawami.InputError, match="quantity 'y' of study 'toy': expected one of 'x'"):
+        tawami.recommend(table, {"y": 0.1})
+    with pytest.raises(tawami.InputError, match=r"nowhere.csv.*expected a CSV file"):
+        tawami.recommend(tmp_path / "nowhere.csv", 0.1)
+
+
+def test_errors_are_relative_unless_the_reference_is_zero():
+    assert error_of(1.1, 1.0) == pytest.approx(0.1)
+    assert error_of(-0.3, 0.0) == pytest.approx(0.3)
+    assert error_of([3.0, 4.0], [0.0, 0.0]) == pytest.approx(5.0)
+    with pytest.raises(tawami.InputError, match="2 numbers and its reference 1"):
+        error_of([1.0, 2.0], 1.0)
