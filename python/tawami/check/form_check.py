@@ -19,9 +19,10 @@ from mpi4py import MPI
 
 from tawami.base.checks import shown
 from tawami.base.errors import FormError, InexactSumWarning, InputError, TawamiError
+from tawami.base.text import quoted
 from tawami.check import scenes as scenes
 from tawami.form.compilation import compile_form
-from tawami.form.form import Form, listed
+from tawami.form.form import Form
 from tawami.form.symbols import Symbols
 
 Verdict = Literal["ok", "note", "FAILED", "not tried"]
@@ -167,7 +168,7 @@ def _arguments(form: Form, given: Settings) -> Found:
         Symbols(form, options).residual()
     yield (
         "ok",
-        f"all known; each of {listed(test for _, test in form.fields.values())} has its term",
+        f"all known; each of {quoted(test for _, test in form.fields.values())} has its term",
     )
     for warning in caught:
         if issubclass(warning.category, InexactSumWarning):
