@@ -53,7 +53,7 @@ fuzz: SEED := $(or $(SEED),$(shell od -An -N4 -tu4 /dev/urandom | tr -d ' '))
 fuzz: setup $(STAMPS)/cargo-tests
 	@echo "Again with the same examples: make fuzz SEED=$(SEED)"
 	PROPTEST_RNG_SEED=$(SEED) PROPTEST_CASES=5000 cargo test --locked --quiet
-	HYPOTHESIS_PROFILE=fuzz SEED=$(SEED) $(PYTEST) -m fuzz --hypothesis-seed=$(SEED) $(TESTS)
+	HYPOTHESIS_PROFILE=fuzz SEED=$(SEED) $(PYTEST) -m 'fuzz or hypothesis' --hypothesis-seed=$(SEED) $(TESTS)
 
 docs: setup $(STAMPS)/docs
 	$(PYTHON) python/docs $(if $(LINKS),--links)

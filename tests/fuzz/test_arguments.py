@@ -40,7 +40,7 @@ NUMBERS: list[Any] = [
 ]  # fmt: skip
 OBJECTS: list[Any] = [
     None, "", "x", "left", "u", "a/b", "\0", "\ud800", "a" * 300, b"ab", [], (), {}, {1, 2},
-    [None, None], ["a", "b"], [[]], [[0.0, 1.0], [2.0]], [1, 2], [1.0, math.nan], (10**9, 10**9), (1, 2, 3),
+    [None, None], ["a", "b"], [[]], [[0.0, 1.0], [2.0]], [1, 2], [1.0, math.nan], (1, 2, 3),
     [[0, 0], [1, 0], [1, 1]], {"x": 1}, {"E": {"default": "much"}}, {1: 2}, [10**400, 1], range(2),
     (i for i in (1, 2)), Path("x"), Path(), Path("/"), Path("a" * 300), object(), object,
     np.ma.masked, np.ma.masked_array([0.0, 1.0], [True, False]), MPI.COMM_NULL, tawami.Body(None, None),

@@ -216,7 +216,6 @@ def test_any_argument_works_or_raises(name):
     replaced()
 
 
-@pytest.mark.fuzz
 @given(
     st.lists(st.integers(0, 4), min_size=80, max_size=80),
     st.integers(0, 80),
