@@ -132,7 +132,7 @@ $(STAMPS)/lint: $(STAMPS)/python
 	@mkdir -p $(STAMPS) && touch $@
 
 $(STAMPS)/docs: $(STAMPS)/python
-	$(PIP) 'sphinx>=7.2' 'myst-parser>=3' 'furo>=2024.1.29'
+	$(PIP) 'sphinx>=7.2' 'myst-parser>=3' 'furo>=2024.1.29' 'sphinx-mathjax-offline>=0.0.2'
 	@mkdir -p $(STAMPS) && touch $@
 
 # Built for the processor it runs on, and again where that is another one.
