@@ -10,7 +10,7 @@ from scipy.interpolate import BSpline
 
 import tawami
 from cases.showcase import cut_cells
-from tawami.field.reference import ghost
+from tawami.field import ghost
 from tawami.form.form import Form
 
 GHOST = {"form": "u_epsv", "ghost_penalty": "on", "k": 0.5}
@@ -75,7 +75,7 @@ def test_it_is_the_integral_of_the_jumps(corner):
     law = tawami.linear_elastic(E=2.0, nu=0.4)
     K, mu = law.bulk_modulus, law.shear_modulus
     expected = 0.0
-    for (i, j), (p, q), _ in ghost.sides(scene.configuration.domain.field.active):
+    for (i, j), (p, q), _ in ghost.sides(scene.configuration.domain.active):
         if p > i:
             bend = [second_derivative(nx, h, a, x) for x in (p * h - 1e-9, p * h + 1e-9)]
             along = spline(ny, h, b, j * h + points)
@@ -94,7 +94,7 @@ def test_it_is_the_integral_of_the_jumps(corner):
 def test_which_cells_are_partly_filled():
     active = np.ones((4, 5), dtype=bool)
     active[3, 4] = False
-    partly = ghost.partly_filled(active)
+    partly = ghost.partially_filled(active)
     assert np.argwhere(partly).tolist() == [[2, 3], [2, 4], [3, 3]]  # not those at the grid's end
     assert len(list(ghost.sides(active))) == 6
     assert not list(ghost.sides(np.ones((3, 3), dtype=bool)))

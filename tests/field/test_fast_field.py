@@ -18,6 +18,7 @@ from scenes import BASES, FORMS, clouds, grid_of
 from scipy.sparse import csr_matrix, identity
 
 import tawami
+from tawami import _rust
 from tawami.base.errors import InexactSumWarning
 from tawami.field.fast import _selection
 from tawami.form.form import Form
@@ -46,7 +47,7 @@ def reduced(scene, c):
     """P^T K P as the field side gives it to the solver, at increments c."""
     reduction = scene.reduction()
     scene.configuration.domain.newton.internal(c)
-    field, data = scene.configuration.domain.field, scene.configuration.domain.newton.data
+    field, data = scene.configuration.domain.assembly, scene.configuration.domain.responses.data
     start, columns, values = field.tangent(c, data, reduction).getValuesCSR()
     return csr_matrix((values, columns, start), shape=(reduction.size,) * 2).toarray()
 
@@ -129,7 +130,7 @@ def test_newton_reuses_the_pattern(random_scene):
 
 
 def test_the_same_bits_whatever_the_number_of_threads():
-    """Residual, tangent, and a reduced tangent in which many points are held, in every row."""
+    """Residual, tangent, a reduced tangent with points held in every row of cells, steps of a motion."""
     code = """
 import hashlib, logging; logging.disable(logging.INFO)
 import numpy as np
@@ -147,8 +148,20 @@ for basis in ("quadratic_spline", "bilinear", "biquadratic"):
     total.update(scene.residual(c).tobytes() + scene.tangent(c).data.tobytes())
     domain, reduction = scene.configuration.domain, scene.reduction()
     for _ in range(3):
-        matrix = domain.field.tangent(c, domain.newton.data, reduction)
+        matrix = domain.assembly.tangent(c, domain.responses.data, reduction)
         total.update(matrix.getValuesCSR()[2].tobytes())
+grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.1, cells=(12, 8))
+sand = tawami.drucker_prager(tawami.linear_elastic(E=1e5, nu=0.3), phi=30.0, c=10.0)
+for form in ("u_epsv_finite", "u_bbar_finite"):
+    body = tawami.box(grid, (0, 0), (0.6, 0.5))
+    scene = tawami.Scene(grid, body, sand, form=form, density=1000.0)
+    scene.gravity((0.0, -9.81))
+    scene.fix("left", "x")
+    scene.fix("bottom", "y")
+    motion = tawami.Dynamics(scene)
+    for _ in range(3):
+        motion.step(0.01)
+    total.update(scene.particles.rows().tobytes())
 print(total.hexdigest())
 """
     outputs = set()
@@ -176,14 +189,14 @@ def test_one_field_with_several_reductions_in_turn(random_scene):
     close(*[reduced(scene, c) for scene in scenes])
     values = []
     for scene, reduction in zip(scenes, reductions, strict=True):
-        matrix = scene.configuration.domain.field.tangent(
-            c, scene.configuration.domain.newton.data, reduction
+        matrix = scene.configuration.domain.assembly.tangent(
+            c, scene.configuration.domain.responses.data, reduction
         )
         vector = matrix.createVecLeft()
         vector.set(3.0)
         matrix.diagonalScale(vector, vector)
-        again = scene.configuration.domain.field.tangent(
-            c, scene.configuration.domain.newton.data, reduction
+        again = scene.configuration.domain.assembly.tangent(
+            c, scene.configuration.domain.responses.data, reduction
         )
         values.append(again.getValuesCSR()[2].sum())
     assert values[0] == pytest.approx(values[1], rel=1e-9)
@@ -208,21 +221,31 @@ def test_solving_again_with_other_supports():
 
 def test_arrays_that_do_not_fit_are_refused_and_never_panic(random_scene):
     scene = random_scene(form="u")
-    field, c = scene.configuration.domain.field, np.zeros(scene.num_coefficients)
+    field, c = scene.configuration.domain.assembly, np.zeros(scene.num_coefficients)
     scene.residual(c)
-    kernels = field._kernels(field.compiled.tangent, scene.configuration.domain.newton.data)
-    volume = scene.particles.volume
-    with pytest.raises(RuntimeError, match="a kernel of another rank"):
-        field._assembler.vector(kernels, volume, c)
-    address, rank, width, slots, constants = kernels[0]
-    wrong = [(address, rank, width + 1, slots, constants)]
+    (kernels, none), volume = field._of_tangent, scene.particles.volume
+    data = list(scene.configuration.domain.responses.data.values())
+    with pytest.raises(RuntimeError, match="kernels of another rank"):
+        field._assembler.vector(kernels, data, volume, c)
+    owner, address, rank, width, slots, constants = field._kernel(
+        field.attachment.compiled.tangent[0]
+    )
     pattern = field._assembler.pattern(
         _selection(identity(len(c), format="csr"), np.arange(len(c)))
     )
+    wrong = (owner, address, rank, width + 1, slots, constants)
     with pytest.raises(RuntimeError, match="a kernel of other coefficients"):
-        field._assembler.matrix(wrong, [], volume, c, pattern, np.zeros(len(pattern.columns)))
+        _rust.Kernels(field._assembler, 2, [wrong])
+    with pytest.raises(RuntimeError, match="a kernel of another rank"):
+        _rust.Kernels(field._assembler, 1, [(owner, address, rank, width, slots, constants)])
+    values = np.zeros(len(pattern.columns))
+    with pytest.raises(RuntimeError, match="kernels of other data"):
+        field._assembler.matrix(kernels, none, [], volume, c, pattern, values)
+    short = [array[1:] for array in data]
+    with pytest.raises(RuntimeError, match="data of other particles"):
+        field._assembler.matrix(kernels, none, short, volume, c, pattern, values)
     with pytest.raises(RuntimeError, match="another pattern"):
-        field._assembler.matrix(kernels, [], volume, c, pattern, np.zeros(3))
+        field._assembler.matrix(kernels, none, data, volume, c, pattern, np.zeros(3))
     with pytest.raises(RuntimeError, match="not a selection of these coefficients"):
         field._assembler.pattern(_selection(identity(3, format="csr"), np.arange(3)))
 

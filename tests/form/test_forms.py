@@ -166,7 +166,7 @@ def test_sums_at_vertices_are_row_sum_lumped(random_scene, assembly):
     form = form_of(lumped, BOTH, "mixed")
     scene = random_scene(form=form, assembly=assembly)
     c = np.zeros(scene.num_coefficients)
-    n = scene.configuration.domain.field.layout.num_displacement
+    n = scene.configuration.domain.layout.num_displacement
     block = scene.tangent(c).toarray()[n:, n:]
     grid = scene.grid
     s = (np.array(scene.particles.x) - grid.origin) / grid.h

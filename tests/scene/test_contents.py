@@ -15,7 +15,7 @@ import tawami
 from tawami.fem import kernels
 from tawami.form import compilation
 from tawami.scene.domain import Domain
-from tawami.solve.newton import Newton
+from tawami.solve.inertia import Inertia
 
 ELASTIC = {"E": 10.0, "nu": 0.3}
 STATIC = ["x", "volume", "material", "number", "stress", "displacement"]
@@ -147,7 +147,7 @@ def test_a_static_scene_assembles_no_mass(monkeypatch):
     def refuse(*_):
         raise AssertionError("a mass")
 
-    monkeypatch.setattr(Newton, "_add_mass", refuse)
+    monkeypatch.setattr(Inertia, "add_to", refuse)
     monkeypatch.setattr(Domain, "mass", property(refuse))
     scene = scene_of(density=1.0, form="u_epsv_finite")
     scene.traction("top", (0.0, -0.1))
@@ -156,7 +156,7 @@ def test_a_static_scene_assembles_no_mass(monkeypatch):
     with pytest.raises(AssertionError, match="a mass"):
         scene.solve()
     monkeypatch.undo()
-    monkeypatch.setattr(Newton, "_add_mass", refuse)
+    monkeypatch.setattr(Inertia, "add_to", refuse)
     scene.solve()
     with pytest.raises(AssertionError, match="a mass"):
         tawami.Dynamics(scene).step(0.01)
@@ -288,7 +288,7 @@ def test_the_header_counts_what_is_there(assembly):
     assert line(header, "supports") == (
         "fix(edge='bottom') x, fix(edge='bottom') y, hold(point=(0.0, 1.7)) x = 0.01 m"
     )
-    data = scene.configuration.domain.newton.data["particle"]
+    data = scene.configuration.domain.responses.data["particle"]
     # sigma 3 and its derivatives 3 x (3 + 1), K, K^2/mu; and K and mu themselves
     assert data.shape[1] == 3 + 12 + 2
     assert f"{8 * (17 + 2)} more each" in line(header, "particles")

@@ -16,6 +16,7 @@ from scenes import greville, grid_of
 import tawami
 from tawami import _rust
 from tawami.base.errors import SupportError
+from tawami.field import constraints
 from tawami.field.reduction import Reduction
 from tawami.grid import edges
 from tawami.grid.basis import values_1d
@@ -41,12 +42,12 @@ def test_point_constraint_by_elimination_is_that_by_multiplier(basis, point, val
     # the same with Lagrange multipliers, by scipy
     n = scene.num_coefficients
     matrix = scene.tangent(np.zeros(n))
-    cells, layout = scene.configuration.domain.field.active, scene.configuration.domain.layout
-    held = edges.held_edge(scene.grid, basis, cells, "left", 0, 1e-3)
+    cells, layout = scene.configuration.domain.active, scene.configuration.domain.layout
+    held = constraints.held_edge(scene.grid, basis, cells, "left", 0, 1e-3)
     rows = [sp.csr_matrix(([1.0], ([0], [k])), shape=(1, n)) for k in held.indices]
     values = list(held.values)
     for place, v in ((point, value), ((0.3, 0.9), -value)):
-        p = edges.held_point(scene.grid, basis, cells, place, 1, v, layout.active)
+        p = constraints.held_point(scene.grid, basis, cells, place, 1, v, layout.active)
         rows.append(sp.csr_matrix((p.weights, (np.zeros(len(p.indices)), p.indices)), shape=(1, n)))
         values.append(v)
     b = sp.vstack(rows)
@@ -64,7 +65,7 @@ def test_a_number_is_its_own_projection(basis):
     active[:, 3] = False  # no particles there
     for between in (None, (-0.5, 1.5)):
         number, function = (
-            edges.held_edge(grid, basis, active, "top", 1, value, between)
+            constraints.held_edge(grid, basis, active, "top", 1, value, between)
             for value in (-0.7, lambda x, y: -0.7 + 0 * x)
         )
         np.testing.assert_array_equal(number.indices, function.indices)
@@ -73,18 +74,18 @@ def test_a_number_is_its_own_projection(basis):
 
 def test_profiles_are_projected_in_l2_and_reproduced_where_the_basis_can(basis):
     scene = beam(basis=basis)
-    linear = edges.held_edge(
-        scene.grid, basis, scene.configuration.domain.field.active, "top", 0, lambda x, y: 2 + 3 * x
+    linear = constraints.held_edge(
+        scene.grid, basis, scene.configuration.domain.active, "top", 0, lambda x, y: 2 + 3 * x
     )
     width = len(linear.indices)
-    u = np.zeros(scene.configuration.domain.field.layout.num_displacement)
+    u = np.zeros(scene.configuration.domain.layout.num_displacement)
     u[linear.indices] = linear.values
     for x in np.linspace(-1, 1, 7):
         location = edges.locate_point(scene.grid, (x, scene.grid.upper[1]), "test")
         assert _rust.interpolate(location, basis, 2, u)[0, 0] == pytest.approx(2 + 3 * x, abs=1e-13)
     # a cubic is not in the space: the error of the projection is orthogonal to it
-    active = scene.configuration.domain.field.active
-    cubic = edges.held_edge(scene.grid, basis, active, "top", 0, lambda x, y: x**3)
+    active = scene.configuration.domain.active
+    cubic = constraints.held_edge(scene.grid, basis, active, "top", 0, lambda x, y: x**3)
     t, w = np.polynomial.legendre.leggauss(6)
     total = np.zeros(width)
     for cell in range(4):
@@ -363,9 +364,11 @@ def test_hold_anywhere_holds_there(a, b):
 
 def test_reduction_selects_active_unsupported_coefficients_once():
     scene = beam()
-    layout = scene.configuration.domain.field.layout
-    active = scene.configuration.domain.field.active
-    held = [edges.held_edge(scene.grid, scene.basis, active, "left", k, 0.0) for k in range(2)]
+    layout = scene.configuration.domain.layout
+    active = scene.configuration.domain.active
+    held = [
+        constraints.held_edge(scene.grid, scene.basis, active, "left", k, 0.0) for k in range(2)
+    ]
     reduction = Reduction(layout, held, [], np.zeros(layout.size))
     assert reduction.size == layout.size - 2 * (3 + 2)
     assert (reduction.selection.sum(axis=0) == 1).all()

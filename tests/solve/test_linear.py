@@ -13,6 +13,7 @@ from cases.verification.cantilever import mpm
 from tawami.base.errors import InexactSumWarning
 from tawami.form.form import Form
 from tawami.solve import direct
+from tawami.solve.scaling import Scaling
 
 
 def hardening(strength):
@@ -146,11 +147,11 @@ def test_the_condition_number(method):
     options = {"alpha": 0.1} if method == "u_epsv" else {}
     scene = mpm.build(method, "clamped", 4, **options)
     solution = scene.solve()
-    newton, reduction = scene.configuration.domain.newton, scene.reduction()
+    domain, reduction = scene.configuration.domain, scene.reduction()
     c = np.zeros(scene.num_coefficients)
-    newton.internal(c)
-    matrix = scene.configuration.domain.field.tangent(c, newton.data, reduction)
-    scale = newton._scale(matrix, reduction)
+    domain.newton.internal(c)
+    matrix = domain.assembly.tangent(c, domain.responses.data, reduction)
+    scale = Scaling(domain.layout, domain.responses).factors(matrix, reduction)
     start, columns, values = matrix.getValuesCSR()
     dense = csr_matrix((values, columns, start)).toarray() * scale * scale[:, None]
     exact = np.linalg.norm(dense) / np.sqrt(len(dense)) * np.linalg.norm(np.linalg.inv(dense))

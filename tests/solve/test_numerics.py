@@ -85,7 +85,7 @@ def test_what_fgmres_cannot_solve_is_said():
     scene.fix("left", "x")
     scene.fix("left", "y")
     scene.traction("right", (0.0, -1.0))
-    with pytest.raises(tawami.SingularError, match="linear_solver='direct' says where"):
+    with pytest.raises(tawami.SingularError, match="linear_solver='direct' names the cells"):
         scene.solve()
     assert not scene.particles.stress.any()
 

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import sys
+from typing import NoReturn
 
 import numpy as np
 
 from tawami.base.errors import MissingDependencyError
 
 
-def missing(error: ImportError) -> MissingDependencyError:
-    """The error to raise if a package for the field problem cannot be imported."""
-    return MissingDependencyError(
+def report_missing(error: ImportError) -> NoReturn:
+    """Raise an error if a package for the field problem cannot be imported."""
+    raise MissingDependencyError(
         f"tawami needs dolfinx with real PETSc, and importing it failed: {error}. On Debian or "
         "Ubuntu: apt install python3-dolfinx-real python3-petsc4py-real python3-mpi4py, and run "
         "Python from a virtual environment made by /usr/bin/python3 -m venv --system-site-packages"
-    )
+    ) from error
 
 
 try:
@@ -27,7 +28,7 @@ try:
         petsc4py.init(["tawami", "-no_signal_handler"])
     from petsc4py import PETSc
 except ImportError as error:  # pragma: no cover - exercised in a subprocess by the tests
-    raise missing(error) from error
+    report_missing(error)
 
 #: How to install the right PETSc.
 ADVICE = "On Debian: apt install python3-dolfinx-real python3-petsc4py-real, and unset PETSC_DIR"

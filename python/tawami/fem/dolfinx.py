@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from tawami.base.arrays import Array
-from tawami.base.dependencies import missing
+from tawami.base.dependencies import report_missing
 
 __all__ = [
     "BILINEAR_DOFS", "DISPLACEMENT_DOFS", "OLD", "IntegralType", "at_points", "at_vertices",
@@ -31,7 +31,7 @@ try:
     import ufl
     from dolfinx import cpp, jit
 except ImportError as error:  # pragma: no cover - exercised in a subprocess by the tests
-    raise missing(error) from error
+    report_missing(error)
 
 if warnings.showwarning is not _showwarning:
     # FFCx from 0.9 on sends all warnings of the process to a log, ours included

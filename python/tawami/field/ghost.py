@@ -1,8 +1,8 @@
-"""Ghost penalty: what a form adds on the sides that partly filled cells share with others.
+"""Ghost penalty: the term of a form on the sides that partially filled cells share with others.
 
-A cell is partly filled where one of its eight neighbours in the grid holds no particles. The term is
-linear in the fields, so that it is one matrix from one reset of the grid to the next; FFCx' kernel of
-the side gives it for both cells at once. (Burman 2010.)
+A cell counts as partially filled if one of its eight neighbours in the grid holds no particles. The term
+is linear in the fields, so it is one matrix from one reset of the grid to the next. The kernel of FFCx
+for a side gives the entries of both cells at once (Burman 2010).
 """
 
 from __future__ import annotations
@@ -14,22 +14,25 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
+from petsc4py import PETSc
 
 from tawami import _rust
-from tawami.base import ranks
+from tawami.base.arrays import Array, Mask
+from tawami.base.petsc import Handles, aij
 from tawami.fem import dolfinx
 from tawami.fem.kernels import Kernel
-from tawami.field.reduction import Layout
+from tawami.fem.rules import Rule
+from tawami.field.attachment import Attachment
+from tawami.field.layout import Layout
+from tawami.field.reduction import Reduction
 from tawami.form.compilation import Integral
 from tawami.grid.grid import Grid
 
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 Side = tuple[tuple[int, int], tuple[int, int], tuple[str, str]]
 
 
-def partly_filled(active: Mask) -> Mask:
-    """Cells with particles that have a neighbour without, ny x nx."""
+def partially_filled(active: Mask) -> Mask:
+    """Cells with particles that have a neighbour without particles, ny x nx."""
     ny, nx = active.shape
     padded = np.pad(active, 1, constant_values=True)
     shifts = [(i, j) for i in range(3) for j in range(3)]
@@ -38,71 +41,114 @@ def partly_filled(active: Mask) -> Mask:
 
 
 def sides(active: Mask) -> Iterator[Side]:
-    """Cells (i, j) on both sides, and names of the side as each of them has it."""
-    partly = partly_filled(active)
+    """Sides of partially filled cells: the cells (i, j) on both sides, and its name in each of them."""
+    partial = partially_filled(active)
     for (di, dj), names in (((1, 0), ("right", "left")), ((0, 1), ("top", "bottom"))):
         ny, nx = active.shape
         here, there = (slice(0, ny - dj), slice(0, nx - di)), (slice(dj, None), slice(di, None))
-        both = active[here] & active[there] & (partly[here] | partly[there])
+        both = active[here] & active[there] & (partial[here] | partial[there])
         for j, i in np.argwhere(both):
             yield (int(i), int(j)), (int(i) + di, int(j) + dj), names
 
 
-def matrix(
-    grid: Grid,
-    layout: Layout,
-    integral: Integral,
-    active: Mask,
-    location: _rust.Location,
-    volume: Array,
-    data: Array,
-    values: Mapping[str, float],
-) -> sp.csr_matrix:
-    """Matrix on all coefficients, the same on every rank.
+class GhostPenalty:
+    """The ghost penalty of a form; without such a term it adds nothing.
 
     Args:
-        grid: The grid.
-        layout: Where the coefficients stand.
-        integral: The compiled term.
-        active: Whether each cell holds particles, ny x nx.
-        location: Where this rank's particles are.
-        volume: Their volumes [m2].
-        data: What is averaged over the cells, particles x columns.
-        values: Numbers that the form names.
+        attachment: The form and the active cells.
     """
-    mean = _means(grid, location, volume, data)
-    columns = list(integral.slots[0].columns) if integral.slots else []
-    constants = np.array([values[name] for name in integral.constants], dtype=float)
-    kernel = _call(integral.kernel)
-    to_grid = grid.rectangle.to_grid_axes
-    vertices = grid.h * np.pad(to_grid(dolfinx.reference_nodes(1)), ((0, 0), (0, 1)))
-    rows, cols, entries = [], [], []
-    for here, there, names in sides(active):
-        shift = grid.h * np.array([*np.subtract(there, here), 0])
-        x = np.concatenate([vertices, vertices + shift]).ravel()
-        facets = np.array([grid.rectangle.facet_of_edge(name) for name in names], dtype=np.int32)
-        cells = [i + grid.cells[0] * j for i, j in (here, there)]
-        packed = mean[cells][:, columns].ravel()
-        (c0, t0), (c1, t1) = (_extraction(grid, layout, cell) for cell in (here, there))
-        element = np.zeros((2 * len(t0), 2 * len(t0)))
-        kernel(element, packed, constants, x, facets)
-        coefficients = np.concatenate([c0, c1])
-        t = sp.block_diag([t0, t1]).toarray()
-        reduced = t.T @ element @ t
-        rows.append(np.repeat(coefficients, len(coefficients)))
-        cols.append(np.tile(coefficients, len(coefficients)))
-        entries.append(reduced.ravel())
-    shape = (layout.size, layout.size)
-    if not rows:
-        return sp.csr_matrix(shape)
-    index = (np.concatenate(rows), np.concatenate(cols))
-    return sp.csr_matrix((np.concatenate(entries), index), shape=shape)
+
+    def __init__(self, attachment: Attachment) -> None:
+        self._attachment = attachment
+        self._matrix: sp.csr_matrix | None = None
+        #: The tangent whose sum with the penalty is in `_petsc`.
+        self._tangent: Any = None
+        self._petsc = Handles(self, attachment.grid.comm)
+
+    def add_forces(self, forces: Array, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
+        """Forces on all coefficients with those of the penalty.
+
+        Args:
+            forces: Forces without it.
+            coefficients: Increments of all fields.
+            data: Particle data of each rule.
+        """
+        matrix = self._on_all(data)
+        return forces if matrix is None else np.asarray(forces + matrix @ coefficients)
+
+    def add_tangent(self, tangent: Any, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
+        """A reduced tangent plus S^T G S, G the penalty; the same object as long as `tangent` is."""
+        penalty = self._on_all(data)
+        if penalty is None:
+            return tangent
+        with self._attachment.stopwatch("reduction"):
+            if self._tangent is tangent:
+                total = self._petsc["total"]
+                total.zeroEntries()
+                for part in (tangent, self._petsc["penalty"]):
+                    total.axpy(1.0, part, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            else:
+                self._petsc.free("penalty", "total")
+                selection = reduction.selection
+                reduced = (selection.T @ penalty @ selection)[reduction.own]
+                comm = self._attachment.grid.comm
+                part = self._petsc["penalty"] = aij(comm, reduced, reduction.num_own)
+                total = self._petsc["total"] = tangent.copy()
+                total.axpy(1.0, part, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+                self._tangent = tangent
+        return total
+
+    def _on_all(self, data: Mapping[Rule, Array]) -> sp.csr_matrix | None:
+        """G on all coefficients, the same on every rank; None without a penalty."""
+        integral = self._attachment.compiled.ghost
+        if integral is not None and self._matrix is None:
+            with self._attachment.stopwatch("set-up"):
+                self._matrix = self._assembled(integral, data["mean"])
+        return self._matrix
+
+    def _assembled(self, integral: Integral, data: Array) -> sp.csr_matrix:
+        attached = self._attachment
+        grid, layout = attached.grid, attached.layout
+        means = self._means(data)
+        columns = list(integral.slots[0].columns) if integral.slots else []
+        constants, kernel = attached.constants(integral), _call(integral.kernel)
+        to_grid = grid.rectangle.to_grid_axes
+        vertices = grid.h * np.pad(to_grid(dolfinx.reference_nodes(1)), ((0, 0), (0, 1)))
+        rows, cols, entries = [], [], []
+        for here, there, names in sides(attached.active):
+            shift = grid.h * np.array([*np.subtract(there, here), 0])
+            x = np.concatenate([vertices, vertices + shift]).ravel()
+            facets = np.array([grid.rectangle.facet_of_edge(n) for n in names], dtype=np.int32)
+            packed = means[grid.cell_numbers(np.array([here, there]))][:, columns].ravel()
+            (c0, t0), (c1, t1) = (_extraction(grid, layout, cell) for cell in (here, there))
+            element = np.zeros((2 * len(t0), 2 * len(t0)))
+            kernel(element, packed, constants, x, facets)
+            coefficients = np.concatenate([c0, c1])
+            t = sp.block_diag([t0, t1]).toarray()
+            rows.append(np.repeat(coefficients, len(coefficients)))
+            cols.append(np.tile(coefficients, len(coefficients)))
+            entries.append((t.T @ element @ t).ravel())
+        shape = (layout.size, layout.size)
+        if not rows:
+            return sp.csr_matrix(shape)
+        index = (np.concatenate(rows), np.concatenate(cols))
+        return sp.csr_matrix((np.concatenate(entries), index), shape=shape)
+
+    def _means(self, data: Array) -> Array:
+        """Volume-weighted means over the particles of each cell, on any rank, cells x columns."""
+        attached = self._attachment
+        columns = [attached.volume, *(attached.volume[:, None] * data).T]
+        cell, cells = attached.location.cell, attached.grid.num_cells
+        sums = [np.bincount(cell, weights=column, minlength=cells) for column in columns]
+        total = attached.summed(np.stack(sums, axis=1))
+        volume = total[:, :1]
+        return np.asarray(total[:, 1:] / np.where(volume > 0, volume, 1.0))
 
 
 def _extraction(
     grid: Grid, layout: Layout, cell: tuple[int, int]
 ) -> tuple[npt.NDArray[Any], Array]:
-    """Coefficients on a cell, and T: the kernel's degrees of freedom there = T coefficients."""
+    """Coefficients on a cell, and T: degrees of freedom of the kernel there = T coefficients."""
     nodes = grid.rectangle.to_grid_axes(dolfinx.reference_nodes(2))
     functions, values = [], []
     for axis in range(2):
@@ -125,24 +171,13 @@ def _extraction(
     return coefficients, t
 
 
-def _means(grid: Grid, location: _rust.Location, volume: Array, data: Array) -> Array:
-    """Means over the particles of each cell, on whichever rank: cells x columns."""
-    cells = grid.cells[0] * grid.cells[1]
-    columns = [volume, *(volume[:, None] * data).T]
-    sums = np.stack(
-        [np.bincount(location.cell, weights=column, minlength=cells) for column in columns], axis=1
-    )
-    sums = ranks.sum_of(grid.comm, sums)
-    return np.asarray(sums[:, 1:] / np.where(sums[:, :1] > 0, sums[:, :1], 1.0))
-
-
 def _call(kernel: Kernel) -> Callable[..., None]:
-    """An FFCx kernel of two cells, as a function of arrays."""
+    """A kernel of FFCx for two cells, as a function of arrays."""
     function = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 7)(kernel.address)
-    same_way = np.zeros(2, dtype=np.uint8)  # both cells run along the side in the same direction
+    permutation = np.zeros(2, dtype=np.uint8)  # both cells run along the side in one direction
 
     def call(element: Array, packed: Array, constants: Array, x: Array, facets: Any) -> None:
-        arrays = (element, packed, constants, x, facets, same_way)
+        arrays = (element, packed, constants, x, facets, permutation)
         function(*(array.ctypes.data for array in arrays), None)
 
     return call

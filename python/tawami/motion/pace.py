@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tawami.solve.newton import History
+from tawami.solve.measures import History
 
 
 @dataclass

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
+from mpi4py import MPI
 
 from tawami import _rust
 from tawami.base import ranks
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.timing import Stopwatch
 from tawami.fem.rules import Rule
@@ -17,7 +18,10 @@ from tawami.form.compilation import CompiledForm
 from tawami.form.quantities import Density, LawQuantity, ParticleScalar
 from tawami.particles.numpy_law import NumpyStage
 
-Array = npt.NDArray[np.float64]
+#: K/mu beyond which a larger bulk modulus makes forces no larger.
+LOCKED = 1e4
+#: Law quantity, value or derivative, first column, and constants that multiply it.
+Request = tuple[str, str, int, Array | None]
 
 
 class Responses:
@@ -35,7 +39,10 @@ class Responses:
         stopwatch: Measures the time of the laws.
 
     Attributes:
+        form: The form.
         data: Particle data of each rule, particles x columns; :meth:`evaluate` writes them.
+        stiffest: Largest modulus of the body [Pa]; a bulk modulus counts up to `LOCKED` mu.
+        largest_mu: Largest shear modulus of the body [Pa].
 
     Raises:
         InputError: A constant that the form names is not finite.
@@ -51,31 +58,37 @@ class Responses:
         comm: Any,
         stopwatch: Stopwatch,
     ) -> None:
-        self.compiled, self.particles, self.location = compiled, particles, location
-        self.stage, self.constants = stage, constants
+        self.form, self.stage, self.constants = compiled.form, stage, constants
+        self.particles, self.location = particles, location
         self._comm, self._stopwatch = comm, stopwatch
         self.data: dict[Rule, Array] = {
             rule: np.zeros((len(particles), compiled.columns(rule))) for rule in compiled.densities
         }
-        #: Law quantities of each rule: (name, part, first column).
-        self._requests: dict[Rule, list[tuple[str, str, int]]] = {rule: [] for rule in self.data}
-        #: Constants that multiply some of them, with their columns.
-        self._factors: dict[Rule, list[tuple[slice, Array]]] = {rule: [] for rule in self.data}
+        requests: dict[Rule, list[Request]] = {rule: [] for rule in self.data}
         with ranks.raise_together(comm):
             for rule, densities in compiled.densities.items():
                 for density, column in densities.items():
-                    self._place(rule, density, column)
+                    quantity = density.quantity
+                    if isinstance(quantity, ParticleScalar):
+                        self.data[rule][:, column] = self._constant(quantity)
+                    else:
+                        requests[rule].append(self._request(density, column))
+        #: Particle data with law quantities, and these quantities.
+        self._written = [self.data[rule] for rule, of_rule in requests.items() if of_rule]
+        self._requests = _rust.Requests([of_rule for of_rule in requests.values() if of_rule])
+        softer = np.minimum(constants["K"], LOCKED * constants["mu"])
+        self.stiffest, self.largest_mu = (
+            comm.allreduce(float(modulus.max(initial=0.0)), op=MPI.MAX)
+            for modulus in (softer, constants["mu"])
+        )
 
-    def _place(self, rule: Rule, density: Density, column: int) -> None:
+    def _request(self, density: Density, column: int) -> Request:
         quantity = density.quantity
-        if isinstance(quantity, ParticleScalar):
-            self.data[rule][:, column] = self._constant(quantity)
-            return
         assert isinstance(quantity, LawQuantity)
-        self._requests[rule].append((quantity.name, density.part, column))
+        factor = None
         if quantity.factor is not None:
-            columns = slice(column, column + density.size)
-            self._factors[rule].append((columns, quantity.factor.evaluate(self.constants)))
+            factor = np.asarray(quantity.factor.evaluate(self.constants), dtype=float)
+        return quantity.name, density.part, column, factor
 
     def _constant(self, scalar: ParticleScalar) -> Array:
         with np.errstate(all="ignore"):
@@ -85,7 +98,7 @@ class Responses:
             p = bad[0]
             K, mu = (self.constants[name][p] for name in ("K", "mu"))
             raise InputError(
-                f"form {self.compiled.form.name}: '{scalar.text}' is not finite at particle "
+                f"form {self.form.name}: '{scalar.text}' is not finite at particle "
                 f"{self.particles.number[p]}, where K = {K:g} and mu = {mu:g} Pa; with nu = 0.5 (K "
                 "infinite) use form 'u_p', or nu < 0.5"
             )
@@ -105,12 +118,9 @@ class Responses:
             volumetric: Coefficients of the bilinear field, if the form has one.
         """
         with self._stopwatch("law"):
-            for rule, requests in self._requests.items():
-                if requests:
-                    with ranks.raise_together(self._comm):
-                        self.stage.evaluate(u, volumetric, requests, self.data[rule])
-                    for columns, factor in self._factors[rule]:
-                        self.data[rule][:, columns] *= factor[:, None]
+            if self._written:
+                with ranks.raise_together(self._comm):
+                    self.stage.evaluate(u, volumetric, self._requests, self._written)
         return self.data
 
     def sums(self, columns: Array) -> Array:

@@ -102,7 +102,7 @@ class Phase:
     def begin(self, pace: Pace, steps: list[Step]) -> None:
         """Resume the phase from its newest checkpoint, or begin it."""
         self._pace, self._steps, self._largest = pace, steps, pace.size
-        self.subject.scene.configuration.domain.newton.keep()
+        self.subject.scene.configuration.domain.newton.record()
         state = self._checkpoints.newest()
         if state is not None:
             self._restore(state)
@@ -183,7 +183,7 @@ class Phase:
             self._checkpoints.write(count, self._state())
         elif by_number or by_time:
             if by_number:  # resumed or not, the next steps use the same factorisations
-                self.subject.scene.configuration.domain.newton.keep()
+                self.subject.scene.configuration.domain.newton.record()
             self._checkpoints.try_to_write(count, self._state())
         if stop:
             self._stop()

@@ -231,7 +231,7 @@ class Configuration:
     def identity(self) -> dict[str, Any]:
         """What tells it from another one, for checkpoints; a call for all ranks."""
         grid = self.model.grid
-        sizes = {"stress": self.domain.newton.stiffest} | dict.fromkeys(LENGTHS, grid.h)
+        sizes = {"stress": self.domain.responses.stiffest} | dict.fromkeys(LENGTHS, grid.h)
         arrays = placement.gathered(grid, self.domain.particles)
         particles = {
             f"'{name}' of the particles at its start": fingerprint(values, sizes.get(name, 1.0))
@@ -271,5 +271,5 @@ class Configuration:
         self.supports.restore(state["supports"])
         self.loads.restore(state["loads"])
         self._attach(particles, location)
-        self.domain.newton.keep()
+        self.domain.newton.record()
         self.domain.newton.restore(state["newton"])

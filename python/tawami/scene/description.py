@@ -37,7 +37,7 @@ def header(now: Configuration, motion: str = "") -> str:
 def _grid(now: Configuration) -> str:
     grid = now.model.grid
     (nx, ny), (x0, y0), (x1, y1) = grid.cells, grid.origin, grid.upper
-    filled = int(np.count_nonzero(now.domain.field.active))
+    filled = int(np.count_nonzero(now.domain.active))
     return (
         f"{nx} x {ny} cells of {grid.h:g} m from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}), {filled} with "
         f"particles; basis {now.model.basis}"
@@ -52,7 +52,7 @@ def _particles(now: Configuration) -> str:
     gone = f" ({len(now.left)} left the grid)" if now.left else ""
     return (
         f"{number}{gone}, {each} bytes each ({arrays}), {size(number * each)} in all; while a step is "
-        f"solved {now.domain.newton.bytes_per_particle} more each for the responses of the laws"
+        f"solved {now.domain.responses.bytes_per_particle} more each for the responses of the laws"
     )
 
 

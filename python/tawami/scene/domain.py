@@ -12,9 +12,12 @@ from tawami.base import ranks
 from tawami.base.errors import InputError, InstabilityWarning
 from tawami.base.timing import Stopwatch
 from tawami.base.warn import warn
-from tawami.field.fast import FastField
-from tawami.field.reduction import Layout
-from tawami.field.reference import Field
+from tawami.field.assembly import Assembly
+from tawami.field.attachment import Attachment
+from tawami.field.fast import FastAssembly
+from tawami.field.layout import Layout
+from tawami.field.reference import ReferenceAssembly
+from tawami.field.tractions import Tractions
 from tawami.grid.basis import Basis
 from tawami.particles.numpy_law import NumpyStage
 from tawami.particles.responses import Responses
@@ -23,7 +26,10 @@ from tawami.solve.newton import Newton
 from tawami.solve.numerics import Numerics
 
 Array = npt.NDArray[np.float64]
-ASSEMBLIES: dict[str, type[Field]] = {"fast": FastField, "reference": Field}
+ASSEMBLIES: dict[str, type[FastAssembly | ReferenceAssembly]] = {
+    "fast": FastAssembly,
+    "reference": ReferenceAssembly,
+}
 #: Share of a cell that a form which needs whole cells takes for a whole one.
 WHOLE = 0.5
 
@@ -36,16 +42,20 @@ class Domain:
         model: What the scene is made of.
         particles: The particles of this rank.
         location: Their cells and positions in them.
-        field: Assembly of the form over these cells.
+        assembly: Assembly of the form over these cells.
+        tractions: Its term on the edges of the grid.
         stage: The material laws of the particles.
+        responses: Their responses, as the form reads them.
         newton: The nonlinear problem of a step.
     """
 
     model: Model
     particles: _rust.Particles
     location: _rust.Location
-    field: Field
+    assembly: Assembly
+    tractions: Tractions
     stage: _rust.Stage | NumpyStage
+    responses: Responses
     newton: Newton
 
     @classmethod
@@ -60,10 +70,11 @@ class Domain:
         """Attach the form and the laws to particles at their present location."""
         form, law = model.form, model.law
         with stopwatch("set-up"):
-            field = ASSEMBLIES[numerics.assembly](
+            attachment = Attachment(
                 model.grid, model.compiled, model.basis, location, particles.volume, model.values,
                 stopwatch,
             )  # fmt: skip
+            assembly = ASSEMBLIES[numerics.assembly](attachment)
         rust = _rust.Stage(
             particles,
             location,
@@ -77,13 +88,20 @@ class Domain:
             model.compiled, particles, location, stage, _constants(model, particles),
             model.grid.comm, stopwatch,
         )  # fmt: skip
-        newton = Newton(field, responses, stopwatch, numerics)
-        return cls(model, particles, location, field, stage, newton)
+        newton = Newton(assembly, responses, numerics, stopwatch)
+        return cls(
+            model, particles, location, assembly, Tractions(attachment), stage, responses, newton
+        )
 
     @property
     def layout(self) -> Layout:
         """Where the coefficients of each field stand."""
-        return self.field.layout
+        return self.assembly.layout
+
+    @property
+    def active(self) -> npt.NDArray[np.bool_]:
+        """Whether each cell holds particles, on any rank, ny x nx."""
+        return self.assembly.attachment.active
 
     @property
     def constants(self) -> dict[str, Array]:

@@ -134,7 +134,7 @@ class Loads:
     def _on_edge(self, domain: Domain, traction: Traction) -> Array:
         """Forces of the whole traction on all coefficients."""
         edge = traction.edge
-        nodes, loaded = domain.field.edge_nodes(edge), self._cells(domain, traction)
+        nodes, loaded = domain.tractions.nodes(edge), self._cells(domain, traction)
         if not loaded.any():
             raise SupportError(
                 f"{traction}: no cell along that edge of the grid holds particles; let the grid end "
@@ -143,12 +143,12 @@ class Loads:
         x, y = nodes[..., 0].ravel(), nodes[..., 1].ravel()
         values = [edges.evaluate(component, x, y, f"{traction}") for component in traction.value]
         at_nodes = np.stack(values, axis=-1).reshape(nodes.shape)
-        return domain.field.traction(edge, np.where(loaded[:, None, None], at_nodes, 0.0))
+        return domain.tractions.forces(edge, np.where(loaded[:, None, None], at_nodes, 0.0))
 
     def _cells(self, domain: Domain, traction: Traction) -> npt.NDArray[np.bool_]:
         """Which cells with particles along its edge a traction loads."""
         part = edges.cells_between(self.grid, traction.edge, traction.between)
-        mask: npt.NDArray[np.bool_] = part[domain.field.along(traction.edge)]
+        mask: npt.NDArray[np.bool_] = part[domain.tractions.cells(traction.edge)]
         return mask
 
     def accept(self, part: float) -> None:

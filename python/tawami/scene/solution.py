@@ -16,7 +16,7 @@ from tawami.form.kinematics import KINEMATICS
 from tawami.grid import edges
 from tawami.scene.absent import Elsewhere
 from tawami.scene.configuration import Configuration, Outcome
-from tawami.solve.newton import History
+from tawami.solve.measures import History
 
 Array = npt.NDArray[np.float64]
 
@@ -73,7 +73,7 @@ class Solution(Elsewhere, Sealed, Unique):
         self.stress = particles["stress"]
         self.displacement_of_particles = particles["displacement"]
         self._eps_v = particles.get("eps_v")
-        self.seal()
+        self._seal()
 
     def __repr__(self) -> str:
         momentum = self.history[-1][0]

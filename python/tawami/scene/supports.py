@@ -13,6 +13,7 @@ from tawami.base import checks
 from tawami.base.errors import InputError
 from tawami.base.identity import text
 from tawami.base.text import listed
+from tawami.field.constraints import Held, PointHeld, held_edge, held_point
 from tawami.field.reduction import Reduction
 from tawami.grid import edges
 from tawami.grid.basis import Basis
@@ -189,7 +190,11 @@ class Supports:
         Raises:
             SupportError: The body has left an edge with a prescribed motion, or a point.
         """
-        layout, held, points = domain.layout, list[edges.Held](), list[edges.PointHeld]()
+        layout, held, points = (
+            domain.layout,
+            list[Held](),
+            list[PointHeld](),
+        )
         for support in self.all:
             if isinstance(support.place, str):
                 if not (moving and support.velocity is None and self._is_left(domain, support)):
@@ -213,21 +218,21 @@ class Supports:
         """Whether no cell along the support's edge holds particles."""
         assert isinstance(support.place, str)
         part = edges.cells_between(self.grid, support.place, support.between)
-        return not part[domain.field.along(support.place)].any()
+        return not part[domain.tractions.cells(support.place)].any()
 
-    def _on_edge(self, domain: Domain, support: Support, amount: float) -> edges.Held:
+    def _on_edge(self, domain: Domain, support: Support, amount: float) -> Held:
         assert isinstance(support.place, str)
-        edge = edges.held_edge(
-            self.grid, self.basis, domain.field.active, support.place, support.component,
+        edge = held_edge(
+            self.grid, self.basis, domain.active, support.place, support.component,
             support.value, support.between,
         )  # fmt: skip
-        return edges.Held(edge.indices, amount * edge.values)
+        return Held(edge.indices, amount * edge.values)
 
-    def _at_point(self, domain: Domain, support: Support, amount: float) -> edges.PointHeld:
+    def _at_point(self, domain: Domain, support: Support, amount: float) -> PointHeld:
         assert not isinstance(support.place, str)
         assert not callable(support.value)
-        return edges.held_point(
-            self.grid, self.basis, domain.field.active, support.place, support.component,
+        return held_point(
+            self.grid, self.basis, domain.active, support.place, support.component,
             amount * support.value, domain.layout.active,
         )  # fmt: skip
 
@@ -262,9 +267,7 @@ class Supports:
                     )
         return crossings
 
-    def follow(
-        self, u: Array, points: Sequence[edges.PointHeld], crossings: Mapping[int, float]
-    ) -> None:
+    def follow(self, u: Array, points: Sequence[PointHeld], crossings: Mapping[int, float]) -> None:
         """Move the points with the body, and record how far it has crossed edges.
 
         Args:

@@ -17,8 +17,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from tawami.field.constraints import Held
 from tawami.grid.basis import Basis
-from tawami.grid.edges import Held, edge_functions
+from tawami.grid.edges import edge_functions
 from tawami.grid.grid import Edge, Grid
 
 Array = npt.NDArray[np.float64]

@@ -1,17 +1,16 @@
-"""The scaled linear systems of a step, solved by MUMPS, whose factorisation is kept and reused.
+"""The scaled linear systems of a step by MUMPS, whose factorisation serves later tangents too.
 
-A tangent is factorised (LDL^T where it is symmetric, LU otherwise) and solved directly; the ones
-that follow are solved by FGMRES with that factorisation as preconditioner, to the tolerance asked
-for. A tangent is factorised again
+A tangent is factorised (LDL^T if it is symmetric, LU otherwise) and solved directly. FGMRES solves the
+following tangents to the given tolerance, with this factorisation as preconditioner. A tangent is
+factorised again
 
-- if it is another matrix: other unknowns, another pattern;
-- if the last solve took more than `PAYS` iterations: from there a new factorisation is cheaper;
-- if FGMRES does not get there within `LIMIT` iterations.
+- if it is another matrix, with other unknowns or another pattern;
+- if the last solve took more than `PAYS` iterations, because a new factorisation is cheaper then;
+- if FGMRES does not converge within `LIMIT` iterations.
 
-With the right-hand side, random vectors are solved for at each factorisation: the rms of `||A^-1 p||`
-over vectors p of standard normal numbers estimates the Frobenius norm of A^-1 (Kenney and Laub 1994),
-and the large entries of `A^-1 p` say where a singular system is weak. Whether a tangent is singular is
-judged where it is factorised.
+Each factorisation also solves for random vectors p of standard normal numbers. The root mean square of
+|A^-1 p| estimates the Frobenius norm of A^-1 (Kenney and Laub 1994), and the large entries of A^-1 p
+show where a singular system is weak. So a singular tangent is noticed when it is factorised.
 """
 
 from __future__ import annotations
@@ -20,38 +19,36 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from petsc4py import PETSc
 
+from tawami.base.arrays import Array
 from tawami.base.errors import SingularError
 from tawami.base.timing import Stopwatch
-from tawami.solve.linear_solver import Blocks, Solver
+from tawami.solve.linear_solver import Blocks, LinearSolver
 
-Array = npt.NDArray[np.float64]
-
-#: Iterations of FGMRES that are worth less than a factorisation, and the most there may be.
+#: Iterations of FGMRES up to which a factorisation costs more, and at which FGMRES stops.
 PAYS, LIMIT = 8, 15
-#: Percent of memory more than MUMPS foresees, for delayed pivots; a singular matrix delays many.
+#: Memory above the estimate of MUMPS [percent], for delayed pivots; a singular matrix delays many.
 ROOM = (50, 1000)
-#: Random vectors; the factors are read once for all right-hand sides, so they cost little.
+#: Number of random vectors. They cost little: the factors are read once for all right-hand sides.
 PROBES = 3
 
 
-class LinearSolver(Solver):
-    """Solves the tangents of one scene by factorisations that are kept; see `Solver`.
+class DirectSolver(LinearSolver):
+    """Solver of the tangents of one scene by factorisations that serve several tangents.
 
-    `symmetric`, `condition` and `weak` are of the tangent last factorised: whether it is symmetric was
-    probed by one product with a random vector; the condition is infinite where it met a zero pivot.
+    `symmetric`, `condition` and `weak` belong to the last factorised tangent. Its symmetry is tested by
+    one product with a random vector. Its condition is infinite if MUMPS met a zero pivot.
 
     Args:
         comm: Communicator.
-        stopwatch: Where the time goes.
+        stopwatch: Measures the time of each stage.
         always: Whether every tangent is factorised.
     """
 
     def __init__(self, comm: Any, stopwatch: Stopwatch, *, always: bool = False) -> None:
         super().__init__(comm, stopwatch)
-        self._always, self._keeps = always, False
+        self._always, self._records = always, False
         self._matrix: Any = None
         self._factorised: Array | None = None
 
@@ -60,16 +57,18 @@ class LinearSolver(Solver):
         super().forget()
         self._matrix, self._factorised = None, None
 
-    def keep(self) -> None:
-        """Keep a copy of each matrix that is factorised from now on, for :meth:`state`; so that none is
-        missing, the next solve makes a new one.
+    def record(self) -> None:
+        """Copy each matrix that is factorised from now on, for :meth:`state`.
+
+        The next tangent is factorised, so that no copy is missing.
         """
-        self._keeps = True
+        self._records = True
         self.forget()
 
     def state(self) -> dict[str, Any] | None:
-        """What makes the factorisation again, to the bit; None where there is none, or several ranks
-        have it.
+        """The factorised matrix, from which the same factorisation is made again, to the bit.
+
+        None without a factorisation, and on several ranks.
         """
         if self._factorised is None:
             return None
@@ -77,11 +76,11 @@ class LinearSolver(Solver):
         return {"matrix": self._factorised, "scale": self._scale, "weak": self.weak, **scalars}
 
     def restore(self, state: Mapping[str, Any], matrix: Any) -> None:
-        """The reverse of :meth:`state`.
+        """Factorise the matrix of a :meth:`state` again.
 
         Args:
-            state: What it gave.
-            matrix: Of the same pattern; it keeps its values.
+            state: The state.
+            matrix: A matrix of the same pattern, whose values do not change.
         """
         start, columns, values = (np.array(part) for part in matrix.getValuesCSR())
         self._begin(matrix, lambda: np.asarray(state["scale"]))
@@ -105,10 +104,10 @@ class LinearSolver(Solver):
         tolerance: float,
         blocks: Callable[[], Blocks],
     ) -> Array:
-        """As `Solver.solve`; direct where the tangent is factorised.
+        """See `LinearSolver.solve`; direct if the tangent is factorised.
 
         Raises:
-            SingularError: The factorisation ran out of memory or failed for another reason than a
+            SingularError: The factorisation ran out of memory, or failed for a reason other than a
                 singular matrix.
         """
         if not self._always and self._matrix is matrix and self.iterations <= PAYS:
@@ -121,14 +120,14 @@ class LinearSolver(Solver):
         return self._direct(matrix, right)
 
     def _iterate(self, right: Array, tolerance: float) -> Array | None:
-        """By FGMRES with the factorisation that is there; None if it takes too long."""
+        """Solve by FGMRES with the present factorisation; None if it takes too many iterations."""
         with self._stopwatch("solve"):
             if not self._fgmres(self._scale * right, tolerance, LIMIT):
                 return None
             return np.asarray(self._scale * self._handles["x"].array)
 
     def _direct(self, matrix: Any, right: Array) -> Array:
-        """By a new factorisation; the condition number and its direction with it."""
+        """Factorise and solve; estimate the condition number and its direction."""
         begin, end = matrix.getOwnershipRange()
         size = matrix.getSize()[0]
         probes = np.random.default_rng(0).standard_normal((PROBES, size))[:, begin:end]
@@ -136,7 +135,7 @@ class LinearSolver(Solver):
             self.symmetric = self._is_symmetric(matrix, probes[0])
         with self._stopwatch("factorise"):
             norm = matrix.norm(PETSc.NormType.FROBENIUS)
-            if self._keeps and matrix.comm.size == 1:
+            if self._records and matrix.comm.size == 1:
                 self._factorised = np.array(matrix.getValuesCSR()[2])
             if not np.isfinite(norm):
                 raise SingularError(
@@ -154,14 +153,14 @@ class LinearSolver(Solver):
             y, *weak = self._solve_all(np.vstack([self._scale * right, probes]))
             norms = [self._norm(direction) for direction in weak]
             self.weak = weak[int(np.argmax(norms))]
-            # rms of the row norms, which the scaling makes alike
+            # root mean square of the row norms, which the scaling makes alike
             estimate = float(norm / np.sqrt(size) * np.sqrt(np.mean(np.square(norms))))
             self.condition = np.inf if failed else estimate
         self._matrix, self.iterations = matrix, 0
         return np.asarray(self._scale * y)
 
     def _factorise(self, matrix: Any) -> bool:
-        """False if a pivot was zero."""
+        """Factorise a matrix; False if a pivot is zero."""
         for room in ROOM:
             code, detail = self._mumps(matrix, room)
             if code != -9:
@@ -169,12 +168,12 @@ class LinearSolver(Solver):
         if code < 0 and code not in (-10, -6):
             raise SingularError(
                 f"MUMPS could not factorise the tangent (INFOG(1) = {code}, INFOG(2) = {detail}): see "
-                "the MUMPS users' guide; -9 and -13 mean that memory is short"
+                "the MUMPS users' guide; -9 and -13 mean too little memory"
             )
         return code >= 0
 
     def _mumps(self, matrix: Any, room: int) -> tuple[int, int]:
-        """Factorise with so many percent of memory more than foreseen; what MUMPS says of it."""
+        """Factorise with memory above the estimate [percent]; error code of MUMPS and its detail."""
         self._handles.free("factor", "pc", "ksp")
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)
         ksp = self._handles["ksp"] = PETSc.KSP().create(matrix.comm)
@@ -193,7 +192,7 @@ class LinearSolver(Solver):
         return int(factor.getMumpsInfog(1)), int(factor.getMumpsInfog(2))
 
     def _solve_all(self, right: Array) -> Array:
-        """Solutions for several right-hand sides, each a row."""
+        """Solve for several right-hand sides, one per row."""
         factor = self._handles["factor"]
         count, n = right.shape
         size = ((n, PETSc.DETERMINE), (PETSc.DECIDE, count))

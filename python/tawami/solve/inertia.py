@@ -1,56 +1,70 @@
-"""Inertia of a step on the grid, in the increments u of its displacement.
+"""Inertia of a step on the grid, in the increments u of its displacement (Newmark 1959).
 
     a = slope (u - dt v) - back,    slope = 1/(beta dt^2),    back = (1/(2 beta) - 1) a at the beginning
 
-In a short step u is nearly `dt v`, in a long one nearly 0 beside it: in u alone the digits of u - dt v
-are lost, in u - dt v alone those of u. Newton's method adds to both.
+In a short step u is nearly dt v, in a long one dt v is large compared with u. So neither u nor u - dt v
+has all digits by itself: Newton's method updates both.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
+import scipy.sparse as sp
 
-Array = npt.NDArray[np.float64]
-#: Between 1 and the next number.
+from tawami.base.arrays import Array
+from tawami.field.reduction import Reduction
+
+#: Distance from 1 to the next floating-point number.
 EPSILON = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
 class Inertia:
-    """Forces `m_i a_i` of the lumped mass.
+    """Forces m_i a_i of the lumped mass.
 
     Attributes:
-        mass: Of each displacement coefficient [kg per metre depth].
-        slope: [1/s2]
-        course: Increments without acceleration, dt v [m].
-        back: [m/s2]
-        impulse: Of the supports at the beginning of the step, over its length: what changed the
-            velocities that came from the particles into those they prescribe [N per metre depth].
+        mass: Mass of each displacement coefficient [kg per metre depth].
+        slope: Derivative of the acceleration with respect to u [1/s2].
+        coasting: Increments without acceleration, dt v [m].
+        back: Part of the acceleration that comes from the beginning of the step [m/s2].
+        impulse: Impulse by which the supports impose their velocities at the beginning of the step,
+            divided by the length of the step [N per metre depth].
     """
 
     mass: Array
     slope: float
-    course: Array
+    coasting: Array
     back: Array
     impulse: Array
 
-    def off_course(self, coefficients: Array) -> Array:
-        """u - dt v of the first iterate; 0 where only round-off is between them, as for functions that
-        constraints make of others.
-        """
-        off = coefficients[: len(self.mass)] - self.course
-        off[np.abs(off) <= 8 * EPSILON * np.abs(self.course).max(initial=0.0)] = 0.0
-        return np.asarray(off)
+    def deviation(self, coefficients: Array) -> Array:
+        """u - dt v of the first iterate.
 
-    def acceleration(self, off: Array) -> Array:
-        """At the end of the step, from u - dt v [m]: of each displacement coefficient [m/s2]."""
-        return np.asarray(self.slope * off - self.back)
+        It is 0 where the difference is only round-off, as in functions that constraints tie to others.
+        """
+        deviation = coefficients[: len(self.mass)] - self.coasting
+        round_off = 8 * EPSILON * np.abs(self.coasting).max(initial=0.0)
+        deviation[np.abs(deviation) <= round_off] = 0.0
+        return np.asarray(deviation)
+
+    def acceleration(self, deviation: Array) -> Array:
+        """Acceleration of each displacement coefficient at the end of the step [m/s2]."""
+        return np.asarray(self.slope * deviation - self.back)
 
     def force(self, acceleration: Array, size: int) -> Array:
-        """On all coefficients, of which there are `size`."""
+        """Forces of an acceleration on all `size` coefficients [N per metre depth]."""
         forces = np.zeros(size)
         forces[: len(acceleration)] = self.mass * acceleration
         return forces
+
+    def add_to(self, tangent: Any, reduction: Reduction) -> None:
+        """Add S^T (slope M) S to a reduced tangent: it is diagonal without point constraints."""
+        padding = len(reduction.offset) - len(self.mass)
+        mass = sp.diags(np.pad(self.slope * self.mass, (0, padding)))
+        reduced = (reduction.selection.T @ mass @ reduction.selection).tocsr()[reduction.own]
+        rows, columns = (part.astype(np.int32) for part in (reduced.indptr, reduced.indices))
+        tangent.setValuesCSR(rows, columns, reduced.data, addv=True)
+        tangent.assemble()

@@ -1,13 +1,13 @@
-"""The scaled linear systems of a step by FGMRES, without a factorisation of the whole.
+"""The scaled linear systems of a step by FGMRES with a preconditioner for each field.
 
-The preconditioner takes the fields one after the other: displacement by smoothed-aggregation
-multigrid, which is told the rigid modes, and eps_v or p by nothing at all: scaled as p/mu (README, The
-method) their Schur complement is near the identity, the less so the smaller alpha is: 20 to 50
-iterations with 0.1, up to 130 with 0.01, whatever Poisson's ratio.
+Smoothed-aggregation multigrid with the rigid modes preconditions the displacement. eps_v or p, scaled
+as p/mu (README, The method), need no preconditioner: their Schur complement is near the identity. It is
+farther from the identity for small alpha: 20 to 50 iterations with alpha = 0.1, up to 130 with 0.01, for
+any Poisson's ratio.
 
-FGMRES finds a solution of a singular system too, if its right-hand side allows one. So the first system
-is also solved, roughly, for a random vector, which no singular system allows; that solution estimates
-the condition number as in `linear`.
+FGMRES also solves a singular system whose right-hand side is in its range. So the first system is also
+solved, to a low tolerance, for a random vector, which is in the range of no singular matrix. That
+solution estimates the condition number as in `direct`.
 """
 
 from __future__ import annotations
@@ -16,35 +16,33 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from petsc4py import PETSc
 
+from tawami.base.arrays import Array
 from tawami.base.errors import SingularError
 from tawami.base.timing import Stopwatch
-from tawami.solve.linear_solver import Blocks, Solver
+from tawami.solve.linear_solver import Blocks, LinearSolver
 
-Array = npt.NDArray[np.float64]
-
-#: Iterations after which a system is given up, and after which FGMRES starts anew.
+#: Iterations at which FGMRES stops, and after which it restarts.
 LIMIT, RESTART = 500, 100
-#: How well the random vector is to be reached.
-ROUGHLY = 1e-2
+#: Tolerance of the solve for the random vector.
+LOW_TOLERANCE = 1e-2
 ADVICE = (
-    "Likely causes: particles that do not stiffen every function of the grid, cells with little of the "
-    "body, or K much larger than mu in a form without a field for the volume; linear_solver='direct' "
-    "says where"
+    "Likely causes: functions of the grid that get no stiffness from the particles, cells with little "
+    "of the body, or K much larger than mu in a form without a field for the volume; "
+    "linear_solver='direct' names the cells"
 )
 
 
-class KrylovSolver(Solver):
-    """Solves the tangents of one scene iteratively, always to the tolerance; see `Solver`.
+class IterativeSolver(LinearSolver):
+    """Solver of the tangents of one scene by FGMRES, always to the tolerance.
 
-    Its `condition` is that of the first tangent, and a singular one is refused at once.
+    Its `condition` belongs to the first tangent; if this is singular, the solver raises an error.
     """
 
     def __init__(self, comm: Any, stopwatch: Stopwatch) -> None:
         super().__init__(comm, stopwatch)
-        self.symmetric, self._tried = False, False  # symmetry is of no use here
+        self.symmetric, self._tested = False, False  # FGMRES makes no use of symmetry
 
     def solve(
         self,
@@ -54,35 +52,36 @@ class KrylovSolver(Solver):
         tolerance: float,
         blocks: Callable[[], Blocks],
     ) -> Array:
-        """As `Solver.solve`.
+        """See `LinearSolver.solve`.
 
         Raises:
-            SingularError: FGMRES did not get there, or the tangent is singular.
+            SingularError: FGMRES did not converge, or the tangent is singular.
         """
         self._begin(matrix, scale)
         with self._stopwatch("factorise"):
             self._precondition(matrix, blocks())
         with self._stopwatch("solve"):
-            if not self._tried:
-                self._try(matrix)
-            self._reach(self._scale * right, tolerance)
+            if not self._tested:
+                self._test(matrix)
+            self._converge(self._scale * right, tolerance)
         return np.asarray(self._scale * self._handles["x"].array)
 
-    def _try(self, matrix: Any) -> None:
-        """A random right-hand side: condition number, or a refusal."""
+    def _test(self, matrix: Any) -> None:
+        """Estimate the condition number from a random right-hand side; raise an error if singular."""
         begin, end = matrix.getOwnershipRange()
         size = matrix.getSize()[0]
-        self._reach(np.random.default_rng(0).standard_normal(size)[begin:end], ROUGHLY)
+        random = np.random.default_rng(0).standard_normal(size)[begin:end]
+        self._converge(random, LOW_TOLERANCE)
         norm = matrix.norm(PETSc.NormType.FROBENIUS)
         self.condition = float(norm / np.sqrt(size) * self._handles["x"].norm())
-        self._tried = True
+        self._tested = True
         if self.singular:
             raise SingularError(
                 f"the tangent is singular (condition number of the scaled matrix: about "
                 f"{self.condition:.1e}, from a random vector). {ADVICE}"
             )
 
-    def _reach(self, right: Array, tolerance: float) -> None:
+    def _converge(self, right: Array, tolerance: float) -> None:
         if not self._fgmres(right, tolerance, LIMIT):
             reached = self._handles["ksp"].getResidualNorm() / self._handles["b"].norm()
             raise SingularError(

@@ -1,4 +1,4 @@
-"""What the solvers of the scaled linear systems of a step share: `S K S y = S r`, `x = S y`."""
+"""What the solvers of the scaled linear systems of a step share: S K S y = S r, x = S y."""
 
 from __future__ import annotations
 
@@ -7,42 +7,40 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from tawami.base.arrays import Array, Mask
 from tawami.base.petsc import Handles
 from tawami.base.timing import Stopwatch
 
-Array = npt.NDArray[np.float64]
-
-#: A scaled system beyond this condition number has no digit left to trust.
+#: Condition number from which the solution of a scaled system has no correct digit.
 SINGULAR = 1e14
 
 
 @dataclass(frozen=True)
 class Blocks:
-    """What this rank's unknowns are.
+    """Fields of this rank's unknowns.
 
     Attributes:
-        displacement: Which of them belong to the displacement.
-        rigid: Values of the three rigid motions for these, n x 3.
+        displacement: Whether each unknown belongs to the displacement.
+        rigid: Values of the three rigid motions at those that do, n x 3.
     """
 
-    displacement: npt.NDArray[np.bool_]
+    displacement: Mask
     rigid: Array
 
 
-class Solver:
-    """Solves the tangents of one scene; each rank passes and gets its own rows.
+class LinearSolver:
+    """Solver of the tangents of one scene; each rank passes and gets its own rows.
 
     Args:
         comm: Communicator.
-        stopwatch: Where the time goes.
+        stopwatch: Measures the time of each stage.
 
     Attributes:
         symmetric: Whether the solver knows the tangent to be symmetric.
-        condition: Estimate of the condition number of a tangent, scaled.
-        weak: This rank's entries of the direction that it is weakest in, so far as known.
-        iterations: FGMRES iterations of the last solve; 0 where the tangent was factorised.
+        condition: Estimated condition number of a tangent, scaled.
+        weak: This rank's entries of the direction in which that tangent is weakest, if known.
+        iterations: FGMRES iterations of the last solve; 0 if the tangent was factorised.
     """
 
     def __init__(self, comm: Any, stopwatch: Stopwatch) -> None:
@@ -53,23 +51,23 @@ class Solver:
         self.weak = np.empty(0)
 
     def forget(self) -> None:
-        """Free what was made for a tangent; the next solve makes it anew."""
+        """Free all that was made for a tangent; the next solve makes it anew."""
         self._handles.free()
 
-    def keep(self) -> None:
-        """Keep what :meth:`state` gives from now on; nothing is taken over from earlier solves."""
+    def record(self) -> None:
+        """Record from now on what :meth:`state` gives, independently of earlier solves."""
 
     def state(self) -> dict[str, Any] | None:
-        """What later solves take from earlier ones; None if that is nothing."""
+        """What later solves take from earlier ones; None if this is nothing."""
         return None
 
     def restore(self, state: Mapping[str, Any], matrix: Any) -> None:
-        """The reverse of :meth:`state`, for a tangent of the same unknowns."""
+        """Restore a :meth:`state`, for a tangent with the same unknowns."""
         raise NotImplementedError
 
     @property
     def singular(self) -> bool:
-        """Whether that tangent cannot be solved to any accuracy."""
+        """Whether the solution of that tangent has no correct digit."""
         return not self.condition < SINGULAR
 
     def solve(
@@ -80,37 +78,37 @@ class Solver:
         tolerance: float,
         blocks: Callable[[], Blocks],
     ) -> Array:
-        """Solution of `K x = r`.
+        """Solve K x = r.
 
         Args:
-            matrix: Reduced tangent K; scaled in place.
-            scale: Gives the factors S of the unknowns, where those of an older tangent do not serve.
+            matrix: Reduced tangent K; it is scaled in place.
+            scale: Gives the factors S of the unknowns, if those of an older tangent do not serve.
             right: r.
-            tolerance: Of `|S (r - K x)| / |S r|` where the solve is not direct.
-            blocks: Says what the unknowns are.
+            tolerance: Bound of |S (r - K x)| / |S r| if the solve is not direct.
+            blocks: Gives the fields of the unknowns.
 
         Raises:
-            SingularError: It cannot be solved, and the solver knows no more than that; `singular` is
-                for the caller to ask.
+            SingularError: The system cannot be solved, and nothing else is known. A caller asks
+                :attr:`singular` as well.
         """
         raise NotImplementedError
 
     def _begin(self, matrix: Any, scale: Callable[[], Array]) -> None:
-        """Vectors and factors for another tangent, which is scaled."""
+        """Make vectors and factors for another tangent, and scale it."""
         self.forget()
         self._handles["x"], self._handles["b"] = matrix.createVecs()
         self._scale = scale()
         self._multiply(matrix, self._scale)
 
     def _multiply(self, matrix: Any, factors: Array) -> None:
-        """Rows and columns of a matrix with factors."""
+        """Multiply rows and columns of a matrix by factors."""
         with self._stopwatch("scale"):
             vector = self._handles["x"]
             vector.setArray(factors)
             matrix.diagonalScale(vector, vector)
 
     def _fgmres(self, right: Array, tolerance: float, limit: int) -> bool:
-        """The scaled system by FGMRES, into the vector x; False if it takes more than the limit."""
+        """Solve the scaled system by FGMRES, into the vector x; False if it does not converge."""
         ksp, x, b = (self._handles[name] for name in ("ksp", "x", "b"))
         ksp.setTolerances(rtol=tolerance, atol=0.0, max_it=limit)
         b.setArray(right)

@@ -1,7 +1,7 @@
-"""How a step is solved: what a scene may trade for speed, and what of it changes the result.
+"""Numerical settings of a scene.
 
-Newton's tolerance is the only one that changes what it converges to; tangent, factorisations and linear
-solver change how long that takes (README, Speed against accuracy).
+Only Newton's tolerance changes the result. Tangent, factorisations and linear solver change the time
+(README, Speed against accuracy).
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ class Numerics:
     """Numerical settings of a scene.
 
     Args:
-        tolerance: Newton stops when both measures of `tawami.solve.newton` are below it, 1e-14 to 0.1.
-        max_iterations: Newton iterations before the step is given up.
-        assembly: 'fast', kernels called from Rust, or 'reference', dolfinx and P^T K P: the same
-            numbers to round-off.
-        tangent_rule: Points at which the tangent takes its sums over particles: 'full' (5 x 5, exact),
-            or 'reduced' (3 x 3: cheaper, an approximation: more iterations, and Newton may diverge).
-        factorise: 'when_it_pays' keeps a factorisation for later iterations and steps; 'always' makes
-            one in each Newton iteration.
-        linear_solver: 'direct' (MUMPS), or 'iterative': FGMRES, multigrid for the displacement.
+        tolerance: Newton stops when both measures of `tawami.solve.measures` are below it, 1e-14 to 0.1.
+        max_iterations: Newton iterations after which the step fails.
+        assembly: 'fast' calls the kernels from Rust, 'reference' is plain dolfinx and P^T K P. Both give
+            the same numbers up to round-off.
+        tangent_rule: Points of the sums over particles in the tangent: 'full' (5 x 5, exact) or
+            'reduced' (3 x 3, an approximation: cheaper, with more iterations, and Newton may diverge).
+        factorise: 'when_it_pays' uses a factorisation in later iterations and steps, 'always' factorises
+            in each Newton iteration.
+        linear_solver: 'direct' (MUMPS) or 'iterative' (FGMRES, with multigrid for the displacement).
 
     Raises:
-        InputError: A value out of its range.
+        InputError: A value is out of its range.
     """
 
     tolerance: float = 1e-6

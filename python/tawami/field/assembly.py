@@ -1,0 +1,65 @@
+"""The seam between particles and field problem (contract 3 of CONTRIBUTING.md).
+
+(form, particle densities on active cells, reduction) -> residual and reduced tangent. `reference` and
+`fast` implement it, and nothing else knows which of them is used.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import scipy.sparse as sp
+
+from tawami.base import ranks
+from tawami.base.arrays import Array
+from tawami.base.petsc import rows_of
+from tawami.fem.rules import Rule
+from tawami.field.attachment import Attachment
+from tawami.field.layout import Layout
+from tawami.field.reduction import Reduction
+
+
+class Assembly(Protocol):
+    """Residual and tangent of a form on the active cells of a grid.
+
+    Attributes:
+        attachment: The form and the active cells.
+        reduction: The reduction of the last tangent; None before the first.
+    """
+
+    attachment: Attachment
+    reduction: Reduction | None = None
+
+    @property
+    def layout(self) -> Layout:
+        """Places of the coefficients."""
+        return self.attachment.layout
+
+    @abstractmethod
+    def residual(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
+        """Internal forces and volume residual on all coefficients, before supports, on every rank.
+
+        Args:
+            coefficients: Increments of all fields.
+            data: Particle data of each rule, particles x columns.
+        """
+
+    @abstractmethod
+    def tangent(self, coefficients: Array, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
+        """P^T K P as a PETSc matrix.
+
+        The next call overwrites it. It is the same object as long as the unknowns are the same.
+        """
+
+    def unreduced_tangent(self, coefficients: Array, data: Mapping[Rule, Array]) -> sp.csr_matrix:
+        """E^T K E, the tangent of :meth:`residual`, complete on every rank."""
+        everything, comm = Reduction.of_all(self.layout), self.layout.grid.comm
+        mine = rows_of(self.tangent(coefficients, data, everything)).tocoo()
+        rows, columns, values = (
+            ranks.allgathered(comm, part)
+            for part in (mine.row + everything.own.start, mine.col, mine.data)
+        )
+        unknowns, shape = everything.unknowns, (self.layout.size, self.layout.size)
+        return sp.csr_matrix((values, (unknowns[rows], unknowns[columns])), shape=shape)

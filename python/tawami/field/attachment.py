@@ -1,0 +1,96 @@
+"""A compiled form attached to the active cells of a grid, as both assemblies use it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from tawami import _rust
+from tawami.base import ranks
+from tawami.base.arrays import Array, Mask
+from tawami.base.timing import Stopwatch
+from tawami.fem.rules import Rule, rule_points
+from tawami.field.layout import Layout
+from tawami.form.compilation import CompiledForm, Integral
+from tawami.grid.basis import Basis
+from tawami.grid.grid import Grid
+
+#: Sum over the particles of a spline below which round-off of the assembly hides its stiffness: that of
+#: a particle 4e-7 of a cell inside the support. Such a spline follows its neighbour, as if the particle
+#: had not arrived. A ghost penalty gives it a stiffness instead. Lagrange functions need no tie: their
+#: gradients do not vanish with them, and biquadratic ones have negative sums as well.
+UNRESOLVED = 1e-13
+
+
+class Attachment:
+    """A compiled form on the active cells of a grid.
+
+    Args:
+        grid: The grid.
+        compiled: The form.
+        basis: Basis of the displacement.
+        location: Cells and positions of this rank's particles.
+        volume: Their volumes [m2 per metre depth].
+        parameters: Parameters of the form (alpha, ...).
+        stopwatch: Measures the time of each stage.
+
+    Attributes:
+        space: Function space of all fields on the mesh.
+        active: Whether each cell holds particles, on any rank, ny x nx.
+        cells: This rank's active cells, as dolfinx numbers them.
+        rows: Position of each of them in `location.active`.
+        layout: Places of the coefficients.
+        points: Indices along the axes of the points of each rule; none for means over cells.
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        compiled: CompiledForm,
+        basis: Basis,
+        location: _rust.Location,
+        volume: Array,
+        parameters: Mapping[str, float],
+        stopwatch: Stopwatch,
+    ) -> None:
+        self.grid, self.compiled, self.stopwatch = grid, compiled, stopwatch
+        self.location, self.volume = location, volume
+        self._values = {"h": grid.h, **parameters}
+        self.space = grid.function_space(len(compiled.form.fields), compiled.element)
+        number = grid.cell_numbers(grid.rectangle.ij)
+        active: Mask = np.zeros(grid.cells[::-1], dtype=bool)
+        active.ravel()[location.active] = True
+        self.cells = np.flatnonzero(active.ravel()[number]).astype(np.int32)
+        self.rows = np.searchsorted(location.active, number[self.cells]).astype(np.uint32)
+        self.active = ranks.any_of(grid.comm, active)
+        self.layout = Layout(grid, basis, self.space, self.active)
+        if compiled.ghost is None and basis == "quadratic_spline":
+            once = np.ones(len(volume))
+            sums = _rust.nodal_sums(location, once, once[:, None], basis)
+            self.layout.tie(self.summed(sums)[:, 0], UNRESOLVED)
+        self.points: dict[Rule, list[tuple[int, int]]] = {
+            rule: self._point_indices(rule) for rule in compiled.densities
+        }
+
+    def _point_indices(self, rule: Rule) -> list[tuple[int, int]]:
+        """Indices along x and y, in the rule of one axis, of each point of a rule of dolfinx."""
+        if rule == "mean":
+            return []
+        points = self.grid.rectangle.to_grid_axes(rule_points(rule))
+        along = np.array([0.0, 1.0])
+        if rule != "vertex":
+            along, _ = _rust.gauss(round(len(points) ** 0.5))
+        distance = np.abs(points[:, :, None] - along[None, None, :])
+        if distance.min(axis=2).max() > 1e-12:
+            raise RuntimeError("internal: dolfinx' quadrature is not the tensor Gauss rule")
+        return [(int(a), int(b)) for a, b in distance.argmin(axis=2)]
+
+    def constants(self, integral: Integral) -> Array:
+        """Values of the constants that an integral names."""
+        return np.array([self._values[name] for name in integral.constants], dtype=float)
+
+    def summed(self, of_cells: Any) -> Array:
+        """The sum over all ranks of arrays from their cells."""
+        return ranks.sum_of(self.grid.comm, np.ascontiguousarray(of_cells))

@@ -1,0 +1,176 @@
+"""Supports as linear constraints on the coefficients of the displacement."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import spsolve
+
+from tawami import _rust
+from tawami.base.arrays import Array, Indices, Mask
+from tawami.base.errors import SupportError
+from tawami.grid.basis import Basis, values_1d
+from tawami.grid.edges import (
+    Interval,
+    Profile,
+    cells_between,
+    edge_functions,
+    evaluate,
+    locate_point,
+)
+from tawami.grid.grid import Edge, Grid
+from tawami.grid.space import Position, lattice, tensor_product
+
+#: Points of the Gauss rule along a cell of an edge, for the projection of profiles.
+POINTS = 5
+#: Distance from a side of a cell below which a point lies on it [cells].
+ON_SIDE = 1e-9
+#: Least share of the value at a point that functions with particles must make up.
+LEAST_SHARE = 0.9
+
+
+@dataclass(frozen=True)
+class Held:
+    """Prescribed coefficients.
+
+    Attributes:
+        indices: The coefficients, all of one displacement component.
+        values: Their values [m].
+    """
+
+    indices: Indices
+    values: Array
+
+
+@dataclass(frozen=True)
+class PointHeld:
+    """A multi-point constraint: `weights . coefficients[indices] = value`.
+
+    Attributes:
+        indices: Coefficients of one displacement component.
+        weights: Values of their functions at the point.
+        value: Displacement of the point [m].
+        where: Name of the support, for messages.
+        place: The point [m].
+    """
+
+    indices: Indices
+    weights: Array
+    value: float
+    where: str
+    place: Position
+
+
+def held_edge(
+    grid: Grid,
+    basis: Basis,
+    active: Mask,
+    edge: Edge,
+    component: int,
+    value: Profile,
+    between: Interval | None = None,
+) -> Held:
+    """Prescribe a displacement component on an edge of the grid.
+
+    A profile is projected in L2. Only cells with particles count, and functions that vanish on all of
+    them are left out.
+
+    Args:
+        grid: The grid.
+        basis: Basis of the displacement.
+        active: Whether each cell holds particles, ny x nx.
+        edge: Name of the edge.
+        component: Number of the component.
+        value: Displacement along the edge [m].
+        between: Part of the edge [m]; all of it by default.
+
+    Raises:
+        SupportError: No cell along the edge holds particles.
+    """
+    axis, end = grid.edge(edge)
+    along = 1 - axis
+    touched = np.flatnonzero(
+        np.take(active, end, axis=1 - axis) & cells_between(grid, edge, between)
+    )
+    if len(touched) == 0:
+        raise SupportError(
+            f"fix(edge='{edge}'): no cell along that edge of the grid holds particles: the support "
+            "would not touch the body. Let the grid end where the body is held"
+        )
+    points, weights = _rust.gauss(POINTS)
+    cell, t = np.repeat(touched, POINTS), np.tile(points, len(touched))
+    position = grid.axis_positions(along, cell, t)
+    fixed = np.full_like(position, grid.upper[axis] if end else grid.origin[axis])
+    x, y = (fixed, position) if axis == 0 else (position, fixed)
+    prescribed = evaluate(value, x, y, f"fix(edge='{edge}')")
+    values = values_1d(basis, grid.cells[along], cell, t)
+    used = np.unique(values.indices)
+    indices = grid.space.dim * edge_functions(grid, basis, edge)[used] + component
+    if not callable(value) and np.ndim(value) == 0:
+        return Held(indices, np.full(len(used), prescribed[0]))  # the functions add up to 1
+    values = values[:, used]
+    weighted = sp.diags(np.tile(weights, len(touched))) @ values
+    coefficients = spsolve((weighted.T @ values).tocsc(), weighted.T @ prescribed)
+    return Held(indices, coefficients)
+
+
+def held_point(
+    grid: Grid,
+    basis: Basis,
+    active: Mask,
+    point: Sequence[float],
+    component: int,
+    value: float,
+    active_functions: Mask,
+) -> PointHeld:
+    """Prescribe a displacement component at a point.
+
+    A point at the border of a moving body may reach a cell without particles. Then the functions with
+    particles stand for all, if they make up most of the value at the point.
+
+    Args:
+        grid: The grid.
+        basis: Basis of the displacement.
+        active: Whether each cell holds particles, ny x nx.
+        point: The point [m].
+        component: Number of the component.
+        value: Its displacement [m].
+        active_functions: Whether each coefficient belongs to a function with particles.
+
+    Raises:
+        InputError: The point is outside the grid.
+        SupportError: The body does not reach the point.
+    """
+    where = f"hold(point=({', '.join(f'{x:g}' for x in point)}))"
+    location = locate_point(grid, point, where)
+    cell = np.unravel_index(int(location.cell[0]), grid.cells, order="F")
+    xi = location.xi[0]
+    # on a side between cells, the point belongs to each of them
+    near = [np.add(cell, shift) for shift in product(*map(_touching, xi))]
+    inside = [c for c in near if (c >= 0).all() and (c < grid.cells).all()]
+    filled = [c for c in inside if active[tuple(c[::-1])]]
+    chosen = filled[0] if filled else np.array(cell)
+    along = [
+        values_1d(basis, n, k, np.clip(t + i - k, 0, 1))
+        for n, i, k, t in zip(grid.cells, cell, chosen, xi, strict=True)
+    ]
+    strides = np.cumprod([1, *(_rust.basis_len(basis, n) for n in grid.cells[:-1])])
+    functions = lattice([values.indices for values in along]).astype(np.int64) @ strides
+    weights = tensor_product([values.data for values in along])
+    dim = grid.space.dim
+    reached = active_functions[dim * functions]
+    if not filled and weights[reached].sum() < LEAST_SHARE:
+        raise SupportError(
+            f"{where}: the point lies in a cell without particles; move it into the body"
+        )
+    functions, weights = functions[reached], weights[reached] / weights[reached].sum()
+    return PointHeld(dim * functions + component, weights, value, where, (point[0], point[1]))
+
+
+def _touching(t: float) -> tuple[int, ...]:
+    """Offsets of the cells that a position within a cell touches along one axis."""
+    return (0, -1) if t < ON_SIDE else (0, 1) if t > 1 - ON_SIDE else (0,)

@@ -1,0 +1,154 @@
+"""Places of the coefficients of all fields, and the extraction matrix E.
+
+The coefficients of all fields form one vector: the displacement (function, then component), followed by
+the bilinear field. E gives the degrees of freedom of the mesh: nodal = E coefficients.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from tawami import _rust
+from tawami.base.arrays import Array, Indices, Mask
+from tawami.fem import dolfinx
+from tawami.fem.mesh import FunctionSpace
+from tawami.grid.basis import Basis, greville_1d
+from tawami.grid.grid import Grid
+from tawami.grid.space import lattice
+
+
+class Layout:
+    """Places of the coefficients, and E.
+
+    Args:
+        grid: The grid.
+        basis: Basis of the displacement.
+        space: Function space on the mesh: biquadratic displacement, then a bilinear field or none.
+        active: Whether each cell holds particles, on any rank, ny x nx.
+
+    Attributes:
+        num_displacement: Number of displacement coefficients; the bilinear field follows.
+        size: Number of coefficients.
+        active: Whether each coefficient belongs to a function with a particle in its support.
+        owner: Rank of each coefficient: one with a cell in the support of the function.
+        num_parts: Number of parts of the body that share no displacement function.
+        part: Part of each displacement coefficient, -1 for inactive ones.
+        tied: Pairs of displacement coefficients, the first of which follows the second.
+    """
+
+    def __init__(self, grid: Grid, basis: Basis, space: FunctionSpace, active: Mask) -> None:
+        self.grid, self.basis, self._space = grid, basis, space
+        self._bilinear = space.dofs.shape[1] > dolfinx.DISPLACEMENT_DOFS
+        self._of_cells = _rust.Active(grid.rust, np.flatnonzero(active).astype(np.uint32))
+        self.num_parts, part = self._of_cells.parts(basis)
+        self.part = np.repeat(part, grid.space.dim)
+        self.num_displacement = len(self.part)
+        self.active = self._of_all(self._of_cells.functions)
+        self.owner = self._of_all(lambda b: self._of_cells.spread(b, grid.rank_of_cell))
+        self.size = len(self.active)
+        self.tied: Indices = np.empty((0, 2), dtype=np.int64)
+
+    def tie(self, sums: Array, least: float) -> None:
+        """Tie weak displacement functions to their strongest neighbours.
+
+        A weak function has particles in its support, but its sum over them is below `least`.
+
+        Args:
+            sums: Sum of each function over the particles.
+            least: Bound of the sums [-].
+        """
+        dim, shape = self.grid.space.dim, self._shape(self.basis)
+        weak = np.flatnonzero(self.active[: self.num_displacement : dim] & (sums < least))
+        tied: list[tuple[int, int]] = []
+        for function in weak:
+            at = np.unravel_index(function, shape, order="F")
+            box = [np.arange(max(i - 1, 0), min(i + 2, n)) for i, n in zip(at, shape, strict=True)]
+            near = lattice(box) @ np.cumprod((1, *shape[:-1]))
+            strongest = near[sums[near].argmax()]
+            if sums[strongest] >= least:
+                tied.append((int(function), int(strongest)))
+        pairs = np.array(tied, dtype=np.int64).reshape(-1, 1, 2)
+        self.tied = (dim * pairs + np.arange(dim)[:, None]).reshape(-1, 2)
+        self.active[self.tied[:, 0]] = False
+
+    def _shape(self, basis: Basis) -> tuple[int, ...]:
+        """Number of functions of a basis along each axis."""
+        return tuple(_rust.basis_len(basis, n) for n in self.grid.cells)
+
+    def _of_all(self, of_functions: Callable[[Basis], Any]) -> Any:
+        """Values for all coefficients, from those for the functions of each field."""
+        fields = [np.repeat(of_functions(self.basis), self.grid.space.dim)]
+        return np.concatenate(fields + [of_functions("bilinear")] * self._bilinear)
+
+    def reached_by(self, cells: Any) -> Mask:
+        """Whether each coefficient belongs to a function with one of these cells in its support."""
+        mask: Mask = self._of_all(_rust.Active(self.grid.rust, cells).functions)
+        return mask
+
+    @functools.cached_property
+    def extraction(self) -> sp.csr_matrix:
+        """E: degrees of freedom of this rank's cells x coefficients."""
+        return self.extraction_on(np.arange(len(self._space.dofs)))
+
+    def extraction_on(self, cells: Any) -> sp.csr_matrix:
+        """The rows of E of the degrees of freedom of some dolfinx cells; the others are empty."""
+        of_u, of_bilinear = dolfinx.DISPLACEMENT_DOFS, dolfinx.BILINEAR_DOFS
+        dofs, dim = self._space.dofs[cells], self.grid.space.dim
+        fields: list[tuple[Basis, int, Any]] = [(self.basis, 2, dofs[:, :of_u].reshape(-1, dim))]
+        if self._bilinear:
+            fields.append(("bilinear", 1, dofs[:, of_u : of_u + of_bilinear].reshape(-1, 1)))
+        rows, columns, values, first = [], [], [], 0
+        for basis, degree, of_nodes in fields:
+            functions, weights = self._at_nodes(basis, degree, cells)
+            once = np.unique(of_nodes[:, 0], return_index=True)[1]
+            components = np.arange(of_nodes.shape[1])
+            shape = (len(once), functions.shape[1], len(components))
+            columns.append(first + len(components) * functions[once][..., None] + components)
+            rows.append(np.broadcast_to(of_nodes[once][:, None], shape))
+            values.append(np.broadcast_to(weights[once][..., None], shape))
+            first += len(components) * int(np.prod(self._shape(basis)))
+        flat = [
+            np.concatenate([part.ravel() for part in parts]) for parts in (values, rows, columns)
+        ]
+        matrix = sp.csr_matrix((flat[0], (flat[1], flat[2])), shape=(self._space.size, self.size))
+        matrix.eliminate_zeros()
+        return matrix
+
+    def _at_nodes(self, basis: Basis, degree: int, cells: Any) -> tuple[Indices, Array]:
+        """Functions at the Lagrange nodes of cells and their values, (cells x nodes) x functions."""
+        grid = self.grid
+        nodes = grid.rectangle.to_grid_axes(dolfinx.reference_nodes(degree))
+        along = []
+        for axis, n in enumerate(grid.cells):
+            cell = np.repeat(grid.rectangle.ij[cells, axis], len(nodes))
+            first, values = _rust.basis_1d(basis, n, cell, np.tile(nodes[:, axis], len(cells)))
+            along.append((first[:, None] + np.arange(3), values))
+        (fx, vx), (fy, vy) = along
+        functions = fx[:, None, :] + self._shape(basis)[0] * fy[:, :, None]
+        weights = vx[:, None, :] * vy[:, :, None]
+        # a function beyond the last has the value 0 (a bilinear cell has two along each axis)
+        functions = np.where(weights == 0, 0, functions)
+        return functions.reshape(-1, 9), weights.reshape(-1, 9)
+
+    @functools.cached_property
+    def greville(self) -> Array:
+        """Greville points [m] of the displacement functions, functions x components."""
+        grid = self.grid
+        axes = zip(grid.origin, grid.cells, strict=True)
+        return lattice([x + grid.h * greville_1d(self.basis, n) for x, n in axes])
+
+    def split(self, coefficients: Array) -> tuple[Array, Array | None]:
+        """Coefficients of the displacement and of the bilinear field (None if there is none)."""
+        n = self.num_displacement
+        return coefficients[:n], coefficients[n:] if n < self.size else None
+
+    def cells_of(self, coefficient: int) -> Indices:
+        """Cells (i, j) with particles in the support of a coefficient's function, cells x axes."""
+        if coefficient < self.num_displacement:
+            return self._of_cells.support(self.basis, coefficient // self.grid.space.dim)
+        return self._of_cells.support("bilinear", coefficient - self.num_displacement)

@@ -1,0 +1,83 @@
+"""The iterates of a step, and the forces that they give."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tawami.base.arrays import Array
+from tawami.field.reduction import Reduction
+from tawami.solve.inertia import Inertia
+
+#: Gives the friction on the body from the forces of supports and walls, functions x 2 each.
+Friction = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class Forces:
+    """Forces on all coefficients [N per metre depth], at one iterate.
+
+    Attributes:
+        internal: Of the stress, and the residual of the volume equation.
+        external: Of the loads.
+        inertia: Of a dynamic step.
+        acceleration: Of each displacement coefficient at the end of a dynamic step [m/s2].
+        reactions: Forces of supports and walls that would balance the others.
+        residual: Out of balance: the same without the impulse of the supports and without friction.
+    """
+
+    internal: Array
+    external: Array
+    inertia: Array | None
+    acceleration: Array | None
+    reactions: Array
+    residual: Array
+
+
+class Iterate:
+    """Increments of all fields in one Newton iteration.
+
+    Args:
+        reduction: Unknowns of the step.
+        guess: Increments to start from; zero by default.
+        inertia: Inertia of a dynamic step.
+
+    Attributes:
+        coefficients: The increments.
+    """
+
+    def __init__(self, reduction: Reduction, guess: Array | None, inertia: Inertia | None) -> None:
+        unknowns = np.zeros(reduction.size) if guess is None else guess[reduction.unknowns]
+        self._inertia, self._num_displacement = inertia, reduction.layout.num_displacement
+        self.coefficients: Array = reduction.selection @ unknowns + reduction.offset
+        #: u - dt v, which is updated by itself to keep its digits.
+        self._deviation = None if inertia is None else inertia.deviation(self.coefficients)
+
+    def add(self, change: Array) -> None:
+        """Go to the next iterate."""
+        self.coefficients = self.coefficients + change
+        if self._deviation is not None:
+            self._deviation = self._deviation + change[: len(self._deviation)]
+
+    def forces(self, internal: Array, external: Array, friction: Friction | None) -> Forces:
+        """All forces at this iterate.
+
+        Args:
+            internal: Internal forces at :attr:`coefficients`.
+            external: External forces.
+            friction: Friction of the walls.
+        """
+        residual = internal - external
+        reactions, inertial, acceleration = residual, None, None
+        if self._inertia is not None and self._deviation is not None:
+            acceleration = self._inertia.acceleration(self._deviation)
+            inertial = self._inertia.force(acceleration, len(residual))
+            residual += inertial
+            reactions = residual.copy()
+            reactions[: len(self._inertia.impulse)] += self._inertia.impulse
+        if friction is not None:
+            n, residual = self._num_displacement, residual.copy()
+            residual[:n] -= friction(reactions[:n].reshape(-1, 2)).ravel()
+        return Forces(internal, external, inertial, acceleration, reactions, residual)

@@ -1,0 +1,144 @@
+"""The two measures that stop Newton's method (README, The method).
+
+momentum   |R_u| / max(|f_int|, |f_ext|, |f_inertia|), norms over all displacement coefficients; a static
+           step also takes |f_int| at its beginning, which a body that is unloaded does not end with
+volume     |R_q| / |sum_p V_p W_p q (max(|div u|, |eps_v|) + p_ref/K_p + floor)|, W = K for a field
+           eps_v, and 1 for a field p (then eps_v is p/K)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from mpi4py import MPI
+
+from tawami import _rust
+from tawami.base import ranks
+from tawami.base.arrays import Array
+from tawami.field.layout import Layout
+from tawami.field.reduction import Reduction
+from tawami.particles.responses import Responses
+from tawami.solve.inertia import Inertia
+from tawami.solve.iterate import Forces
+
+#: Measures of momentum and volume; the second is None without a field for the volume.
+Measured = tuple[float, float | None]
+#: The measures of every residual of a step, the first before any solve.
+History = list[Measured]
+
+#: Volumetric strain that is small enough to be an error of the volume equation.
+STRAIN_FLOOR = 1e-7
+#: Forces and strains below these, relative to those of the motion of the body, are round-off.
+NO_FORCE, NO_STRAIN = 1e-14, 1e-10
+
+
+def worst(measures: Measured) -> float:
+    """The larger of the two measures; NaN if one of them is."""
+    return float(np.max([m for m in measures if m is not None]))
+
+
+def forcing(history: History, tolerance: float) -> float:
+    """Tolerance of the next linear solve.
+
+    It follows the rate of convergence (choice 2 of Eisenstat and Walker 1996), as far as Newton's own
+    tolerance needs it.
+    """
+    now = worst(history[-1])
+    rate = now / worst(history[-2]) if len(history) > 1 else 1.0
+    return float(np.clip(0.1 * rate**2, min(0.1 * tolerance / now, 1e-3), 1e-3))
+
+
+class Measures:
+    """Measures of the residuals of one step after another.
+
+    Args:
+        layout: Places of the coefficients.
+        responses: The particles.
+    """
+
+    def __init__(self, layout: Layout, responses: Responses) -> None:
+        self._layout, self._responses = layout, responses
+        self._comm = layout.grid.comm
+        self._p_ref = self._at_start = 0.0
+
+    def begin(self, internal: Callable[[Array], Array] | None) -> None:
+        """Begin a step; a collective call.
+
+        Args:
+            internal: Internal forces at given increments, in a static step.
+        """
+        mean_stress = self._responses.particles.stress[:, :3].mean(axis=1)
+        sums = np.array([np.sum(mean_stress**2), len(mean_stress)])
+        squares, count = ranks.sum_of(self._comm, sums)
+        self._p_ref = float(np.sqrt(squares / count))
+        self._at_start = 0.0
+        if internal is not None and squares > 0:
+            forces = internal(np.zeros(self._layout.size))
+            self._at_start = float(np.linalg.norm(forces[: self._layout.num_displacement]))
+
+    def of(
+        self, forces: Forces, coefficients: Array, reduction: Reduction, inertia: Inertia | None
+    ) -> Measured:
+        """Measures of momentum and volume, the same on all ranks; a collective call.
+
+        Args:
+            forces: Forces at the increments.
+            coefficients: The increments.
+            reduction: Unknowns of the step.
+            inertia: Inertia of a dynamic step.
+        """
+        n = self._layout.num_displacement
+        free = reduction.selection.T @ forces.residual
+        of_u = reduction.unknowns < n
+        parts = [forces.internal, forces.external]
+        parts += [] if forces.inertia is None else [forces.inertia]
+        scale = max(self._at_start, *(float(np.linalg.norm(part[:n])) for part in parts))
+        at_rest = not forces.external.any() and self._is_at_rest(
+            scale, coefficients[:n], reduction.offset[:n], inertia
+        )
+        momentum = 0.0 if at_rest or scale == 0 else float(np.linalg.norm(free[of_u])) / scale
+        volume = None
+        if self._responses.form.kinematics.volume_fields:
+            sums = self._responses.sums(self._volume_scale(coefficients)[:, None])
+            volume = float(np.linalg.norm(free[~of_u]) / np.linalg.norm(sums))
+        measures: Measured = self._comm.bcast((momentum, volume))  # the same bits on all ranks
+        return measures
+
+    def _is_at_rest(self, scale: float, u: Array, offset: Array, inertia: Inertia | None) -> bool:
+        """Whether forces without a load are round-off.
+
+        This holds for the forces of a body that supports move rigidly, or that moves freely, and for
+        those of the rest of a stress. It does not hold for a small load, nor for the forces of an
+        iterate that went farther than supports and velocities take the body.
+        """
+        distance = prescribed = float(np.abs(offset).max())
+        if inertia is not None:
+            distance = max(prescribed, float(np.abs(inertia.coasting).max(initial=0.0)))
+        distance = 10 * min(distance, float(np.abs(u).max())) + self._layout.grid.h
+        largest = NO_FORCE * self._responses.stiffest * distance * np.sqrt(len(u))
+        at_rest: bool = self._comm.bcast(scale <= largest)  # the same branch on all ranks
+        if at_rest and inertia is None:
+            return self._moves_rigidly(u, prescribed)
+        return at_rest
+
+    def _moves_rigidly(self, u: Array, prescribed: float) -> bool:
+        """Whether strains are round-off compared with the displacement that is prescribed.
+
+        Forces alone do not tell: those of a soft part may be as small as the round-off of a stiff one.
+        """
+        location, basis = self._responses.location, self._layout.basis
+        gradient = np.asarray(_rust.gradients(location, basis, np.ascontiguousarray(u)))
+        strain = self._responses.form.strain.metric_change(gradient.reshape(-1, 2, 2))
+        largest = self._comm.allreduce(float(np.abs(strain).max(initial=0.0)), op=MPI.MAX)
+        return bool(prescribed == 0 or largest <= NO_STRAIN * prescribed / self._layout.grid.h)
+
+    def _volume_scale(self, coefficients: Array) -> Array:
+        """What the volume equation of each particle is compared with, without its volume."""
+        bulk = self._responses.constants["K"]
+        strains = self._responses.stage.volume_strains(*self._layout.split(coefficients))
+        div_u, field = np.abs(strains).T
+        pressure = self._responses.form.kinematics.deviatoric
+        eps_v = field / bulk if pressure else field
+        scale = np.maximum(div_u, eps_v) + self._p_ref / bulk + STRAIN_FLOOR
+        return np.asarray(scale if pressure else bulk * scale)

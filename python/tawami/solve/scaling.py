@@ -1,0 +1,73 @@
+"""Scaling of the unknowns: displacement by its stiffness, eps_v and p as p/mu (README, The method)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tawami.base.arrays import Array, Indices
+from tawami.field.layout import Layout
+from tawami.field.reduction import Reduction
+from tawami.particles.responses import Responses
+from tawami.solve.linear_solver import Blocks
+
+#: Share of the area of a cell below which the volume of a function counts as zero.
+LEAST = 1e-14
+
+
+class Scaling:
+    """Scale and kind of the unknowns of a tangent.
+
+    Args:
+        layout: Places of the coefficients.
+        responses: The particles.
+    """
+
+    def __init__(self, layout: Layout, responses: Responses) -> None:
+        self._layout, self._responses = layout, responses
+
+    def factors(self, matrix: Any, reduction: Reduction) -> Array:
+        """Factors of this rank's unknowns; a collective call.
+
+        Displacement is divided by the square root of the diagonal. eps_v and p are solved for as p/mu,
+        divided by the square root of mu times the volume of their function, or of their diagonal if that
+        is larger.
+        """
+        own = reduction.unknowns[reduction.own]
+        of_u = own < self._layout.num_displacement
+        vector = matrix.getDiagonal()
+        diagonal = vector.array.copy()
+        vector.destroy()
+        # A softening law makes negative diagonals. A zero one (a function without stiffness) is left to
+        # the solver to report, in a scale that does not depend on units.
+        size = np.abs(np.where(of_u, diagonal, 0.0))
+        scale: Array = 1 / np.sqrt(np.where(size > 0, size, self._responses.largest_mu))
+        if self._responses.form.kinematics.volume_fields:
+            functions = own[~of_u] - self._layout.num_displacement
+            scale[~of_u] = self._of_volume(functions, diagonal[~of_u])
+        return scale
+
+    def _of_volume(self, functions: Indices, diagonal: Array) -> Array:
+        """Factors of eps_v or p of some bilinear functions."""
+        bulk, mu = (self._responses.constants[name] for name in ("K", "mu"))
+        sums = self._responses.sums(np.column_stack([np.ones_like(mu), 1 / bulk, 1 / mu]))
+        volume, over_bulk, over_mu = sums[functions].T
+        least = LEAST * self._layout.grid.h**2
+        volume = np.maximum(volume, least)
+        mu_i = volume / np.maximum(over_mu, least / self._responses.largest_mu)
+        has_eps_v = self._responses.form.kinematics.has_eps_v
+        to_field = mu_i * over_bulk / volume if has_eps_v else mu_i
+        to_field = np.where(to_field > 0, to_field, 1)
+        # in a cell with little of the body the stabilisation is larger than that volume
+        size = np.maximum(mu_i * volume, to_field**2 * np.abs(diagonal))
+        return np.asarray(to_field / np.sqrt(size))
+
+    def blocks(self, reduction: Reduction) -> Blocks:
+        """Fields of this rank's unknowns, with the rigid motions at the Greville points."""
+        own = reduction.unknowns[reduction.own]
+        of_u = own < self._layout.num_displacement
+        function, along_y = np.divmod(own[of_u], 2)
+        x, y = (self._layout.greville[function] - self._layout.grid.origin).T
+        rigid = [1.0 - along_y, along_y, np.where(along_y == 1, x, -y)]
+        return Blocks(of_u, np.column_stack(rigid))
