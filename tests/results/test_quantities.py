@@ -14,7 +14,10 @@ P, G, T = tawami.ParticleOutput, tawami.GridOutput, tawami.TableOutput
     ("output", "message"),
     [
         (P("velocity"), r"velocity: a scene by itself is static.*Dynamics\(scene, velocity"),
-        (P("plastic_strain"), r"'plastic_strain': the laws of this scene have no history: .*von_mises"),
+        (
+            P("plastic_strain"),
+            r"'plastic_strain': the laws of this scene have no history: .*von_mises",
+        ),
         (P("eps_v"), r"eps_v: .*expected one with.*form='u_epsv'"),
         (G("velocity"), r"velocity: a scene by itself is static"),
         (G("mean stress", "dilatancy"), "'dilatancy': the laws of this scene have no history"),
