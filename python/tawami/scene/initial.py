@@ -74,7 +74,7 @@ def _check(now: Configuration, name: str, beyond: Beyond) -> None:
     if now.begun or "velocity" in dict(now.domain.particles.arrays):
         raise InputError(
             f"initial('{name}') after the scene was solved or set in motion: expected it before. To "
-            "start from a later state, make another scene with the particles that tawami.earlier(...) reads"
+            "start from a later state, make another scene with the particles of tawami.earlier(...)"
         )
 
 
