@@ -27,7 +27,7 @@ export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 .DELETE_ON_ERROR:
 
 cantilever: setup
-	$(PYTHON) -m cases.cantilever
+	$(PYTHON) -m cases.verification.cantilever
 
 test: setup
 	cargo test --locked --quiet
@@ -110,7 +110,7 @@ $(STAMPS)/lint: $(STAMPS)/python
 	@mkdir -p $(STAMPS) && touch $@
 
 $(STAMPS)/docs: $(STAMPS)/python
-	$(PIP) 'sphinx>=7.2' 'myst-parser>=3' 'furo>=2024.1.29'
+	$(PIP) 'sphinx>=7.2' 'myst-parser>=3' 'furo>=2024.1.29' 'sphinx-mathjax-offline>=0.0.2'
 	@mkdir -p $(STAMPS) && touch $@
 
 # Built for the processor it runs on, and again where that is another one.

@@ -1,8 +1,10 @@
-//! The one error type of the crate: every variant is a sentence for the person at the keyboard.
+//! The error type of the crate: every variant is a message to the user.
 
 use thiserror::Error;
 
-/// What can be wrong with the input. Python sees each of these as `tawami.InputError`.
+use crate::space::{Extent, Position};
+
+/// Errors in the input. In Python each of these is a `tawami.InputError`.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum Error {
     /// A scalar parameter out of its range.
@@ -10,15 +12,15 @@ pub enum Error {
     Parameter {
         /// Name of the parameter as the user typed it.
         name: &'static str,
-        /// What came.
+        /// Its value.
         value: f64,
-        /// What would have been right, as the end of a sentence.
+        /// Expected value, as the end of a sentence.
         expected: &'static str,
     },
     /// Particles outside the grid.
     #[error(
         "{count} of {total} particles lie outside the grid; the first is particle {index} at \
-         ({x}, {y}), the grid covers [{x0}, {x1}] x [{y0}, {y1}]. Enlarge the grid or move the body"
+         {position}, the grid covers {extent}. Enlarge the grid or move the body"
     )]
     OutsideGrid {
         /// How many are outside.
@@ -28,17 +30,9 @@ pub enum Error {
         /// Index of the first one outside.
         index: usize,
         /// Its position [m].
-        x: f64,
-        /// Its position [m].
-        y: f64,
-        /// Left end of the grid [m].
-        x0: f64,
-        /// Right end of the grid [m].
-        x1: f64,
-        /// Lower end of the grid [m].
-        y0: f64,
-        /// Upper end of the grid [m].
-        y1: f64,
+        position: Position,
+        /// Where the grid is [m].
+        extent: Extent,
     },
     /// A NaN or an infinity in an array.
     #[error(
@@ -68,44 +62,44 @@ pub enum Error {
     Shape {
         /// Name of the array.
         name: &'static str,
-        /// Shape that came.
+        /// Its shape.
         got: Vec<usize>,
-        /// Shape that was expected.
+        /// Expected shape.
         expected: String,
     },
     /// A body without particles.
     #[error("the body has no particles: expected at least one; check its region and the number of particles per cell")]
     NoParticles,
-    /// A particle that names a material which is not there.
+    /// A particle with the number of a material that does not exist.
     #[error("particle {index} names material {material}, but there are {count} materials (numbered from 0)")]
     UnknownMaterial {
         /// The particle.
         index: usize,
-        /// The material it names.
+        /// Its material number.
         material: usize,
         /// How many materials there are.
         count: usize,
     },
-    /// A name that is not one of a fixed set.
+    /// A name outside a fixed set.
     #[error("{what} '{name}' is unknown: expected one of {expected}")]
     UnknownName {
-        /// What kind of thing is named.
+        /// Kind of the name.
         what: &'static str,
-        /// The name that came.
+        /// The name.
         name: String,
-        /// The names that exist.
+        /// Names that exist.
         expected: &'static str,
     },
-    /// An incompressible material met kinematics that need K.
+    /// An incompressible material with kinematics that need K.
     #[error(
         "particle {index} is of an incompressible material (nu = 0.5, K infinite): \
-         only a form with the kinematics 'deviatoric' takes it. Use form 'u_p', or nu < 0.5"
+         it needs a form with the kinematics 'deviatoric'. Use form 'u_p', or nu < 0.5"
     )]
     Incompressible {
         /// The first such particle.
         index: usize,
     },
-    /// A law that needs the mean stress met kinematics that do not give it.
+    /// A law that needs the mean stress with kinematics that do not give it.
     #[error(
         "the strength of particle {index} depends on the mean stress, which the kinematics \
          'deviatoric' (u-p) do not give to the law. Use form 'u_epsv'"
@@ -114,7 +108,7 @@ pub enum Error {
         /// The first such particle.
         index: usize,
     },
-    /// A law of finite strain met a form of small strains.
+    /// A law of finite strain with a form of small strain.
     #[error(
         "the law of particle {index} exists at finite strain only, and the form has small strains: \
          expected a form with strain = 'finite'. Use form 'u_epsv_finite' or 'u_finite'"
@@ -132,9 +126,9 @@ pub enum Error {
 }
 
 impl Error {
-    /// The same with the number that its particle has in the body.
+    /// The same error with the number of its particle in the body.
     #[must_use]
-    pub(crate) fn of_body(mut self, number: &ndarray::Array1<u32>) -> Self {
+    pub(crate) fn of_body(mut self, number: &[u32]) -> Self {
         if let Self::NotFinite { index, .. } = &mut self {
             *index = number[*index] as usize;
         }
@@ -145,7 +139,7 @@ impl Error {
 /// Result with this crate's [`enum@Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Index and value of the first entry that is not finite, and how many there are.
+/// Check that all entries are finite; the error has the first entry that is not, and their number.
 pub(crate) fn check_finite(name: &str, values: &[f64], per_particle: usize) -> Result<()> {
     let mut bad = values.iter().enumerate().filter(|(_, v)| !v.is_finite());
     match bad.next() {

@@ -1,8 +1,19 @@
 //! Particle side of tawami: an implicit material point method with the mixed
 //! displacement - volumetric strain (u-eps_v) formulation.
 //!
-//! Everything here is plain Rust on slices and `ndarray`; only [`python`] knows PyO3.
-//! Symbols and equation numbers are those of the paper of Okagawa, Hashimoto and Higo.
+//! | module       | content                                                              |
+//! |--------------|----------------------------------------------------------------------|
+//! | [`space`]    | the dimension, and every number that follows from it                 |
+//! | [`tensor`]   | tensors, component order, sign convention, Hencky strains            |
+//! | [`grid`]     | background grid, bases, quadrature rules, location of particles      |
+//! | [`transfer`] | from the grid to the particles, from the particles to grid and rules |
+//! | [`law`]      | material laws                                                        |
+//! | [`particles`]| storage of the particles, their strains and the answers of the laws  |
+//! | `assembly`   | kernels of the form over the cells, into the reduced matrix          |
+//! | `python`     | bindings                                                             |
+//!
+//! Everything is plain Rust on slices and `ndarray`; only `python` knows PyO3. A module uses only those above
+//! it in the table. Symbols and equation numbers are those of the paper of Okagawa, Hashimoto and Higo.
 
 #![warn(clippy::pedantic)]
 #![allow(
@@ -17,21 +28,14 @@
     clippy::needless_pass_by_value
 )]
 
-pub mod active;
-pub mod adjoint;
 #[cfg(feature = "python")]
 mod assembly;
-pub mod basis;
-pub mod constitutive;
 pub mod error;
-pub mod finite_strain;
 pub mod grid;
-pub mod interpolation;
-pub mod kinematics;
-pub mod material;
+pub mod law;
 pub mod particles;
-pub mod plane;
 #[cfg(feature = "python")]
 mod python;
-pub mod quadrature;
+pub mod space;
 pub mod tensor;
+pub mod transfer;

@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import logging
-import os
 import signal
 from collections.abc import Callable
 from typing import Any
 
+import profiles
 import pytest
 import scenes
-from hypothesis import settings
 
 import tawami
 
 # A shell that starts pytest in the background ignores Ctrl-C for it and for the processes of its tests.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 logging.disable(logging.INFO)  # FFCx reports every form that it compiles
-# No deadline: the first example of a test may compile a form.
-settings.register_profile("test", deadline=None, derandomize=True, database=None)
-# `make fuzz`: random examples, reproducible by the seed that it prints.
-settings.register_profile("fuzz", deadline=None, database=None)
-settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "test"))
+profiles.load()
 
 
 @pytest.fixture(params=scenes.FORMS)

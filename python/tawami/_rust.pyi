@@ -1,7 +1,7 @@
 """Types of the compiled module."""
 
 from collections.abc import Sequence
-from typing import final
+from typing import Any, final
 
 import numpy as np
 import numpy.typing as npt
@@ -12,15 +12,19 @@ __all__ = [
     "Grid",
     "InputError",
     "InvertedError",
+    "Kernels",
     "Location",
     "Material",
     "Particles",
     "Pattern",
+    "Requests",
     "Stage",
     "TawamiError",
     "basis_1d",
     "basis_len",
+    "cell_sums",
     "densities",
+    "extraction",
     "gauss",
     "gradients",
     "interpolate",
@@ -145,8 +149,8 @@ class Material:
     @property
     def shear_modulus(self) -> float: ...
 
-_Source = tuple[_Floats, Sequence[tuple[int, int]], bool, Sequence[int]]
-_Kernel = tuple[int, int, int, Sequence[_Source | None], Sequence[float]]
+# law quantity, value or derivative, first column, factor of each particle
+_Request = tuple[str, str, int, _Floats | None]
 _Starts = npt.NDArray[np.int32]
 _Selection = tuple[_Starts, _Starts, _Floats, npt.NDArray[np.int64]]
 
@@ -158,16 +162,17 @@ class Assembler:
         basis: str,
         nodes: Sequence[Sequence[int]],
         vertices: Sequence[Sequence[int]],
-        bilinear: bool,
+        linear: bool,
     ) -> Assembler: ...
     def vector(
-        self, kernels: Sequence[_Kernel], volume: _Floats, coefficients: _Floats
+        self, kernels: Kernels, data: Sequence[_Floats], volume: _Floats, coefficients: _Floats
     ) -> _Floats: ...
     def pattern(self, selection: _Selection) -> Pattern: ...
     def matrix(
         self,
-        kernels: Sequence[_Kernel],
-        couplings: Sequence[Sequence[_Kernel]],
+        kernels: Kernels,
+        couplings: Kernels,
+        data: Sequence[_Floats],
         volume: _Floats,
         coefficients: _Floats,
         pattern: Pattern,
@@ -175,11 +180,24 @@ class Assembler:
     ) -> None: ...
 
 @final
+class Kernels:
+    # of each kernel: owner of the code, address, rank, number of packed coefficients, these in packed
+    # order (none for the fields; else number of the array of particle data, points of the rule,
+    # whether these are the vertices, columns), constants
+    def __new__(
+        cls, assembler: Assembler, rank: int, kernels: Sequence[tuple[Any, ...]]
+    ) -> Kernels: ...
+
+@final
 class Pattern:
     @property
     def start(self) -> _Starts: ...
     @property
     def columns(self) -> _Starts: ...
+
+@final
+class Requests:
+    def __new__(cls, arrays: Sequence[Sequence[_Request]]) -> Requests: ...
 
 @final
 class Stage:
@@ -196,8 +214,8 @@ class Stage:
         self,
         u: _Floats,
         volumetric: _Floats | None,
-        requests: Sequence[tuple[str, str, int]],
-        data: _Floats,
+        requests: Requests,
+        data: Sequence[_Floats],
         given: tuple[_Floats, _Floats] | None = None,
     ) -> None: ...
     def commit(
@@ -218,6 +236,9 @@ def basis_1d(
     basis: str, n: int, cell: npt.NDArray[np.int64], t: _Floats
 ) -> tuple[npt.NDArray[np.int64], _Floats]: ...
 def basis_len(basis: str, n: int) -> int: ...
+def extraction(
+    basis: str, size: Sequence[int], cells: _Integers, nodes: _Floats
+) -> tuple[_Integers, _Floats]: ...
 def gauss(n: int) -> tuple[_Floats, _Floats]: ...
 def densities(
     location: Location,
@@ -230,4 +251,5 @@ def densities(
     offset: int,
     out: _Floats,
 ) -> None: ...
-def nodal_sums(location: Location, volume: _Floats, data: _Floats, basis: str) -> _Floats: ...
+def nodal_sums(location: Location, weight: _Floats, data: _Floats, basis: str) -> _Floats: ...
+def cell_sums(location: Location, weight: _Floats, data: _Floats) -> _Floats: ...

@@ -1,36 +1,43 @@
 //! Element kernels over the active cells, straight into the reduced matrix.
 //!
-//! A kernel is the C function that FFCx made of one integral of the form: biquadratic displacement
-//! and a bilinear field on one cell. Cell by cell this module gathers what it reads (fields and
-//! densities), calls it, passes its result to spline coefficients (`T^T A T`, T the extraction of
-//! the cell) and adds that to known slots of a CSR matrix, `P^T K P` without P, K or their product.
+//! A kernel is the C function that FFCx made of one integral of the form: quadratic displacement and a linear
+//! field on one cell. For each cell this module gathers the coefficients of the kernel (fields and
+//! densities), calls it, transforms its result to the coefficients of the basis (`T^T A T`, T the
+//! extraction of the cell) and adds that to known entries of a matrix in compressed rows. The result is
+//! `P^T K P` without P, K or their product.
 //!
-//! Rows of cells go in three colours, so that no two that run at the same time share a function;
-//! the order of summation does not depend on the number of threads.
+//! Rows of cells along x are treated in colours. No two rows of one colour share a function, so they can
+//! run at the same time; the order of summation does not depend on the number of threads.
 
-mod element;
-mod reduced;
+mod cell;
+mod kernel;
+mod matrix;
+mod pattern;
+mod selection;
+
+use std::ops::Range;
 
 use rayon::prelude::*;
 
 use crate::grid::Location;
+use crate::space::{number_of, DIM, FUNCTIONS_1D, MAX_DOFS};
 
-pub use element::{Bilinear, Cells, Kernel, Slot, TabulateTensor};
-pub use reduced::{matrix, pattern, Pattern, Selection};
+pub use cell::Cells;
+pub use kernel::{Bilinear, Kernel, Slot, State, TabulateTensor};
+pub use matrix::matrix;
+pub use pattern::{pattern, Pattern};
+pub use selection::Selection;
 
-use element::{tabulate, MAX_DOFS};
+/// Number of colours: functions reach over this many rows along each axis but x.
+const COLOURS: usize = FUNCTIONS_1D.pow(DIM as u32 - 1);
 
-/// Active cells in runs of one row of the grid, in three colours: within a colour no two rows share
-/// a function.
-fn colours(location: &Location) -> [Vec<std::ops::Range<usize>>; 3] {
-    let mut colours: [Vec<std::ops::Range<usize>>; 3] = Default::default();
-    let row = |a: usize| location.active[a] as usize / location.grid.cells[0];
-    let mut start = 0;
-    for a in 1..=location.active.len() {
-        if a == location.active.len() || row(a) != row(start) {
-            colours[row(start) % 3].push(start..a);
-            start = a;
-        }
+/// Active cells in rows along x, in colours: within a colour no two rows share a function.
+fn colours(location: &Location) -> [Vec<Range<usize>>; COLOURS] {
+    let mut colours: [Vec<Range<usize>>; COLOURS] = Default::default();
+    for row in location.rows() {
+        let mut index = location.active_index(row.start).map(|i| i % FUNCTIONS_1D);
+        index[0] = 0;
+        colours[number_of(index, [FUNCTIONS_1D; DIM]) / FUNCTIONS_1D].push(row);
     }
     colours
 }
@@ -42,7 +49,7 @@ struct Shared {
     len: usize,
 }
 
-// SAFETY: see `add`; who shares one keeps to disjoint indices.
+// SAFETY: see `add`; whoever shares one keeps to disjoint indices.
 unsafe impl Send for Shared {}
 unsafe impl Sync for Shared {}
 
@@ -52,7 +59,7 @@ impl Shared {
     }
 
     /// # Safety
-    /// The index is inside the slice, and no other thread touches it at the same time.
+    /// The index is inside the slice, and no other thread uses it at the same time.
     unsafe fn add(self, index: usize, value: f64) {
         debug_assert!(index < self.len, "index outside the shared slice");
         // SAFETY: inside the slice, and the caller is alone with this index.
@@ -63,30 +70,23 @@ impl Shared {
 /// The form's vector on all coefficients: `E^T r`.
 ///
 /// # Safety
-/// Each kernel is an FFCx kernel of rank 1 of these cells, loaded, that reads as many coefficients as
-/// its slots have and as many constants as it has; `coefficients` are those of all fields.
-pub unsafe fn vector(
-    cells: &Cells,
-    kernels: &[Kernel],
-    location: &Location,
-    volume: &[f64],
-    coefficients: &[f64],
-) -> Vec<f64> {
-    let mut sums = vec![0.0; coefficients.len()];
+/// Each kernel is a loaded FFCx kernel of rank 1 of these cells. It reads as many coefficients as its slots
+/// have and as many constants as it has. The coefficients are those of all fields.
+pub unsafe fn vector(state: &State, kernels: &[Kernel]) -> Vec<f64> {
+    let mut sums = vec![0.0; state.coefficients.len()];
     let shared = Shared::new(&mut sums);
-    for rows in colours(location) {
+    for rows in colours(state.location) {
         rows.into_par_iter().for_each(|row| {
             let (mut packed, mut element) = (Vec::new(), [0.0; MAX_DOFS]);
             let mut reduced = [0.0; MAX_DOFS];
+            let element = &mut element[..state.cells.dofs()];
             for a in row {
-                let local = cells.local(location, a);
-                let at = (a, &local, coefficients);
-                let element = &mut element[..cells.dofs()];
+                let local = state.cells.local(state.location, a);
                 // SAFETY: the caller's; kernels of rank 1 write `dofs` numbers.
-                unsafe { tabulate(cells, kernels, location, volume, at, &mut packed, element) };
+                unsafe { state.tabulate(kernels, a, &local, &mut packed, element) };
                 local.transposed(element, 1, &mut reduced);
-                for (&c, &value) in local.coefficients.iter().zip(&reduced) {
-                    // SAFETY: a local coefficient is one of all; rows of one colour share none.
+                for (&c, &value) in local.numbers().iter().zip(&reduced) {
+                    // SAFETY: the coefficient is one of all; rows of one colour share none.
                     unsafe { shared.add(c, value) };
                 }
             }

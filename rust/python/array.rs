@@ -1,5 +1,6 @@
-//! Array arguments. NumPy's own types panic where an array cannot be written, or is written and read
-//! at once, and read wrong memory where its numbers are not aligned; these raise.
+//! Array arguments. The types of rust-numpy panic where an array cannot be written, or is written and read
+//! at the same time, and they read wrong memory where its numbers are not aligned. These types raise an
+//! error instead.
 
 use std::ops::{Deref, DerefMut};
 

@@ -2,71 +2,150 @@
 
 use std::sync::Arc;
 
+use ndarray::ArrayView2;
 use numpy::{PyArray1, ToPyArray};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
-use super::adjoint::points_per_axis;
 use super::array::{Read1, Read2, Write1};
 use super::grid::PyLocation;
+use super::transfer::{check_data, points_per_axis};
 use super::{require, view, InputError};
-use crate::adjoint::{Densities, MAX_POINTS};
-use crate::assembly::{self, Bilinear, Cells, Kernel, Pattern, Selection, Slot, TabulateTensor};
-use crate::grid::Location;
-use crate::quadrature::Rule;
+use crate::assembly::{
+    self, Bilinear, Cells, Kernel, Pattern, Selection, Slot, State, TabulateTensor,
+};
+use crate::grid::{Location, Rule};
+use crate::space::{Index, NODES, NODES_1D, VERTICES};
+use crate::transfer::densities::Densities;
 
-/// Particle data of one rule, at which points (indices along x and y, or none for cell means), whether
-/// these are the vertices rather than Gauss points, and which columns.
-type Source<'py> = (Read2<'py, f64>, Vec<[usize; 2]>, bool, Vec<usize>);
+/// Coefficient of a kernel: number of the array of particle data, points of the rule (none for means over
+/// cells), whether these are the vertices rather than Gauss points, and columns.
+type SlotOf = (usize, Vec<Index>, bool, Vec<usize>);
 
-/// Address of an FFCx kernel, its rank, the number of its packed coefficients, these in packed order
-/// (none stands for the fields), and its constants.
-type KernelOf<'py> = (usize, usize, usize, Vec<Option<Source<'py>>>, Vec<f64>);
+/// Owner of an FFCx kernel, its address, its rank, the number of its packed coefficients, these in packed
+/// order (none stands for the fields), and its constants.
+type KernelOf = (Py<PyAny>, usize, usize, usize, Vec<Option<SlotOf>>, Vec<f64>);
+
+/// A kernel and where its coefficients come from.
+struct Plan {
+    /// Keeps the code loaded.
+    _owner: Py<PyAny>,
+    tabulate: TabulateTensor,
+    slots: Vec<Option<Source>>,
+    constants: Vec<f64>,
+}
+
+/// Densities or means of some columns of an array of particle data.
+struct Source {
+    array: usize,
+    /// Points of a tensor rule by their positions along the axes; none for means over cells.
+    points: Vec<Index>,
+    rule: Option<Rule>,
+    columns: Vec<usize>,
+}
+
+/// Element kernels of one rank, with the sources of their coefficients; made once.
+#[pyclass(name = "Kernels", frozen, module = "tawami._rust")]
+pub(super) struct PyKernels {
+    plans: Vec<Plan>,
+    rank: usize,
+    dofs: usize,
+}
+
+impl Source {
+    fn new((array, points, vertices, columns): SlotOf) -> PyResult<Self> {
+        require(!columns.is_empty(), "columns")?;
+        let rule = match points_per_axis(&points, vertices)? {
+            0 => None,
+            _ if vertices => Some(Rule::ends()),
+            n => Some(Rule::gauss(n)),
+        };
+        Ok(Self { array, points, rule, columns })
+    }
+
+    /// Number of packed coefficients.
+    fn len(&self) -> usize {
+        self.points.len().max(1) * self.columns.len()
+    }
+
+    fn slot<'a>(&'a self, location: &Location, data: &'a [Read2<f64>]) -> PyResult<Slot<'a>> {
+        let Some(data) = data.get(self.array) else {
+            return Err(PyRuntimeError::new_err("internal: kernels of other data"));
+        };
+        let data: ArrayView2<f64> = data.as_array();
+        check_data(location, &data, &self.columns)?;
+        Ok(match &self.rule {
+            None => Slot::Means(&self.columns, data),
+            Some(rule) => {
+                let (points, columns) = (&self.points, &self.columns);
+                Slot::Densities(Densities { rule, points, columns }, data)
+            }
+        })
+    }
+}
+
+#[pymethods]
+impl PyKernels {
+    #[new]
+    fn new(assembler: &PyAssembler, rank: usize, kernels: Vec<KernelOf>) -> PyResult<Self> {
+        let dofs = assembler.cells.dofs();
+        let plan = |(owner, address, its_rank, width, slots, constants): KernelOf| {
+            require(address != 0 && its_rank == rank, "a kernel of another rank")?;
+            let source = |slot: Option<SlotOf>| slot.map(Source::new).transpose();
+            let slots: Vec<_> = slots.into_iter().map(source).collect::<PyResult<_>>()?;
+            let packed: usize =
+                slots.iter().map(|slot| slot.as_ref().map_or(dofs, Source::len)).sum();
+            require(packed == width, "a kernel of other coefficients")?;
+            // SAFETY: the address is that of an FFCx kernel, which its owner keeps loaded. Rank and
+            // number of coefficients are checked against what the caller says of it.
+            let tabulate =
+                unsafe { std::mem::transmute::<*const (), TabulateTensor>(address as *const ()) };
+            Ok(Plan { _owner: owner, tabulate, slots, constants })
+        };
+        let plans = kernels.into_iter().map(plan).collect::<PyResult<_>>()?;
+        Ok(Self { plans, rank, dofs })
+    }
+}
+
+impl PyKernels {
+    fn with<'a>(
+        &'a self,
+        assembler: &PyAssembler,
+        rank: usize,
+        data: &'a [Read2<f64>],
+    ) -> PyResult<Vec<Kernel<'a>>> {
+        require(self.rank == rank, "kernels of another rank")?;
+        require(self.dofs == assembler.cells.dofs(), "kernels of other fields")?;
+        let slot = |source: &'a Option<Source>| match source {
+            None => Ok(Slot::Fields),
+            Some(source) => source.slot(&assembler.location, data),
+        };
+        let kernel = |plan: &'a Plan| {
+            let slots = plan.slots.iter().map(slot).collect::<PyResult<_>>()?;
+            Ok(Kernel { tabulate: plan.tabulate, slots, constants: &plan.constants })
+        };
+        self.plans.iter().map(kernel).collect()
+    }
+}
 
 /// Element kernels over the cells with particles; see `rust/assembly`.
-#[pyclass(name = "Assembler", frozen)]
+#[pyclass(name = "Assembler", frozen, module = "tawami._rust")]
 pub(super) struct PyAssembler {
     location: Arc<Location>,
     cells: Cells,
-    rules: Vec<Rule>,
-    ends: Rule,
 }
 
 impl PyAssembler {
-    fn kernels<'a>(&'a self, rank: usize, kernels: &'a [KernelOf]) -> PyResult<Vec<Kernel<'a>>> {
-        let slot = |source: &'a Option<Source>| -> PyResult<Slot<'a>> {
-            let Some((data, points, vertices, columns)) = source else { return Ok(Slot::Fields) };
-            let data = data.as_array();
-            let per_axis = points_per_axis(&self.location, &data, points, columns)?;
-            require(!vertices || per_axis == 2, "a cell has two vertices along each axis")?;
-            let rule = if *vertices { &self.ends } else { &self.rules[per_axis] };
-            Ok(match per_axis {
-                0 => Slot::Means(columns, data),
-                _ => Slot::Densities(Densities { rule, points, columns }, data),
-            })
-        };
-        kernels
-            .iter()
-            .map(|(address, its_rank, width, slots, constants)| {
-                require(*address != 0 && *its_rank == rank, "a kernel of another rank")?;
-                // SAFETY: the address is that of an FFCx kernel, which `compilation.Integral` keeps
-                // loaded; rank and number of coefficients are checked against what it says of it.
-                let tabulate = unsafe {
-                    std::mem::transmute::<*const (), TabulateTensor>(*address as *const ())
-                };
-                let slots = slots.iter().map(slot).collect::<PyResult<Vec<_>>>()?;
-                let packed: usize = slots.iter().map(|slot| slot.len(&self.cells)).sum();
-                require(packed == *width, "a kernel of other coefficients")?;
-                Ok(Kernel { tabulate, slots, constants: constants.clone() })
-            })
-            .collect()
-    }
-
-    fn coefficients<'a>(&self, coefficients: &'a Read1<f64>) -> PyResult<&'a [f64]> {
-        let coefficients = coefficients.as_slice()?;
+    fn state<'a>(
+        &'a self,
+        volume: &'a Read1<f64>,
+        coefficients: &'a Read1<f64>,
+    ) -> PyResult<State<'a>> {
+        let (volume, coefficients) = (volume.as_slice()?, coefficients.as_slice()?);
+        require(volume.len() == self.location.len(), "volumes of other particles")?;
         let expected = self.cells.coefficients(self.location.grid.cells);
         require(coefficients.len() == expected, "wrong number of grid coefficients")?;
-        Ok(coefficients)
+        Ok(State::new(&self.cells, &self.location, volume, coefficients))
     }
 }
 
@@ -79,38 +158,34 @@ impl PyAssembler {
     fn new(
         location: &PyLocation,
         basis: &str,
-        nodes: [[usize; 2]; 9],
-        vertices: [[usize; 2]; 4],
-        bilinear: bool,
+        nodes: [Index; NODES],
+        vertices: [Index; VERTICES],
+        linear: bool,
     ) -> PyResult<Self> {
-        require(nodes.iter().flatten().all(|&p| p < 3), "nodes of a cell")?;
+        require(nodes.iter().flatten().all(|&p| p < NODES_1D), "nodes of a cell")?;
         require(vertices.iter().flatten().all(|&p| p < 2), "vertices of a cell")?;
-        let cells = Cells { basis: basis.parse()?, nodes, vertices, bilinear };
-        let rules = (0..=MAX_POINTS).map(Rule::gauss).collect();
-        Ok(Self { location: Arc::clone(&location.0), cells, rules, ends: Rule::ends() })
+        let cells = Cells::new(basis.parse()?, nodes, vertices, linear);
+        Ok(Self { location: Arc::clone(&location.0), cells })
     }
 
-    /// The form's vector on all coefficients.
+    /// The form's vector on all coefficients; `data` are the arrays that the kernels count.
     fn vector<'py>(
         &self,
         py: Python<'py>,
-        kernels: Vec<KernelOf>,
+        kernels: &PyKernels,
+        data: Vec<Read2<f64>>,
         volume: Read1<f64>,
         coefficients: Read1<f64>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let volume = volume.as_slice()?;
-        require(volume.len() == self.location.len(), "volumes of other particles")?;
-        let kernels = self.kernels(1, &kernels)?;
-        let coefficients = self.coefficients(&coefficients)?;
-        // SAFETY: kernels as in `kernels`, of rank 1; the coefficients' number was checked.
-        let sums = unsafe {
-            assembly::vector(&self.cells, &kernels, &self.location, volume, coefficients)
-        };
+        let kernels = kernels.with(self, 1, &data)?;
+        let state = self.state(&volume, &coefficients)?;
+        // SAFETY: kernels as in `PyKernels::new`, of rank 1; the number of coefficients was checked.
+        let sums = py.detach(|| unsafe { assembly::vector(&state, &kernels) });
         Ok(sums.to_pyarray(py))
     }
 
     /// Pattern of the reduced matrix for a selection.
-    fn pattern(&self, selection: SelectionOf) -> PyResult<PyPattern> {
+    fn pattern(&self, py: Python, selection: SelectionOf) -> PyResult<PyPattern> {
         let (start, unknown, weight, coefficient) = &selection;
         let (start, unknown) = (start.as_slice()?.to_vec(), unknown.as_slice()?.to_vec());
         let (weight, coefficient) = (weight.as_slice()?.to_vec(), coefficient.as_slice()?.to_vec());
@@ -120,7 +195,8 @@ impl PyAssembler {
                 "internal: not a selection of these coefficients (please report this)",
             ));
         };
-        let Some(pattern) = assembly::pattern(&self.cells, &self.location, &selection) else {
+        let pattern = py.detach(|| assembly::pattern(&self.cells, &self.location, &selection));
+        let Some(pattern) = pattern else {
             return Err(InputError::new_err(
                 "the reduced matrix has more than 2147483647 entries: expected a coarser grid",
             ));
@@ -128,48 +204,44 @@ impl PyAssembler {
         Ok(PyPattern { location: Arc::clone(&self.location), selection, pattern })
     }
 
-    /// Fill the values of the reduced matrix in its pattern; `couplings` are pairs of rank 1.
+    /// Fill the values of the reduced matrix in its pattern. `couplings` are kernels of rank 1; the products
+    /// of the first and the second, of the third and the fourth, ... are added.
     #[allow(clippy::too_many_arguments)]
     fn matrix(
         &self,
-        kernels: Vec<KernelOf>,
-        couplings: Vec<[KernelOf; 2]>,
+        py: Python,
+        kernels: &PyKernels,
+        couplings: &PyKernels,
+        data: Vec<Read2<f64>>,
         volume: Read1<f64>,
         coefficients: Read1<f64>,
         pattern: &PyPattern,
         mut values: Write1<f64>,
     ) -> PyResult<()> {
-        let (volume, values) = (volume.as_slice()?, values.as_slice_mut()?);
-        require(volume.len() == self.location.len(), "volumes of other particles")?;
+        let values = values.as_slice_mut()?;
         let mine = Arc::ptr_eq(&pattern.location, &self.location);
         require(mine && values.len() == pattern.pattern.columns.len(), "another pattern")?;
-        let pair = |pair| -> PyResult<[Kernel; 2]> {
-            let kernels = self.kernels(1, pair)?;
-            kernels.try_into().map_err(|_| PyRuntimeError::new_err("internal: not a pair"))
-        };
-        let couplings = couplings.iter().map(|p| pair(p)).collect::<PyResult<_>>()?;
-        let form = Bilinear { kernels: self.kernels(2, &kernels)?, couplings };
-        let coefficients = self.coefficients(&coefficients)?;
-        // SAFETY: kernels as in `kernels`, of the ranks asked for; the pattern is one that `assembly::pattern`
-        // made of this location, and the lengths were checked.
-        let fits = unsafe {
-            assembly::matrix(
-                &self.cells,
-                &form,
-                &self.location,
-                volume,
-                coefficients,
-                &pattern.selection,
-                &pattern.pattern,
-                values,
-            )
-        };
+        let mut sides = couplings.with(self, 1, &data)?.into_iter();
+        let mut pairs = Vec::new();
+        while let Some(left) = sides.next() {
+            let Some(right) = sides.next() else {
+                return Err(PyRuntimeError::new_err("internal: not a pair of kernels"));
+            };
+            pairs.push([left, right]);
+        }
+        let form = Bilinear { kernels: kernels.with(self, 2, &data)?, couplings: pairs };
+        let state = self.state(&volume, &coefficients)?;
+        // SAFETY: kernels as in `PyKernels::new`, of the ranks asked for; `assembly::pattern` made the
+        // pattern for this location, and the lengths were checked.
+        let fits = py.detach(|| unsafe {
+            assembly::matrix(&state, &form, &pattern.selection, &pattern.pattern, values)
+        });
         require(fits, "not the pattern of this matrix")
     }
 }
 
 /// Compressed rows of the reduced matrix of one selection.
-#[pyclass(name = "Pattern", frozen)]
+#[pyclass(name = "Pattern", frozen, module = "tawami._rust")]
 pub(super) struct PyPattern {
     location: Arc<Location>,
     selection: Selection,

@@ -2,21 +2,16 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, ToPyArray};
-use pyo3::exceptions::PyRuntimeError;
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, ToPyArray};
 use pyo3::prelude::*;
-use rayon::prelude::*;
 
 use super::array::{Read1, Read2};
 use super::require;
-use crate::active::Active;
-use crate::basis::Basis;
 use crate::error::Error;
-use crate::grid::{Grid, Location, MAX_CELLS};
-use crate::interpolation::Field;
-use crate::quadrature::Rule;
+use crate::grid::{Active, Basis, Functions, Grid, Location, Rule, MAX_CELLS};
+use crate::space::{count, index_of, Index, Point, DIM, FUNCTIONS_1D};
 
-/// Points of a Gauss rule beyond which its making, which takes their square, would be waited for.
+/// Most points of a Gauss rule; the time to make one grows with their square.
 const MAX_GAUSS: usize = 1000;
 
 #[pyclass(name = "Grid", frozen)]
@@ -25,19 +20,25 @@ pub(super) struct PyGrid(pub(super) Grid);
 #[pymethods]
 impl PyGrid {
     #[new]
-    fn new(origin: [f64; 2], h: f64, cells: [usize; 2]) -> PyResult<Self> {
+    fn new(origin: Point, h: f64, cells: Index) -> PyResult<Self> {
         Ok(Self(Grid::new(origin, h, cells)?))
     }
 
-    fn locate(&self, x: Read2<f64>) -> PyResult<PyLocation> {
-        let x = x.as_array().as_standard_layout().into_owned();
-        if x.ncols() != 2 {
-            let expected = "(points, 2)".to_owned();
-            return Err(Error::Shape { name: "x", got: x.shape().to_vec(), expected }.into());
-        }
-        let flat = x.as_slice().unwrap_or_default();
-        Ok(PyLocation(Arc::new(self.0.locate(flat)?)))
+    /// Cells of points [m] and positions in them.
+    fn locate(&self, py: Python, x: Read2<f64>) -> PyResult<PyLocation> {
+        let x = points(&x)?;
+        Ok(PyLocation(Arc::new(py.detach(|| self.0.locate(&x))?)))
     }
+}
+
+/// Rows of positions as points.
+fn points(x: &Read2<f64>) -> PyResult<Vec<Point>> {
+    let x = x.as_array();
+    if x.ncols() != DIM {
+        let expected = format!("(points, {DIM})");
+        return Err(Error::Shape { name: "x", got: x.shape().to_vec(), expected }.into());
+    }
+    Ok(x.outer_iter().map(|x| std::array::from_fn(|axis| x[axis])).collect())
 }
 
 #[pyclass(name = "Location", frozen)]
@@ -57,20 +58,20 @@ impl PyLocation {
 
     #[getter]
     fn xi<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.0.xi.as_flattened().to_pyarray(py).reshape([self.0.len(), 2])
+        self.0.xi.as_flattened().to_pyarray(py).reshape([self.0.len(), DIM])
     }
 
     fn __len__(&self) -> usize {
         self.0.len()
     }
 
-    /// The same, away from the sides of the cells by a part of a cell, up to a half.
+    /// The same location, at least a part of a cell (up to a half) away from the sides of the cells.
     fn away_from_sides(&self, margin: f64) -> PyResult<Self> {
         require((0.0..=0.5).contains(&margin), "a margin beyond half a cell")?;
         Ok(Self(Arc::new((*self.0).clone().away_from_sides(margin))))
     }
 
-    /// Where some of the particles are.
+    /// Location of some of the particles.
     fn select(&self, particles: Read1<u32>) -> PyResult<Self> {
         let particles = particles.as_slice()?;
         let inside = particles.iter().all(|&p| (p as usize) < self.0.len());
@@ -79,13 +80,13 @@ impl PyLocation {
     }
 }
 
-/// The cells that hold particles and the functions on them; see `active.rs`.
+/// The active cells and the functions on them; see `grid/active.rs`.
 #[pyclass(name = "Active", frozen)]
 pub(super) struct PyActive(Active, Grid);
 
 impl PyActive {
     fn functions_of(&self, basis: Basis) -> usize {
-        self.1.cells.map(|n| basis.len(n)).iter().product()
+        Functions { basis, cells: self.1.cells }.len()
     }
 }
 
@@ -126,7 +127,7 @@ impl PyActive {
         Ok(self.0.spread(basis.parse()?, of_cells, 0).to_pyarray(py))
     }
 
-    /// The active cells (i, j) in the support of a function: cells x 2.
+    /// The active cells in the support of a function, by their positions along the axes: cells x 2.
     fn support<'py>(
         &self,
         py: Python<'py>,
@@ -137,56 +138,12 @@ impl PyActive {
         require(function < self.functions_of(basis), "a function of another basis")?;
         let cells = self.0.support(basis, function);
         let flat: Vec<i64> = cells.as_flattened().iter().map(|&i| i as i64).collect();
-        flat.to_pyarray(py).reshape([cells.len(), 2])
+        flat.to_pyarray(py).reshape([cells.len(), DIM])
     }
 }
 
-pub(super) fn field<'a, const C: usize>(
-    grid: Grid,
-    basis: Basis,
-    coefficients: &'a Read1<f64>,
-) -> PyResult<Field<'a, C>> {
-    let coefficients = coefficients.as_slice()?;
-    let expected = C * basis.len(grid.cells[0]) * basis.len(grid.cells[1]);
-    require(coefficients.len() == expected, "wrong number of grid coefficients")?;
-    Ok(Field { grid, basis, coefficients })
-}
-
-/// Values of a grid field at points: points x components.
-#[pyfunction]
-pub(super) fn interpolate<'py>(
-    py: Python<'py>,
-    location: &PyLocation,
-    basis: &str,
-    components: usize,
-    coefficients: Read1<f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (basis, grid) = (basis.parse()?, location.0.grid);
-    let values = match components {
-        1 => field::<1>(grid, basis, &coefficients)?.at_particles(&location.0).into_flattened(),
-        2 => field::<2>(grid, basis, &coefficients)?.at_particles(&location.0).into_flattened(),
-        _ => return Err(PyRuntimeError::new_err("internal: fields have 1 or 2 components")),
-    };
-    values.to_pyarray(py).reshape([location.0.len(), components])
-}
-
-/// Gradients of a displacement at points (xx, xy, yx, yy: d u_x/dx, d u_x/dy, ...): points x 4.
-#[pyfunction]
-pub(super) fn gradients<'py>(
-    py: Python<'py>,
-    location: &PyLocation,
-    basis: &str,
-    coefficients: Read1<f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let location = &location.0;
-    let u = field::<2>(location.grid, basis.parse()?, &coefficients)?;
-    let at = |p: usize| u.gradient(location.cell[p] as usize, location.xi[p]);
-    let values: Vec<[[f64; 2]; 2]> = (0..location.len()).into_par_iter().map(at).collect();
-    values.as_flattened().as_flattened().to_pyarray(py).reshape([location.len(), 4])
-}
-
-/// Functions of a basis on a row of `n` cells at positions `t` of `cell`: index of the first one
-/// and the values of up to three.
+/// Functions of a basis on a row of `n` cells at positions `t` in `cell`: number of the first one, and the
+/// values of up to three.
 #[pyfunction]
 #[allow(clippy::type_complexity)]
 pub(super) fn basis_1d<'py>(
@@ -202,13 +159,13 @@ pub(super) fn basis_1d<'py>(
     require(cell.len() == t.len(), "cells and positions differ in number")?;
     require(cell.iter().all(|&c| c >= 0 && (c as usize) < n), "cell outside the row")?;
     let mut first = Vec::with_capacity(t.len());
-    let mut values = Vec::with_capacity(3 * t.len());
+    let mut values = Vec::with_capacity(FUNCTIONS_1D * t.len());
     for (&c, &s) in cell.iter().zip(&t) {
         let local = basis.at(n, c as usize, s);
         first.push(local.first as i64);
         values.extend(local.value);
     }
-    Ok((first.to_pyarray(py), values.to_pyarray(py).reshape([t.len(), 3])?))
+    Ok((first.to_pyarray(py), values.to_pyarray(py).reshape([t.len(), FUNCTIONS_1D])?))
 }
 
 /// Number of functions of a basis on a row of `n` cells.
@@ -228,4 +185,35 @@ pub(super) fn gauss(
     require(n <= MAX_GAUSS, "a rule of very many points")?;
     let rule = Rule::gauss(n);
     Ok((rule.points.to_pyarray(py), rule.weights.to_pyarray(py)))
+}
+
+/// Extraction of cells of a grid of `size` cells: the functions that do not vanish on each cell (cells x
+/// functions), and their values at nodes, given by positions 0 to 1 in the cell (cells x nodes x functions).
+#[pyfunction]
+#[allow(clippy::type_complexity)]
+pub(super) fn extraction<'py>(
+    py: Python<'py>,
+    basis: &str,
+    size: Index,
+    cells: Read1<i64>,
+    nodes: Read2<f64>,
+) -> PyResult<(Bound<'py, PyArray2<i64>>, Bound<'py, PyArray3<f64>>)> {
+    let functions = Functions { basis: basis.parse()?, cells: size };
+    let sound = size.iter().all(|n| (1..=MAX_CELLS).contains(n));
+    require(sound, "more cells than a grid has")?;
+    let (cells, nodes) = (cells.as_array(), points(&nodes)?);
+    let inside = |&c: &i64| c >= 0 && (c as usize) < count(size);
+    require(cells.iter().all(inside), "a cell outside the grid")?;
+    let width = functions.per_cell();
+    let mut numbers = Vec::with_capacity(cells.len() * width);
+    let mut values = Vec::with_capacity(cells.len() * nodes.len() * width);
+    for cell in cells.iter().map(|&c| index_of(c as usize, size)) {
+        numbers.extend(functions.on_cell(cell).iter().map(|&f| f as i64));
+        for &xi in &nodes {
+            values.extend_from_slice(&functions.values(cell, xi)[..width]);
+        }
+    }
+    let shape = [cells.len(), nodes.len(), width];
+    let numbers = numbers.to_pyarray(py).reshape([cells.len(), width])?;
+    Ok((numbers, values.to_pyarray(py).reshape(shape)?))
 }

@@ -1,11 +1,13 @@
-//! Python bindings: they convert and check shapes at the border, and nothing else.
+//! Python bindings: they convert, check shapes at the border, and release the interpreter lock during the
+//! computation.
 
-mod adjoint;
 mod array;
 mod assembly;
 mod grid;
+mod law;
 mod particles;
 mod stage;
+mod transfer;
 
 use ndarray::Dimension;
 use numpy::{Element, PyArray};
@@ -34,7 +36,7 @@ impl From<Error> for PyErr {
     }
 }
 
-/// A mistake of the Python package, not of the user: the arrays it passes do not fit together.
+/// Check for a mistake of the Python package, not of the user: its arrays do not belong together.
 fn require(condition: bool, what: &str) -> PyResult<()> {
     if condition {
         return Ok(());
@@ -42,8 +44,8 @@ fn require(condition: bool, what: &str) -> PyResult<()> {
     Err(PyRuntimeError::new_err(format!("internal: {what} (please report this)")))
 }
 
-/// NumPy view of an array inside a Python object: no copy; the object stays alive with the view.
-/// Arrays so seen are never reallocated: those of `PyParticles` and of `PyPattern` keep their length.
+/// NumPy view of an array inside a Python object, without a copy. The view keeps the object alive, and the
+/// array is never reallocated.
 fn view<'py, T: Element, D: Dimension, O: PyClass>(
     array: impl Fn(&O) -> &ndarray::Array<T, D>,
     owner: &Bound<'py, O>,
@@ -62,16 +64,20 @@ fn _rust(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<grid::PyLocation>()?;
     m.add_class::<grid::PyActive>()?;
     m.add_class::<particles::PyParticles>()?;
-    m.add_class::<particles::PyMaterial>()?;
+    m.add_class::<law::PyMaterial>()?;
     m.add_class::<assembly::PyAssembler>()?;
     m.add_class::<assembly::PyPattern>()?;
+    m.add_class::<assembly::PyKernels>()?;
     m.add_class::<stage::PyStage>()?;
-    m.add_function(wrap_pyfunction!(grid::interpolate, m)?)?;
-    m.add_function(wrap_pyfunction!(grid::gradients, m)?)?;
+    m.add_class::<stage::PyRequests>()?;
+    m.add_function(wrap_pyfunction!(transfer::interpolate, m)?)?;
+    m.add_function(wrap_pyfunction!(transfer::gradients, m)?)?;
     m.add_function(wrap_pyfunction!(grid::basis_1d, m)?)?;
     m.add_function(wrap_pyfunction!(grid::basis_len, m)?)?;
     m.add_function(wrap_pyfunction!(grid::gauss, m)?)?;
-    m.add_function(wrap_pyfunction!(adjoint::densities, m)?)?;
-    m.add_function(wrap_pyfunction!(adjoint::nodal_sums, m)?)?;
+    m.add_function(wrap_pyfunction!(grid::extraction, m)?)?;
+    m.add_function(wrap_pyfunction!(transfer::densities, m)?)?;
+    m.add_function(wrap_pyfunction!(transfer::nodal_sums, m)?)?;
+    m.add_function(wrap_pyfunction!(transfer::cell_sums, m)?)?;
     Ok(())
 }

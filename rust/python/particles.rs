@@ -1,32 +1,59 @@
-//! Particles, as views of their storage, and material laws.
+//! Particles, as views of their storage.
 
-use std::sync::Arc;
-
-use numpy::{PyArray, PyArray1, PyArray2, ToPyArray};
+use numpy::{PyArray, PyArray2, ToPyArray};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
 
 use super::array::{Read1, Read2};
-use super::{require, view, InputError};
-use crate::constitutive;
-use crate::material::{
-    DruckerPrager, Friction, LinearElastic, Material, MohrCoulomb, NeoHookean, VonMises,
-};
-use crate::particles::Particles;
+use super::law::{laws, PyMaterial};
+use super::{require, InputError};
+use crate::particles::stage::check_materials;
+use crate::particles::{Particles, Role, Values};
 
-/// The same array, not writeable from Python: the cells of the particles and their laws' constants
-/// are known from these values.
-fn read_only<T, D>(array: Bound<'_, PyArray<T, D>>) -> PyResult<Bound<'_, PyArray<T, D>>> {
-    array.call_method("setflags", (false,), None)?;
-    Ok(array)
-}
-
-/// Columns that an array of a time integration has at most.
+/// Most columns of an array of a time integration.
 const MAX_WIDTH: usize = 64;
 
 #[pyclass(name = "Particles", module = "tawami._rust")]
 pub(super) struct PyParticles(pub(super) Particles);
+
+/// View of a column. Columns keep their length, and the view keeps the particles alive.
+fn column<'py>(particles: &Bound<'py, PyParticles>, place: usize) -> PyResult<Bound<'py, PyAny>> {
+    let (object, owner) = (particles.try_borrow()?, particles.clone().into_any());
+    // SAFETY: a column is never reallocated, and the view keeps the particles.
+    Ok(unsafe {
+        match object.0.columns()[place].values() {
+            Values::Reals(values) => PyArray::borrow_from_array(values, owner).into_any(),
+            Values::Numbers(values) => PyArray::borrow_from_array(values, owner).into_any(),
+        }
+    })
+}
+
+/// View of a column that Python cannot write: the cells of the particles and the constants of their laws
+/// were computed from it.
+fn read_only<'py>(
+    particles: &Bound<'py, PyParticles>,
+    place: usize,
+) -> PyResult<Bound<'py, PyAny>> {
+    let view = column(particles, place)?;
+    view.call_method("setflags", (false,), None)?;
+    Ok(view)
+}
+
+/// View of a column that not all particles have; `missing` makes the message from the names of those there
+/// are.
+fn optional<'py>(
+    particles: &Bound<'py, PyParticles>,
+    role: Role,
+    name: &str,
+    missing: impl Fn(Vec<&str>) -> String,
+) -> PyResult<Bound<'py, PyAny>> {
+    let place = {
+        let object = particles.try_borrow()?;
+        let place = object.0.place(role, name);
+        place.ok_or_else(|| InputError::new_err(missing(object.0.names(role))))?
+    };
+    column(particles, place)
+}
 
 #[pymethods]
 impl PyParticles {
@@ -37,18 +64,19 @@ impl PyParticles {
         Ok(Self(Particles::new(x, volume, material)?))
     }
 
+    /// Check what a user may have written into the arrays.
     fn check(&self) -> PyResult<()> {
         Ok(self.0.check()?)
     }
 
+    /// Check that the laws of the particles fit kinematics and strains.
     fn check_materials(
         &self,
         materials: Vec<PyRef<PyMaterial>>,
         kinematics: &str,
         finite: bool,
     ) -> PyResult<()> {
-        let laws = laws(&materials);
-        Ok(constitutive::check_materials(&self.0, &laws, kinematics.parse()?, finite)?)
+        Ok(check_materials(&self.0, &laws(&materials), kinematics.parse()?, finite)?)
     }
 
     /// Some of the particles.
@@ -59,7 +87,7 @@ impl PyParticles {
         Ok(Self(self.0.select(particles)))
     }
 
-    /// All arrays side by side, a row each.
+    /// All arrays side by side, one row per particle.
     fn rows<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         self.0.rows().to_pyarray(py)
     }
@@ -70,77 +98,74 @@ impl PyParticles {
         particles.ok_or_else(|| PyRuntimeError::new_err("internal: rows of other particles"))
     }
 
-    /// Take over the values of the same particles; false if they are others.
+    /// Copy the values of the same particles; false if they are others.
     fn assign(&mut self, other: PyRef<Self>) -> bool {
         self.0.assign(&other.0)
     }
 
-    /// Make room for an array of a time integration.
+    /// Add an array of a time integration, zero at first.
     fn carry(&mut self, name: &str, width: usize) -> PyResult<()> {
         require(width <= MAX_WIDTH, "an array of very many columns")?;
-        self.0.carry(name, width);
+        self.0.add(Role::Carried, name, Some(width));
         Ok(())
     }
 
     /// An array of a time integration by its name: n x width.
-    fn carried<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let object = slf.try_borrow()?;
-        let Some((_, array)) = object.0.carried.iter().find(|(known, _)| known == name) else {
-            let known: Vec<_> = object.0.carried.iter().map(|(known, _)| known.as_str()).collect();
-            return Err(InputError::new_err(if known.is_empty() {
-                format!(
-                    "no array '{name}': a scene by itself is static; Dynamics(scene, velocity=...) \
-                     gives its particles velocities and accelerations"
-                )
-            } else {
-                format!("no array '{name}': expected one of {known:?}")
-            }));
-        };
-        // SAFETY: as in `view`; never reallocated once it is there.
-        Ok(unsafe { PyArray::borrow_from_array(array, slf.clone().into_any()) })
+    fn carried<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        optional(slf, Role::Carried, name, |known| {
+            if known.is_empty() {
+                return format!(
+                    "no array '{name}': the scene is static. Dynamics(scene, velocity=...) gives its \
+                     particles velocities and accelerations"
+                );
+            }
+            format!("no array '{name}': expected one of {known:?}")
+        })
     }
 
+    /// Add the history variables of laws, zero at first.
     fn add_history(&mut self, materials: Vec<PyRef<PyMaterial>>) {
         for law in laws(&materials) {
-            self.0.add_history(law.history());
+            law.history().iter().for_each(|name| self.0.add(Role::History, name, None));
         }
     }
 
-    /// Put the particles elsewhere.
+    /// Move the particles to other positions.
     fn move_to(&mut self, x: Read2<f64>) -> PyResult<()> {
-        require(x.as_array().dim() == self.0.x.dim(), "positions of other particles")?;
+        let mine = self.0.reals_mut(Particles::X);
+        let x = x.as_array();
+        require(
+            x.ncols() == crate::space::DIM && x.len() == mine.len(),
+            "positions of other particles",
+        )?;
         // a copy: the positions may be a view of these particles' own, in another order
-        let x = x.as_array().to_owned();
-        self.0.x.assign(&x);
+        let x: Vec<f64> = x.iter().copied().collect();
+        mine.copy_from_slice(&x);
         Ok(())
     }
 
     /// Names of the history variables.
     #[getter]
-    fn history_names(&self) -> Vec<&'static str> {
-        self.0.history.iter().map(|(name, _)| *name).collect()
+    fn history_names(&self) -> Vec<&str> {
+        self.0.names(Role::History)
     }
 
     /// A history variable by its name.
-    fn history<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let object = slf.try_borrow()?;
-        let Some((_, array)) = object.0.history.iter().find(|(known, _)| *known == name) else {
-            let known: Vec<_> = object.0.history.iter().map(|(name, _)| *name).collect();
-            return Err(InputError::new_err(if known.is_empty() {
-                format!(
-                    "history '{name}': the laws of this scene have none: expected a plastic law, as \
+    fn history<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        optional(slf, Role::History, name, |known| {
+            if known.is_empty() {
+                return format!(
+                    "history '{name}': the laws of this scene have no history: expected a plastic law, as \
                      von_mises(...), drucker_prager(...) or mohr_coulomb(...)"
-                )
-            } else {
-                format!("history '{name}': the laws of this scene have {known:?}")
-            }));
-        };
-        // SAFETY: as in `view`; never reallocated once a scene is made.
-        Ok(unsafe { PyArray::borrow_from_array(array, slf.clone().into_any()) })
+                );
+            }
+            format!("history '{name}': the laws of this scene have {known:?}")
+        })
     }
 
+    /// Add the volumetric strain, zero at first.
     fn add_eps_v(&mut self) {
-        self.0.add_eps_v();
+        self.0.add(Role::State, "eps_v", None);
     }
 
     /// Name of each array, and bytes that one particle takes in it.
@@ -159,173 +184,41 @@ impl PyParticles {
     }
 
     #[getter]
-    fn x<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        read_only(view(|p: &Self| &p.0.x, slf)?)
+    fn x<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        read_only(slf, Particles::X)
     }
 
     #[getter]
-    fn volume<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        view(|p: &Self| &p.0.volume, slf)
+    fn volume<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        column(slf, Particles::VOLUME)
     }
 
     #[getter]
-    fn material<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<u32>>> {
-        read_only(view(|p: &Self| &p.0.material, slf)?)
+    fn material<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        read_only(slf, Particles::MATERIAL)
     }
 
     #[getter]
-    fn number<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<u32>>> {
-        read_only(view(|p: &Self| &p.0.number, slf)?)
+    fn number<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        read_only(slf, Particles::NUMBER)
     }
 
     #[getter]
-    fn stress<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        view(|p: &Self| &p.0.stress, slf)
+    fn stress<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        column(slf, Particles::STRESS)
     }
 
     #[getter]
-    fn displacement<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        view(|p: &Self| &p.0.displacement, slf)
+    fn displacement<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        column(slf, Particles::DISPLACEMENT)
     }
 
     #[getter]
-    fn eps_v<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let object = slf.try_borrow()?;
-        let Some(array) = object.0.eps_v.as_ref() else {
-            return Err(InputError::new_err(
-                "eps_v: the form of this scene has no volumetric strain: expected one with the \
-                 kinematics 'mixed', as Scene(..., form='u_epsv') or, at finite strain, \
-                 form='u_epsv_finite'",
-            ));
-        };
-        // SAFETY: as in `view`; never reallocated.
-        Ok(unsafe { PyArray::borrow_from_array(array, slf.clone().into_any()) })
+    fn eps_v<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        optional(slf, Role::State, "eps_v", |_| {
+            "eps_v: the form of this scene has no volumetric strain: expected one with the kinematics \
+             'mixed', as Scene(..., form='u_epsv') or, at finite strain, form='u_epsv_finite'"
+                .to_owned()
+        })
     }
-}
-
-#[pyclass(name = "Material", frozen, module = "tawami._rust")]
-pub(super) struct PyMaterial {
-    law: Arc<dyn Material>,
-    /// The function that made it, and what that got: how it is copied and pickled.
-    made: (&'static str, Vec<f64>),
-}
-
-impl PyMaterial {
-    fn new(law: impl Material + 'static, made: &'static str, given: &[f64]) -> Self {
-        Self { law: Arc::new(law), made: (made, given.to_vec()) }
-    }
-}
-
-#[pymethods]
-impl PyMaterial {
-    #[staticmethod]
-    fn linear_elastic_e_nu(e: f64, nu: f64) -> PyResult<Self> {
-        Ok(Self::new(LinearElastic::from_e_nu(e, nu)?, "linear_elastic_e_nu", &[e, nu]))
-    }
-
-    #[staticmethod]
-    fn linear_elastic_e_one_minus_2nu(e: f64, one_minus_2nu: f64) -> PyResult<Self> {
-        let law = LinearElastic::from_e_one_minus_2nu(e, one_minus_2nu)?;
-        Ok(Self::new(law, "linear_elastic_e_one_minus_2nu", &[e, one_minus_2nu]))
-    }
-
-    #[staticmethod]
-    fn linear_elastic_k_mu(k: f64, mu: f64) -> PyResult<Self> {
-        Ok(Self::new(LinearElastic::from_k_mu(k, mu)?, "linear_elastic_k_mu", &[k, mu]))
-    }
-
-    #[staticmethod]
-    fn von_mises(k: f64, mu: f64, yield_stress: f64, hardening: f64) -> PyResult<Self> {
-        let elastic = LinearElastic::from_k_mu(k, mu)?;
-        let law = VonMises::new(elastic, yield_stress, hardening)?;
-        Ok(Self::new(law, "von_mises", &[k, mu, yield_stress, hardening]))
-    }
-
-    #[staticmethod]
-    fn drucker_prager(
-        elastic: (f64, f64),
-        phi: f64,
-        c: f64,
-        psi: f64,
-        eps_v_max: f64,
-        tiny: bool,
-    ) -> PyResult<Self> {
-        let given = [elastic.0, elastic.1, phi, c, psi, eps_v_max, f64::from(u8::from(tiny))];
-        let elastic = LinearElastic::from_k_mu(elastic.0, elastic.1)?;
-        let friction = Friction { phi, c, psi, eps_v_max, tiny };
-        Ok(Self::new(DruckerPrager::new(elastic, friction)?, "drucker_prager", &given))
-    }
-
-    #[staticmethod]
-    fn mohr_coulomb(
-        elastic: (f64, f64),
-        phi: f64,
-        c: f64,
-        psi: f64,
-        eps_v_max: f64,
-        tiny: bool,
-    ) -> PyResult<Self> {
-        let given = [elastic.0, elastic.1, phi, c, psi, eps_v_max, f64::from(u8::from(tiny))];
-        let elastic = LinearElastic::from_k_mu(elastic.0, elastic.1)?;
-        let friction = Friction { phi, c, psi, eps_v_max, tiny };
-        Ok(Self::new(MohrCoulomb::new(elastic, friction)?, "mohr_coulomb", &given))
-    }
-
-    #[staticmethod]
-    fn neo_hookean(k: f64, mu: f64) -> PyResult<Self> {
-        let law = NeoHookean::new(LinearElastic::from_k_mu(k, mu)?);
-        Ok(Self::new(law, "neo_hookean", &[k, mu]))
-    }
-
-    /// How a copy is made, here or in another process.
-    fn __reduce__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
-        let (name, given) = &self.made;
-        let arguments = match given[..] {
-            [k, mu, phi, c, psi, eps_v_max, tiny] => {
-                ((k, mu), phi, c, psi, eps_v_max, tiny > 0.0).into_pyobject(py)?
-            }
-            _ => PyTuple::new(py, given)?,
-        };
-        Ok((py.get_type::<Self>().getattr(*name)?, arguments))
-    }
-
-    /// The law with its parameters.
-    fn __repr__(&self) -> String {
-        format!("{:?}", self.law)
-    }
-
-    /// What the law is called.
-    #[getter]
-    fn name(&self) -> &'static str {
-        self.law.name()
-    }
-
-    /// Names of its history variables.
-    #[getter]
-    fn history_names(&self) -> Vec<&'static str> {
-        self.law.history().to_vec()
-    }
-
-    /// Whether the law exists at finite strain only.
-    #[getter]
-    fn finite_only(&self) -> bool {
-        self.law.finite_only()
-    }
-
-    #[getter]
-    fn bulk_modulus(&self) -> f64 {
-        self.law.bulk_modulus()
-    }
-
-    #[getter]
-    fn shear_modulus(&self) -> f64 {
-        self.law.shear_modulus()
-    }
-}
-
-pub(super) fn laws(materials: &[PyRef<PyMaterial>]) -> Vec<Arc<dyn Material>> {
-    materials.iter().map(|m| Arc::clone(&m.law)).collect()
 }

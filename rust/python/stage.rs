@@ -3,28 +3,79 @@
 use std::sync::Arc;
 
 use numpy::{PyArray2, PyArrayMethods, ToPyArray};
-use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use super::array::{Read1, Write2};
-use super::grid::{field, PyLocation};
-use super::particles::{laws, PyMaterial, PyParticles};
+use super::grid::PyLocation;
+use super::law::{laws, PyMaterial};
+use super::particles::PyParticles;
 use super::require;
-use crate::basis::Basis;
-use crate::constitutive::{Operator, Part, Request, Response, Stage, MAX_HISTORY};
-use crate::grid::Location;
-use crate::kinematics::{Increments, Kinematics};
-use crate::material::Material;
-use crate::tensor::{Sym, COMPONENTS};
+use super::transfer::field;
+use crate::grid::{Basis, Location};
+use crate::law::{Law, MAX_HISTORY};
+use crate::particles::kinematics::{Increments, Kinematics};
+use crate::particles::request::Request;
+use crate::particles::stage::{Output, Response, Stage};
+use crate::space::COMPONENTS;
+use crate::tensor::{Stress, Sym};
+
+/// The law quantities that a form reads, array by array; parsed once.
+#[pyclass(name = "Requests", frozen, module = "tawami._rust")]
+pub(super) struct PyRequests {
+    arrays: Vec<Vec<Request>>,
+    finite: Option<bool>,
+}
+
+/// Quantity, part, first column and factors (one per particle, or none) of a request.
+type RequestOf<'py> = (String, String, usize, Option<Read1<'py, f64>>);
+
+#[pymethods]
+impl PyRequests {
+    /// From the requests of each array of particle data.
+    #[new]
+    fn new(arrays: Vec<Vec<RequestOf>>) -> PyResult<Self> {
+        let request = |(operator, part, column, factor): &RequestOf| -> PyResult<Request> {
+            let factor = factor.as_ref().map(|factor| Ok(factor.as_slice()?.to_vec()));
+            Ok(Request {
+                operator: operator.parse()?,
+                part: part.parse()?,
+                column: *column,
+                factor: factor.transpose().map_err(|e: numpy::NotContiguousError| e)?,
+            })
+        };
+        let requests = |array: &Vec<RequestOf>| array.iter().map(request).collect();
+        let arrays: Vec<Vec<Request>> = arrays.iter().map(requests).collect::<PyResult<_>>()?;
+        let finite = arrays.iter().flatten().map(|request| request.operator.finite()).next();
+        let same = |request: &Request| Some(request.operator.finite()) == finite;
+        require(arrays.iter().flatten().all(same), "requests of small and of finite strain")?;
+        Ok(Self { arrays, finite })
+    }
+}
+
+impl PyRequests {
+    /// Check that the requests belong to particles with `finite` strains and to arrays of these columns.
+    fn check(&self, particles: usize, finite: bool, columns: &[usize]) -> PyResult<()> {
+        require(self.finite.is_none_or(|mine| mine == finite), "requests of other strains")?;
+        require(self.arrays.len() == columns.len(), "requests of other arrays")?;
+        for (requests, &columns) in self.arrays.iter().zip(columns) {
+            let fits = |request: &Request| {
+                request.column <= columns && request.width() <= columns - request.column
+            };
+            require(requests.iter().all(fits), "a request reaches outside the particle data")?;
+            let mut factors = requests.iter().flat_map(|request| &request.factor);
+            require(factors.all(|f| f.len() == particles), "factors of other particles")?;
+        }
+        Ok(())
+    }
+}
 
 /// The particle side of one scene: its particles in their cells, with their laws.
-#[pyclass(name = "Stage")]
+#[pyclass(name = "Stage", frozen, module = "tawami._rust")]
 pub(super) struct PyStage {
     particles: Py<PyParticles>,
     location: Arc<Location>,
-    materials: Vec<Arc<dyn Material>>,
-    history: Vec<Vec<usize>>,
+    materials: Vec<Arc<dyn Law>>,
     kinematics: Kinematics,
     finite: bool,
     basis: Basis,
@@ -34,13 +85,12 @@ pub(super) struct PyStage {
 type Given<'py> = (Read1<'py, f64>, Read1<'py, f64>);
 
 impl PyStage {
-    fn with<R>(
-        &self,
-        u: &Read1<f64>,
-        volumetric: Option<&Read1<f64>>,
-        given: Option<&Given>,
-        run: impl FnOnce(&Stage) -> R,
-    ) -> PyResult<R> {
+    fn stage<'a>(
+        &'a self,
+        u: &'a Read1<f64>,
+        volumetric: Option<&'a Read1<f64>>,
+        given: Option<&'a Given>,
+    ) -> PyResult<Stage<'a>> {
         let grid = self.location.grid;
         let response = match given {
             None => Response::Laws(&self.materials),
@@ -57,14 +107,24 @@ impl PyStage {
             u: field(grid, self.basis, u)?,
             volumetric: volumetric.map(|v| field(grid, Basis::Bilinear, v)).transpose()?,
         };
-        Ok(run(&Stage {
+        Ok(Stage {
             location: &self.location,
             response,
-            history: &self.history,
             kinematics: self.kinematics,
             finite: self.finite,
             increments,
-        }))
+        })
+    }
+
+    /// Rows of `N` numbers, one per particle.
+    fn each<'py, const N: usize>(
+        &self,
+        py: Python<'py>,
+        of: impl Fn(usize) -> [f64; N] + Sync + Send,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let n = self.location.len();
+        let rows: Vec<[f64; N]> = py.detach(|| (0..n).into_par_iter().map(of).collect());
+        rows.as_flattened().to_pyarray(py).reshape([n, N])
     }
 }
 
@@ -85,58 +145,56 @@ impl PyStage {
             let particles = &particles.try_borrow(py)?.0;
             require(particles.len() == location.0.len(), "location of other particles")?;
             let known = |&m: &u32| (m as usize) < materials.len();
-            require(particles.material.iter().all(known), "particles of other materials")?;
-        }
-        let mut history = Vec::new();
-        for law in &materials {
-            let names = law.history();
-            require(names.len() <= MAX_HISTORY, "a law with more history than there is room for")?;
-            let places = particles.try_borrow(py)?.0.history_of(names);
-            require(places.is_some(), "particles without the history of their laws")?;
-            history.extend(places);
+            require(particles.material().iter().all(known), "particles of other materials")?;
+            for law in &materials {
+                let names = law.history();
+                require(names.len() <= MAX_HISTORY, "a law with too many history variables")?;
+                let known = particles.history_of(names).is_some();
+                require(known, "particles without the history of their laws")?;
+            }
         }
         Ok(Self {
             particles,
             location: Arc::clone(&location.0),
             materials,
-            history,
             kinematics: kinematics.parse()?,
             finite,
             basis: basis.parse()?,
         })
     }
 
-    /// Write the requested quantities of the law into `data` (particles x columns).
+    /// Write the requested quantities of the law into arrays of particle data (particles x columns).
     #[pyo3(signature = (u, volumetric, requests, data, given=None))]
     fn evaluate(
         &self,
         py: Python,
         u: Read1<f64>,
         volumetric: Option<Read1<f64>>,
-        requests: Vec<(String, String, usize)>,
-        mut data: Write2<f64>,
+        requests: &PyRequests,
+        mut data: Vec<Write2<f64>>,
         given: Option<Given>,
     ) -> PyResult<()> {
         let particles = self.particles.try_borrow(py)?;
-        let (rows, columns) = (data.as_array().nrows(), data.as_array().ncols());
-        let data = data.as_slice_mut()?;
-        require(rows == particles.0.len(), "data of other particles")?;
-        let requests: Vec<Request> = requests.iter().map(request).collect::<PyResult<_>>()?;
-        let fits = |r: &Request| {
-            r.operator.finite() == self.finite
-                && r.column <= columns
-                && r.operator.components() * r.part.width() <= columns - r.column
-        };
-        require(requests.iter().all(fits), "a request reaches outside the particle data")?;
-        if requests.is_empty() {
+        let particles = &particles.0;
+        let columns: Vec<usize> = data.iter().map(|data| data.as_array().ncols()).collect();
+        requests.check(particles.len(), self.finite, &columns)?;
+        let rows = data.iter().all(|data| data.as_array().nrows() == particles.len());
+        require(rows, "data of other particles")?;
+        let mut outputs = Vec::with_capacity(data.len());
+        for ((data, requests), columns) in data.iter_mut().zip(&requests.arrays).zip(columns) {
+            if !requests.is_empty() {
+                outputs.push(Output { requests, columns, data: data.as_slice_mut()? });
+            }
+        }
+        if outputs.is_empty() {
             return Ok(());
         }
-        let run = |s: &Stage| s.evaluate(&particles.0, &requests, columns, data);
-        Ok(self.with(&u, volumetric.as_ref(), given.as_ref(), run)??)
+        let stage = self.stage(&u, volumetric.as_ref(), given.as_ref())?;
+        Ok(py.detach(|| stage.evaluate(particles, outputs))?)
     }
 
-    /// Accept the increments: stress, displacement and eps_v of the particles. Returns what the laws
-    /// dissipate [J per metre depth].
+    /// Accept the increments: stress, displacement and eps_v of the particles. Returns the energy that the
+    /// laws dissipate [J per metre depth].
     #[pyo3(signature = (u, volumetric, given=None))]
     fn commit(
         &self,
@@ -146,18 +204,21 @@ impl PyStage {
         given: Option<Given>,
     ) -> PyResult<f64> {
         let mut particles = self.particles.try_borrow_mut(py)?;
-        Ok(self.with(&u, volumetric.as_ref(), given.as_ref(), |s| s.commit(&mut particles.0))??)
+        let particles = &mut particles.0;
+        let stage = self.stage(&u, volumetric.as_ref(), given.as_ref())?;
+        Ok(py.detach(|| stage.commit(particles))?)
     }
 
     /// Energy that the laws store in the particles [J per metre depth].
     fn elastic_energy(&self, py: Python) -> PyResult<f64> {
         let particles = &self.particles.try_borrow(py)?.0;
-        let of = |p: usize| {
-            let law = &self.materials[particles.material[p] as usize];
-            let stress: Sym = std::array::from_fn(|i| particles.stress[[p, i]]);
-            particles.volume[p] * law.elastic_energy(&law.elastic_strain(&(&stress).into()))
+        let (volume, material) = (particles.volume(), particles.material());
+        let of = |(p, stress): (usize, &[f64])| {
+            let law = &self.materials[material[p] as usize];
+            let stress: Sym = std::array::from_fn(|i| stress[i]);
+            volume[p] * law.elastic_energy(&law.elastic_strain(&Stress::from(&stress)))
         };
-        Ok((0..particles.len()).map(of).sum())
+        Ok(particles.stress().chunks_exact(COMPONENTS).enumerate().map(of).sum())
     }
 
     /// Strain increments at the particles (xx, yy, zz, gamma_xy): n x 4.
@@ -168,13 +229,11 @@ impl PyStage {
         u: Read1<f64>,
         volumetric: Option<Read1<f64>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let strains: Vec<Sym> = self.with(&u, volumetric.as_ref(), None, |s| {
-            (0..self.location.len()).into_par_iter().map(|p| s.strain(p)).collect()
-        })?;
-        strains.as_flattened().to_pyarray(py).reshape([self.location.len(), COMPONENTS])
+        let stage = self.stage(&u, volumetric.as_ref(), None)?;
+        self.each(py, |p| stage.strain(p))
     }
 
-    /// div u (ln J_f at finite strain) and the bilinear field (0 if there is none) at the particles: n x 2.
+    /// div u (ln J_f at finite strain) and the linear field (0 if there is none) at the particles: n x 2.
     #[pyo3(signature = (u, volumetric))]
     fn volume_strains<'py>(
         &self,
@@ -182,32 +241,8 @@ impl PyStage {
         u: Read1<f64>,
         volumetric: Option<Read1<f64>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let location = &self.location;
-        let of = |s: &Stage, p| [s.volume_change(p), s.increments.volumetric_at(location, p)];
-        let strains: Vec<[f64; 2]> = self.with(&u, volumetric.as_ref(), None, |s| {
-            (0..location.len()).into_par_iter().map(|p| of(s, p)).collect()
-        })?;
-        strains.as_flattened().to_pyarray(py).reshape([location.len(), 2])
+        let stage = self.stage(&u, volumetric.as_ref(), None)?;
+        let volumetric_at = |p| stage.increments.volumetric_at(&self.location, p);
+        self.each(py, |p| [stage.volume_change(p), volumetric_at(p)])
     }
-}
-
-pub(super) fn request((operator, part, column): &(String, String, usize)) -> PyResult<Request> {
-    let operator = match operator.as_str() {
-        "sigma" => Operator::Sigma,
-        "s" => Operator::Deviator,
-        "sigma_m" => Operator::Mean,
-        "P" => Operator::Nominal,
-        "P_s" => Operator::NominalDeviator,
-        "tau_m" => Operator::MeanKirchhoff,
-        "ln_J" => Operator::LnJ,
-        other => return Err(PyRuntimeError::new_err(format!("internal: operator '{other}'"))),
-    };
-    let part = match part.as_str() {
-        "value" => Part::Value,
-        "strain" => Part::Strain,
-        "gradient" => Part::Gradient,
-        "volume" => Part::Volume,
-        other => return Err(PyRuntimeError::new_err(format!("internal: part '{other}'"))),
-    };
-    Ok(Request { operator, part, column: *column })
 }

@@ -78,7 +78,7 @@ def test_new_writes_a_script_but_not_over_another(capsys, rejected, tmp_path, ki
     assert "SCRIPT" not in text
     assert "`tawami run mycase.py`" in text
     path.write_text("mine")
-    assert "is there already, and was not touched" in rejected("new", path)
+    assert "exists already, and was not changed" in rejected("new", path)
     assert path.read_text() == "mine"
     assert "expected a name of letters" in rejected("new", tmp_path / "my-case")
     assert main.main(["new", str(tmp_path / "nowhere" / "case")]) == 1

@@ -18,6 +18,7 @@ from scenes import BASES, FORMS, clouds, grid_of
 from scipy.sparse import csr_matrix, identity
 
 import tawami
+from tawami import _rust
 from tawami.base.errors import InexactSumWarning
 from tawami.field.fast import _selection
 from tawami.form.form import Form
@@ -129,7 +130,7 @@ def test_newton_reuses_the_pattern(random_scene):
 
 
 def test_the_same_bits_whatever_the_number_of_threads():
-    """Residual, tangent, and a reduced tangent in which many points are held, in every row."""
+    """Residual, tangent, a reduced tangent with points held in every row of cells, steps of a motion."""
     code = """
 import hashlib, logging; logging.disable(logging.INFO)
 import numpy as np
@@ -149,6 +150,18 @@ for basis in ("quadratic_spline", "bilinear", "biquadratic"):
     for _ in range(3):
         matrix = domain.assembly.tangent(c, domain.responses.data, reduction)
         total.update(matrix.getValuesCSR()[2].tobytes())
+grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.1, cells=(12, 8))
+sand = tawami.drucker_prager(tawami.linear_elastic(E=1e5, nu=0.3), phi=30.0, c=10.0)
+for form in ("u_epsv_finite", "u_bbar_finite"):
+    body = tawami.box(grid, (0, 0), (0.6, 0.5))
+    scene = tawami.Scene(grid, body, sand, form=form, density=1000.0)
+    scene.gravity((0.0, -9.81))
+    scene.fix("left", "x")
+    scene.fix("bottom", "y")
+    motion = tawami.Dynamics(scene)
+    for _ in range(3):
+        motion.step(0.01)
+    total.update(scene.particles.rows().tobytes())
 print(total.hexdigest())
 """
     outputs = set()
@@ -210,21 +223,29 @@ def test_arrays_that_do_not_fit_are_refused_and_never_panic(random_scene):
     scene = random_scene(form="u")
     field, c = scene.configuration.domain.assembly, np.zeros(scene.num_coefficients)
     scene.residual(c)
-    kernels = field._kernels(
-        field.attachment.compiled.tangent, scene.configuration.domain.responses.data
+    (kernels, none), volume = field._of_tangent, scene.particles.volume
+    data = list(scene.configuration.domain.responses.data.values())
+    with pytest.raises(RuntimeError, match="kernels of another rank"):
+        field._assembler.vector(kernels, data, volume, c)
+    owner, address, rank, width, slots, constants = field._kernel(
+        field.attachment.compiled.tangent[0]
     )
-    volume = scene.particles.volume
-    with pytest.raises(RuntimeError, match="a kernel of another rank"):
-        field._assembler.vector(kernels, volume, c)
-    address, rank, width, slots, constants = kernels[0]
-    wrong = [(address, rank, width + 1, slots, constants)]
     pattern = field._assembler.pattern(
         _selection(identity(len(c), format="csr"), np.arange(len(c)))
     )
+    wrong = (owner, address, rank, width + 1, slots, constants)
     with pytest.raises(RuntimeError, match="a kernel of other coefficients"):
-        field._assembler.matrix(wrong, [], volume, c, pattern, np.zeros(len(pattern.columns)))
+        _rust.Kernels(field._assembler, 2, [wrong])
+    with pytest.raises(RuntimeError, match="a kernel of another rank"):
+        _rust.Kernels(field._assembler, 1, [(owner, address, rank, width, slots, constants)])
+    values = np.zeros(len(pattern.columns))
+    with pytest.raises(RuntimeError, match="kernels of other data"):
+        field._assembler.matrix(kernels, none, [], volume, c, pattern, values)
+    short = [array[1:] for array in data]
+    with pytest.raises(RuntimeError, match="data of other particles"):
+        field._assembler.matrix(kernels, none, short, volume, c, pattern, values)
     with pytest.raises(RuntimeError, match="another pattern"):
-        field._assembler.matrix(kernels, [], volume, c, pattern, np.zeros(3))
+        field._assembler.matrix(kernels, none, data, volume, c, pattern, np.zeros(3))
     with pytest.raises(RuntimeError, match="not a selection of these coefficients"):
         field._assembler.pattern(_selection(identity(3, format="csr"), np.arange(3)))
 

@@ -7,8 +7,10 @@ A panic of Rust reaches Python as pyo3's PanicException, which is no `Exception`
 from __future__ import annotations
 
 import gc
+import threading
 import warnings
 from collections.abc import Callable
+from time import perf_counter, sleep
 from typing import Any
 
 import numpy as np
@@ -80,9 +82,11 @@ NASTY = st.one_of(
         [None, True, "", BASIS, "bilinear", "biquadratic", "mixed", "cell", "x\ud800", b"x", 1j, [], (),
          {}, [[0]], [(0, 0)],
          [(9, 9)], [(0, 2**63)], [[(0, 0, 0)]], [1, -1], [0] * 9, [(0,)], {1}, range(3),
-         object(), [None], [(0, 1, 0, [], [])], [(1, 7, 0, [], [])], ["sigma"],
-         [("sigma", "value", 0)], [("sigma", "value", 2**64 - 1)], [("ln_J", "strain", 1)],
-         [("no", "value", 0)], [("sigma", "no", 0)]]
+         object(), [None], [(None, 0, 1, 0, [], [])], [(None, 1, 7, 0, [], [])], ["sigma"],
+         [[("sigma", "value", 0, None)]], [[("sigma", "value", 2**64 - 1, None)]],
+         [[("ln_J", "strain", 1, None)]], [[("sigma", "value", 0, np.ones(N + 1))]],
+         [[("ln_J", "value", 0, None), ("s", "value", 1, None)]], [[], []],
+         [[("no", "value", 0, None)]], [[("sigma", "no", 0, None)]]]
     ),
     st.lists(st.integers(-1, 2**33), max_size=4),
 )  # fmt: skip
@@ -119,6 +123,9 @@ class Sample:
         self.packed = np.zeros((len(self.rows), 12))
         self.few = np.array([0, 2], dtype=np.uint32)
         self.given = (np.zeros(4 * N), np.zeros(16 * N))
+        self.wanted = [[("sigma", "value", 0, None), ("sigma_m", "value", 3, np.ones(N))]]
+        self.requests = _rust.Requests(self.wanted)
+        self.none = [_rust.Kernels(self.assembler, rank, []) for rank in (1, 2)]
 
 
 #: What is called, and good arguments; one after the other is replaced.
@@ -156,14 +163,16 @@ CALLS: dict[str, Callable[[Sample], tuple[Any, ...]]] = {
         _rust.Material.mohr_coulomb, (1.0, 0.3), 30.0, 1.0, 0.0, np.inf, False,
     ),
     "Assembler": lambda s: (_rust.Assembler, s.location, BASIS, NODES, TERMS, True),
-    "Assembler.vector": lambda s: (s.assembler.vector, [], s.volume, s.all),
+    "Assembler.vector": lambda s: (s.assembler.vector, s.none[0], [s.data], s.volume, s.all),
     "Assembler.pattern": lambda s: (s.assembler.pattern, s.selection),
     "Assembler.matrix": lambda s: (
-        s.assembler.matrix, [], [], s.volume, s.all, s.pattern, s.values,
+        s.assembler.matrix, s.none[1], s.none[0], [s.data], s.volume, s.all, s.pattern, s.values,
     ),
+    "Kernels": lambda s: (_rust.Kernels, s.assembler, 1, []),
+    "Requests": lambda s: (_rust.Requests, s.wanted),
     "Stage": lambda s: (_rust.Stage, s.particles, s.location, [s.law], "mixed", False, BASIS),
     "Stage.evaluate": lambda s: (
-        s.stage.evaluate, s.u, s.v, [("sigma", "value", 0)], s.data, s.given,
+        s.stage.evaluate, s.u, s.v, s.requests, [s.data], s.given,
     ),
     "Stage.commit": lambda s: (s.stage.commit, s.u, s.v, s.given),
     "Stage.strains": lambda s: (s.stage.strains, s.u, s.v),
@@ -179,6 +188,10 @@ CALLS: dict[str, Callable[[Sample], tuple[Any, ...]]] = {
         _rust.densities, s.location, s.volume, s.data, TERMS, False, s.rows, [0, 1], 2, s.packed,
     ),
     "nodal_sums": lambda s: (_rust.nodal_sums, s.location, s.volume, s.data, BASIS),
+    "cell_sums": lambda s: (_rust.cell_sums, s.location, s.volume, s.data),
+    "extraction": lambda s: (
+        _rust.extraction, BASIS, (4, 3), np.array([0, 11]), np.array([[0.0, 0.5], [1.0, 0.3]]),
+    ),
 }  # fmt: skip
 
 
@@ -232,7 +245,8 @@ def test_any_selection_has_a_pattern_inside_or_is_refused(counts, unknowns, seed
     else:
         assert len(pattern.start) == unknowns + 1
         assert (pattern.columns < unknowns).all()
-        called(s.assembler.matrix, [], [], s.volume, s.all, pattern, np.zeros(len(pattern.columns)))
+        values = np.zeros(len(pattern.columns))
+        called(s.assembler.matrix, s.none[1], s.none[0], [], s.volume, s.all, pattern, values)
 
 
 def test_every_function_and_method_is_in_the_table():
@@ -260,11 +274,11 @@ def test_an_array_to_write_that_cannot_be_written():
     s = Sample()
     s.data.setflags(write=False)
     with pytest.raises(TypeError, match="not writeable"):
-        s.stage.evaluate(s.u, s.v, [("sigma", "value", 0)], s.data)
+        s.stage.evaluate(s.u, s.v, s.requests, [s.data])
     with pytest.raises(TypeError, match="row by row"):
-        s.stage.evaluate(s.u, s.v, [("sigma", "value", 0)], np.zeros((N, 4), order="F"))
+        s.stage.evaluate(s.u, s.v, s.requests, [np.zeros((N, 4), order="F")])
     with pytest.raises(TypeError, match="already borrowed"):  # read and written at once
-        s.assembler.matrix([], [], s.volume, s.values[:80], s.pattern, s.values)
+        s.assembler.matrix(s.none[1], s.none[0], [], s.volume, s.values[:80], s.pattern, s.values)
 
 
 def test_positions_that_are_a_view_of_the_particles_own():
@@ -294,9 +308,14 @@ def test_objects_of_other_particles_or_of_another_grid():
             "other materials",
         ),
         (
-            lambda: s.assembler.matrix([], [], s.volume, s.all, other.pattern, s.values),
+            lambda: s.assembler.matrix(
+                s.none[1], s.none[0], [], s.volume, s.all, other.pattern, s.values
+            ),
             "another pattern",
         ),
+        (lambda: s.assembler.vector(s.none[1], [], s.volume, s.all), "another rank"),
+        (lambda: s.stage.evaluate(s.u, s.v, s.requests, [s.data, s.packed]), "other arrays"),
+        (lambda: s.stage.evaluate(s.u, s.v, s.requests, [np.zeros((N, 3))]), "reaches outside"),
         (lambda: s.particles.of_rows(plain.rows()), "rows of other"),
         (lambda: _rust.interpolate(elsewhere, BASIS, 2, s.u), "wrong number of grid"),
     ):
@@ -313,6 +332,29 @@ def test_an_index_that_looks_at_the_particles_while_they_are_changed():
 
     with pytest.raises(RuntimeError, match="borrowed"):
         s.particles.carry("acceleration", Width())
+
+
+def test_other_threads_of_python_run_during_a_long_call():
+    grid = _rust.Grid((0.0, 0.0), 1.0, (300, 300))
+    x = np.random.default_rng(0).random((300_000, 2)) * 300
+    location = grid.locate(x)
+    ones, seen, running = np.ones(len(x)), [], True
+
+    def watch() -> None:
+        while running:
+            seen.append(perf_counter())
+            sleep(1e-3)
+
+    watcher = threading.Thread(target=watch)
+    watcher.start()
+    try:
+        start = perf_counter()
+        _rust.nodal_sums(location, ones, np.ones((len(x), 12)), BASIS)
+        end = perf_counter()
+    finally:
+        running = False
+        watcher.join()
+    assert any(start < time < end for time in seen)
 
 
 def test_a_view_stays_readable_when_the_storage_is_replaced():

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import subprocess
 import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import meshio
 import numpy as np
@@ -12,27 +17,35 @@ import pytest
 from programs import on_ranks as start
 
 pytestmark = pytest.mark.mpi
-NUMBERS = (2, 4)
+NUMBERS = (2, 3, pytest.param(4, marks=pytest.mark.slow))
+
+
+@dataclass(frozen=True)
+class Found:
+    """Results of `on_ranks.py` on a number of ranks, and the folder of its files."""
+
+    number: int
+    folder: Path
+    results: dict[str, Any]
 
 
 @pytest.fixture(scope="module")
-def folders(tmp_path_factory):
-    """Folders of the files that one, two and four ranks write."""
-    return {number: tmp_path_factory.mktemp(f"ranks{number}") for number in (1, *NUMBERS)}
+def found(tmp_path_factory) -> Callable[[int], Found]:
+    """Results on a number of ranks, computed once; one rank is this process."""
 
-
-@pytest.fixture(scope="module")
-def results(folders):
-    """Number of ranks -> results of `on_ranks.py`; one rank is this process."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        found = {1: on_ranks.results(folders[1])}
-    for number in NUMBERS:
-        run = start(number, "tests/processes/on_ranks.py", folders[number] / "results.npz")
+    @functools.cache
+    def on(number: int) -> Found:
+        folder = tmp_path_factory.mktemp(f"ranks{number}")
+        if number == 1:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                return Found(1, folder, on_ranks.results(folder))
+        run = start(number, "tests/processes/on_ranks.py", folder / "results.npz")
         assert run.returncode == 0, run.stderr
         assert run.stdout.count("solved and written") == 1
-        found[number] = dict(np.load(folders[number] / "results.npz"))
-    return found
+        return Found(number, folder, dict(np.load(folder / "results.npz")))
+
+    return on
 
 
 @pytest.mark.parametrize("number", NUMBERS)
@@ -40,11 +53,12 @@ def results(folders):
     "subject",
     ["beam", "cloud", "nonlinear", "fem", "singular", "motion", "initial", "inverted", "few"],
 )
-def test_results_do_not_depend_on_the_number_of_ranks(results, number, subject):
-    names = [name for name in results[1] if name.startswith(subject)]
+def test_results_do_not_depend_on_the_number_of_ranks(found, number, subject):
+    alone, together = found(1).results, found(number).results
+    names = [name for name in alone if name.startswith(subject)]
     assert names
     for name in names:
-        one, several = (np.asarray(results[n][name], dtype=float) for n in (1, number))
+        one, several = (np.asarray(results[name], dtype=float) for results in (alone, together))
         size = 1.0 if name.endswith("error") else np.abs(one).max()  # errors are relative already
         assert np.abs(several - one).max() <= tolerance(name) * size, name
 
@@ -61,46 +75,48 @@ def tolerance(name: str) -> float:
     return 1e-9 if locking and "deflection" not in name else 1e-10
 
 
-def test_the_scenes_are_what_they_are_meant_to_be(results):
-    for found in results.values():
-        assert found["beam exact u_epsv fast deflection"] == pytest.approx(0.0111, rel=0.1)
-        assert found["singular"]
-        assert found["times inverted"] > 0
-        for path in ("fast", "reference"):
-            krylov = list(found[f"nonlinear {path} krylov"])
-            assert len(krylov) > 4
-            assert 0 < krylov.count(0) < len(krylov)
+@pytest.mark.parametrize("number", [1, *NUMBERS])
+def test_the_scenes_are_what_they_are_meant_to_be(found, number):
+    results = found(number).results
+    assert results["beam exact u_epsv fast deflection"] == pytest.approx(0.0111, rel=0.1)
+    assert results["singular"]
+    assert results["times inverted"] > 0
+    for path in ("fast", "reference"):
+        krylov = list(results[f"nonlinear {path} krylov"])
+        assert len(krylov) > 4
+        assert 0 < krylov.count(0) < len(krylov)
 
 
-def test_an_error_on_one_rank_can_be_caught_on_all(results):
-    for number in NUMBERS:
-        found = results[number]
-        assert list(found["errors law"]) == ["BrokenError: of the law, on one rank"] * number
-        assert list(found["errors iterations"]) == [1] * number  # and they compute together again
-        for said in found["errors nan"]:
-            assert "the first is NaN at particle 101" in said
-        assert len(found["errors nan"]) == number
+@pytest.mark.parametrize("number", NUMBERS)
+def test_an_error_on_one_rank_can_be_caught_on_all(found, number):
+    results = found(number).results
+    assert list(results["errors law"]) == ["BrokenError: of the law, on one rank"] * number
+    assert list(results["errors iterations"]) == [1] * number  # they compute together again
+    assert len(results["errors nan"]) == number
+    for said in results["errors nan"]:
+        assert "the first is NaN at particle 101" in said
 
 
-def test_files_hold_the_whole_body_once(results, folders):
-    for number, folder in folders.items():
-        assert list(results[number]["output counts"]) == [128] * 3
-        written = {path.name for path in folder.iterdir()} - {"results.npz"}
-        assert written == {"grid.vtu", "particles.vtu"}
-        mesh = meshio.read(folder / "particles.vtu")
-        assert len(mesh.points) == 128
-        assert len(np.unique(mesh.points, axis=0)) == 128
-        stress = mesh.point_data["mean stress [Pa]"]
-        assert np.isfinite(stress).all()
-        assert np.ptp(stress) > 0
+@pytest.mark.parametrize("number", [1, *NUMBERS])
+def test_files_hold_the_whole_body_once(found, number):
+    folder = found(number).folder
+    assert list(found(number).results["output counts"]) == [128] * 3
+    written = {path.name for path in folder.iterdir()} - {"results.npz"}
+    assert written == {"grid.vtu", "particles.vtu"}
+    mesh = meshio.read(folder / "particles.vtu")
+    assert len(mesh.points) == 128
+    assert len(np.unique(mesh.points, axis=0)) == 128
+    stress = mesh.point_data["mean stress [Pa]"]
+    assert np.isfinite(stress).all()
+    assert np.ptp(stress) > 0
 
 
-def test_the_header_describes_the_whole_body_on_every_rank(results):
-    (alone,) = results[1]["output header"]
+@pytest.mark.parametrize("number", NUMBERS)
+def test_the_header_describes_the_whole_body_on_every_rank(found, number):
+    (alone,) = found(1).results["output header"]
     assert "particles     128, 88 bytes each" in alone
-    for number in NUMBERS:
-        expected = str(alone).replace("1 rank", f"{number} ranks")
-        assert list(results[number]["output header"]) == [expected] * number
+    expected = str(alone).replace("1 rank", f"{number} ranks")
+    assert list(found(number).results["output header"]) == [expected] * number
 
 
 # -- programs that end by an error ------------------------------------------------
@@ -170,7 +186,7 @@ def test_an_error_of_a_driver_is_one_line(tmp_path):
     file = tmp_path / "file"
     file.touch()
     run = failed(
-        "from cases.cantilever.__main__ import main; import tawami; "
+        "from cases.verification.cantilever.__main__ import main; import tawami; "
         f"tawami.run(lambda: main(['--results', '{file}']), 'cantilever')"
     )
     assert run.stderr.count("cantilever: result folder ") == 1, run.stderr
@@ -179,7 +195,7 @@ def test_an_error_of_a_driver_is_one_line(tmp_path):
 
 @pytest.mark.slow
 def test_the_study_of_the_cantilever_runs_on_two_ranks(tmp_path):
-    run = start(2, "-m", "cases.cantilever", "--cells", "2,4", "--results", tmp_path)
+    run = start(2, "-m", "cases.verification.cantilever", "--cells", "2,4", "--results", tmp_path)
     assert run.returncode == 0, run.stderr
     assert run.stdout.count("66 computations") == 1
     written = {path.name for path in tmp_path.iterdir()}

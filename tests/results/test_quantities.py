@@ -48,5 +48,7 @@ def test_an_unknown_quantity_is_rejected_with_the_known_ones(output, message, tm
 
 
 def test_a_point_away_from_the_body_is_rejected(tmp_path):
-    with pytest.raises(tawami.InputError, match="no particle was within a cell of it, 0.25 m: exp"):
+    with pytest.raises(
+        tawami.InputError, match=r"no particle was within a cell \(0.25 m\) of it: exp"
+    ):
         T("displacement (0.45, 1.7)").begin(tmp_path, plastic_block().scene, None)

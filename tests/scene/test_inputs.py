@@ -338,8 +338,9 @@ def test_internal_shapes_are_checked_at_the_border_and_never_panic():
         scene.split(None)
     u, v = scene.split(np.zeros(scene.num_coefficients))
     data = np.zeros((len(scene.particles), 2))
+    requests = _rust.Requests([[("sigma", "value", 0, None)]])
     with pytest.raises(RuntimeError, match="outside the particle data"):
-        scene.configuration.domain.stage.evaluate(u, v, [("sigma", "value", 0)], data)
+        scene.configuration.domain.stage.evaluate(u, v, requests, [data])
     with pytest.raises(RuntimeError, match="row of no active cell"):
         _rust.densities(
             scene.configuration.domain.location, scene.particles.volume, data, [(0, 0)], False,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +11,7 @@ from tawami.base.arrays import Array, Indices
 from tawami.base.checks import one_of, path, shown
 from tawami.base.errors import GeometryWarning, InputError
 from tawami.base.files import unreadable
+from tawami.base.warn import warn
 from tawami.body import elements
 from tawami.body.body import Body
 from tawami.body.filling import Filling
@@ -208,9 +208,8 @@ def _warn_of_curved_sides(read: Any, blocks: list[tuple[int, Any]], x: Array) ->
             off = np.linalg.norm(middle - (corner + after) / 2, axis=2)
             furthest = max(furthest, float((off / np.maximum(side, 1e-300)).max()))
     if furthest > STRAIGHT:
-        warnings.warn(
+        warn(
             f"mesh: quadratic elements have curved sides, by up to {furthest:.2g} of a side: they are "
-            "taken as straight between their corners; refine the mesh where that matters",
+            "taken as straight between their corners; refine the mesh if this is not accurate enough",
             GeometryWarning,
-            stacklevel=3,
         )

@@ -72,7 +72,7 @@ def _parsed(given: list[str]) -> argparse.Namespace:
     parser = _parser()
     asked = parser.parse_args(own)
     if rest and asked.name != "tawami run":
-        parser.error(f"arguments after -- are those of a script: {asked.name} runs none")
+        parser.error(f"arguments after -- belong to a script: {asked.name} does not run one")
     asked.arguments = rest
     return asked
 

@@ -61,7 +61,8 @@ class Run:
         except (OSError, KeyError, TypeError, ValueError) as error:
             what = f"no {error}" if isinstance(error, KeyError) else reason(error)
             raise InputError(
-                f"'{file}' is damaged ({what}): run the script itself, with tawami run SCRIPT --resume"
+                f"'{file}' does not name a script to run again ({what}): run the script itself, with "
+                "tawami run SCRIPT --resume"
             ) from error
 
     @property

@@ -56,31 +56,38 @@ class FastAssembly(Assembly):
             self.attachment.location, self.layout.basis, nodes, vertices, bilinear
         )
 
-    def _kernels(self, integrals: Sequence[Integral], data: Mapping[Rule, Array]) -> list[Any]:
-        """Address, rank, width, coefficients and constants of each kernel, for Rust."""
-        kernels = []
-        for integral in integrals:
-            slots: list[Any] = []
-            for slot in integral.slots:
-                if slot.source == "fields":
-                    slots.append(None)
-                else:
-                    assert (
-                        slot.source != "traction"
-                    )  # compilation rejects it in integrals over cells
-                    points, columns = self.attachment.points[slot.source], list(slot.columns)
-                    slots.append((data[slot.data], points, slot.source == "vertex", columns))
-            constants = self.attachment.constants(integral).tolist()
-            kernels.append(
-                (integral.kernel.address, integral.rank, integral.width, slots, constants)
-            )
-        return kernels
+    def _kernel(self, integral: Integral) -> tuple[Any, ...]:
+        """An integral as `_rust.Kernels` reads it."""
+        rules = list(self._compiled.densities)
+        slots: list[tuple[Any, ...] | None] = []
+        for slot in integral.slots:
+            if slot.source == "fields":
+                slots.append(None)
+                continue
+            assert slot.source != "traction"  # compilation rejects it in integrals over cells
+            points, vertices = self.attachment.points[slot.source], slot.source == "vertex"
+            slots.append((rules.index(slot.data), points, vertices, slot.columns))
+        kernel, constants = integral.kernel, self.attachment.constants(integral).tolist()
+        return kernel.module, kernel.address, integral.rank, integral.width, slots, constants
+
+    def _kernels(self, rank: int, integrals: Sequence[Integral]) -> _rust.Kernels:
+        return _rust.Kernels(self._assembler, rank, list(map(self._kernel, integrals)))
+
+    @functools.cached_property
+    def _of_residual(self) -> _rust.Kernels:
+        return self._kernels(1, self._compiled.residual)
+
+    @functools.cached_property
+    def _of_tangent(self) -> tuple[_rust.Kernels, _rust.Kernels]:
+        """Kernels of rank 2, and the pairs of kernels of rank 1 whose products are added."""
+        pairs = [integral for pair in self._compiled.couplings for integral in pair]
+        return self._kernels(2, self._compiled.tangent), self._kernels(1, pairs)
 
     def residual(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
         """See `Assembly.residual`."""
         with self._stopwatch("residual"):
-            kernels = self._kernels(self._compiled.residual, data)
-            of_cells = self._assembler.vector(kernels, self.attachment.volume, coefficients)
+            arrays, volume = list(data.values()), self.attachment.volume
+            of_cells = self._assembler.vector(self._of_residual, arrays, volume, coefficients)
             forces = self.attachment.summed(of_cells)
         return self._ghost.add_forces(forces, coefficients, data)
 
@@ -90,10 +97,8 @@ class FastAssembly(Assembly):
             if not reduction.same_unknowns(self.reduction):
                 self._new_pattern(reduction)
         with self._stopwatch("tangent"):
-            kernels = self._kernels(self._compiled.tangent, data)
-            couplings = [self._kernels(pair, data) for pair in self._compiled.couplings]
-            volume = self.attachment.volume
-            self._assembler.matrix(kernels, couplings, volume, coefficients, *self._pattern)
+            arrays, volume = list(data.values()), self.attachment.volume
+            self._assembler.matrix(*self._of_tangent, arrays, volume, coefficients, *self._pattern)
             self._petsc["of cells"].assemble()
         if self._comm.size == 1:
             return self._ghost.add_tangent(self._petsc["of cells"], data, reduction)

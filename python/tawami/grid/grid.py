@@ -90,6 +90,10 @@ class Grid(Unique):
         ends = zip(self.origin, self.upper, strict=True)
         return " x ".join(f"[{low:g}, {high:g}]" for low, high in ends)
 
+    def __repr__(self) -> str:
+        cells = " x ".join(map(str, self.cells))
+        return f"Grid({cells} cells of {self.h:g} m, {self.extent} m)"
+
     def identity(self) -> dict[str, Any]:
         """What distinguishes it from another grid, for checkpoints."""
         return {"grid": [list(self.origin), self.h, list(self.cells)]}

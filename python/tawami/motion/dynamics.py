@@ -81,9 +81,9 @@ class Dynamics(Sealed, Unique):
         self.velocity[:] = given
         self._clock = Clock()
         self._balance = Balance(self._now, self._carried)
-        self.seal()
+        self._seal()
 
-    def how_to_set(self, name: str) -> str:
+    def _how_to_set(self, name: str) -> str:
         """What to do instead of setting an attribute."""
         if name in ("velocity", "acceleration", "velocity_gradient"):
             return f"write into the array, as motion.{name}[:] = ..."

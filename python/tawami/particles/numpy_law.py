@@ -115,8 +115,8 @@ class NumpyStage:
         self,
         u: Array,
         volumetric: Array | None,
-        requests: Sequence[tuple[str, str, int]],
-        data: Array,
+        requests: _rust.Requests,
+        data: Sequence[Array],
     ) -> None:
         """As `_rust.Stage.evaluate`."""
         self._stage.evaluate(u, volumetric, requests, data, self._given(u, volumetric))

@@ -20,6 +20,8 @@ from tawami.particles.numpy_law import NumpyStage
 
 #: K/mu beyond which a larger bulk modulus makes forces no larger.
 LOCKED = 1e4
+#: Law quantity, value or derivative, first column, and constants that multiply it.
+Request = tuple[str, str, int, Array | None]
 
 
 class Responses:
@@ -62,30 +64,31 @@ class Responses:
         self.data: dict[Rule, Array] = {
             rule: np.zeros((len(particles), compiled.columns(rule))) for rule in compiled.densities
         }
-        #: Law quantities of each rule: (name, part, first column).
-        self._requests: dict[Rule, list[tuple[str, str, int]]] = {rule: [] for rule in self.data}
-        #: Constants that multiply some of them, with their columns.
-        self._factors: dict[Rule, list[tuple[slice, Array]]] = {rule: [] for rule in self.data}
+        requests: dict[Rule, list[Request]] = {rule: [] for rule in self.data}
         with ranks.raise_together(comm):
             for rule, densities in compiled.densities.items():
                 for density, column in densities.items():
-                    self._place(rule, density, column)
+                    quantity = density.quantity
+                    if isinstance(quantity, ParticleScalar):
+                        self.data[rule][:, column] = self._constant(quantity)
+                    else:
+                        requests[rule].append(self._request(density, column))
+        #: Particle data with law quantities, and these quantities.
+        self._written = [self.data[rule] for rule, of_rule in requests.items() if of_rule]
+        self._requests = _rust.Requests([of_rule for of_rule in requests.values() if of_rule])
         softer = np.minimum(constants["K"], LOCKED * constants["mu"])
         self.stiffest, self.largest_mu = (
             comm.allreduce(float(modulus.max(initial=0.0)), op=MPI.MAX)
             for modulus in (softer, constants["mu"])
         )
 
-    def _place(self, rule: Rule, density: Density, column: int) -> None:
+    def _request(self, density: Density, column: int) -> Request:
         quantity = density.quantity
-        if isinstance(quantity, ParticleScalar):
-            self.data[rule][:, column] = self._constant(quantity)
-            return
         assert isinstance(quantity, LawQuantity)
-        self._requests[rule].append((quantity.name, density.part, column))
+        factor = None
         if quantity.factor is not None:
-            columns = slice(column, column + density.size)
-            self._factors[rule].append((columns, quantity.factor.evaluate(self.constants)))
+            factor = np.asarray(quantity.factor.evaluate(self.constants), dtype=float)
+        return quantity.name, density.part, column, factor
 
     def _constant(self, scalar: ParticleScalar) -> Array:
         with np.errstate(all="ignore"):
@@ -115,12 +118,9 @@ class Responses:
             volumetric: Coefficients of the bilinear field, if the form has one.
         """
         with self._stopwatch("law"):
-            for rule, requests in self._requests.items():
-                if requests:
-                    with ranks.raise_together(self._comm):
-                        self.stage.evaluate(u, volumetric, requests, self.data[rule])
-                    for columns, factor in self._factors[rule]:
-                        self.data[rule][:, columns] *= factor[:, None]
+            if self._written:
+                with ranks.raise_together(self._comm):
+                    self.stage.evaluate(u, volumetric, self._requests, self._written)
         return self.data
 
     def sums(self, columns: Array) -> Array:

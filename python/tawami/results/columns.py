@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-import numpy.typing as npt
 from mpi4py import MPI
 
 from tawami import _rust
 from tawami.base import checks
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError, NotModelledError
 from tawami.grid import edges
 from tawami.motion.energy import Energies
@@ -20,7 +20,6 @@ from tawami.results.quantities import body_view
 from tawami.scene.reactions import supported_edge
 from tawami.scene.scene import Scene
 
-Array = npt.NDArray[np.float64]
 #: Particles that a linear fit of displacements around a point uses at finite strain.
 NEIGHBOURS = 12
 

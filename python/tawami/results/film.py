@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from tawami.base.arrays import Array
 from tawami.base.errors import OutputError
 from tawami.base.files import atomic_file
 from tawami.results.figure import new_figure, save
@@ -20,7 +21,6 @@ from tawami.results.frame import Frame
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = npt.NDArray[np.float64]
 Movie = Literal["gif", "mp4"]
 #: Times, and functions that read the frames.
 Times = Sequence[tuple[float, Callable[[], Frame]]]

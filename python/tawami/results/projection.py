@@ -16,13 +16,12 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks
+from tawami.base.arrays import Array
 from tawami.scene.scene import Scene
 
-Array = npt.NDArray[np.float64]
 Projection = Literal["lumped", "consistent"]
 #: Relative residual at which conjugate gradients end, and their largest number of iterations.
 SMALL, MOST = 1e-10, 200

@@ -11,10 +11,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 
 from tawami import _rust
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError, NotModelledError
 from tawami.form.kinematics import FIELD_UNITS
 from tawami.grid import edges
@@ -26,7 +26,6 @@ from tawami.results.projection import Projection, nodal
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
 
-Array = npt.NDArray[np.float64]
 #: Arrays of the particles by name.
 View = Callable[[str], Array]
 

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from tawami import _rust
 from tawami.base import checks, ranks
 from tawami.base.errors import InputError
 from tawami.form import quantities
@@ -130,9 +131,9 @@ def _returned(domain: Domain) -> Array:
     layout = domain.layout
     fields = layout.split(np.zeros(layout.size))
     strain = domain.model.form.strain
-    requests = [(strain.mean, "value", 0), (strain.stress, "value", 1)]
+    wanted = [(strain.mean, "value", 0, None), (strain.stress, "value", 1, None)]
     data = np.zeros((len(domain.particles), 1 + quantities.COMPONENTS[strain.stress]))
-    domain.stage.evaluate(*fields, requests, data)
+    domain.stage.evaluate(*fields, _rust.Requests([wanted]), [data])
     mean, components = data[:, 0], data[:, 1:]
     xx, yy, xy = components[:, strain.stress_xx_yy_xy].T
     return np.column_stack([xx, yy, 3 * mean - xx - yy, xy])

@@ -73,7 +73,7 @@ class Solution(Elsewhere, Sealed, Unique):
         self.stress = particles["stress"]
         self.displacement_of_particles = particles["displacement"]
         self._eps_v = particles.get("eps_v")
-        self.seal()
+        self._seal()
 
     def __repr__(self) -> str:
         momentum = self.history[-1][0]

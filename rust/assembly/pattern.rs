@@ -1,0 +1,140 @@
+//! Pattern of the reduced matrix.
+
+use std::collections::BTreeMap;
+
+use ndarray::Array1;
+use rayon::prelude::*;
+
+use super::cell::Cells;
+use super::selection::Selection;
+use crate::grid::{Active, Functions, Location};
+use crate::space::{indices, number_of, Block, Index, DIM};
+
+/// Pattern of the reduced matrix in compressed rows.
+#[derive(Debug, Clone)]
+pub struct Pattern {
+    /// Start of each row in `columns`; one more than rows.
+    pub start: Array1<i32>,
+    /// Columns of the rows, ascending.
+    pub columns: Array1<i32>,
+    /// Whether the unknowns of each active cell reach beyond its functions (point constraints).
+    pub(super) reaching: Vec<bool>,
+}
+
+/// A field: its functions, and its place among the coefficients.
+struct Field {
+    functions: Functions,
+    /// First coefficient.
+    first: usize,
+    components: usize,
+}
+
+/// Intersection of two blocks.
+fn intersection(a: Block, b: Block) -> Block {
+    std::array::from_fn(|axis| [a[axis][0].max(b[axis][0]), a[axis][1].min(b[axis][1])])
+}
+
+impl Field {
+    /// The fields of the forms of these cells.
+    fn of(cells: &Cells, grid: Index) -> Vec<Self> {
+        let functions = cells.displacement(grid);
+        let first = DIM * functions.len();
+        let displacement = Self { functions, first: 0, components: DIM };
+        let linear = cells.linear(grid).map(|functions| Self { functions, first, components: 1 });
+        std::iter::once(displacement).chain(linear).collect()
+    }
+
+    /// Cells of the support of the function that a coefficient belongs to.
+    fn support(&self, coefficient: usize) -> Block {
+        self.functions.support((coefficient - self.first) / self.components)
+    }
+
+    /// Append the unknowns whose functions share an active cell with a support.
+    fn sharing(&self, active: &Active, support: Block, selection: &Selection, row: &mut Vec<i32>) {
+        let cells: usize = support.iter().map(|[first, last]| last + 1 - first).product();
+        let full = active.count(support) == cells;
+        for index in indices(support.map(|cells| self.functions.basis.on(cells))) {
+            let shared = || intersection(support, self.functions.support_at(index));
+            if full || active.count(shared()) > 0 {
+                let function = self.functions.number(index);
+                let first = self.first + self.components * function;
+                row.extend(selection.unknowns(first, self.components));
+            }
+        }
+    }
+}
+
+/// Rows that one task makes.
+const ROWS: usize = 512;
+
+/// Pattern of the reduced matrix; `None` if it has more entries than its indices can count.
+///
+/// On the structured grid it is known which functions share an active cell. Only the cells at point
+/// constraints are visited one by one.
+#[must_use]
+pub fn pattern(cells: &Cells, location: &Location, selection: &Selection) -> Option<Pattern> {
+    let active = Active::new(location.grid, &location.active);
+    let fields = Field::of(cells, location.grid.cells);
+    let support = |c: usize| {
+        let field = fields.iter().rev().find(|field| c >= field.first).unwrap_or(&fields[0]);
+        field.support(c)
+    };
+    let (reaching, further) = reach(cells, location, selection, support);
+    let of_task = |(task, unknowns): (usize, &[i64])| {
+        let (mut lengths, mut columns, mut row) = (Vec::new(), Vec::new(), Vec::new());
+        for (k, &c) in unknowns.iter().enumerate() {
+            row.clear();
+            let support = support(c as usize);
+            for field in &fields {
+                field.sharing(&active, support, selection, &mut row);
+            }
+            let more = further.get(&((task * ROWS + k) as u32));
+            row.extend(more.into_iter().flatten().map(|&u| u as i32));
+            if !row.is_sorted() {
+                row.sort_unstable();
+            }
+            row.dedup();
+            lengths.push(row.len());
+            columns.extend_from_slice(&row);
+        }
+        (lengths, columns)
+    };
+    let tasks = selection.coefficients().par_chunks(ROWS).enumerate().map(of_task);
+    let (lengths, columns): (Vec<_>, Vec<_>) = tasks.unzip();
+    let mut start = Vec::with_capacity(selection.coefficients().len() + 1);
+    let mut end = 0;
+    start.push(0);
+    for length in lengths.iter().flatten() {
+        end += length;
+        start.push(i32::try_from(end).ok()?);
+    }
+    Some(Pattern { start: start.into(), columns: columns.concat().into(), reaching })
+}
+
+/// The active cells with coefficients that depend on others, and what they add to the pattern: for each
+/// unknown of such a cell, all of its unknowns.
+fn reach(
+    cells: &Cells,
+    location: &Location,
+    selection: &Selection,
+    support: impl Fn(usize) -> Block,
+) -> (Vec<bool>, BTreeMap<u32, Vec<u32>>) {
+    let mut reaching = vec![false; location.active.len()];
+    for c in selection.dependent() {
+        for index in indices(support(c)) {
+            let cell = number_of(index, location.grid.cells) as u32;
+            if let Ok(a) = location.active.binary_search(&cell) {
+                reaching[a] = true;
+            }
+        }
+    }
+    let mut further = BTreeMap::<u32, Vec<u32>>::new();
+    let mut entries = Vec::new();
+    for a in (0..reaching.len()).filter(|&a| reaching[a]) {
+        selection.of_cell(&cells.local(location, a), &mut entries);
+        for &(u, ..) in &entries {
+            further.entry(u).or_default().extend(entries.iter().map(|e| e.0));
+        }
+    }
+    (reaching, further)
+}

@@ -1,0 +1,76 @@
+//! Uniform background grid: its cells, bases, quadrature rules, and the location of particles in it.
+
+mod active;
+mod basis;
+mod extraction;
+mod functions;
+mod location;
+mod rule;
+
+pub use active::Active;
+pub use basis::{Basis, Local};
+pub use extraction::{extraction, Extraction};
+pub use functions::{products, CellFunctions, Functions};
+pub use location::Location;
+pub use rule::{Rule, MAX_POINTS};
+
+use crate::error::{Error, Result};
+use crate::space::{count, index_of, Index, Point, DIM};
+
+/// Largest number of cells along an axis.
+pub const MAX_CELLS: usize = 1 << 15;
+
+/// Uniform grid of cubes of side `h` (squares in the plane). Cells are numbered x fastest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grid {
+    /// Lower corner [m].
+    pub origin: Point,
+    /// Side of a cell [m].
+    pub h: f64,
+    /// Number of cells along each axis.
+    pub cells: Index,
+}
+
+impl Grid {
+    /// A grid; `h` must be positive and finite, and there must be at least one cell along each axis.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] with the parameter that is out of range.
+    pub fn new(origin: Point, h: f64, cells: Index) -> Result<Self> {
+        const ORIGIN: [&str; 3] = ["origin[0]", "origin[1]", "origin[2]"];
+        const CELLS: [&str; 3] = ["cells[0]", "cells[1]", "cells[2]"];
+        let refuse = |name, value, expected| Err(Error::Parameter { name, value, expected });
+        if !(h.is_finite() && h > 0.0) {
+            return refuse("h", h, "a positive cell size in m");
+        }
+        for axis in 0..DIM {
+            if !origin[axis].is_finite() {
+                return refuse(ORIGIN[axis], origin[axis], "a finite position in m");
+            }
+        }
+        for axis in 0..DIM {
+            if cells[axis] == 0 || cells[axis] > MAX_CELLS {
+                return refuse(CELLS[axis], cells[axis] as f64, "between 1 and 32768 cells");
+            }
+        }
+        Ok(Self { origin, h, cells })
+    }
+
+    /// Number of cells.
+    #[must_use]
+    pub fn num_cells(&self) -> usize {
+        count(self.cells)
+    }
+
+    /// Position of a cell along each axis.
+    #[must_use]
+    pub fn cell_index(&self, cell: usize) -> Index {
+        index_of(cell, self.cells)
+    }
+
+    /// Upper corner [m].
+    #[must_use]
+    pub fn upper(&self) -> Point {
+        std::array::from_fn(|axis| self.origin[axis] + self.h * self.cells[axis] as f64)
+    }
+}

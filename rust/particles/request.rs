@@ -1,0 +1,139 @@
+//! What a weak form asks of the laws: the columns of its particle data.
+
+use std::str::FromStr;
+
+use crate::error::Error;
+use crate::space::{GRADIENT, SYMMETRIC};
+
+/// A quantity of the law that a form may name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Operator {
+    /// Stress in space (xx, yy, xy) [Pa].
+    Sigma,
+    /// Components in space (xx, yy, xy) of the three-dimensional deviator [Pa].
+    Deviator,
+    /// Mean stress [Pa].
+    Mean,
+    /// P = tau f^-T (xx, xy, yx, yy) [Pa]; finite strain only.
+    Nominal,
+    /// P_s = s f^-T (xx, xy, yx, yy) [Pa], the part of P from the deviator; finite strain only.
+    NominalDeviator,
+    /// Mean Kirchhoff stress [Pa]; finite strain only.
+    MeanKirchhoff,
+    /// ln J_f; finite strain only.
+    LnJ,
+}
+
+impl Operator {
+    /// Number of components.
+    #[must_use]
+    pub fn components(self) -> usize {
+        match self {
+            Self::Nominal | Self::NominalDeviator => GRADIENT,
+            Self::Sigma | Self::Deviator => SYMMETRIC,
+            Self::Mean | Self::MeanKirchhoff | Self::LnJ => 1,
+        }
+    }
+
+    /// Whether it belongs to finite strain.
+    #[must_use]
+    pub fn finite(self) -> bool {
+        !matches!(self, Self::Sigma | Self::Deviator | Self::Mean)
+    }
+}
+
+/// Value of an operator, or one of its derivatives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// Its value.
+    Value,
+    /// Its derivative with respect to the strain in space (xx, yy, gamma_xy) of `sym grad u`, strain
+    /// fastest; small strain only.
+    Strain,
+    /// Its derivative with respect to grad u (xx, xy, yx, yy), gradient fastest; finite strain only.
+    Gradient,
+    /// Its derivative with respect to the volumetric strain.
+    Volume,
+}
+
+impl Part {
+    /// Numbers per component.
+    #[must_use]
+    pub fn width(self) -> usize {
+        match self {
+            Self::Value | Self::Volume => 1,
+            Self::Strain => SYMMETRIC,
+            Self::Gradient => GRADIENT,
+        }
+    }
+}
+
+/// An entry of the particle data: `part` of `operator`, from `column` on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Request {
+    /// The operator.
+    pub operator: Operator,
+    /// Value or derivative.
+    pub part: Part,
+    /// First column of the particle data that is written.
+    pub column: usize,
+    /// Factor of each particle, where the form multiplies the quantity by constants.
+    pub factor: Option<Vec<f64>>,
+}
+
+impl Request {
+    /// A request without a factor.
+    #[must_use]
+    pub fn new(operator: Operator, part: Part, column: usize) -> Self {
+        Self { operator, part, column, factor: None }
+    }
+
+    /// Number of columns that are written.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.operator.components() * self.part.width()
+    }
+}
+
+impl FromStr for Operator {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self, Error> {
+        Ok(match name {
+            "sigma" => Self::Sigma,
+            "s" => Self::Deviator,
+            "sigma_m" => Self::Mean,
+            "P" => Self::Nominal,
+            "P_s" => Self::NominalDeviator,
+            "tau_m" => Self::MeanKirchhoff,
+            "ln_J" => Self::LnJ,
+            _ => {
+                return Err(Error::UnknownName {
+                    what: "operator",
+                    name: name.to_owned(),
+                    expected: "'sigma', 's', 'sigma_m', 'P', 'P_s', 'tau_m', 'ln_J'",
+                })
+            }
+        })
+    }
+}
+
+impl FromStr for Part {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self, Error> {
+        Ok(match name {
+            "value" => Self::Value,
+            "strain" => Self::Strain,
+            "gradient" => Self::Gradient,
+            "volume" => Self::Volume,
+            _ => {
+                return Err(Error::UnknownName {
+                    what: "part",
+                    name: name.to_owned(),
+                    expected: "'value', 'strain', 'gradient', 'volume'",
+                })
+            }
+        })
+    }
+}

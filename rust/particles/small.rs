@@ -1,0 +1,47 @@
+//! Requested quantities at small strain.
+
+use super::kinematics::Kinematics;
+use super::request::{Operator, Part, Request};
+use crate::space::{DIM, SYMMETRIC};
+use crate::tensor::{dot, Moduli, Stress, Sym, IN_SPACE, UNIT, UNIT_DEVIATORS};
+
+/// Components of an operator from a deviator `s` and a mean `m` of the stress, or of their derivatives.
+fn components(operator: Operator, s: &Sym, m: f64, out: &mut [f64]) {
+    match operator {
+        Operator::Sigma => {
+            IN_SPACE.iter().zip(out).for_each(|(&i, o)| *o = s[i] + m * UNIT[i]);
+        }
+        Operator::Deviator => IN_SPACE.iter().zip(out).for_each(|(&i, o)| *o = s[i]),
+        Operator::Mean => out[0] = m,
+        _ => {}
+    }
+}
+
+/// Write the requested quantity from its first column on.
+pub(super) fn write(
+    request: &Request,
+    kinematics: Kinematics,
+    stress: &Stress,
+    c: &Moduli,
+    out: &mut [f64],
+) {
+    let n = request.operator.components();
+    match request.part {
+        Part::Value => components(request.operator, &stress.deviator, stress.mean, out),
+        Part::Volume => components(request.operator, &c.dev_vol, c.mean_vol, out),
+        Part::Gradient => {}
+        Part::Strain => {
+            for (j, e) in UNIT_DEVIATORS.iter().enumerate() {
+                let mut ds: Sym = std::array::from_fn(|i| dot(&c.dev_dev[i], e));
+                let mut dm = dot(&c.mean_dev, e);
+                if kinematics == Kinematics::Displacement && j < DIM {
+                    ds.iter_mut().zip(&c.dev_vol).for_each(|(d, v)| *d += v);
+                    dm += c.mean_vol;
+                }
+                let mut column = [0.0; SYMMETRIC];
+                components(request.operator, &ds, dm, &mut column[..n]);
+                (0..n).for_each(|i| out[SYMMETRIC * i + j] = column[i]);
+            }
+        }
+    }
+}

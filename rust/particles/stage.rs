@@ -1,0 +1,338 @@
+//! The particle stage of a Newton iteration: strain, law, and the quantities that the weak form asks for.
+//! The same stage accepts a converged step.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::kinematics::{Increments, Kinematics};
+use super::request::Request;
+use super::{finite, small, Particles, Role};
+use crate::error::{Error, Result};
+use crate::grid::Location;
+use crate::law::{Law, MAX_HISTORY};
+use crate::space::{COMPONENTS, DIM};
+use crate::tensor::hencky::Trial;
+use crate::tensor::matrix::{det_minus_one, trace};
+use crate::tensor::{dot, Moduli, Strain, Stress, Sym, UNIT};
+
+/// Where stress and tangent come from.
+#[derive(Clone, Copy)]
+pub enum Response<'a> {
+    /// The laws; the material numbers of the particles count them from 0.
+    Laws(&'a [Arc<dyn Law>]),
+    /// Computed by the caller for the strains of [`Stage::strain`]: stress (4 numbers per particle) and
+    /// tangent d stress / d strain (16, strain fastest), in the order of [`crate::tensor`].
+    Given(&'a [f64], &'a [f64]),
+}
+
+/// One array of particle data: the requests that are written into its columns.
+pub struct Output<'a> {
+    /// What is written.
+    pub requests: &'a [Request],
+    /// Number of columns, at least one.
+    pub columns: usize,
+    /// Particles x columns.
+    pub data: &'a mut [f64],
+}
+
+/// What the particle stage works on.
+#[derive(Clone, Copy)]
+pub struct Stage<'a> {
+    /// Where the particles are.
+    pub location: &'a Location,
+    /// The laws, or their answers.
+    pub response: Response<'a>,
+    /// How the strain follows from the increments.
+    pub kinematics: Kinematics,
+    /// Whether strains are finite.
+    pub finite: bool,
+    /// The increments of the current Newton iterate.
+    pub increments: Increments<'a>,
+}
+
+/// Particles that one task treats.
+const BLOCK: usize = 64;
+
+/// State of the particles at the start of the step.
+struct Old<'a> {
+    material: &'a [u32],
+    stress: &'a [f64],
+    /// History variables of each law.
+    history: Vec<Vec<&'a [f64]>>,
+}
+
+/// Answer of a particle to the increments.
+struct Answer {
+    /// Change of the volume that its law got.
+    volume: f64,
+    stress: Stress,
+    moduli: Moduli,
+    trial: Option<Trial>,
+    history: [f64; MAX_HISTORY],
+    /// Strain that the law got, and the stress that it starts from.
+    strain: Strain,
+    start: Stress,
+}
+
+/// New state of a particle after an accepted step. It is much smaller than an answer, and those of all
+/// particles are in memory at once.
+struct Accepted {
+    stress: Stress,
+    volume: f64,
+    u: [f64; DIM],
+    history: [f64; MAX_HISTORY],
+    dissipated: f64,
+}
+
+impl Stage<'_> {
+    fn old<'a>(&self, particles: &'a Particles) -> Old<'a> {
+        let of_law = |places: Vec<usize>| places.into_iter().map(|c| particles.reals(c)).collect();
+        Old {
+            material: particles.material(),
+            stress: particles.stress(),
+            history: self.history(particles).into_iter().map(of_law).collect(),
+        }
+    }
+
+    /// Places of the history variables of each law.
+    fn history(&self, particles: &Particles) -> Vec<Vec<usize>> {
+        let of_law = |law: &Arc<dyn Law>| particles.history_of(law.history()).unwrap_or_default();
+        match self.response {
+            Response::Laws(laws) => laws.iter().map(of_law).collect(),
+            Response::Given(..) => Vec::new(),
+        }
+    }
+
+    /// Strain, stress and tangent of particle `p`; `None` if it is turned inside out.
+    fn respond(&self, old: &Old, p: usize) -> Option<Answer> {
+        match self.response {
+            Response::Laws(laws) => {
+                let number = old.material[p] as usize;
+                self.of_law(&*laws[number], &old.history[number], old, p)
+            }
+            Response::Given(stress, tangent) => {
+                let strain = self.increments.strain(self.kinematics, self.location, p);
+                let stress: Sym = std::array::from_fn(|i| stress[COMPONENTS * p + i]);
+                let at = COMPONENTS * COMPONENTS * p;
+                let row = |i: usize| std::array::from_fn(|j| tangent[at + COMPONENTS * i + j]);
+                Some(Answer {
+                    volume: strain.volume,
+                    stress: Stress::from(&stress),
+                    moduli: Moduli::from(&std::array::from_fn(row)),
+                    trial: None,
+                    history: [0.0; MAX_HISTORY],
+                    strain,
+                    start: Stress::default(),
+                })
+            }
+        }
+    }
+
+    fn of_law(&self, law: &dyn Law, history: &[&[f64]], old: &Old, p: usize) -> Option<Answer> {
+        let (mut before, mut after) = ([0.0; MAX_HISTORY], [0.0; MAX_HISTORY]);
+        for (value, column) in before.iter_mut().zip(history) {
+            *value = column[p];
+        }
+        let stress: Sym = std::array::from_fn(|i| old.stress[COMPONENTS * p + i]);
+        let stress = Stress::from(&stress);
+        let (strain, start, volume, trial);
+        if self.finite {
+            let own = match self.kinematics {
+                Kinematics::Displacement => None,
+                Kinematics::Mixed => Some(self.increments.volumetric_at(self.location, p)),
+                Kinematics::Cell => {
+                    let g = self.increments.grad_u_of_cell(self.location, p);
+                    let change = det_minus_one(&g);
+                    Some((change > -1.0).then(|| change.ln_1p())?)
+                }
+                Kinematics::Deviatoric => Some(0.0),
+            };
+            let g = self.increments.grad_u(self.location, p);
+            let of_step = Trial::new(&g, own, &law.elastic_strain(&stress))?;
+            // the law gets the total elastic strain and starts from zero stress
+            (strain, start) = (of_step.strain, Stress::default());
+            volume = own.unwrap_or(of_step.ln_j);
+            trial = Some(of_step);
+        } else {
+            strain = self.increments.strain(self.kinematics, self.location, p);
+            (start, volume, trial) = (stress, strain.volume, None);
+        }
+        let n = history.len();
+        let (stress, moduli) = law.respond(&strain, &start, &before[..n], &mut after[..n]);
+        Some(Answer { volume, stress, moduli, trial, history: after, strain, start })
+    }
+
+    /// Work of the stress on the plastic strain of the step [J/m3]; zero for laws without history.
+    fn dissipated(&self, particles: &Particles, p: usize, answer: &Answer) -> f64 {
+        let Response::Laws(laws) = self.response else { return 0.0 };
+        let law = &laws[particles.material()[p] as usize];
+        if law.history().is_empty() {
+            return 0.0;
+        }
+        let Answer { strain, stress, .. } = answer;
+        let (start, end) = (law.elastic_strain(&answer.start), law.elastic_strain(stress));
+        let plastic = |i| start.deviator[i] + strain.deviator[i] - end.deviator[i];
+        dot(&stress.deviator, &std::array::from_fn(plastic))
+            + stress.mean * (start.volume + strain.volume - end.volume)
+    }
+
+    /// Strain increment of particle `p` as one tensor; small strain.
+    #[must_use]
+    pub fn strain(&self, p: usize) -> Sym {
+        let strain = self.increments.strain(self.kinematics, self.location, p);
+        std::array::from_fn(|i| strain.deviator[i] + strain.volume / 3.0 * UNIT[i])
+    }
+
+    /// div u (ln J_f at finite strain) at particle `p`.
+    #[must_use]
+    pub fn volume_change(&self, p: usize) -> f64 {
+        let g = self.increments.grad_u(self.location, p);
+        if self.finite {
+            // NaN where f turns the particle inside out: such an iterate is not accepted
+            return det_minus_one(&g).ln_1p();
+        }
+        trace(&g)
+    }
+
+    /// Write what is requested into all arrays of particle data. The law of a particle answers once.
+    ///
+    /// # Errors
+    /// [`Error::Inverted`] with the first such particle.
+    ///
+    /// # Panics
+    /// If a request reaches outside the columns, or the particles lack the history of a law; callers check
+    /// at the border.
+    pub fn evaluate(&self, particles: &Particles, outputs: Vec<Output>) -> Result<()> {
+        let old = self.old(particles);
+        let blocks = self.location.len().div_ceil(BLOCK);
+        let mut tasks: Vec<Vec<Output>> = (0..blocks).map(|_| Vec::new()).collect();
+        for Output { requests, columns, data } in outputs {
+            let parts = data.chunks_mut(BLOCK * columns);
+            for (task, data) in tasks.iter_mut().zip(parts) {
+                task.push(Output { requests, columns, data });
+            }
+        }
+        let of = |(block, mut outputs): (usize, Vec<Output>)| {
+            let particles = BLOCK * block..(BLOCK * (block + 1)).min(self.location.len());
+            let mut inverted = None;
+            for (row, p) in particles.enumerate() {
+                match self.respond(&old, p) {
+                    Some(answer) => {
+                        for output in &mut outputs {
+                            self.write(&answer, p, row, output);
+                        }
+                    }
+                    None => inverted = inverted.or(Some(p)),
+                }
+            }
+            inverted
+        };
+        let first = tasks.into_par_iter().enumerate().filter_map(of).min();
+        first.map_or(Ok(()), |p| Err(Error::Inverted { index: particles.number()[p] as usize }))
+    }
+
+    /// Write the requests of particle `p` into its row of an array.
+    fn write(&self, answer: &Answer, p: usize, row: usize, output: &mut Output) {
+        let own = self.kinematics != Kinematics::Displacement;
+        let row = &mut output.data[output.columns * row..][..output.columns];
+        let Answer { stress, moduli, trial, .. } = answer;
+        for request in output.requests {
+            let out = &mut row[request.column..][..request.width()];
+            match trial {
+                Some(trial) => finite::write(request, trial, own, stress, moduli, out),
+                None => small::write(request, self.kinematics, stress, moduli, out),
+            }
+            if let Some(factor) = &request.factor {
+                for value in out {
+                    *value *= factor[p];
+                }
+            }
+        }
+    }
+
+    /// Accept the increments: stress (tau at finite strain), history, displacement and (where stored)
+    /// eps_v of the particles. Returns the energy that the laws dissipate in the step [J per metre depth].
+    ///
+    /// # Errors
+    /// [`Error::Inverted`]; then nothing has changed.
+    pub fn commit(&self, particles: &mut Particles) -> Result<f64> {
+        let old = self.old(particles);
+        let of = |p: usize| {
+            let answer = self.respond(&old, p)?;
+            let dissipated = self.dissipated(particles, p, &answer);
+            let Answer { mut stress, volume, history, .. } = answer;
+            if self.kinematics == Kinematics::Deviatoric {
+                stress.mean += self.increments.volumetric_at(self.location, p);
+            }
+            let u = self.increments.displacement(self.location, p);
+            Some(Accepted { stress, volume, u, history, dissipated })
+        };
+        let tasks = (0..particles.len()).into_par_iter().with_min_len(BLOCK);
+        let new: Vec<Option<Accepted>> = tasks.map(of).collect();
+        if let Some(p) = new.iter().position(Option::is_none) {
+            return Err(Error::Inverted { index: particles.number()[p] as usize });
+        }
+        let each = new.iter().flatten().zip(particles.volume());
+        let dissipated = each.fold(0.0, |sum, (new, volume)| sum + volume * new.dissipated);
+        self.store(particles, &new);
+        Ok(dissipated)
+    }
+
+    fn store(&self, particles: &mut Particles, new: &[Option<Accepted>]) {
+        let stress = particles.reals_mut(Particles::STRESS).chunks_exact_mut(COMPONENTS);
+        for (stress, new) in stress.zip(new.iter().flatten()) {
+            for (i, s) in stress.iter_mut().enumerate() {
+                *s = new.stress.deviator[i] + new.stress.mean * UNIT[i];
+            }
+        }
+        let displacement = particles.reals_mut(Particles::DISPLACEMENT).chunks_exact_mut(DIM);
+        for (displacement, new) in displacement.zip(new.iter().flatten()) {
+            displacement.iter_mut().zip(new.u).for_each(|(d, u)| *d += u);
+        }
+        if let Some(eps_v) = particles.place(Role::State, "eps_v") {
+            let eps_v = particles.reals_mut(eps_v).iter_mut();
+            eps_v.zip(new.iter().flatten()).for_each(|(e, new)| *e += new.volume);
+        }
+        let material = particles.material().to_vec();
+        for (law, places) in self.history(particles).into_iter().enumerate() {
+            for (k, place) in places.into_iter().enumerate() {
+                let values = particles.reals_mut(place).iter_mut().zip(&material);
+                for ((value, &m), new) in values.zip(new.iter().flatten()) {
+                    if m as usize == law {
+                        *value = new.history[k];
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Check that the material of every particle exists, and that its law fits the kinematics and the strains.
+///
+/// # Errors
+/// [`Error::UnknownMaterial`], [`Error::Incompressible`], [`Error::PressureDependent`] or
+/// [`Error::FiniteOnly`] with the first such particle.
+pub fn check_materials(
+    particles: &Particles,
+    materials: &[Arc<dyn Law>],
+    kinematics: Kinematics,
+    finite: bool,
+) -> Result<()> {
+    for (index, &m) in particles.material().iter().enumerate() {
+        let Some(law) = materials.get(m as usize) else {
+            let (material, count) = (m as usize, materials.len());
+            return Err(Error::UnknownMaterial { index, material, count });
+        };
+        if law.bulk_modulus().is_infinite() && kinematics != Kinematics::Deviatoric {
+            return Err(Error::Incompressible { index });
+        }
+        if law.pressure_dependent() && kinematics == Kinematics::Deviatoric {
+            return Err(Error::PressureDependent { index });
+        }
+        if law.finite_only() && !finite {
+            return Err(Error::FiniteOnly { index });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,133 @@
+//! The space of the computation: the plane, with plane strain.
+//!
+//! This module owns every number that follows from the dimension. Other modules use its names and loop over
+//! axes; they contain no literal 2, 4, 9 or 18 of the plane. Two things are particular to the plane beyond
+//! these numbers, and both are in [`crate::tensor`]: the component zz, which has no axis in the
+//! grid, and the closed forms of eigenvalues and inverse of a 2 x 2 tensor.
+//!
+//! In three dimensions `DIM` is 3, `COMPONENTS` and `SHEARS` follow, and `tensor` gets a second set
+//! of closed forms. The names are constants rather than parameters of types because Rust cannot yet
+//! compute the length of an array from a parameter (`3^DIM`); one build computes in one space.
+
+use std::fmt::{self, Display, Formatter};
+
+/// Number of axes, of coordinates and of displacement components.
+pub const DIM: usize = 2;
+
+/// Components of a symmetric tensor that a law sees (xx, yy, zz and the shears).
+pub const COMPONENTS: usize = 3 + SHEARS;
+
+/// Shear components of a symmetric tensor in space (xy).
+pub const SHEARS: usize = DIM * (DIM - 1) / 2;
+
+/// Components of a symmetric tensor in space (xx, yy, xy).
+pub const SYMMETRIC: usize = DIM + SHEARS;
+
+/// Components of a gradient of a vector in space (xx, xy, yx, yy).
+pub const GRADIENT: usize = DIM * DIM;
+
+/// Most functions of a basis that do not vanish on a cell, along one axis.
+pub const FUNCTIONS_1D: usize = 3;
+
+/// Most functions of a basis that do not vanish on a cell.
+pub const FUNCTIONS: usize = FUNCTIONS_1D.pow(DIM as u32);
+
+/// Nodes of a quadratic Lagrange cell along one axis.
+pub const NODES_1D: usize = 3;
+
+/// Nodes of a quadratic Lagrange cell: those of the displacement in a form's kernels.
+pub const NODES: usize = NODES_1D.pow(DIM as u32);
+
+/// Vertices of a cell: the nodes of the linear field in a form's kernels.
+pub const VERTICES: usize = 1 << DIM;
+
+/// Degrees of freedom of the displacement in a form's kernels.
+pub const DISPLACEMENT_DOFS: usize = DIM * NODES;
+
+/// Degrees of freedom of a form's kernels with both fields.
+pub const MAX_DOFS: usize = DISPLACEMENT_DOFS + VERTICES;
+
+/// A position or a vector.
+pub type Point = [f64; DIM];
+
+/// A whole number along each axis: of cells, of functions or of points of a rule.
+pub type Index = [usize; DIM];
+
+/// First and last index along each axis.
+pub type Block = [[usize; 2]; DIM];
+
+/// Measure of a cube of side `h`.
+#[must_use]
+pub fn volume_of_cell(h: f64) -> f64 {
+    [h; DIM].iter().product()
+}
+
+/// How many indices lie below `size`.
+#[must_use]
+pub fn count(size: Index) -> usize {
+    size.iter().product()
+}
+
+/// Position of an index among all below `size`, x fastest.
+#[must_use]
+pub fn number_of(index: Index, size: Index) -> usize {
+    index.iter().zip(size).rev().fold(0, |number, (&i, n)| number * n + i)
+}
+
+/// The reverse of [`number_of`].
+#[must_use]
+pub fn index_of(mut number: usize, size: Index) -> Index {
+    size.map(|n| {
+        let i = number % n;
+        number /= n;
+        i
+    })
+}
+
+/// Distance of the numbers of two neighbours along each axis.
+#[must_use]
+pub fn strides(size: Index) -> Index {
+    let mut stride = 1;
+    size.map(|n| {
+        let here = stride;
+        stride *= n;
+        here
+    })
+}
+
+/// All indices in a block, x fastest.
+pub fn indices(block: Block) -> impl Iterator<Item = Index> {
+    let size = block.map(|[first, last]| last + 1 - first);
+    (0..count(size)).map(move |number| {
+        let inside = index_of(number, size);
+        std::array::from_fn(|axis| block[axis][0] + inside[axis])
+    })
+}
+
+/// All indices below `size`, x fastest.
+pub fn indices_below(size: Index) -> impl Iterator<Item = Index> {
+    (0..count(size)).map(move |number| index_of(number, size))
+}
+
+/// A position as it appears in messages: its coordinates in parentheses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Position(pub Point);
+
+impl Display for Position {
+    fn fmt(&self, f: &mut Formatter) -> fmt::Result {
+        let coordinates: Vec<String> = self.0.iter().map(f64::to_string).collect();
+        write!(f, "({})", coordinates.join(", "))
+    }
+}
+
+/// Lower and upper corner of a box, in messages its intervals along the axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent(pub Point, pub Point);
+
+impl Display for Extent {
+    fn fmt(&self, f: &mut Formatter) -> fmt::Result {
+        let interval = |(a, b)| format!("[{a}, {b}]");
+        let intervals: Vec<String> = self.0.iter().zip(self.1).map(interval).collect();
+        f.write_str(&intervals.join(" x "))
+    }
+}

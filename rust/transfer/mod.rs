@@ -1,0 +1,13 @@
+//! Transfers between particles and grid.
+//!
+//! | module           | from      | to                                         |
+//! |------------------|-----------|--------------------------------------------|
+//! | [`to_particles`] | grid      | particles: values and gradients of fields  |
+//! | [`to_grid`]      | particles | functions: sums weighted by their values   |
+//! | [`densities`]    | particles | points of a quadrature rule                |
+//! | [`cells`]        | particles | cells: sums and means                      |
+
+pub mod cells;
+pub mod densities;
+pub mod to_grid;
+pub mod to_particles;

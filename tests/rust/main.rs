@@ -1,0 +1,15 @@
+//! Tests of the crate without Python; one module per subject.
+
+mod active;
+mod basis;
+mod border;
+mod hencky;
+mod linear_elastic;
+mod location;
+mod mohr_coulomb;
+mod neo_hookean;
+mod plasticity;
+mod space;
+mod stage;
+mod storage;
+mod transfer;
