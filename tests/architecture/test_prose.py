@@ -17,7 +17,7 @@ SUFFIXES = (".md", ".py", ".pyi", ".rs", ".toml")
 #: Phrase, as a regular expression, and what to write instead.
 PHRASES = {
     r"(go|goes|going|gone|went) on\b(?! (strike|foot))": "continue, resume",
-    r"(take|takes|taken|took) up\b": "apply, use, continue",
+    r"(take|takes|taken|took) up\b(?! to)": "apply, use, continue",
     r"(numbers|values|entries|lines) that are none\b": "NaN and infinity",
     r"counts? as none\b": "is ignored",
     r"(let|lets|letting) go\b": "release, stop",

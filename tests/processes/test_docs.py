@@ -6,7 +6,6 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import compatibility
@@ -71,20 +70,6 @@ def test_pages_that_would_load_something_from_the_web(tmp_path):
     assert pages.loaded_from_web(tmp_path) == []
     (tmp_path / "remote.html").write_text(head.format("//cdn.net/mathjax.js"))
     assert pages.loaded_from_web(tmp_path) == ["remote.html: //cdn.net/mathjax.js"] * 2
-
-
-def test_equations_are_drawn_by_scripts_of_the_site(tmp_path):
-    """One page, built by Sphinx; skipped before the first `make docs` has installed it."""
-    pytest.importorskip("sphinx")
-    (tmp_path / "index.md").write_text("# Page\n\n$a$\n\n```{math}\n:label: one\na = b\n```\n")
-    built = tmp_path / "html"
-    words = [sys.executable, "-m", "sphinx", "-W", "-q", "-c", DOCS, "-b", "html", tmp_path, built]
-    subprocess.run(words, check=True)
-    page = (built / "index.html").read_text()
-    (script,) = re.findall(r'<script defer="defer" src="([^"?]*mathjax[^"?]*)', page)
-    assert (built / script).is_file()
-    assert r"\(a\)" in page
-    assert pages.loaded_from_web(built) == []
 
 
 def test_files_and_symbols_that_pages_name_exist():

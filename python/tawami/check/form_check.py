@@ -26,8 +26,8 @@ from tawami.form.form import Form
 from tawami.form.symbols import Symbols
 
 Verdict = Literal["ok", "note", "FAILED", "not tried"]
-#: What relative errors may be: of differences, of what is exact but for round-off, of uniform
-#: stresses that Newton found.
+#: Largest relative errors: of differences, of results that are exact except for round-off, and of
+#: uniform stresses that Newton's method finds.
 DIFFERENCES, ROUND_OFF, UNIFORM = 1e-6, 1e-11, 1e-8
 #: Mean stress in a bent beam so far off is that of a form that locks (displacement only has
 #: 0.41, B-bar 0.12, u_epsv 0.007), and an inf-sup constant this small that of one whose pressures

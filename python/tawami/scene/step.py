@@ -1,4 +1,4 @@
-"""One accepted step of a scene: what is solved, what comes out, and what is stored."""
+"""One accepted step of a scene: the problem, its solution, and what is stored."""
 
 from __future__ import annotations
 

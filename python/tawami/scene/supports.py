@@ -181,7 +181,7 @@ class Supports:
         Args:
             domain: The particles where they are.
             amount: Factor of each support's value.
-            start: Coefficients that are there already, which the amounts include.
+            start: Coefficients at the start of the step, which the amounts include.
             before: Displacement coefficients since the start of the scene where particles do not move,
                 0 where they do: what walls measure distances from.
             moving: Inertia holds the body: rigid motions may be free, and edges that are held at rest

@@ -110,7 +110,7 @@ class Wall:
         Args:
             active: Whether each displacement coefficient has particles.
             prescribed: As :meth:`prescribed` gives it; the wall leaves these to the other supports.
-            start: Coefficients that are there already, which the values include.
+            start: Coefficients at the start of the step, which the values include.
             before: Displacement coefficients since the body touched the wall.
         """
         across, along, _ = self._axes
