@@ -67,6 +67,14 @@ class Space:
         """Area or volume of a cell of side `h` [m]."""
         return h**self.dim
 
+    def vectors(self, components: Array) -> Array:
+        """Vectors, n x dim, of their components in one array, those of one vector after each other."""
+        return components.reshape(-1, self.dim)
+
+    def tensors(self, components: Array) -> Array:
+        """Tensors, n x dim x dim, of their components in one array, as :meth:`vectors`."""
+        return components.reshape(-1, self.dim, self.dim)
+
     def unit(self, unit: str) -> str:
         """Unit of an extensive quantity per metre depth: 'N per m'."""
         return unit + self.depth
