@@ -1,5 +1,8 @@
 """Mixed u-eps_v form of Okagawa, Hashimoto and Higo: their eqs. (1) and (2).
 
+eps_v is the elastic volumetric strain, so that the mean stress is a field: sigma_m = old + K eps_v. The
+plastic one, eps_p, comes from the law at the particle; without it the form is the paper's.
+
 `stabilisation` chooses the term that replaces alpha h^2 (K/mu) lap(eps_v) of eq. (2):
 
 laplacian       the paper's; imposes d eps_v/dn = 0 weakly on the border of the body
@@ -28,12 +31,14 @@ whole_cells = ("residual_based",)
 
 
 def residual(
-    u, eps_v, w, q, sigma, K, mu, t, h, sum_p, cell_mean, dx, dx_c, ds, dG, facet_mean, jump_n,
+    u, eps_v, w, q, sigma, eps_p, K, mu, t, h, sum_p, cell_mean, dx, dx_c, ds, dG, facet_mean, jump_n,
     jump_nn, alpha, k, stabilisation, ghost_penalty,
 ):  # fmt: skip
-    """R_u = sum_p V_p sigma_p : grad w - int t . w ds;  R_q = sum_p V_p K_p q (div u - eps_v) - S."""
+    """R_u = sum_p V_p sigma_p : grad w - int t . w ds
+    R_q = sum_p V_p K_p q (div u - eps_v - eps_p) - S.
+    """
     R_u = sum_p(sigma, grad(w)) - dot(t, w) * ds
-    R_q = sum_p(K, q * (div(u) - eps_v))
+    R_q = sum_p(K, q * (div(u) - eps_v)) - sum_p(K * eps_p, q)
     if ghost_penalty == "on":
         R_u += k * facet_mean(mu) * h**3 * inner(jump_nn(u), jump_nn(w)) * dG
         R_q -= k * facet_mean(K**2 / mu) * h**3 * jump_n(eps_v) * jump_n(q) * dG

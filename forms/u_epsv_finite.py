@@ -1,5 +1,6 @@
-"""Mixed u-eps_v form at finite strain, updated Lagrangian: the law receives (exp(eps_v)/J_f)^(1/3) f.
+"""Mixed u-eps_v form at finite strain, updated Lagrangian: tau_m = old + K eps_v, eps_v elastic.
 
+Strains are logarithmic: ln J_f = eps_v + eps_p, eps_p the plastic volumetric strain of the law.
 ln J_f is taken at the particles, as all that is nonlinear in the unknowns. V0, the volume at the start
 of the scene, in both equations keeps the elastic tangent symmetric. theta lumps a share of the mass of
 eps_v: one particle alone in a cell makes the consistent mass singular; constants are unchanged by it.
@@ -20,15 +21,16 @@ options = {"ghost_penalty": ("off", "on")}
 
 
 def residual(
-    u, eps_v, w, q, P, ln_J, K, mu, t, h, sum_p, sum_v, ds, dG, facet_mean, jump_n, jump_nn,
+    u, eps_v, w, q, P, ln_J, eps_p, K, mu, t, h, sum_p, sum_v, ds, dG, facet_mean, jump_n, jump_nn,
     alpha, theta, k, ghost_penalty,
 ):  # fmt: skip
     """R_u = sum_p V0_p (tau_p f^-T) : grad w - int t . w ds
-    R_q = sum_p V0_p K_p { q (ln J_f - (1 - theta) eps_v) - theta q_i eps_v,i (lumped)
+    R_q = sum_p V0_p K_p { q (ln J_f - eps_p - (1 - theta) eps_v) - theta q_i eps_v,i (lumped)
                            - alpha h^2 (K_p/mu_p) grad q . grad eps_v }.
     """
     R_u = sum_p(P, grad(w)) - dot(t, w) * ds
-    R_q = sum_p(K * ln_J, q) - sum_p(K, (1 - theta) * q * eps_v) - sum_v(K, theta * q * eps_v)
+    R_q = sum_p(K * ln_J, q) - sum_p(K * eps_p, q)
+    R_q -= sum_p(K, (1 - theta) * q * eps_v) + sum_v(K, theta * q * eps_v)
     if ghost_penalty == "on":
         R_u += k * facet_mean(mu) * h**3 * inner(jump_nn(u), jump_nn(w)) * dG
         R_q -= k * facet_mean(K**2 / mu) * h**3 * jump_n(eps_v) * jump_n(q) * dG

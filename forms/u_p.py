@@ -1,7 +1,7 @@
 """Mixed u-p form: Commend, Truty and Zimmermann 2004. Takes nu = 0.5 exactly (1/K = 0).
 
 p is the increment of the pressure-like mean stress; sigma is the law's stress without it, that is
-the new deviator and the old mean stress.
+the new deviator and the old mean stress. eps_p is the plastic volumetric strain of the law.
 """
 
 from ufl import div, dot, grad
@@ -11,10 +11,10 @@ kinematics = "deviatoric"
 parameters = {"alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0}}
 
 
-def residual(u, p, w, q, sigma, K, mu, t, h, sum_p, ds, alpha):
+def residual(u, p, w, q, sigma, eps_p, K, mu, t, h, sum_p, ds, alpha):
     """R_u = sum_p V_p (sigma_p + p I) : grad w - int t . w ds
-    R_q = sum_p V_p { q (div u - p/K) - alpha h^2/mu grad q . grad p }.
+    R_q = sum_p V_p { q (div u - p/K - eps_p) - alpha h^2/mu grad q . grad p }.
     """
     R_u = sum_p(sigma, grad(w)) + sum_p(p * div(w)) - dot(t, w) * ds
-    R_q = sum_p(q * div(u)) - sum_p(1 / K, q * p)
+    R_q = sum_p(q * div(u)) - sum_p(1 / K, q * p) - sum_p(eps_p, q)
     return R_u + R_q - sum_p(1 / mu, alpha * h**2 * dot(grad(q), grad(p)))

@@ -99,15 +99,6 @@ pub enum Error {
         /// The first such particle.
         index: usize,
     },
-    /// A law that needs the mean stress with kinematics that do not give it.
-    #[error(
-        "the strength of particle {index} depends on the mean stress, which the kinematics \
-         'deviatoric' (u-p) do not give to the law. Use form 'u_epsv'"
-    )]
-    PressureDependent {
-        /// The first such particle.
-        index: usize,
-    },
     /// A law of finite strain with a form of small strain.
     #[error(
         "the law of particle {index} exists at finite strain only, and the form has small strains: \

@@ -17,11 +17,18 @@ pub use mohr_coulomb::MohrCoulomb;
 pub use neo_hookean::NeoHookean;
 pub use von_mises::VonMises;
 
-use crate::tensor::{deviatoric_stiffness, Moduli, Strain, Stress};
+use crate::tensor::{deviatoric_stiffness, AtMean, Moduli, Strain, Stress, Sym};
 
 /// A stress beyond the yield surface by no more than this share of its size counts as lying on it. A stored
 /// stress was returned to the surface; when it is unloaded, it starts elastic.
 pub(crate) const ROUND_OFF: f64 = 1e-13;
+
+/// Resistance to opening beyond the apex of a frictional law at a given mean stress, as a share of mu.
+///
+/// A mean stress m beyond that of the apex is not clipped, since its tangent would be zero. The material
+/// opens by `(m - m_apex) / (SOFT mu)` in the step instead, so that the excess is SOFT mu times the
+/// volumetric strain of the step.
+pub(crate) const SOFT: f64 = 0.01;
 
 /// Most history variables that a law may have.
 pub const MAX_HISTORY: usize = 8;
@@ -63,7 +70,7 @@ pub trait Law: Elastic {
     /// Name of the law in driver scripts.
     fn name(&self) -> &'static str;
 
-    /// Whether the deviator depends on the mean stress, which the form u-p does not give to the law.
+    /// Whether the strength depends on the mean stress, so that plastic flow may change the volume.
     fn pressure_dependent(&self) -> bool {
         false
     }
@@ -87,6 +94,24 @@ pub trait Law: Elastic {
         history: &[f64],
         new: &mut [f64],
     ) -> (Stress, Moduli);
+
+    /// Deviator and plastic volumetric strain at the end of the step, from the deviatoric strain increment,
+    /// the old deviator and the **new** mean stress [Pa]: the law as forms with a field for the mean stress
+    /// use it. Here for laws whose deviator does not depend on the mean stress and whose flow preserves
+    /// the volume.
+    fn respond_at_mean(
+        &self,
+        increment: &Sym,
+        old: &Sym,
+        mean: f64,
+        history: &[f64],
+        new: &mut [f64],
+    ) -> AtMean {
+        let increment = Strain { deviator: *increment, volume: 0.0 };
+        let old = Stress { deviator: *old, mean };
+        let (stress, moduli) = self.respond(&increment, &old, history, new);
+        AtMean { deviator: stress.deviator, dev_dev: moduli.dev_dev, ..AtMean::default() }
+    }
 }
 
 /// `K/2 v^2`; without a change of volume there is no such energy, even if K is infinite.

@@ -12,12 +12,16 @@
 //! Where that would reverse the order of two principal stresses, the two planes that meet there flow until
 //! these stresses are equal. This return to the edge has s, f and g averaged over the two. Where it passes
 //! the apex, s = 0 and m = c cot phi, which also limits tension at psi = 0. With phi = 0 the law is that of
-//! Tresca, c is the undrained strength, and there is no apex.
+//! Tresca, c is the undrained strength, and there is no apex. At a given mean stress the return has K = 0
+//! here, and the plastic volumetric strain is `2 sin psi d_gamma`.
 //! Dilatancy ends at a plastic volumetric strain of `eps_v_max`.
 
-use super::{Elastic, Friction, Law, LinearElastic, ROUND_OFF};
+use super::{Elastic, Friction, Law, LinearElastic, ROUND_OFF, SOFT};
 use crate::error::Result;
-use crate::tensor::{Moduli, Principal, Strain, Stress};
+use crate::space::COMPONENTS;
+use crate::tensor::{
+    deviatoric_stiffness, AtMean, Moduli, Principal, Strain, Stress, Sym, Tangent,
+};
 
 /// Mohr-Coulomb plasticity.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,6 +53,53 @@ struct Return {
     excess: f64,
     /// d_gamma.
     gamma: f64,
+}
+
+/// A return with its result.
+struct Flow {
+    path: Return,
+    /// Principal values of the deviator.
+    deviator: Sorted,
+    /// Difference of the largest and smallest principal plastic strain.
+    shear: f64,
+    /// Plastic volumetric strain.
+    dilation: f64,
+}
+
+/// A trial deviator by its principal values in order.
+struct InOrder {
+    principal: Principal,
+    s: Sorted,
+    /// Places of the two values in the plane and of zz among them.
+    place: [usize; 3],
+}
+
+impl InOrder {
+    fn of(deviator: &Sym) -> Self {
+        let principal = Principal::of_stress(deviator);
+        let [first, second, zz] = principal.values;
+        let place = [usize::from(zz > first), 1 + usize::from(zz > second)];
+        let place = [place[0], place[1], 3 - place[0] - place[1]];
+        let mut s = [0.0; 3];
+        place.iter().zip(principal.values).for_each(|(&i, value)| s[i] = value);
+        Self { principal, s, place }
+    }
+
+    /// Values in order as a stress.
+    fn stress(&self, values: &Sorted) -> Sym {
+        self.principal.stress(&self.place.map(|i| values[i]))
+    }
+
+    /// The tangent of a deviator from its derivatives with respect to the principal strains in order.
+    fn tangent(&self, deviator: &Sorted, moduli: &[Sorted; 3], double_mu: f64) -> Tangent {
+        let [first, second, _] = self.principal.values;
+        let difference = first - second;
+        let ratio = (deviator[self.place[0]] - deviator[self.place[1]]) / difference;
+        // equal trial values that yield lie on an edge and stay equal
+        let ratio = if difference > 0.0 { ratio.clamp(0.0, 1.0) } else { 0.0 };
+        let of_pair = self.place.map(|i| self.place.map(|j| moduli[i][j]));
+        self.principal.tangent(&of_pair, double_mu * ratio)
+    }
 }
 
 fn averaged(values: &Sorted, edge: Edge) -> Sorted {
@@ -85,18 +136,19 @@ impl MohrCoulomb {
         })
     }
 
-    /// Return along the flow of one plane, or of the two that meet in an edge.
-    fn along(&self, s: &Sorted, mean: f64, sin_psi: f64, edge: Edge) -> Return {
+    /// Return along the flow of one plane, or of the two that meet in an edge. `bulk` is K where the strain
+    /// is given, and 0 where the mean stress is.
+    fn along(&self, s: &Sorted, mean: f64, bulk: f64, sin_psi: f64, edge: Edge) -> Return {
         let (f, g) = (gradient(self.sin_phi, edge), gradient(sin_psi, edge));
-        let stiffness = 2.0 * self.shear_modulus() * dot(&f, &g)
-            + 4.0 * self.bulk_modulus() * self.sin_phi * sin_psi;
+        let stiffness =
+            2.0 * self.shear_modulus() * dot(&f, &g) + 4.0 * bulk * self.sin_phi * sin_psi;
         let excess = dot(&f, s) + 2.0 * (self.sin_phi * mean - self.strength);
         Return { edge, f, g, sin_psi, stiffness, excess, gamma: excess / stiffness }
     }
 
     /// Return to the plane, or to the edge that is crossed before the plane is reached.
-    fn return_of(&self, s: &Sorted, mean: f64, sin_psi: f64) -> Return {
-        let plane = self.along(s, mean, sin_psi, None);
+    fn return_of(&self, s: &Sorted, mean: f64, bulk: f64, sin_psi: f64) -> Return {
+        let plane = self.along(s, mean, bulk, sin_psi, None);
         let fall = 2.0 * self.shear_modulus() * plane.gamma;
         let (upper, lower) = (s[0] - s[1], s[1] - s[2]);
         if upper >= fall * (1.0 + sin_psi) && lower >= fall * (1.0 - sin_psi) {
@@ -104,7 +156,25 @@ impl MohrCoulomb {
         }
         let upper_first = upper * (1.0 - sin_psi) < lower * (1.0 + sin_psi);
         let edge = if upper_first { [0, 1] } else { [1, 2] };
-        self.along(s, mean, sin_psi, Some(edge))
+        self.along(s, mean, bulk, sin_psi, Some(edge))
+    }
+
+    /// Return of a trial stress beyond the surface, with at most `left` of dilatancy.
+    fn flow(&self, sorted: &InOrder, mean: f64, bulk: f64, left: f64) -> Option<Flow> {
+        let s = &sorted.s;
+        let beyond = self.along(s, mean, bulk, self.sin_psi, None).excess;
+        if beyond <= ROUND_OFF * (s[0] - s[2] + mean.abs()) {
+            return None;
+        }
+        let mut path = self.return_of(s, mean, bulk, self.sin_psi);
+        let mut dilation = 2.0 * self.sin_psi * path.gamma;
+        if dilation > left {
+            // the rest of the dilatancy, then flow at constant volume
+            dilation = left;
+            path = self.return_of(s, mean - bulk * left, bulk, 0.0);
+        }
+        let (deviator, shear) = self.returned(s, &path);
+        Some(Flow { path, deviator, shear, dilation })
     }
 
     /// Deviator after the return; difference of the largest and smallest principal plastic strain.
@@ -157,53 +227,74 @@ impl Law for MohrCoulomb {
     ) -> (Stress, Moduli) {
         let (trial, moduli) = self.elastic.respond(increment, old, &[], &mut []);
         new.copy_from_slice(history);
-        let principal = Principal::of_stress(&trial.deviator);
-        let [first, second, zz] = principal.values;
-        // places of the two values in the plane and of zz in sorted order
-        let place = [usize::from(zz > first), 1 + usize::from(zz > second)];
-        let place = [place[0], place[1], 3 - place[0] - place[1]];
-        let mut s = [0.0; 3];
-        place.iter().zip(principal.values).for_each(|(&i, value)| s[i] = value);
-        let unsorted = |values: &Sorted| place.map(|i| values[i]);
-
-        let beyond = self.along(&s, trial.mean, self.sin_psi, None).excess;
-        if beyond <= ROUND_OFF * (s[0] - s[2] + trial.mean.abs()) {
-            return (trial, moduli);
-        }
-        let bulk = self.bulk_modulus();
-        let mut path = self.return_of(&s, trial.mean, self.sin_psi);
-        let mut dilation = 2.0 * self.sin_psi * path.gamma;
+        let (double, bulk) = (2.0 * self.shear_modulus(), self.bulk_modulus());
+        let sorted = InOrder::of(&trial.deviator);
         let left = (self.eps_v_max - history[1]).max(0.0);
-        if dilation > left {
-            // the rest of the dilatancy, then flow at constant volume
-            dilation = left;
-            path = self.return_of(&s, trial.mean - bulk * left, 0.0);
-        }
+        let Some(flow) = self.flow(&sorted, trial.mean, bulk, left) else {
+            return (trial, moduli);
+        };
+        let Flow { path, deviator, shear, dilation } = flow;
         let mean = trial.mean - bulk * dilation;
         if self.sin_phi * mean >= self.strength {
             // the apex; here sin phi > 0, since phi = 0 has a positive strength
-            new[0] += (s[0] - s[2]) / (2.0 * self.shear_modulus());
+            new[0] += (sorted.s[0] - sorted.s[2]) / double;
             let apex = Stress { mean: self.strength / self.sin_phi, ..Stress::default() };
             return (apex, Moduli::default());
         }
-        let (deviator, shear) = self.returned(&s, &path);
         new[0] += shear;
         new[1] += dilation;
-
-        let double = 2.0 * self.shear_modulus();
-        let difference = first - second;
-        let ratio = (deviator[place[0]] - deviator[place[1]]) / difference;
-        // equal trial values that yield lie on an edge and stay equal
-        let ratio = if difference > 0.0 { ratio.clamp(0.0, 1.0) } else { 0.0 };
-        let sorted = self.moduli(&path);
-        let of_pair = place.map(|i| unsorted(&sorted[i]));
         let cross = double * bulk / path.stiffness;
         let moduli = Moduli {
-            dev_dev: principal.tangent(&of_pair, double * ratio),
-            dev_vol: principal.stress(&unsorted(&path.g)).map(|g| -2.0 * self.sin_phi * cross * g),
-            mean_dev: principal.stress(&unsorted(&path.f)).map(|f| -2.0 * path.sin_psi * cross * f),
+            dev_dev: sorted.tangent(&deviator, &self.moduli(&path), double),
+            dev_vol: sorted.stress(&path.g).map(|g| -2.0 * self.sin_phi * cross * g),
+            mean_dev: sorted.stress(&path.f).map(|f| -2.0 * path.sin_psi * cross * f),
             mean_vol: cross * dot(&path.f, &path.g),
         };
-        (Stress { deviator: principal.stress(&unsorted(&deviator)), mean }, moduli)
+        (Stress { deviator: sorted.stress(&deviator), mean }, moduli)
+    }
+
+    fn respond_at_mean(
+        &self,
+        increment: &Sym,
+        old: &Sym,
+        mean: f64,
+        history: &[f64],
+        new: &mut [f64],
+    ) -> AtMean {
+        let mu = self.shear_modulus();
+        let elastic = deviatoric_stiffness(mu);
+        let trial: Sym = std::array::from_fn(|i| old[i] + elastic[i] * increment[i]);
+        new.copy_from_slice(history);
+        // infinite where phi = 0
+        let apex = self.strength / self.sin_phi;
+        let sorted = InOrder::of(&trial);
+        let left = (self.eps_v_max - history[1]).max(0.0);
+        let flow = self.flow(&sorted, mean.min(apex), 0.0, left);
+        let mut answer = AtMean::default();
+        if let Some(Flow { path, shear, dilation, .. }) = &flow {
+            new[0] += shear;
+            new[1] += dilation;
+            let along = 4.0 * mu * path.sin_psi / path.stiffness;
+            answer.plastic_volume = *dilation;
+            answer.volume_dev = sorted.stress(&path.f).map(|f| along * f);
+        }
+        if mean >= apex {
+            answer.plastic_volume += (mean - apex) / (SOFT * mu);
+            answer.volume_mean = 1.0 / (SOFT * mu);
+            return answer;
+        }
+        let Some(Flow { path, deviator, .. }) = flow else {
+            answer.deviator = trial;
+            (0..COMPONENTS).for_each(|i| answer.dev_dev[i][i] = elastic[i]);
+            return answer;
+        };
+        let cross = 4.0 * self.sin_phi / path.stiffness;
+        AtMean {
+            deviator: sorted.stress(&deviator),
+            dev_dev: sorted.tangent(&deviator, &self.moduli(&path), 2.0 * mu),
+            dev_mean: sorted.stress(&path.g).map(|g| -mu * cross * g),
+            volume_mean: cross * path.sin_psi,
+            ..answer
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Requested quantities at finite strain.
 
 use super::request::{Operator, Part, Request};
+use super::stage::PlasticVolume;
 use crate::space::{COMPONENTS, DIM, GRADIENT};
 use crate::tensor::hencky::Trial;
 use crate::tensor::{Matrix, Moduli, Stress};
@@ -20,6 +21,7 @@ pub(super) fn write(
     own: bool,
     tau: &Stress,
     c: &Moduli,
+    plastic: &PlasticVolume,
     out: &mut [f64],
 ) {
     let (mut tau, mut c) = (*tau, *c);
@@ -44,7 +46,12 @@ pub(super) fn write(
         (Operator::MeanKirchhoff, Part::Value) => out[0] = tau.mean,
         (Operator::MeanKirchhoff, Part::Volume) => out[0] = c.mean_vol,
         (Operator::MeanKirchhoff, Part::Gradient) => {
-            (0..GRADIENT).for_each(|k| out[k] = trial.mean_change(&c, &unit(k)));
+            (0..GRADIENT).for_each(|k| out[k] = trial.change(&c.mean_dev, &unit(k)));
+        }
+        (Operator::PlasticVolume, Part::Value) => out[0] = plastic.value,
+        (Operator::PlasticVolume, Part::Volume) => out[0] = plastic.field,
+        (Operator::PlasticVolume, Part::Gradient) => {
+            (0..GRADIENT).for_each(|k| out[k] = trial.change(&plastic.deviator, &unit(k)));
         }
         (Operator::LnJ, Part::Value) => out[0] = trial.ln_j,
         (Operator::LnJ, Part::Volume) => out[0] = 0.0,

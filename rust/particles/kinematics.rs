@@ -3,11 +3,12 @@
 //! | name           | deviator                  | volume                     |
 //! |----------------|---------------------------|----------------------------|
 //! | `displacement` | dev(sym grad u)           | div u                      |
-//! | `mixed`        | dev(sym grad u)           | eps_v                      |
+//! | `mixed`        | dev(sym grad u)           | eps_v, the elastic part    |
 //! | `cell`         | dev(sym grad u)           | div u at the cell's centre |
 //! | `deviatoric`   | dev(sym grad u)           | 0 (the form has p)         |
 //!
-//! At finite strain, ln J_f takes the place of div u.
+//! At finite strain, ln J_f takes the place of div u. With `mixed` and `deviatoric` the law receives the
+//! mean stress, old + K eps_v or old + p, and answers with the plastic volumetric strain.
 
 use std::str::FromStr;
 

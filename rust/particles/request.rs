@@ -22,6 +22,8 @@ pub enum Operator {
     MeanKirchhoff,
     /// ln J_f; finite strain only.
     LnJ,
+    /// Plastic volumetric strain of the step, where the form has a field for the mean stress.
+    PlasticVolume,
 }
 
 impl Operator {
@@ -31,14 +33,17 @@ impl Operator {
         match self {
             Self::Nominal | Self::NominalDeviator => GRADIENT,
             Self::Sigma | Self::Deviator => SYMMETRIC,
-            Self::Mean | Self::MeanKirchhoff | Self::LnJ => 1,
+            Self::Mean | Self::MeanKirchhoff | Self::LnJ | Self::PlasticVolume => 1,
         }
     }
 
-    /// Whether it belongs to finite strain.
+    /// Whether it belongs to finite strain; `None` if to both.
     #[must_use]
-    pub fn finite(self) -> bool {
-        !matches!(self, Self::Sigma | Self::Deviator | Self::Mean)
+    pub fn finite(self) -> Option<bool> {
+        match self {
+            Self::PlasticVolume => None,
+            _ => Some(!matches!(self, Self::Sigma | Self::Deviator | Self::Mean)),
+        }
     }
 }
 
@@ -52,7 +57,7 @@ pub enum Part {
     Strain,
     /// Its derivative with respect to grad u (xx, xy, yx, yy), gradient fastest; finite strain only.
     Gradient,
-    /// Its derivative with respect to the volumetric strain.
+    /// Its derivative with respect to the volumetric field of the form: eps_v, or p.
     Volume,
 }
 
@@ -107,11 +112,12 @@ impl FromStr for Operator {
             "P_s" => Self::NominalDeviator,
             "tau_m" => Self::MeanKirchhoff,
             "ln_J" => Self::LnJ,
+            "eps_p" => Self::PlasticVolume,
             _ => {
                 return Err(Error::UnknownName {
                     what: "operator",
                     name: name.to_owned(),
-                    expected: "'sigma', 's', 'sigma_m', 'P', 'P_s', 'tau_m', 'ln_J'",
+                    expected: "'sigma', 's', 'sigma_m', 'P', 'P_s', 'tau_m', 'ln_J', 'eps_p'",
                 })
             }
         })

@@ -2,6 +2,7 @@
 
 use super::kinematics::Kinematics;
 use super::request::{Operator, Part, Request};
+use super::stage::PlasticVolume;
 use crate::space::{DIM, SYMMETRIC};
 use crate::tensor::{dot, Moduli, Stress, Sym, IN_SPACE, UNIT, UNIT_DEVIATORS};
 
@@ -23,8 +24,21 @@ pub(super) fn write(
     kinematics: Kinematics,
     stress: &Stress,
     c: &Moduli,
+    plastic: &PlasticVolume,
     out: &mut [f64],
 ) {
+    if request.operator == Operator::PlasticVolume {
+        match request.part {
+            Part::Value => out[0] = plastic.value,
+            Part::Volume => out[0] = plastic.field,
+            Part::Strain => out
+                .iter_mut()
+                .zip(&UNIT_DEVIATORS)
+                .for_each(|(o, e)| *o = dot(&plastic.deviator, e)),
+            Part::Gradient => {}
+        }
+        return;
+    }
     let n = request.operator.components();
     match request.part {
         Part::Value => components(request.operator, &stress.deviator, stress.mean, out),

@@ -14,16 +14,29 @@ use crate::law::{Law, MAX_HISTORY};
 use crate::space::{COMPONENTS, DIM};
 use crate::tensor::hencky::Trial;
 use crate::tensor::matrix::{det_minus_one, trace};
-use crate::tensor::{dot, Moduli, Strain, Stress, Sym, UNIT};
+use crate::tensor::{dot, mean, AtMean, Moduli, Strain, Stress, Sym, UNIT};
 
 /// Where stress and tangent come from.
 #[derive(Clone, Copy)]
 pub enum Response<'a> {
     /// The laws; the material numbers of the particles count them from 0.
     Laws(&'a [Arc<dyn Law>]),
-    /// Computed by the caller for the strains of [`Stage::strain`]: stress (4 numbers per particle) and
-    /// tangent d stress / d strain (16, strain fastest), in the order of [`crate::tensor`].
-    Given(&'a [f64], &'a [f64]),
+    /// Computed by the caller; the laws are elastic ones with its K and mu.
+    Given(Given<'a>, &'a [Arc<dyn Law>]),
+}
+
+/// Stress and tangent of a law of the total strain, computed by the caller.
+///
+/// Where the form has a field for the mean stress, they belong to the volumetric strain with which the law
+/// has that mean stress.
+#[derive(Clone, Copy)]
+pub struct Given<'a> {
+    /// 4 numbers per particle, in the order of [`crate::tensor`].
+    pub stress: &'a [f64],
+    /// d stress / d strain, 16 numbers per particle, strain fastest.
+    pub tangent: &'a [f64],
+    /// Volumetric strain increment of each particle that is not elastic; 0 in other forms.
+    pub plastic_volume: &'a [f64],
 }
 
 /// One array of particle data: the requests that are written into its columns.
@@ -62,10 +75,26 @@ struct Old<'a> {
     history: Vec<Vec<&'a [f64]>>,
 }
 
+impl Old<'_> {
+    fn stress_of(&self, p: usize) -> Sym {
+        std::array::from_fn(|i| self.stress[COMPONENTS * p + i])
+    }
+}
+
+/// Stress, tangent and plastic volume of a particle.
+struct OfMean {
+    stress: Stress,
+    moduli: Moduli,
+    plastic: PlasticVolume,
+}
+
 /// Answer of a particle to the increments.
 struct Answer {
-    /// Change of the volume that its law got.
+    /// Volumetric strain increment, elastic and plastic.
     volume: f64,
+    /// Its plastic part; 0 where the law received the total strain.
+    plastic: PlasticVolume,
+    /// In u-p without the increment p.
     stress: Stress,
     moduli: Moduli,
     trial: Option<Trial>,
@@ -73,6 +102,16 @@ struct Answer {
     /// Strain that the law got, and the stress that it starts from.
     strain: Strain,
     start: Stress,
+}
+
+/// Plastic volumetric strain with its derivatives.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct PlasticVolume {
+    pub value: f64,
+    /// With respect to the deviatoric strain.
+    pub deviator: Sym,
+    /// With respect to the volumetric field of the form.
+    pub field: f64,
 }
 
 /// New state of a particle after an accepted step. It is much smaller than an answer, and those of all
@@ -104,6 +143,40 @@ impl Stage<'_> {
         }
     }
 
+    /// Whether the volumetric field of the form determines the mean stress.
+    fn has_mean_stress(&self) -> bool {
+        matches!(self.kinematics, Kinematics::Mixed | Kinematics::Deviatoric)
+    }
+
+    /// Stress, tangent and plastic volume from what a law answers at a mean stress. `start` is the stress
+    /// at the start of the step, `slope` the derivative of the mean stress with respect to the field.
+    fn at_mean(&self, answer: &AtMean, start: f64, mean: f64, slope: f64) -> OfMean {
+        let with_field = self.kinematics == Kinematics::Mixed;
+        let stress =
+            Stress { deviator: answer.deviator, mean: if with_field { mean } else { start } };
+        let moduli = Moduli {
+            dev_dev: answer.dev_dev,
+            dev_vol: answer.dev_mean.map(|d| slope * d),
+            mean_dev: [0.0; COMPONENTS],
+            mean_vol: if with_field { slope } else { 0.0 },
+        };
+        let plastic = PlasticVolume {
+            value: answer.plastic_volume,
+            deviator: answer.volume_dev,
+            field: slope * answer.volume_mean,
+        };
+        OfMean { stress, moduli, plastic }
+    }
+
+    /// The new mean stress and its derivative with respect to the field; `elastic` is the strain whose
+    /// volume is elastic, as the law of particle `p` receives it.
+    fn mean_stress(&self, bulk: f64, start: f64, elastic: f64, p: usize) -> (f64, f64) {
+        if self.kinematics == Kinematics::Deviatoric {
+            return (start + self.increments.volumetric_at(self.location, p), 1.0);
+        }
+        (start + if elastic == 0.0 { 0.0 } else { bulk * elastic }, bulk)
+    }
+
     /// Strain, stress and tangent of particle `p`; `None` if it is turned inside out.
     fn respond(&self, old: &Old, p: usize) -> Option<Answer> {
         match self.response {
@@ -111,21 +184,36 @@ impl Stage<'_> {
                 let number = old.material[p] as usize;
                 self.of_law(&*laws[number], &old.history[number], old, p)
             }
-            Response::Given(stress, tangent) => {
-                let strain = self.increments.strain(self.kinematics, self.location, p);
-                let stress: Sym = std::array::from_fn(|i| stress[COMPONENTS * p + i]);
-                let at = COMPONENTS * COMPONENTS * p;
-                let row = |i: usize| std::array::from_fn(|j| tangent[at + COMPONENTS * i + j]);
-                Some(Answer {
-                    volume: strain.volume,
-                    stress: Stress::from(&stress),
-                    moduli: Moduli::from(&std::array::from_fn(row)),
-                    trial: None,
-                    history: [0.0; MAX_HISTORY],
-                    strain,
-                    start: Stress::default(),
-                })
+            Response::Given(given, laws) => {
+                let bulk = laws[old.material[p] as usize].bulk_modulus();
+                Some(self.of_given(&given, bulk, old, p))
             }
+        }
+    }
+
+    fn of_given(&self, given: &Given, bulk: f64, old: &Old, p: usize) -> Answer {
+        let strain = self.increments.strain(self.kinematics, self.location, p);
+        let stress: Sym = std::array::from_fn(|i| given.stress[COMPONENTS * p + i]);
+        let at = COMPONENTS * COMPONENTS * p;
+        let row = |i: usize| std::array::from_fn(|j| given.tangent[at + COMPONENTS * i + j]);
+        let (stress, moduli) = (Stress::from(&stress), Moduli::from(&std::array::from_fn(row)));
+        let mut of = OfMean { stress, moduli, plastic: PlasticVolume::default() };
+        if self.has_mean_stress() {
+            let at = AtMean::of_total(stress.deviator, given.plastic_volume[p], &moduli, bulk);
+            let start = mean(&old.stress_of(p));
+            let (mean, slope) = self.mean_stress(bulk, start, strain.volume, p);
+            of = self.at_mean(&at, start, mean, slope);
+        }
+        let OfMean { stress, moduli, plastic } = of;
+        Answer {
+            volume: strain.volume + plastic.value,
+            plastic,
+            stress,
+            moduli,
+            trial: None,
+            history: [0.0; MAX_HISTORY],
+            strain,
+            start: Stress::default(),
         }
     }
 
@@ -134,8 +222,7 @@ impl Stage<'_> {
         for (value, column) in before.iter_mut().zip(history) {
             *value = column[p];
         }
-        let stress: Sym = std::array::from_fn(|i| old.stress[COMPONENTS * p + i]);
-        let stress = Stress::from(&stress);
+        let stress = Stress::from(&old.stress_of(p));
         let (strain, start, volume, trial);
         if self.finite {
             let own = match self.kinematics {
@@ -158,9 +245,19 @@ impl Stage<'_> {
             strain = self.increments.strain(self.kinematics, self.location, p);
             (start, volume, trial) = (stress, strain.volume, None);
         }
-        let n = history.len();
-        let (stress, moduli) = law.respond(&strain, &start, &before[..n], &mut after[..n]);
-        Some(Answer { volume, stress, moduli, trial, history: after, strain, start })
+        let (before, new) = (&before[..history.len()], &mut after[..history.len()]);
+        let of = if self.has_mean_stress() {
+            let (mean, slope) = self.mean_stress(law.bulk_modulus(), start.mean, strain.volume, p);
+            let (e, s) = (&strain.deviator, &start.deviator);
+            let answer = law.respond_at_mean(e, s, mean, before, new);
+            self.at_mean(&answer, start.mean, mean, slope)
+        } else {
+            let (stress, moduli) = law.respond(&strain, &start, before, new);
+            OfMean { stress, moduli, plastic: PlasticVolume::default() }
+        };
+        let OfMean { stress, moduli, plastic } = of;
+        let volume = volume + plastic.value;
+        Some(Answer { volume, plastic, stress, moduli, trial, history: after, strain, start })
     }
 
     /// Work of the stress on the plastic strain of the step [J/m3]; zero for laws without history.
@@ -173,8 +270,12 @@ impl Stage<'_> {
         let Answer { strain, stress, .. } = answer;
         let (start, end) = (law.elastic_strain(&answer.start), law.elastic_strain(stress));
         let plastic = |i| start.deviator[i] + strain.deviator[i] - end.deviator[i];
-        dot(&stress.deviator, &std::array::from_fn(plastic))
-            + stress.mean * (start.volume + strain.volume - end.volume)
+        let volume = if self.has_mean_stress() {
+            answer.plastic.value
+        } else {
+            start.volume + strain.volume - end.volume
+        };
+        dot(&stress.deviator, &std::array::from_fn(plastic)) + stress.mean * volume
     }
 
     /// Strain increment of particle `p` as one tensor; small strain.
@@ -236,12 +337,12 @@ impl Stage<'_> {
     fn write(&self, answer: &Answer, p: usize, row: usize, output: &mut Output) {
         let own = self.kinematics != Kinematics::Displacement;
         let row = &mut output.data[output.columns * row..][..output.columns];
-        let Answer { stress, moduli, trial, .. } = answer;
+        let Answer { stress, moduli, plastic, trial, .. } = answer;
         for request in output.requests {
             let out = &mut row[request.column..][..request.width()];
             match trial {
-                Some(trial) => finite::write(request, trial, own, stress, moduli, out),
-                None => small::write(request, self.kinematics, stress, moduli, out),
+                Some(trial) => finite::write(request, trial, own, stress, moduli, plastic, out),
+                None => small::write(request, self.kinematics, stress, moduli, plastic, out),
             }
             if let Some(factor) = &request.factor {
                 for value in out {
@@ -259,12 +360,12 @@ impl Stage<'_> {
     pub fn commit(&self, particles: &mut Particles) -> Result<f64> {
         let old = self.old(particles);
         let of = |p: usize| {
-            let answer = self.respond(&old, p)?;
-            let dissipated = self.dissipated(particles, p, &answer);
-            let Answer { mut stress, volume, history, .. } = answer;
+            let mut answer = self.respond(&old, p)?;
             if self.kinematics == Kinematics::Deviatoric {
-                stress.mean += self.increments.volumetric_at(self.location, p);
+                answer.stress.mean += self.increments.volumetric_at(self.location, p);
             }
+            let dissipated = self.dissipated(particles, p, &answer);
+            let Answer { stress, volume, history, .. } = answer;
             let u = self.increments.displacement(self.location, p);
             Some(Accepted { stress, volume, u, history, dissipated })
         };
@@ -311,8 +412,8 @@ impl Stage<'_> {
 /// Check that the material of every particle exists, and that its law fits the kinematics and the strains.
 ///
 /// # Errors
-/// [`Error::UnknownMaterial`], [`Error::Incompressible`], [`Error::PressureDependent`] or
-/// [`Error::FiniteOnly`] with the first such particle.
+/// [`Error::UnknownMaterial`], [`Error::Incompressible`] or [`Error::FiniteOnly`] with the first such
+/// particle.
 pub fn check_materials(
     particles: &Particles,
     materials: &[Arc<dyn Law>],
@@ -326,9 +427,6 @@ pub fn check_materials(
         };
         if law.bulk_modulus().is_infinite() && kinematics != Kinematics::Deviatoric {
             return Err(Error::Incompressible { index });
-        }
-        if law.pressure_dependent() && kinematics == Kinematics::Deviatoric {
-            return Err(Error::PressureDependent { index });
         }
         if law.finite_only() && !finite {
             return Err(Error::FiniteOnly { index });

@@ -119,6 +119,12 @@ impl PyMaterial {
         self.law.finite_only()
     }
 
+    /// Whether its strength depends on the mean stress: its flow may change the volume.
+    #[getter]
+    fn pressure_dependent(&self) -> bool {
+        self.law.pressure_dependent()
+    }
+
     #[getter]
     fn bulk_modulus(&self) -> f64 {
         self.law.bulk_modulus()

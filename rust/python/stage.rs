@@ -16,7 +16,7 @@ use crate::grid::{Basis, Location};
 use crate::law::{Law, MAX_HISTORY};
 use crate::particles::kinematics::{Increments, Kinematics};
 use crate::particles::request::Request;
-use crate::particles::stage::{Output, Response, Stage};
+use crate::particles::stage::{Given, Output, Response, Stage};
 use crate::space::COMPONENTS;
 use crate::tensor::{Stress, Sym};
 
@@ -46,9 +46,10 @@ impl PyRequests {
         };
         let requests = |array: &Vec<RequestOf>| array.iter().map(request).collect();
         let arrays: Vec<Vec<Request>> = arrays.iter().map(requests).collect::<PyResult<_>>()?;
-        let finite = arrays.iter().flatten().map(|request| request.operator.finite()).next();
-        let same = |request: &Request| Some(request.operator.finite()) == finite;
-        require(arrays.iter().flatten().all(same), "requests of small and of finite strain")?;
+        let strains = || arrays.iter().flatten().filter_map(|request| request.operator.finite());
+        let finite = strains().next();
+        let same = strains().all(|mine| Some(mine) == finite);
+        require(same, "requests of small and of finite strain")?;
         Ok(Self { arrays, finite })
     }
 }
@@ -81,26 +82,27 @@ pub(super) struct PyStage {
     basis: Basis,
 }
 
-/// Stress and tangent that were computed in Python, flat.
-type Given<'py> = (Read1<'py, f64>, Read1<'py, f64>);
+/// Stress, tangent and plastic volumetric strain that were computed in Python, flat.
+type GivenArrays<'py> = (Read1<'py, f64>, Read1<'py, f64>, Read1<'py, f64>);
 
 impl PyStage {
     fn stage<'a>(
         &'a self,
         u: &'a Read1<f64>,
         volumetric: Option<&'a Read1<f64>>,
-        given: Option<&'a Given>,
+        given: Option<&'a GivenArrays>,
     ) -> PyResult<Stage<'a>> {
         let grid = self.location.grid;
         let response = match given {
             None => Response::Laws(&self.materials),
-            Some((stress, tangent)) => {
+            Some((stress, tangent, plastic)) => {
                 let (stress, tangent) = (stress.as_slice()?, tangent.as_slice()?);
-                let n = self.location.len();
-                let fits =
-                    stress.len() == COMPONENTS * n && tangent.len() == COMPONENTS * COMPONENTS * n;
+                let (plastic_volume, n) = (plastic.as_slice()?, self.location.len());
+                let fits = stress.len() == COMPONENTS * n
+                    && tangent.len() == COMPONENTS * COMPONENTS * n
+                    && plastic_volume.len() == n;
                 require(fits, "stress and tangent of other particles")?;
-                Response::Given(stress, tangent)
+                Response::Given(Given { stress, tangent, plastic_volume }, &self.materials)
             }
         };
         let increments = Increments {
@@ -172,7 +174,7 @@ impl PyStage {
         volumetric: Option<Read1<f64>>,
         requests: &PyRequests,
         mut data: Vec<Write2<f64>>,
-        given: Option<Given>,
+        given: Option<GivenArrays>,
     ) -> PyResult<()> {
         let particles = self.particles.try_borrow(py)?;
         let particles = &particles.0;
@@ -201,7 +203,7 @@ impl PyStage {
         py: Python,
         u: Read1<f64>,
         volumetric: Option<Read1<f64>>,
-        given: Option<Given>,
+        given: Option<GivenArrays>,
     ) -> PyResult<f64> {
         let mut particles = self.particles.try_borrow_mut(py)?;
         let particles = &mut particles.0;

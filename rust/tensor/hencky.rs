@@ -116,10 +116,11 @@ impl Trial {
         [de[0][0], de[1][1], -third, 2.0 * de[0][1]]
     }
 
-    /// Change of the mean stress with a change `dg` of grad u at constant volume.
+    /// Change of a number with a change `dg` of grad u, from its derivative with respect to the deviatoric
+    /// strain.
     #[must_use]
-    pub fn mean_change(&self, c: &Moduli, dg: &Matrix) -> f64 {
-        dot(&c.mean_dev, &self.strain_change(&multiply(dg, &self.inverse)))
+    pub fn change(&self, slope: &Sym, dg: &Matrix) -> f64 {
+        dot(slope, &self.strain_change(&multiply(dg, &self.inverse)))
     }
 
     /// Change of P with a change `dg` of grad u and a change `dv` of the volume.

@@ -14,7 +14,7 @@ mod principal;
 mod symmetric;
 
 pub use matrix::Matrix;
-pub use parts::{Moduli, Strain, Stress};
+pub use parts::{AtMean, Moduli, Strain, Stress};
 pub(crate) use principal::Principal;
 pub use symmetric::{deviator, dot, mean, trace, Sym, Tangent, IN_SPACE, UNIT};
 pub(crate) use symmetric::{deviatoric_stiffness, norm, small_strain, UNIT_DEVIATORS};

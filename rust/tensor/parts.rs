@@ -37,6 +37,45 @@ pub struct Moduli {
     pub mean_vol: f64,
 }
 
+/// Answer of a law to a deviatoric strain increment at a given mean stress.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct AtMean {
+    /// Deviator s [Pa].
+    pub deviator: Sym,
+    /// Plastic volumetric strain of the step.
+    pub plastic_volume: f64,
+    /// d s_i / d deviator_j [Pa].
+    pub dev_dev: Tangent,
+    /// d s_i / d sigma_m.
+    pub dev_mean: Sym,
+    /// d plastic volume / d deviator_j.
+    pub volume_dev: Sym,
+    /// d plastic volume / d sigma_m [1/Pa].
+    pub volume_mean: f64,
+}
+
+impl AtMean {
+    /// From the answer of a law of the total strain whose mean stress is the given one.
+    ///
+    /// The total volumetric strain v follows from `sigma_m(deviator, v) = given`, and the plastic one is
+    /// `v - sigma_m / K`. `c.mean_vol` is not 0.
+    #[must_use]
+    pub fn of_total(deviator: Sym, plastic_volume: f64, c: &Moduli, bulk: f64) -> Self {
+        let dev_mean = c.dev_vol.map(|d| d / c.mean_vol);
+        let volume_dev = c.mean_dev.map(|m| -m / c.mean_vol);
+        let row =
+            |i: usize| std::array::from_fn(|j| c.dev_dev[i][j] + c.dev_vol[i] * volume_dev[j]);
+        Self {
+            deviator,
+            plastic_volume,
+            dev_dev: std::array::from_fn(row),
+            dev_mean,
+            volume_dev,
+            volume_mean: 1.0 / c.mean_vol - 1.0 / bulk,
+        }
+    }
+}
+
 impl From<&Sym> for Stress {
     fn from(stress: &Sym) -> Self {
         Self { deviator: deviator(stress), mean: mean(stress) }

@@ -15,7 +15,7 @@ from tawami.base.timing import tally
 from tawami.fem.rules import Rule, TangentRule
 from tawami.form.form import Form
 from tawami.form.integral import Integral, KernelBuilder, ufl_errors
-from tawami.form.quantities import Density
+from tawami.form.quantities import Density, LawQuantity
 from tawami.form.symbols import Symbols
 from tawami.form.tangent import Linearisation
 from tawami.form.terms import by_rule, reduced, terms_of
@@ -56,6 +56,14 @@ class CompiledForm:
     def columns(self, rule: Rule) -> int:
         """Number of columns of the particle data of a rule."""
         return sum(density.size for density in self.densities[rule])
+
+    def names(self, quantity: str) -> bool:
+        """Whether the residual names a quantity of the law."""
+        return any(
+            isinstance(density.quantity, LawQuantity) and density.quantity.name == quantity
+            for of_rule in self.densities.values()
+            for density in of_rule
+        )
 
 
 _compiled: dict[tuple[Form, TangentRule, tuple[tuple[str, str], ...]], CompiledForm] = {}

@@ -9,6 +9,8 @@ sigma, s, sigma_m         stress of the law in the plane, its three-dimensional 
 P, P_s, tau_m, ln_J       with `strain = "finite"`, instead of these: tau f^-T, s f^-T, mean Kirchhoff
                           stress and ln det f of the step, where f = I + grad u and
                           tau = s + tau_m I is the Kirchhoff stress of the law
+eps_p                     plastic volumetric strain of the step, with the kinematics 'mixed' and
+                          'deviatoric': the field is elastic, div u (ln_J) = eps_v + eps_p
 K, mu                     bulk and shear modulus of the particle, also in K**2 / mu, 1 / K, K * ln_J
 sum_p(D, f), sum_p(f)     sum over particles of V_p D_p : f(x_p), and of V_p f(x_p); exact for f up
                           to degree 4 along x and along y (a warning reports a higher degree)

@@ -29,7 +29,7 @@ class Kinematics:
     Attributes:
         name: As a form file declares it.
         volume_fields: Kinds of the fields that the form needs after the displacement.
-        has_eps_v: Whether the volumetric strain is a field, which particles store.
+        has_eps_v: Whether the elastic volumetric strain is a field. Particles store the total.
         volume_at_centre: Whether it is that of the displacement at the centre of the cell.
         deviatoric: Whether the law receives the deviator alone: the pressure is a field.
         locks: Whether the displacement alone is evaluated at the particles: locks near nu = 0.5.
@@ -41,6 +41,11 @@ class Kinematics:
     volume_at_centre: bool = False
     deviatoric: bool = False
     locks: bool = False
+
+    @property
+    def has_mean_stress(self) -> bool:
+        """Whether the volumetric field determines the mean stress that the law receives."""
+        return bool(self.volume_fields)
 
     def __str__(self) -> str:
         return self.name
@@ -123,7 +128,7 @@ STRAIN_MEASURES: Mapping[str, StrainMeasure] = {
     "small": StrainMeasure(
         name="small",
         finite=False,
-        quantities=("sigma", "s", "sigma_m"),
+        quantities=("sigma", "s", "sigma_m", "eps_p"),
         stress="sigma",
         stress_xx_yy_xy=(0, 1, 2),
         deviator="s",
@@ -135,7 +140,7 @@ STRAIN_MEASURES: Mapping[str, StrainMeasure] = {
     "finite": StrainMeasure(
         name="finite",
         finite=True,
-        quantities=("P", "P_s", "tau_m", "ln_J"),
+        quantities=("P", "P_s", "tau_m", "ln_J", "eps_p"),
         stress="P",
         stress_xx_yy_xy=(0, 3, 1),
         deviator="P_s",

@@ -19,10 +19,10 @@ Part = Literal["value", "strain", "gradient", "volume"]
 
 #: Components of the quantities that the material law gives: (xx, yy, xy) or (xx, xy, yx, yy).
 COMPONENTS: Mapping[str, int] = {
-    "sigma": 3, "s": 3, "sigma_m": 1, "P": 4, "P_s": 4, "tau_m": 1, "ln_J": 1
+    "sigma": 3, "s": 3, "sigma_m": 1, "P": 4, "P_s": 4, "tau_m": 1, "ln_J": 1, "eps_p": 1
 }  # fmt: skip
 #: Numbers per component of the parts of a law quantity: its value, and its derivatives with respect to
-#: the strain (xx, yy, gamma_xy), grad u (xx, xy, yx, yy) and the volumetric strain.
+#: the strain (xx, yy, gamma_xy), grad u (xx, xy, yx, yy) and the volumetric field, eps_v or p.
 WIDTH: Mapping[Part, int] = {"value": 1, "strain": 3, "gradient": 4, "volume": 1}
 
 OPERATIONS: Mapping[str, Callable[[Any, Any], Any]] = {

@@ -165,6 +165,12 @@ class Symbols:
                 f"form {self.form.name}: sum_v({quantity.name}, ...): expected constants of the "
                 "particle (K, mu): the stress depends on the strain at the particle"
             )
+        if quantity.name == "eps_p" and not self.form.kinematics.has_mean_stress:
+            raise FormError(
+                f"form {self.form.name}: {caller}(eps_p, ...) with kinematics "
+                f"'{self.form.kinematics}', whose law receives the total strain: expected kinematics "
+                "'mixed' or 'deviatoric'"
+            )
         cell, centre = self.form.kinematics.volume_at_centre, rule == "centre"
         if not cell and centre:
             raise FormError(

@@ -69,7 +69,7 @@ class Linearisation:
         ]
 
     def _direction(self, density: Density) -> Any:
-        """Change of a law quantity with the fields: C : strain(du) (or grad(du)) + c d_eps_v."""
+        """Change of a law quantity with the fields: C : strain(du) (or grad(du)) + c d_eps_v (d_p)."""
         kinematics, quantity = self._form.kinematics, density.quantity
         assert isinstance(quantity, LawQuantity)
         n = COMPONENTS[quantity.name]
@@ -78,7 +78,7 @@ class Linearisation:
         if density.rule == "particle":
             change = self._strain_change(quantity, du)
         volume = None
-        if kinematics.has_eps_v and quantity.name != "ln_J":
+        if kinematics.has_mean_stress and quantity.name != "ln_J":
             volume = volumetric[0]
         elif kinematics.volume_at_centre and density.rule == "centre":
             volume = self._volume_change(du)

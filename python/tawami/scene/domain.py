@@ -18,6 +18,7 @@ from tawami.field.fast import FastAssembly
 from tawami.field.layout import Layout
 from tawami.field.reference import ReferenceAssembly
 from tawami.field.tractions import Tractions
+from tawami.form.kinematics import KINEMATICS, Kinematics
 from tawami.grid.basis import Basis
 from tawami.particles.numpy_law import NumpyStage
 from tawami.particles.responses import Responses
@@ -68,22 +69,14 @@ class Domain:
         stopwatch: Stopwatch,
     ) -> Domain:
         """Attach the form and the laws to particles at their present location."""
-        form, law = model.form, model.law
+        form = model.form
         with stopwatch("set-up"):
             attachment = Attachment(
                 model.grid, model.compiled, model.basis, location, particles.volume, model.values,
                 stopwatch,
             )  # fmt: skip
             assembly = ASSEMBLIES[numerics.assembly](attachment)
-        rust = _rust.Stage(
-            particles,
-            location,
-            list(model.materials),
-            form.kinematics.name,
-            model.moves,
-            model.basis,
-        )
-        stage = rust if law is None else NumpyStage(rust, particles, law)
+        stage = _stage(model, particles, location, form.kinematics)
         responses = Responses(
             model.compiled, particles, location, stage, _constants(model, particles),
             model.grid.comm, stopwatch,
@@ -92,6 +85,11 @@ class Domain:
         return cls(
             model, particles, location, assembly, Tractions(attachment), stage, responses, newton
         )
+
+    @property
+    def total_strain_stage(self) -> _rust.Stage | NumpyStage:
+        """The laws as they answer to total strains, whatever the form has as fields."""
+        return _stage(self.model, self.particles, self.location, KINEMATICS["displacement"])
 
     @property
     def layout(self) -> Layout:
@@ -182,6 +180,15 @@ class Domain:
                 "form, or a grid whose lines follow the body",
                 InstabilityWarning,
             )
+
+
+def _stage(
+    model: Model, particles: _rust.Particles, location: _rust.Location, kinematics: Kinematics
+) -> _rust.Stage | NumpyStage:
+    rust = _rust.Stage(
+        particles, location, list(model.materials), kinematics.name, model.moves, model.basis
+    )
+    return rust if model.law is None else NumpyStage(rust, particles, model.law, kinematics)
 
 
 def _constants(model: Model, particles: _rust.Particles) -> dict[str, Array]:

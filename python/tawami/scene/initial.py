@@ -133,7 +133,7 @@ def _returned(domain: Domain) -> Array:
     strain = domain.model.form.strain
     wanted = [(strain.mean, "value", 0, None), (strain.stress, "value", 1, None)]
     data = np.zeros((len(domain.particles), 1 + quantities.COMPONENTS[strain.stress]))
-    domain.stage.evaluate(*fields, _rust.Requests([wanted]), [data])
+    domain.total_strain_stage.evaluate(*fields, _rust.Requests([wanted]), [data])
     mean, components = data[:, 0], data[:, 1:]
     xx, yy, xy = components[:, strain.stress_xx_yy_xy].T
     return np.column_stack([xx, yy, 3 * mean - xx - yy, xy])

@@ -162,6 +162,7 @@ def build(
     _warn_of_locking(grid, loaded, materials, particles)
     compiled = compile_form(grid.comm, loaded, options, tangent_rule)
     check_used(compiled, options, parameters)
+    _check_plastic_volume(compiled, materials, law, particles)
     instead = "the form's parameters are fixed when a scene is made: Scene(..., {}=...)"
     used = {name: value for name, value in values.items() if name in compiled.used}
     model = Model(
@@ -182,6 +183,31 @@ def _particles(
     particles.check_materials(assigned.materials, form.kinematics.name, form.strain.finite)
     particles.add_history(assigned.materials)
     return particles, assigned.materials, assigned.law
+
+
+def _check_plastic_volume(
+    compiled: CompiledForm,
+    materials: Sequence[_rust.Material],
+    law: NumpyLaw | None,
+    particles: _rust.Particles,
+) -> None:
+    """Check that the form has the plastic volume of the laws in its volume equation.
+
+    Raises:
+        InputError: It does not name eps_p, and flow may change the volume of a particle.
+    """
+    form = compiled.form
+    if not form.kinematics.has_mean_stress or compiled.names("eps_p"):
+        return
+    dilates = np.array([law is not None or m.pressure_dependent for m in materials])
+    bad = np.flatnonzero(dilates[particles.material])
+    if len(bad):
+        why = "is a NumpyLaw" if law is not None else "depends on the mean stress"
+        raise InputError(
+            f"the law of particle {bad[0]} {why}, so that its flow may change the volume, and form "
+            f"{form.name} has no term for that: expected eps_p in its volume equation, as "
+            "- sum_p(K * eps_p, q) in 'u_epsv'"
+        )
 
 
 def _warn_of_locking(
