@@ -1,6 +1,7 @@
 //! Tests of the crate without Python; one module per subject.
 
 mod active;
+mod at_mean;
 mod basis;
 mod border;
 mod hencky;
