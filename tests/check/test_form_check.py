@@ -119,7 +119,7 @@ def test_what_costs_only_is_a_note():
     for subject in ("symmetry", "patch test, loaded", "stability"):
         assert report.line(subject).verdict == "note"
     assert "twice the time" in report.line("symmetry").words
-    assert "traction(...) will be refused" in report.line("patch test, loaded").words
+    assert "traction(...) will be rejected" in report.line("patch test, loaded").words
 
 
 def test_a_wrong_tangent_fails(monkeypatch):
