@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,6 +20,7 @@ DEV = np.eye(4) - np.outer(UNIT, UNIT) / 3
 TWO_MATERIALS = ((2 / 2.6, 2 / 1.2), (7 / 2.98, 7 / 0.06))
 
 
+@functools.cache
 def functions_1d(basis: str, n: int, s: float, cell: int) -> np.ndarray:
     """Values, first and second derivatives (3 x functions) at s, in cells; `cell` picks the side."""
     if basis == "quadratic_spline":

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+import zlib
 
 from hypothesis import settings
 
@@ -18,6 +19,11 @@ FACTOR = 20
 def examples(number: int) -> int:
     """Examples of a test that draws `number` of them in `make test`."""
     return number * FACTOR if FUZZ else number
+
+
+def seed_of(name: str) -> int:
+    """Seed of a test that draws for each of many functions: not the same values for all of them."""
+    return zlib.crc32(name.encode()) + int(os.environ.get("SEED", "0"))
 
 
 def load() -> None:

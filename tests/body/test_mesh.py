@@ -267,6 +267,7 @@ def test_files_that_cannot_be_read(tmp_path):
         tawami.mesh(grid_of(), mesh, tags="layer")
 
 
+@pytest.mark.slow
 def test_time_for_many_elements():
     """50 000 triangles on 64 x 64 cells; `pytest -s` prints the time."""
     random = np.random.default_rng(0)

@@ -38,7 +38,6 @@ def test_particles_on_edges_and_corners_of_cells(random_scene, name):
     compare(random_scene(x=x, **FORMS[name]), FORMS[name])
 
 
-@pytest.mark.fuzz
 @settings(max_examples=examples(15))
 @given(data=st.data())
 def test_any_cloud_of_particles(data):

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from profiles import examples
 from scenes import BASES, FORMS, clouds, grid_of
 from scipy.sparse import csr_matrix, identity
 
@@ -82,7 +83,7 @@ def test_a_form_nonlinear_in_the_fields(random_scene):
     close(*[reduced(scene, c) for scene in scenes])
 
 
-@settings(max_examples=20)
+@settings(max_examples=examples(20))
 @given(data=st.data())
 def test_any_cloud_of_particles(data):
     grid, x = data.draw(clouds(cells=(7, 7), most=20))

@@ -71,7 +71,7 @@ def block(form="u_epsv_finite", **options):
 
 
 @pytest.mark.parametrize("form", ["u_epsv_finite", "u_epsv"])
-def test_what_was_borne_stays_and_what_is_new_comes_in_shares(form):
+def test_loads_in_equilibrium_stay_and_new_loads_grow(form):
     scene = block(form)
     tops = []
     scene.gravity((0.0, -2.0))
@@ -95,7 +95,7 @@ def test_a_prescribed_displacement_comes_once():
         assert scene.particles.displacement == pytest.approx(shortened, abs=0.01)
 
 
-def test_a_load_beyond_the_strength_stops_where_it_is_reached_and_can_go_on():
+def test_a_load_beyond_the_strength_stops_where_it_is_reached_and_can_be_resumed():
     """A von Mises block in uniform shortening under a dead load: the limit is 2/sqrt(3) sigma_y."""
     grid = grid_of((4, 2))
     body = tawami.box(grid, grid.origin, grid.upper, per_axis=3, gauss=True)
@@ -164,7 +164,7 @@ def test_an_edge_does_not_move_the_body_away_from_its_functions():
         scene.solve()
     with pytest.raises(tawami.InputError, match="a quarter of a cell"):
         tawami.ramp(scene, 0.25)
-    assert scene.particles.displacement.min() < -0.03  # what there was of it
+    assert scene.particles.displacement.min() < -0.03  # of the accepted steps
 
 
 def test_a_point_of_the_border_is_held_on_its_way_and_found_by_its_names():
@@ -186,7 +186,7 @@ def test_a_point_of_the_border_is_held_on_its_way_and_found_by_its_names():
     scene.release(points[0])
 
 
-def test_wrong_input_gets_a_sentence():
+def test_wrong_input_raises_an_error():
     scene = block()
     with pytest.raises(tawami.InputError, match="size = 2.0: expected a finite number above 0"):
         tawami.ramp(scene, 2.0)

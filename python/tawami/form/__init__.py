@@ -1,4 +1,4 @@
-"""A weak form: its contract, the names that its residual may use, its derived tangent and its kernels."""
+"""A weak form: its contract, the names in its residual, its derived tangent and its kernels."""
 
 from tawami.form.compilation import CompiledForm, compile_form
 from tawami.form.form import Form
