@@ -110,7 +110,7 @@ def test_which_cells_are_partly_filled():
         (lambda u, w, dG, jump_nn, mu: jump_nn(w)[0] * dG, "linear in the fields"),
     ],
 )
-def test_terms_on_sides_that_are_not_linear_get_a_sentence(random_scene, term, words):
+def test_terms_on_sides_that_are_not_linear_are_rejected(random_scene, term, words):
     from ufl import grad
 
     def residual(u, w, sigma, mu, sum_p, dG, jump_nn):

@@ -187,7 +187,7 @@ def test_results_do_not_depend_on_units_or_place(name):
 
 
 @pytest.mark.parametrize("name", ["u", "u_epsv"])
-def test_particles_anywhere_let_go_of_a_stress(name, basis):
+def test_particles_anywhere_release_a_stress(name, basis):
     """A body under -C : eps whose border moves by eps x is free of stress, whatever its quadrature. For
     biquadratic functions, some of which are negative at most particles, too.
     """

@@ -1,4 +1,4 @@
-"""The contract of a weak form: written anywhere, checked with a sentence, compiled once."""
+"""The contract of a weak form: its places, its error messages, one compilation."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ def form_of(function, fields=None, kinematics="displacement", **more):
 
 @pytest.mark.parametrize("assembly", ["fast", "reference"])
 def test_sums_at_vertices_are_row_sum_lumped(random_scene, assembly):
-    """sum_p V_p K_p M_v(x_p) on the diagonal, M_v written out once more here."""
+    """sum_p V_p K_p M_v(x_p) on the diagonal, with an independent M_v."""
 
     def lumped(w, q, eps_v, sigma, K, sum_p, sum_v):
         return sum_p(sigma, grad(w)) + sum_v(K, q * eps_v)
@@ -362,7 +362,7 @@ def test_an_unusual_alpha_gets_a_warning(form):
 @pytest.mark.parametrize(("form", "nu", "locks"), [
     ("u", 0.4999, True), ("u_finite", 0.4999, True), ("u", 0.48, False), ("u_bbar", 0.4999, False)
 ])  # fmt: skip
-def test_a_form_that_locks_says_so(form, nu, locks):
+def test_a_form_that_locks_warns(form, nu, locks):
     grid = grid_of()
     body, law = tawami.box(grid, grid.origin, grid.upper), tawami.linear_elastic(E=1.0, nu=nu)
     with warnings.catch_warnings(record=True) as caught:

@@ -24,7 +24,7 @@ ELASTIC = tawami.linear_elastic(E=100.0, nu=0.3)
     ],
 )
 @pytest.mark.parametrize("law", [tawami.drucker_prager, tawami.mohr_coulomb])
-def test_wrong_angles_get_a_sentence(law, options, words):
+def test_wrong_angles_give_an_error_message(law, options, words):
     with pytest.raises(tawami.InputError) as error:
         law(ELASTIC, **options)
     assert f"{law.__name__}: {words}" in str(error.value)

@@ -1,4 +1,4 @@
-"""How a step is solved may change how long it takes, not what comes out."""
+"""Numerical settings change the time of a step, not its result."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_a_factorisation_for_every_iteration():
     assert np.allclose(always.u, seldom.u, rtol=0, atol=1e-6 * np.abs(seldom.u).max())
 
 
-def test_what_fgmres_cannot_solve_is_said():
+def test_fgmres_reports_a_system_that_it_cannot_solve():
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.5, cells=(4, 2))
     body = tawami.box(grid, (0.0, 0.0), (2.0, 1.0), per_axis=1)
     scene = tawami.Scene(
