@@ -16,8 +16,8 @@ from tawami.base.arrays import Array, Indices
 from tawami.base.checks import number, one_of, pair, point, room, shown, whole_number
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
+from tawami.base.space import PLANE, Counts, Position
 from tawami.fem import mesh
-from tawami.grid.space import PLANE, Counts, Position
 
 Edge = Literal["left", "right", "bottom", "top"]
 EDGES: tuple[Edge, ...] = get_args(Edge)

@@ -20,6 +20,7 @@ import numpy as np
 from tawami import _rust
 from tawami.base import checks
 from tawami.base.arrays import Array
+from tawami.base.space import lattice
 from tawami.scene.scene import Scene
 
 Projection = Literal["lumped", "consistent"]
@@ -37,13 +38,14 @@ def check_projection(method: str) -> Projection:
 
 
 def vertices(scene: Scene) -> Array:
-    """Corners of the cells, x fastest [m]: vertices x 2."""
+    """Corners of the cells, x fastest [m]: vertices x dim."""
     grid = scene.grid
-    x, y = (
-        grid.axis_positions(axis, np.arange(number + 1), 0.0)
-        for axis, number in enumerate(grid.cells)
+    return lattice(
+        [
+            grid.axis_positions(axis, np.arange(number + 1), 0.0)
+            for axis, number in enumerate(grid.cells)
+        ]
     )
-    return np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
 
 
 def nodal(scene: Scene, values: Array, method: Projection = "lumped") -> Array:
