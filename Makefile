@@ -35,8 +35,6 @@ cantilever: setup
 # A file is tested by one process, so that what its tests share is computed once.
 PYTEST = $(PYTHON) -m pytest --quiet -n $(shell nproc) --dist loadfile --no-loadscope-reorder
 
-# Property tests draw the same examples every time.
-test quick test-all: export PROPTEST_RNG_SEED = 0
 test: setup $(STAMPS)/cargo-tests
 	cargo test --locked --quiet
 	$(PYTEST) -m 'not slow' $(TESTS)

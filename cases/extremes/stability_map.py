@@ -97,7 +97,7 @@ def draw(found: Sequence[Point], path: Path) -> None:
         row[0].set_ylabel(r"$1 - 2\nu$ [-]")
     figure.suptitle(
         f"Cantilever, {2 * N} x {N} cells, 2 x 2 particles, support 'exact': errors against the closed "
-        "form and condition; hatched: refused with a sentence"
+        "form and condition; hatched: rejected with an error message"
     )
     save(figure, path)
 

@@ -72,10 +72,8 @@ def _of_module(tree: ast.Module) -> Iterator[tuple[str, str]]:
         if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and node.exc.args:
             yield ast.unparse(node.exc.func), _pattern(node.exc.args[0])
         elif isinstance(node, ast.Return) and isinstance(node.value, ast.Call) and node.value.args:
-            yield (
-                ast.unparse(node.value.func),
-                _pattern(node.value.args[0]),
-            )  # returned, to be raised
+            call = node.value  # an error that the caller raises
+            yield ast.unparse(call.func), _pattern(call.args[0])
         elif isinstance(node, ast.Call) and node.args:
             called = ast.unparse(node.func)
             if called in ("warn", "warnings.warn"):

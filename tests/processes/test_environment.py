@@ -14,7 +14,7 @@ from programs import PYTHONPATH, ROOT, python
 from scenes import FINITE, FORMS
 
 from tawami.fem import environment
-from tawami.form.form import shipped
+from tawami.form.files import shipped
 
 
 def test_a_missing_dolfinx_is_named_with_its_package():

@@ -14,10 +14,13 @@ P, G, T = tawami.ParticleOutput, tawami.GridOutput, tawami.TableOutput
     ("output", "message"),
     [
         (P("velocity"), r"velocity: a scene by itself is static.*Dynamics\(scene, velocity"),
-        (P("plastic_strain"), r"'plastic_strain': the laws of this scene have none: .*von_mises"),
+        (
+            P("plastic_strain"),
+            r"'plastic_strain': the laws of this scene have no history: .*von_mises",
+        ),
         (P("eps_v"), r"eps_v: .*expected one with.*form='u_epsv'"),
         (G("velocity"), r"velocity: a scene by itself is static"),
-        (G("mean stress", "dilatancy"), "'dilatancy': the laws of this scene have none"),
+        (G("mean stress", "dilatancy"), "'dilatancy': the laws of this scene have no history"),
         (G("eps_v"), r"eps_v: .*form='u_epsv'"),
         (G("p"), r"p: form 'u' has no pressure: expected form='u_p'"),
         (T("energies"), r"energies: a scene by itself is static"),

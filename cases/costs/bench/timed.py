@@ -53,7 +53,7 @@ def pile() -> Any:
 
 
 class Steps:
-    """Steps to measure; the pile goes on from one request to the next."""
+    """Steps to measure; the pile continues from one request to the next."""
 
     def __init__(self) -> None:
         beam(2).solve()  # loads libraries and compiles the form

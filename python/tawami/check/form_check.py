@@ -19,14 +19,15 @@ from mpi4py import MPI
 
 from tawami.base.checks import shown
 from tawami.base.errors import FormError, InexactSumWarning, InputError, TawamiError
+from tawami.base.text import quoted
 from tawami.check import scenes as scenes
 from tawami.form.compilation import compile_form
-from tawami.form.form import Form, listed
+from tawami.form.form import Form
 from tawami.form.symbols import Symbols
 
 Verdict = Literal["ok", "note", "FAILED", "not tried"]
-#: What relative errors may be: of differences, of what is exact but for round-off, of uniform
-#: stresses that Newton found.
+#: Largest relative errors: of differences, of results that are exact except for round-off, and of
+#: uniform stresses that Newton's method finds.
 DIFFERENCES, ROUND_OFF, UNIFORM = 1e-6, 1e-11, 1e-8
 #: Mean stress in a bent beam so far off is that of a form that locks (displacement only has
 #: 0.41, B-bar 0.12, u_epsv 0.007), and an inf-sup constant this small that of one whose pressures
@@ -167,7 +168,7 @@ def _arguments(form: Form, given: Settings) -> Found:
         Symbols(form, options).residual()
     yield (
         "ok",
-        f"all known; each of {listed(test for _, test in form.fields.values())} has its term",
+        f"all known; each of {quoted(test for _, test in form.fields.values())} has its term",
     )
     for warning in caught:
         if issubclass(warning.category, InexactSumWarning):

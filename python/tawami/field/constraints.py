@@ -130,7 +130,7 @@ def held_point(
     """Prescribe a displacement component at a point.
 
     A point at the border of a moving body may reach a cell without particles. Then the functions with
-    particles stand for all, if they make up most of the value at the point.
+    particles replace all, if they make up most of the value at the point.
 
     Args:
         grid: The grid.

@@ -25,7 +25,7 @@ from tawami.fem.rules import Rule
 from tawami.field.attachment import Attachment
 from tawami.field.layout import Layout
 from tawami.field.reduction import Reduction
-from tawami.form.compilation import Integral
+from tawami.form.integral import Integral
 from tawami.grid.grid import Grid
 
 Side = tuple[tuple[int, int], tuple[int, int], tuple[str, str]]

@@ -3,6 +3,7 @@
 This is the only place that says that the grid is plane. Code that is not about the plane itself
 (clipping polygons, discs) asks `grid.space`, and never writes 2, 4, "xy" or h**2. A grid in three
 dimensions needs a second `Space`, a second form of `Position` and `Counts`, and that code.
+`rust/space.rs` is the same for the Rust part.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ class Space:
 
     @property
     def tensor(self) -> tuple[str, ...]:
-        """Names of the components of a symmetric tensor, in the order of `rust/tensor.rs`."""
+        """Names of the components of a symmetric tensor, in the order of `rust/tensor/mod.rs`."""
         return ("xx", "yy", "zz", *("".join(pair) for pair in combinations(self.axes, 2)))
 
     @property
@@ -65,6 +66,14 @@ class Space:
     def measure(self, h: float) -> float:
         """Area or volume of a cell of side `h` [m]."""
         return h**self.dim
+
+    def vectors(self, components: Array) -> Array:
+        """Vectors, n x dim, of their components in one array, those of one vector after each other."""
+        return components.reshape(-1, self.dim)
+
+    def tensors(self, components: Array) -> Array:
+        """Tensors, n x dim x dim, of their components in one array, as :meth:`vectors`."""
+        return components.reshape(-1, self.dim, self.dim)
 
     def unit(self, unit: str) -> str:
         """Unit of an extensive quantity per metre depth: 'N per m'."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from tawami import _rust
 from tawami.base import checks
 from tawami.base.errors import InputError
-from tawami.form.form import source_of
+from tawami.base.source import source_of
 
 Array = npt.NDArray[np.float64]
 

@@ -57,7 +57,7 @@ def distributed(
 
 
 def columns(particles: _rust.Particles) -> list[tuple[str, int]]:
-    """Name and width of the arrays of particles, as they stand in their rows."""
+    """Name and width of the arrays of particles, in the order of their rows."""
     double = np.dtype(float).itemsize
     return [(name, max(1, size // double)) for name, size in particles.arrays]
 

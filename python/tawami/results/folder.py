@@ -1,4 +1,4 @@
-"""Folder of a run: what it holds, and `run.json`, the record of the run."""
+"""Folder of a run: its files, and `run.json`, the record of the run."""
 
 from __future__ import annotations
 

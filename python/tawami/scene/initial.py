@@ -73,8 +73,8 @@ def _check(now: Configuration, name: str, beyond: Beyond) -> None:
         )
     if now.begun or "velocity" in dict(now.domain.particles.arrays):
         raise InputError(
-            f"initial('{name}') after the scene was solved or set in motion: expected it before; to go "
-            "on from a state make another scene with it, as tawami.earlier(...) reads it"
+            f"initial('{name}') after the scene was solved or set in motion: expected it before. To "
+            "start from a later state, make another scene with the particles of tawami.earlier(...)"
         )
 
 

@@ -22,6 +22,7 @@ from tawami.form.compilation import CompiledForm, check_used, compile_form
 from tawami.form.form import Form
 from tawami.grid.basis import BASES, Basis
 from tawami.grid.grid import Grid
+from tawami.grid.space import Space
 from tawami.particles import assignment
 from tawami.particles.numpy_law import NumpyLaw
 
@@ -64,6 +65,11 @@ class Model:
     density: Array | None
     leaving: Leaving
     num_particles: int
+
+    @property
+    def space(self) -> Space:
+        """What follows from the dimension."""
+        return self.grid.space
 
     @property
     def moves(self) -> bool:

@@ -73,11 +73,11 @@ class Earlier:
 
     @property
     def body(self) -> Body:
-        """Positions and volumes of these particles, for a scene that goes on with them."""
+        """Positions and volumes of these particles, for a scene that starts from them."""
         return Body(self.x, self.field("volume", 1, f"{self.name}: body")[:, 0])
 
     def field(self, name: str, width: int, what: str) -> Array:
-        """An array of the file, particles x width; its name may go on with components and unit."""
+        """An array of the file, particles x width; components and unit may follow its name."""
         wanted = name.replace("_", " ")
         for known, values in self.fields.items():
             plain = known.split("[")[0].replace("_", " ").strip()

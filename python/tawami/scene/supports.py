@@ -181,7 +181,7 @@ class Supports:
         Args:
             domain: The particles where they are.
             amount: Factor of each support's value.
-            start: Coefficients that are there already, which the amounts include.
+            start: Coefficients at the start of the step, which the amounts include.
             before: Displacement coefficients since the start of the scene where particles do not move,
                 0 where they do: what walls measure distances from.
             moving: Inertia holds the body: rigid motions may be free, and edges that are held at rest
@@ -271,12 +271,12 @@ class Supports:
         """Move the points with the body, and record how far it has crossed edges.
 
         Args:
-            u: Increments of the displacement, functions x 2.
+            u: Increments of the displacement, functions x dim.
             points: The constraints of the step, in the order of the supports.
             crossings: As :meth:`crossings` gave them for this step.
         """
         for support, point in zip(self.at_points, points, strict=True):
-            x, y = point.place + point.weights @ u[point.indices // 2]
+            x, y = point.place + point.weights @ u[point.indices // self.grid.space.dim]
             support.place = (float(x), float(y))
         for number, crossing in crossings.items():
             self.all[number].crossing = crossing
@@ -297,7 +297,10 @@ class Supports:
     @property
     def line(self) -> str:
         """The supports in words, for the header of a run."""
-        texts = [f"{support} {'xy'[support.component]}{support.motion}" for support in self.all]
+        texts = [
+            f"{support} {self.grid.space.axes[support.component]}{support.motion}"
+            for support in self.all
+        ]
         texts += [f"wall(edge='{wall.edge}') friction {wall.friction:g}" for wall in self.walls]
         return listed(texts)
 
