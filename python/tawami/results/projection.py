@@ -13,6 +13,7 @@ errors.
 
 from __future__ import annotations
 
+import math
 from typing import Literal, get_args
 
 import numpy as np
@@ -63,7 +64,9 @@ def nodal(scene: Scene, values: Array, method: Projection = "lumped") -> Array:
         InputError: An unknown method.
     """
     method = check_projection(method)
-    columns = np.asarray(values, dtype=float).reshape(len(scene.particles), -1)
+    values = np.asarray(values, dtype=float)
+    # a rank may be without particles: its number of columns is that of the shape
+    columns = values.reshape(len(values), math.prod(values.shape[1:]))
     sums = _sums(scene, np.column_stack([np.ones(len(columns)), columns]))
     weight, right = sums[:, :1], sums[:, 1:]
     near = weight > 0
