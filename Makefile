@@ -83,7 +83,7 @@ format: setup $(STAMPS)/lint
 	.venv/bin/ruff format .
 
 clean:
-	rm -rf .venv target results
+	rm -rf .venv target results .pytest_cache
 
 setup: $(STAMPS)/wheel
 
