@@ -90,6 +90,13 @@ class Grid(Unique):
         ends = zip(self.origin, self.upper, strict=True)
         return " x ".join(f"[{low:g}, {high:g}]" for low, high in ends)
 
+    @property
+    def line(self) -> str:
+        """The grid in words, for the header of a run."""
+        cells = " x ".join(map(str, self.cells))
+        corners = (", ".join(f"{x:g}" for x in corner) for corner in (self.origin, self.upper))
+        return f"{cells} cells of {self.h:g} m from ({next(corners)}) to ({next(corners)})"
+
     def __repr__(self) -> str:
         cells = " x ".join(map(str, self.cells))
         return f"Grid({cells} cells of {self.h:g} m, {self.extent} m)"
