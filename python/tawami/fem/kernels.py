@@ -64,8 +64,8 @@ class Kernel:
     module: Any
 
 
-#: How long a kernel is waited for that another process compiles [s]; FFCx would raise an error after 10 s,
-#: which is short on a busy machine.
+#: How long to wait for a kernel that another process compiles [s]. FFCx would raise an error after 10 s,
+#: which is too short on a busy machine.
 PATIENCE = 60
 
 

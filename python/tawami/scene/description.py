@@ -35,13 +35,8 @@ def header(now: Configuration, motion: str = "") -> str:
 
 
 def _grid(now: Configuration) -> str:
-    grid = now.model.grid
-    (nx, ny), (x0, y0), (x1, y1) = grid.cells, grid.origin, grid.upper
-    filled = int(np.count_nonzero(now.domain.active))
-    return (
-        f"{nx} x {ny} cells of {grid.h:g} m from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}), {filled} with "
-        f"particles; basis {now.model.basis}"
-    )
+    filled = int(np.count_nonzero(now.domain.field.active))
+    return f"{now.model.grid.line}, {filled} with particles; basis {now.model.basis}"
 
 
 def _particles(now: Configuration) -> str:
