@@ -35,7 +35,7 @@ def header(now: Configuration, motion: str = "") -> str:
 
 
 def _grid(now: Configuration) -> str:
-    filled = int(np.count_nonzero(now.domain.field.active))
+    filled = int(np.count_nonzero(now.domain.active))
     return f"{now.model.grid.line}, {filled} with particles; basis {now.model.basis}"
 
 
