@@ -15,11 +15,11 @@ import scipy.sparse as sp
 
 from tawami import _rust
 from tawami.base.arrays import Array, Indices, Mask
+from tawami.base.space import lattice
 from tawami.fem import dolfinx
 from tawami.fem.mesh import FunctionSpace
 from tawami.grid.basis import Basis, greville_1d
 from tawami.grid.grid import Grid
-from tawami.grid.space import lattice
 
 
 class Layout:

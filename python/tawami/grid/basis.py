@@ -17,7 +17,7 @@ import scipy.sparse as sp
 
 from tawami import _rust
 from tawami.base.arrays import Array
-from tawami.grid.space import Counts
+from tawami.base.space import Counts
 
 Basis = Literal["quadratic_spline", "bilinear", "biquadratic"]
 BASES: tuple[Basis, ...] = get_args(Basis)
