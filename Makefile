@@ -1,10 +1,13 @@
 # make cantilever   set up what is missing, run the study of the cantilever
-# make test         set up what is missing, pass every test (TESTS="..." some of pytest's files)
+# make test         set up what is missing, pass the tests (TESTS="..." some of pytest's files)
+# make quick        those of them that start no ranks
+# make test-all     all tests, the slow ones too: extremes, studies, endurance, large cases
+# make fuzz         look for arguments that fail, at random (SEED=... again with that seed)
 # make docs         the documentation as HTML, every script and case in it run; LINKS=1 checks the web's links
-# make matrix       make test on Debian 12, 13 and sid, each in a throw-away root (see tests/matrix.sh)
-# make extremes     try the method at its extremes, say what survives and what is refused
-# make bench        speed and memory, stage by stage
-# make trade        what accuracy costs: every knob of four cases; goes on where it was
+# make matrix       make test-all on Debian 12, 13 and sid, each in a throw-away root (see tests/matrix.sh)
+# make extremes     try the method at its limits, print what survives and what is rejected
+# make bench        speed and memory, stage by stage (AGAINST=../checkout compares with another checkout)
+# make trade        what accuracy costs: the settings of five cases; resumes an interrupted study
 # make lint, make format, make clean
 #
 # Set-up needs Debian 12, 13 or sid (root or sudo for the packages that are missing) and Rust.
@@ -22,16 +25,33 @@ export OMP_NUM_THREADS ?= 1
 export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 
-.PHONY: cantilever test docs matrix extremes bench trade lint format setup clean
+.PHONY: cantilever test quick test-all fuzz docs matrix extremes bench trade lint format setup clean
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 
 cantilever: setup
-	$(PYTHON) -m cases.cantilever
+	$(PYTHON) -m cases.verification.cantilever
 
-test: setup
+# A file is tested by one process, so that what its tests share is computed once.
+PYTEST = $(PYTHON) -m pytest --quiet -n $(shell nproc) --dist loadfile --no-loadscope-reorder
+
+test: setup $(STAMPS)/cargo-tests
 	cargo test --locked --quiet
-	$(PYTHON) -m pytest --quiet $(TESTS)
+	$(PYTEST) -m 'not slow' $(TESTS)
+
+quick: setup $(STAMPS)/cargo-tests
+	cargo test --locked --quiet
+	$(PYTEST) -m 'not slow and not mpi' $(TESTS)
+
+test-all: setup $(STAMPS)/cargo-tests
+	cargo test --locked --quiet
+	$(PYTEST) $(TESTS)
+
+fuzz: SEED := $(or $(SEED),$(shell od -An -N4 -tu4 /dev/urandom | tr -d ' '))
+fuzz: setup $(STAMPS)/cargo-tests
+	@echo "Again with the same examples: make fuzz SEED=$(SEED)"
+	PROPTEST_RNG_SEED=$(SEED) PROPTEST_CASES=5000 cargo test --locked --quiet
+	HYPOTHESIS_PROFILE=fuzz SEED=$(SEED) $(PYTEST) -m 'fuzz or hypothesis' --hypothesis-seed=$(SEED) $(TESTS)
 
 docs: setup $(STAMPS)/docs
 	$(PYTHON) python/docs $(if $(LINKS),--links)
@@ -43,7 +63,7 @@ extremes: setup
 	$(PYTHON) -m cases.extremes
 
 bench: setup
-	$(PYTHON) -m cases.costs.bench
+	$(PYTHON) -m cases.costs.bench $(if $(AGAINST),--against $(AGAINST))
 
 trade: setup
 	$(PYTHON) -m cases.costs.trade
@@ -63,7 +83,7 @@ format: setup $(STAMPS)/lint
 	.venv/bin/ruff format .
 
 clean:
-	rm -rf .venv target results
+	rm -rf .venv target results .pytest_cache
 
 setup: $(STAMPS)/wheel
 
@@ -102,7 +122,7 @@ $(STAMPS)/debian: $(STAMPS)/rust Makefile
 PIP = $(PYTHON) -m pip install --quiet --disable-pip-version-check --constraint .venv/constraints.txt
 
 $(STAMPS)/python: .venv/constraints.txt pyproject.toml
-	$(PIP) 'maturin>=1.12.1,<2' 'meshio>=5.3' 'shapely>=2.1' 'matplotlib>=3.7' 'tqdm>=4.60' 'hypothesis>=6.80' 'mypy>=1.10' 'pytest>=7.4'
+	$(PIP) 'maturin>=1.12.1,<2' 'meshio>=5.3' 'shapely>=2.1' 'matplotlib>=3.7' 'tqdm>=4.60' 'hypothesis>=6.80' 'mypy>=1.10' 'pytest>=7.4' 'pytest-xdist>=3.7'
 	@mkdir -p $(STAMPS) && touch $@
 
 $(STAMPS)/lint: $(STAMPS)/python
@@ -110,7 +130,7 @@ $(STAMPS)/lint: $(STAMPS)/python
 	@mkdir -p $(STAMPS) && touch $@
 
 $(STAMPS)/docs: $(STAMPS)/python
-	$(PIP) 'sphinx>=7.2' 'myst-parser>=3' 'furo>=2024.1.29'
+	$(PIP) 'sphinx>=7.2' 'myst-parser>=3' 'furo>=2024.1.29' 'sphinx-mathjax-offline>=0.0.2'
 	@mkdir -p $(STAMPS) && touch $@
 
 # Built for the processor it runs on, and again where that is another one.
@@ -121,3 +141,8 @@ $(PROCESSOR): $(STAMPS)/rust
 $(STAMPS)/wheel: $(STAMPS)/python $(PROCESSOR) Cargo.toml Cargo.lock $(shell find rust -name '*.rs')
 	RUSTFLAGS="-C target-cpu=native" VIRTUAL_ENV=$(CURDIR)/.venv PIP_CONSTRAINT=$(CURDIR)/.venv/constraints.txt .venv/bin/maturin develop --release --locked --quiet >/dev/null
 	@touch $@
+
+# Compiled beforehand: it takes longer than the tests themselves.
+$(STAMPS)/cargo-tests: $(STAMPS)/rust Cargo.toml Cargo.lock $(shell find rust -name '*.rs') $(wildcard tests/*.rs tests/*/*.rs)
+	cargo test --locked --quiet --no-run
+	@mkdir -p $(STAMPS) && touch $@

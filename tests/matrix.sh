@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# `make test` on every supported Debian, each in a throw-away root folder; a table of versions and results.
+# `make test-all` on every supported Debian, each in a throw-away root folder; a table of versions and results.
 #
 #   make matrix                                  bookworm, trixie and sid, all tests
 #   SUITES=sid make matrix                       some of them
 #   MATRIX_TESTS="tests/form/test_forms.py" ...       some of pytest's files (cargo's tests run always)
 #   MATRIX_ROOT=/var/tmp ...                     where the root folders are made
-#   MATRIX_MINUTES=90 ...                        time limit of each `make test`
+#   MATRIX_MINUTES=90 ...                        time limit of each `make test-all`
 #   MATRIX_MIRROR=URL ...                        Debian's mirror; by default that of the host's apt
 #
 # The present commit is cloned; changes that are not committed are not part of it. Mounts live in a
@@ -139,9 +139,9 @@ try_suite() { # suite: writes its log, and its row of the table beside it
     {
         prepare "$suite" "$root" &&
             within "$root" timeout --kill-after=30 $((60 * minutes)) \
-                make -C /root/tawami test TESTS="${MATRIX_TESTS:-}"
+                make -C /root/tawami test-all TESTS="${MATRIX_TESTS:-}"
     } >"$log" 2>&1 || status=$?
-    [ "$status" != 124 ] || echo "make test was ended after $minutes minutes" >>"$log"
+    [ "$status" != 124 ] || echo "make test-all was ended after $minutes minutes" >>"$log"
     found=$(within "$root" /root/tawami/.venv/bin/python -c "$versions" 2>/dev/null) || found='- - -'
     local passed failed
     passed=$(counted passed "$log")

@@ -19,6 +19,10 @@ PYTHONPATH = os.pathsep.join(
 )
 
 
+#: Ranks that wait for others let them compute: there may be more ranks than processors.
+YIELD = {"OMPI_MCA_mpi_yield_when_idle": "1"}
+
+
 def python(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
     """Run Python with these arguments; options are those of subprocess.run, `variables` are added to
     the environment. A program that hangs fails the test.
@@ -34,7 +38,7 @@ def python(*arguments: object, **options: Any) -> subprocess.CompletedProcess[st
 def on_ranks(number: int, *arguments: object, **variables: str) -> subprocess.CompletedProcess[str]:
     """Run Python with these arguments on several ranks. A hang fails the test."""
     command, environment = mpirun(number, [sys.executable, *map(str, arguments)])
-    environment |= {"PYTHONPATH": PYTHONPATH, "OMP_NUM_THREADS": "1"} | variables
+    environment |= {"PYTHONPATH": PYTHONPATH, "OMP_NUM_THREADS": "1"} | YIELD | variables
     return subprocess.run(
         command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False, timeout=200
     )

@@ -1,4 +1,4 @@
-"""What the method survives, what it refuses, and where each of that ends.
+"""Limits of the method: what it survives, what it rejects, and where.
 
 python -m cases.extremes
 """

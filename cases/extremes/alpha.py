@@ -1,13 +1,13 @@
-"""The stabilisation from alpha = 0 to 1000 on the cantilever, beside what theory allows it.
+"""The stabilisation from alpha = 0 to 1000 on the cantilever, compared with what theory allows.
 
-With p and p_a the mean stress without and with the Laplacian's term and e the difference of the two
-solutions, the difference of their weak forms, tested with e, is
+Let p and p_a be the mean stress without and with the Laplacian's term, and e the difference of the two
+solutions. The difference of their weak forms, tested with e, is
 
     2 mu |dev eps(e_u)|^2 + |e_p|^2 / K + alpha h^2/mu |grad e_p|^2 = -alpha h^2/mu (grad p, grad e_p)
 
-whence |2 mu dev eps(e_u)| <= h sqrt(alpha/2) |grad p| for any alpha, however large. The same holds of
-the projection with |p - p_c| for h |grad p|, p_c the mean of p over a cell: h^2/12 |grad p|^2 is its
-square for a bilinear p but for terms of higher order in h.
+so that |2 mu dev eps(e_u)| <= h sqrt(alpha/2) |grad p| for any alpha, however large. The same holds for
+the projection with |p - p_c| in place of h |grad p|, where p_c is the mean of p over a cell. For a
+bilinear p its square is h^2/12 |grad p|^2, up to terms of higher order in h.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ N = 8  # cells over the height
 
 @functools.cache
 def deviator_error(form: str, alpha: float, stabilisation: str, n: int = N) -> tuple[float, float]:
-    """L2 error of the in-plane and out-of-plane deviator over the norm of the mean stress, and the
-    relative error of the deflection.
+    """L2 error of the deviatoric stress over the norm of the mean stress, relative error of the
+    deflection.
     """
     options = {"stabilisation": stabilisation} if form == "u_epsv" else {}
     solution = mpm.build(form, "exact", n, alpha=alpha, **options).solve()
@@ -49,7 +49,7 @@ def deviator_error(form: str, alpha: float, stabilisation: str, n: int = N) -> t
 
 
 def measured(form: str, alpha: float, stabilisation: str) -> tuple[float, str]:
-    """The error, and the deflection's in words."""
+    """The error of the deviator, and the error of the deflection as a remark."""
     error, deflection = deviator_error(form, alpha, stabilisation)
     return error, f"deflection {100 * deflection:.2g} % off"
 
@@ -61,16 +61,18 @@ def gradient_over_size() -> float:
 
 
 def bound_of(form: str, alpha: float, stabilisation: str) -> float:
-    """Error without the term, and what the estimate above adds; the consistent residual-based term adds
-    nothing, and is allowed as much as the discretisation misses once more.
+    """Error without the term, plus the estimate above.
+
+    The residual-based term is consistent and adds nothing to the estimate: its bound is twice the error
+    without the term.
     """
     without = deviator_error(form, 0.0, stabilisation)[0]
     if stabilisation == "residual_based":
         return 2 * without
     part = 1 / 12 if stabilisation == "projection" else 1.0
-    # what is worse than the estimate at alpha = 1 is useless, whatever theory allows it
+    # a result with a larger error than the estimate at alpha = 1 is useless, whatever theory allows
     alpha = min(alpha, 1.0)
-    # 5 % for the gradient of the discrete p, which stands for that of the closed form
+    # 5 % because the gradient is that of the closed form instead of the discrete p
     return without + 1.05 * sqrt(part * alpha / 2) / N * gradient_over_size()
 
 

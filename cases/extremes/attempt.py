@@ -1,8 +1,8 @@
-"""One thing that was tried: it survives with an error below its bound, or is refused with a sentence.
+"""One attempt at a limit: it survives with an error below its bound, or an error message rejects it.
 
-Anything else is WRONG: an answer worse than its bound, an answer where a refusal was due, an error that
-is no sentence. A bound comes from outside the code (a closed form, another method, an invariant); the
-comment beside it says from where.
+Everything else is WRONG: an error above the bound, a result where an error message was due, or an
+exception that is not an error message of tawami. A bound comes from outside the code: a closed form,
+another method, or an invariant. The comment next to it names the source.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ import numpy as np
 import tawami
 
 Outcome = Literal["survived", "warned", "refused", "WRONG"]
-#: An error, or an error and what there is to say about it.
+#: An error, or an error and a remark.
 Measured = float | tuple[float, str]
 
-#: What may be said of an answer beforehand.
+#: Warnings that may precede a result above its bound.
 WARNINGS = (
     tawami.EnergyWarning,
     tawami.InstabilityWarning,
@@ -36,16 +36,16 @@ COLUMNS = ("subject", "setting", "outcome", "error", "bound", "says")
 
 @dataclass(frozen=True)
 class Attempt:
-    """What was tried and what happened.
+    """An attempt and its outcome.
 
     Attributes:
-        subject: What it belongs to.
-        setting: What was tried.
-        outcome: 'survived' with its error below its bound; 'warned', an answer worse than that and a
-            warning that said so beforehand; 'refused'; 'WRONG'.
-        error: Against an independent reference; None where there is no answer.
-        bound: Of the error; None where a refusal was due.
-        says: The sentence of a refusal or warning, or a remark.
+        subject: The subject it belongs to.
+        setting: The setting that was tried.
+        outcome: 'survived' with an error below the bound; 'warned' with a larger error and a warning
+            before it; 'refused' with an error message; 'WRONG'.
+        error: Error against an independent reference; None without a result.
+        bound: Bound of the error; None if an error message is due.
+        says: Error message, warning or remark.
     """
 
     subject: str
@@ -57,7 +57,7 @@ class Attempt:
 
     @property
     def wrong(self) -> bool:
-        """Whether it must not stay so."""
+        """Whether the outcome is a fault of the code."""
         return self.outcome == "WRONG"
 
 
@@ -68,14 +68,14 @@ def attempted(
     run: Callable[[], Measured],
     refusals: tuple[type[Exception], ...] = (tawami.TawamiError,),
 ) -> Attempt:
-    """Try it.
+    """Run an attempt.
 
     Args:
-        subject: What it belongs to.
-        setting: What is tried.
-        bound: Of the error; None if it has to be refused.
-        run: Gives the error, with a remark if there is one.
-        refusals: Errors that are sentences for the user.
+        subject: The subject it belongs to.
+        setting: The setting that is tried.
+        bound: Bound of the error; None if an error message is due.
+        run: Returns the error, or the error and a remark.
+        refusals: Exceptions that count as error messages.
     """
     error, says = None, ""
     outcome: Outcome = "WRONG"
@@ -92,7 +92,7 @@ def attempted(
             error, says = measured if isinstance(measured, tuple) else (measured, "")
             said = [str(w.message) for w in caught if issubclass(w.category, WARNINGS)]
             if bound is None:
-                says = " ".join(["an answer, where a refusal was due", says]).strip()
+                says = " ".join(["a result, where an error message was due", says]).strip()
             elif math.isfinite(error) and error <= bound:
                 outcome = "survived"
             elif said:
@@ -102,10 +102,10 @@ def attempted(
 
 @contextmanager
 def untouched(scene: tawami.Scene) -> Iterator[None]:
-    """A refusal leaves the particles as they were, to the bit.
+    """Check that an error in the block leaves the particles unchanged, bit for bit.
 
     Raises:
-        RuntimeError: It did not.
+        RuntimeError: The particles have changed.
     """
     before = _arrays(scene)
     try:
@@ -117,10 +117,13 @@ def untouched(scene: tawami.Scene) -> Iterator[None]:
         raise
 
 
+def array_names(scene: tawami.Scene) -> list[str]:
+    """Names of the arrays that the particles of a scene have without a history."""
+    names = ["x", "volume", "stress", "displacement"]
+    return [*names, "eps_v"] if "eps_v" in scene.form.fields else names
+
+
 def _arrays(scene: tawami.Scene) -> dict[str, Any]:
     particles = scene.particles
-    names = ["x", "volume", "stress", "displacement"]
-    if scene.form.kinematics.has_eps_v:
-        names.append("eps_v")
-    arrays = {name: np.array(getattr(particles, name)) for name in names}
+    arrays = {name: np.array(getattr(particles, name)) for name in array_names(scene)}
     return arrays | {name: np.array(particles.history(name)) for name in particles.history_names}

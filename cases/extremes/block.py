@@ -1,4 +1,4 @@
-"""The block that several subjects share: 0.5 m x 0.5 m of 4 x 4 cells, in the middle of a grid."""
+"""The block of several subjects: 0.5 m x 0.5 m, 4 x 4 cells, in the middle of a grid."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 import tawami
+from cases.extremes.attempt import array_names
 
 Array = npt.NDArray[np.float64]
 
-SIDE, H = 0.5, 0.125  # of the block, of its cells [m]
+SIDE, H = 0.5, 0.125  # sides of the block and of a cell [m]
 E, RHO = 1.0e5, 1000.0  # [Pa], [kg/m3]
 MASS = RHO * SIDE**2  # [kg per metre depth]
 FINITE = ("u_epsv_finite", "u_bbar_finite", "u_finite")
@@ -29,16 +30,16 @@ def scene(
     grid: tawami.Grid | None = None,
     **options: Any,
 ) -> tawami.Scene:
-    """The block on lines of the grid.
+    """The block as a scene.
 
     Args:
         form: Weak form.
-        law: Linear elastic with nu = 0.4 where none is given.
-        cells: Of the grid; the block is about its middle.
-        shift: Of the block from the lines of the grid [cells].
+        law: Material law; linear elastic with nu = 0.4 by default.
+        cells: Cells of the grid. The block is in its middle.
+        shift: Shift of the block from the grid lines [cells].
         per_axis: Particles per cell and axis.
-        grid: One that was made so before; another one by default.
-        options: For `tawami.Scene`.
+        grid: A grid with these cells; a new one by default.
+        options: Options of `Scene`.
     """
     origin = tuple(-H * (n // 2) for n in cells)
     grid = grid or tawami.Grid(MPI.COMM_WORLD, origin=origin, h=H, cells=cells)
@@ -53,7 +54,7 @@ def scene(
 
 
 def spinning(scene: tawami.Scene, omega: float, **options: Any) -> tawami.Dynamics:
-    """Set in rotation about the origin [rad/s], its affine velocities too."""
+    """A motion that starts as a rotation about the origin with `omega` [rad/s]."""
     spin = omega * np.array([[0.0, -1.0], [1.0, 0.0]])
     motion = tawami.Dynamics(scene, velocity=np.array(scene.particles.x) @ spin.T, **options)
     motion.velocity_gradient[:] = spin
@@ -61,11 +62,9 @@ def spinning(scene: tawami.Scene, omega: float, **options: Any) -> tawami.Dynami
 
 
 def state(motion: tawami.Dynamics) -> dict[str, Array]:
-    """Copies of all arrays of the particles, by name."""
+    """Copies of all arrays of the particles by name."""
     particles = motion.scene.particles
-    arrays = {name: getattr(particles, name) for name in ("x", "volume", "stress", "displacement")}
-    if motion.scene.form.kinematics.has_eps_v:
-        arrays["eps_v"] = particles.eps_v
+    arrays = {name: getattr(particles, name) for name in array_names(motion.scene)}
     arrays |= {name: particles.history(name) for name in particles.history_names}
     arrays |= {
         name: particles.carried(name)
@@ -75,6 +74,6 @@ def state(motion: tawami.Dynamics) -> dict[str, Array]:
 
 
 def changed(before: dict[str, Array], motion: tawami.Dynamics) -> list[str]:
-    """Names of the arrays that are not what they were, to the bit."""
+    """Names of the arrays that have changed, compared bit for bit."""
     now = state(motion)
     return [name for name in now if not np.array_equal(now[name], before[name], equal_nan=True)]

@@ -1,8 +1,8 @@
-"""Two materials, one up to 10^13 times as stiff: in series and in parallel, beside the closed forms.
+"""Two materials, one up to 10^13 times as stiff, in series and in parallel, with closed forms.
 
-A bar with Gauss points, plane strain, stretched along x between smooth sides. In series (left half soft)
-both halves bear one stress. In parallel (lower half soft, Lame's lambda the same, so that the stress
-across is too) both have one strain.
+A bar in plane strain, with Gauss points, is stretched along x between smooth sides. In series (left half
+soft) both halves carry the same stress. In parallel (lower half soft, the same Lame constant lambda, so
+that the stress across the bar is the same too) both have the same strain.
 """
 
 from __future__ import annotations
@@ -55,9 +55,10 @@ def force_error(form: str, basis: str, arrangement: str, contrast: float) -> tup
 
 
 def representable(form: str, basis: str, arrangement: str) -> bool:
-    """Whether the fields can take the jump that the closed form has at the interface: of the strain in
-    series, where p does not jump; of p in parallel, where strains do not, and which B-bar with quadratic
-    functions does not balance (`tests/field/test_patch.py`).
+    """Whether the fields can represent the closed form.
+
+    In series the strain jumps at the interface and p does not. In parallel p jumps and the strains
+    do not; B-bar with quadratic functions does not balance this (`tests/field/test_patch.py`).
     """
     if arrangement == "parallel":
         return form != "u_p" and (form != "u_bbar" or basis == "bilinear")
@@ -67,9 +68,9 @@ def representable(form: str, basis: str, arrangement: str) -> bool:
 def attempts(short: bool) -> Iterator[Attempt]:
     """Each form and basis at each contrast.
 
-    What can represent the closed form has to give it, to 1e-5: Newton's tolerance of 1e-6 and what a
-    force loses of it by a sum over the end. The others smear a jump over a cell: by as much as a cell is
-    of the soft half (or of the height) their force may be off.
+    Fields that can represent the closed form must reproduce it to 1e-5: Newton's tolerance of 1e-6,
+    times 10 for a force that is a sum over the end. The others smear the jump over a cell: the
+    error of their force may be the share of a cell in the soft half (or in the height).
     """
     for arrangement in ("series", "parallel"):
         for basis in BASES[:2] if short else BASES:

@@ -1,7 +1,7 @@
-"""NaN and infinity in every array of the particles in the middle of a run, in the step and in the loads.
+"""NaN and infinity in every array of the particles during a run, in the step size and in the loads.
 
-The next step must be refused with the name of the array and the number of the particle, and leave
-everything else as it was, to the bit; mended, the run must go on as if nothing had been.
+An error message must name the array and the particle, and leave everything else unchanged, bit for bit.
+Once corrected, the run must continue as if nothing had happened.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ LAWS = {
 
 
 def running(law: str) -> tawami.Dynamics:
-    """The block, spinning and plastic here and there, after three steps."""
+    """The spinning block, partly plastic, after three steps."""
     motion = block.spinning(block.scene(law=LAWS[law]), 4.0)
     for _ in range(3):
         motion.step(DT)
@@ -34,9 +34,9 @@ def running(law: str) -> tawami.Dynamics:
 
 
 def put(motion: tawami.Dynamics, name: str, value: float) -> None:
-    """Into one entry of the particle's row of an array."""
+    """Write a value into one entry of the row of `PARTICLE` in an array."""
     particles = motion.scene.particles
-    if name == "x":  # which no script can write: as a step would
+    if name == "x":  # read-only for scripts: written as a step does
         x = np.array(particles.x)
         x[PARTICLE, 1] = value
         particles.move_to(x)
@@ -51,11 +51,11 @@ def put(motion: tawami.Dynamics, name: str, value: float) -> None:
 
 
 def refused(motion: tawami.Dynamics, act: Callable[[], object], words: list[str]) -> float:
-    """The refusal of an act on a run; infinity where there is none.
+    """Perform an act on a run that must fail; returns infinity if it does not.
 
     Raises:
-        TawamiError: As it must.
-        AssertionError: The act changed something, or its sentence does not name what is wrong.
+        TawamiError: The expected error.
+        AssertionError: The act has changed something, or the error message lacks one of the words.
     """
     before, energies, time = block.state(motion), motion.energies, motion.time
     try:
@@ -63,7 +63,7 @@ def refused(motion: tawami.Dynamics, act: Callable[[], object], words: list[str]
     except tawami.TawamiError as refusal:
         changed = block.changed(before, motion)
         if changed or motion.energies != energies or motion.time != time:
-            raise AssertionError(f"refused, and changed: {changed}") from refusal
+            raise AssertionError(f"changed in spite of the error: {changed}") from refusal
         missing = [word for word in words if word not in str(refusal)]
         if missing:
             raise AssertionError(f"'{refusal}' does not say {missing}") from refusal
@@ -72,7 +72,7 @@ def refused(motion: tawami.Dynamics, act: Callable[[], object], words: list[str]
 
 
 def corrupted(law: str, name: str, value: float) -> float:
-    """The refusal of the step after the value was put into an array."""
+    """The step after a value was written into an array must fail."""
     motion = running(law)
     put(motion, name, value)
     words = [f"{name}:", f"particle {PARTICLE}"]
@@ -80,7 +80,7 @@ def corrupted(law: str, name: str, value: float) -> float:
 
 
 def mended(law: str, name: str, value: float) -> float:
-    """Difference to an undisturbed run after the array was mended; to the bit where it is 0."""
+    """Largest difference from an undisturbed run after the array was corrected."""
     motion, other = running(law), running(law)
     good = block.state(motion)
     put(motion, name, value)
@@ -100,7 +100,7 @@ def mended(law: str, name: str, value: float) -> float:
 
 
 def of_the_step(what: str, value: float) -> float:
-    """The refusal of a step size, end or load."""
+    """A step size, an end or a load with the value must be rejected."""
     motion = running("linear_elastic")
     if what == "traction":  # of a body that fills its grid
         motion = tawami.Dynamics(block.scene("u", cells=(4, 4)))
@@ -131,7 +131,7 @@ def of_the_step(what: str, value: float) -> float:
 
 
 def attempts(short: bool) -> Iterator[Attempt]:
-    """Every array of every law; every number that a step is given."""
+    """Every array of every law, and every number that a step takes."""
     values = {"NaN": np.nan, "infinity": np.inf, "-infinity": -np.inf}
     seen: set[str] = set()
     for law in LAWS:

@@ -1,10 +1,10 @@
 """Densities from 1e-9 to 1e9 kg/m3, of one material or as the contrast of two.
 
-References: free fall; a bar of two densities, E the same, whose first axial mode has
+References are free fall, and the first axial mode of a bar of two densities with the same E:
 
     tan(k1 a) tan(k2 (L - a)) = k1/k2,    k = omega sqrt(rho/E),  a the length of the held part
 
-so that at a high contrast it is a weight on a spring, or a heavy bar with a tip of nothing.
+At a high contrast this is a mass on a spring, or a heavy bar with a tip without mass.
 """
 
 from __future__ import annotations
@@ -24,18 +24,19 @@ from cases.extremes.attempt import Attempt, attempted
 
 SUBJECT = "density"
 Array = npt.NDArray[np.float64]
-L, A, E = 1.0, 0.5, 1.0e6  # of the bar, of its held part [m]; [Pa]
+L, A, E = 1.0, 0.5, 1.0e6  # length of the bar and of its held part [m]; [Pa]
 CELLS, STEPS = 32, 50  # along the bar, in a quarter of the period
 G = 10.0
-#: A function at the border of the two parts has the mass of both: half a cell's weight is out of place,
-#: h/(2 L) = 1.6 % of the period, and less than half of that counts.
+#: Of the period. A function at the border of the two parts has mass of both: the mass of half a cell is
+#: misplaced, which is h/(2 L) = 1.6 % of the period; less than half of that counts.
 BOUND = 0.02
-#: Newton's, of forces: the round-off of the stiffness, eps E u, comes near m g where rho is small.
+#: Newton's tolerance of the forces. For small rho the round-off of the stiffness, eps E u,
+#: approaches m g.
 TOLERANCE = 1e-6
 
 
 def fall(form: str, densities: tuple[float, float], dt: float = 0.01) -> float:
-    """Velocity after 20 steps of free fall, over g t; two materials in layers."""
+    """Error of the velocity after 20 steps of free fall, over g t; two materials in layers."""
     made = tawami.linear_elastic(E=block.E, nu=0.4)
     x = block.scene(form).particles.x
     upper = (np.array(x)[:, 1] > 0).astype(int)
@@ -49,12 +50,12 @@ def fall(form: str, densities: tuple[float, float], dt: float = 0.01) -> float:
 
 
 def frequency(held: float, free: float) -> float:
-    """Of the first axial mode of the bar of two densities [rad/s]."""
+    """Angular frequency of the first axial mode of the bar of two densities [rad/s]."""
     scale = np.pi / 2 * np.sqrt(E / max(held, free)) / L
     a, b = (np.sqrt(rho / E) for rho in (held, free))
 
     def balance(omega: float) -> float:
-        """Velocity at the end, over that where the parts meet: cos cos - (b/a) sin sin = 0."""
+        """Zero at the frequency of a mode: cos cos - (b/a) sin sin."""
         first, second = omega * a * A, omega * b * (L - A)
         return float(np.cos(first) * np.cos(second) - b / a * np.sin(first) * np.sin(second))
 
@@ -65,7 +66,7 @@ def frequency(held: float, free: float) -> float:
 
 
 def mode(omega: float, held: float, free: float, x: Array) -> Array:
-    """Its displacement at x [m], 1 where the parts meet; the free part ends without stress."""
+    """Displacement of the mode at x [m], scaled to 1 where the parts meet."""
     k1, k2 = (omega * np.sqrt(rho / E) for rho in (held, free))
     inner = np.sin(k1 * x) / np.sin(k1 * A)
     outer = np.cos(k2 * (L - x)) / np.cos(k2 * (L - A))
@@ -73,7 +74,7 @@ def mode(omega: float, held: float, free: float, x: Array) -> Array:
 
 
 def vibration(form: str, held: float, free: float) -> float:
-    """Error of the period: what is left of the velocity in the mode after a quarter of it."""
+    """Error of the period, from the velocity in the mode after a quarter of a period."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=L / CELLS, cells=(CELLS + 2, 2))
     body = tawami.box(grid, (0, 0), (L, 2 * L / CELLS))
     x = body.x[:, 0]
@@ -96,7 +97,7 @@ def vibration(form: str, held: float, free: float) -> float:
 
 
 def attempts(short: bool) -> Iterator[Attempt]:
-    """Free fall and vibration, one density and two."""
+    """Free fall and vibration, with one density and with two."""
     forms = ("u_epsv_finite",) if short else ("u_epsv_finite", "u_bbar_finite", "u")
     every = (1e-9, 1e9) if short else (1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9)
     for form in forms:

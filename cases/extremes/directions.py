@@ -1,8 +1,8 @@
-"""Grids elsewhere, and body, supports and loads turned by quarter turns: the same answer.
+"""Grids far from the origin, and scenes turned by quarter turns: the solution must be the same.
 
-An L-shaped body of two materials with a particle or two out of line, held along part of an edge, loaded
-on another and by its weight. Turned by 90 degrees it meets the axes in another order; elsewhere its
-positions have fewer digits.
+The body is L-shaped, of two materials, held along an edge, and loaded on a part of another edge and by
+its weight. Turned by 90 degrees it meets the axes in another order. Far from the origin its positions
+have fewer digits.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ FORMS: dict[str, dict[str, Any]] = {
     "u_bbar_finite": {"form": "u_bbar_finite"},
 }
 BASES = ("quadratic_spline", "bilinear", "biquadratic")
-#: Edges and parts of them as they follow each other in turns to the left.
+#: Edges in the order of turns to the left.
 EDGES = ("bottom", "right", "top", "left")
 QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
-AWAY = (1e2, 1e4, 1e6, 1e8, 1e9, 1e10, 1e16)  # cells from (0, 0)
+AWAY = (1e2, 1e4, 1e6, 1e8, 1e9, 1e10, 1e16)  # distances from (0, 0) in cells
 
 
 def edge(name: str, turns: int) -> Any:
-    """An edge after turns to the left."""
+    """The edge that an edge becomes after quarter turns to the left."""
     return EDGES[(EDGES.index(name) + turns) % 4]
 
 
 def solved(form: str, basis: Any, turns: int = 0, away: float = 0.0) -> list[Array]:
-    """Displacement and stress of the particles, turned back."""
+    """Displacement and stress of the particles, turned back to the original axes."""
     turn = np.linalg.matrix_power(QUARTER, turns)
     side = N * H
     origin = np.array([away, -0.7 * away]) * H
@@ -60,7 +60,7 @@ def solved(form: str, basis: Any, turns: int = 0, away: float = 0.0) -> list[Arr
     )  # fmt: skip
     for component in "xy":
         scene.fix(edge("bottom", turns), component)
-    # on the part of the top that the body reaches
+    # the part of the top that the body reaches
     part = np.array([[2 / 3 * side, side], [side, side]])
     along = 1 if edge("top", turns) in ("left", "right") else 0
     ends = ((part - side / 2) @ turn.T + side / 2 + origin)[:, along]
@@ -83,9 +83,11 @@ def difference(form: str, basis: str, turns: int, away: float) -> float:
 
 
 def attempts(short: bool) -> Iterator[Attempt]:
-    """Turned: to round-off (1e-16 times a condition number of at most 1e6, and 10 for sums). Elsewhere:
-    positions are round-off of the distance, 2e-16 of it in cells, and strains at the slanted border
-    change by as much, 100 times at most.
+    """Each form and basis turned, and three forms far from the origin.
+
+    Turned scenes agree to round-off: 1e-16 times a condition number of at most 1e6, times 10 for
+    sums. Far away, positions are off by 2e-16 of the distance in cells; the strains at the slanted
+    border change by at most 100 times as much.
     """
     for basis in BASES[:1] if short else BASES:
         for form in list(FORMS)[::2] if short else FORMS:

@@ -1,8 +1,8 @@
-"""A long run of a small scene: memory that the process has taken and not given back.
+"""Long runs of small scenes: memory that the process does not release.
 
-Measured with the C library's own count of what is in use (mallinfo2, glibc), after the first steps have
-filled the caches of Python, PETSc, MUMPS and of the C library; over ten thousand steps also what the
-process holds (Linux), its open files, and the objects of PETSc that there are.
+Memory in use is that of the C library (mallinfo2, glibc), counted after the first steps have filled the
+caches of Python, PETSc, MUMPS and the C library. Over ten thousand steps the memory of the process
+(Linux), its open files and its PETSc objects are counted too.
 """
 
 from __future__ import annotations
@@ -22,21 +22,20 @@ from petsc4py import PETSc
 import tawami
 from cases.extremes import block
 from cases.extremes.attempt import Attempt, attempted
-from tawami.fem.environment import MAPS
 
 SUBJECT = "endurance"
-#: Bytes that a step may leave behind: a leaked vector of the grid has 5 kB, the smallest object of
-#: PETSc 1 kB. Patterns of the matrix that are larger than all before make it grow a little, late too.
+#: Bytes that a step may leave in use. A leaked vector of the grid has 5 kB, the smallest object of PETSc
+#: 1 kB. A matrix pattern that is larger than all before adds some bytes, even late in a run.
 BOUND = 500.0
 
 
-#: The same of the memory that the process holds, over the last half of a run. It grows by whole pages of
-#: 4 kB, and with the largest pattern so far.
+#: Bytes by which the process may grow in a step, over the last half of a run. It grows by pages of 4 kB,
+#: and with the largest matrix pattern so far.
 RESIDENT = 500.0
 
 
 class _Mallinfo(ctypes.Structure):
-    """What glibc says of its memory [bytes]."""
+    """Memory statistics of glibc [bytes]."""
 
     _fields_ = [
         (name, ctypes.c_size_t)
@@ -57,7 +56,7 @@ def in_use() -> int:
 
 
 def growth(form: str, first: int, steps: int, **options: Any) -> float:
-    """Bytes a step that are in use after `steps` steps and were not after the `first`."""
+    """Growth of the memory in use per step [bytes], over `steps` steps after the `first`."""
     motion = block.spinning(block.scene(form, **options), 2.0)
     start = 0
     for step in range(first + steps):
@@ -68,44 +67,47 @@ def growth(form: str, first: int, steps: int, **options: Any) -> float:
 
 
 class _Counter(ctypes.Structure):
-    """What PETSc keeps with a communicator: the second number is that of the objects on it."""
+    """Counters that PETSc attaches to a communicator."""
 
     _fields_ = [("tag", ctypes.c_int), ("objects", ctypes.c_int)]
 
 
-#: In place of a number of objects.
+#: Stands for an unknown number of objects.
 HIDDEN = -1
 
 
 def objects() -> int:
-    """Objects of PETSc that there are, on the communicators of all ranks and of this one alone; HIDDEN
-    where PETSc does not tell (Debian sid's 3.25).
+    """Number of PETSc objects on the communicators of all ranks and of this rank.
+
+    HIDDEN if PETSc does not tell (3.25 in Debian sid).
     """
-    (library,) = {line.split()[-1] for line in MAPS.read_text().splitlines() if "libpetsc" in line}
+    maps = Path("/proc/self/maps").read_text().splitlines()
+    (library,) = {line.split()[-1] for line in maps if "libpetsc" in line}
     try:
         key = ctypes.c_int.in_dll(ctypes.CDLL(library), "Petsc_Counter_keyval").value
     except ValueError:
         return HIDDEN
-    there = 0
+    count = 0
     for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
         probe = PETSc.Vec().createMPI((1, PETSc.DETERMINE), comm=comm)
-        there += _Counter.from_address(probe.comm.tompi4py().Get_attr(key)).objects - 1
+        count += _Counter.from_address(probe.comm.tompi4py().Get_attr(key)).objects - 1
         probe.destroy()
-    return int(there)
+    return int(count)
 
 
 def resident() -> int:
-    """Memory that the process holds [bytes]."""
+    """Resident memory of the process [bytes]."""
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
 def held(form: str, steps: int) -> tuple[float, str]:
-    """Bytes a step by which the process grows over the last half of a run: slope of the line of least
-    squares. The block hangs from points and vibrates, at finite strain it spins; its solutions are
-    dropped, and the records of `run`, which have about 600 bytes a step.
+    """Growth of the process per step [bytes] over the last half of a run, by linear regression.
+
+    The block hangs from points and vibrates; at finite strain it spins. Solutions are dropped, and
+    so are the records of `run`, about 600 bytes per step.
 
     Raises:
-        RuntimeError: In the last half there are more files or objects of PETSc than ever in the first.
+        RuntimeError: The last half has more open files or PETSc objects than the first half ever had.
     """
     scene = block.scene(form)
     if form in block.FINITE:
@@ -118,29 +120,28 @@ def held(form: str, steps: int) -> tuple[float, str]:
         motion = tawami.Dynamics(scene)
     found, every = list[tuple[int, int, int]](), max(steps // 40, 1)
 
-    def look(_: tawami.Solution) -> None:
+    def count(_: tawami.Solution) -> None:
         if motion.steps % every == 0:
             gc.collect()
             found.append((resident(), len(os.listdir("/proc/self/fd")), objects()))
 
     for part in range(every, steps + 1, every):
-        motion.run(end=1e-3 * part, dt=1e-3, each=look)
-    bytes_held, files, there = np.array(found).T
+        motion.run(end=1e-3 * part, dt=1e-3, each=count)
+    bytes_held, files, alive = np.array(found).T
     half = len(found) // 2
-    for name, counts in (("files", files), ("objects of PETSc", there)):
+    for name, counts in (("files", files), ("objects of PETSc", alive)):
         if counts[half:].max() > counts[:half].max():
             raise RuntimeError(f"{name}: {counts[:half].max()}, later {counts[half:].max()}")
     slope = np.polyfit(every * np.arange(half, len(found)), bytes_held[half:], 1)[0]
-    counted = (
-        "objects of PETSc not told" if there[-1] == HIDDEN else f"{there[-1]} objects of PETSc"
-    )
-    remark = f"{bytes_held[-1] / 2**20:.0f} MB, {files[-1]} files, {counted}"
+    counted = "unknown" if alive[-1] == HIDDEN else alive[-1]
+    remark = f"{bytes_held[-1] / 2**20:.0f} MB, {files[-1]} files, {counted} objects of PETSc"
     return max(float(slope), 0.0), remark
 
 
 def scenes(number: int, *, one_grid: bool = False) -> float:
-    """Bytes a scene that are in use after so many were made, stepped and dropped; each on a grid of its
-    own, or all on one.
+    """Growth of the memory in use per scene [bytes], for scenes that are made, stepped and dropped.
+
+    Each has a grid of its own, or all have the same.
     """
     shared = block.scene().grid if one_grid else None
 
@@ -156,7 +157,7 @@ def scenes(number: int, *, one_grid: bool = False) -> float:
 
 
 def attempts(short: bool) -> Iterator[Attempt]:
-    """Steps of each form and path, and scenes."""
+    """Many steps of each form and assembly, and many scenes."""
     first, steps = (100, 150) if short else (300, 1000)
     for form in ("u_epsv_finite",) if short else ("u_epsv_finite", "u_bbar_finite"):
         yield attempted(

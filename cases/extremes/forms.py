@@ -1,4 +1,4 @@
-"""The small-strain forms and the bases that subjects go over."""
+"""The small-strain forms and the bases that the subjects try."""
 
 from __future__ import annotations
 

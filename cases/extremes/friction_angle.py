@@ -1,9 +1,9 @@
-"""Friction angles from 0 to near 90 degrees without cohesion, Drucker-Prager and Mohr-Coulomb.
+"""Friction angles from 0 to 90 degrees without cohesion, Drucker-Prager and Mohr-Coulomb.
 
-References: between smooth plates that shorten a block and widen it by as much, the stresses come to the
-ratio (1 + sin phi)/(1 - sin phi), with both laws; dust that flies apart has no stress and keeps its
-kinetic energy; a pile that collapses has no state beyond the yield surface, as written out once more
-here, and no energy from nowhere.
+References: between smooth plates that shorten a block and widen it by the same amount, the ratio of
+the stresses becomes (1 + sin phi)/(1 - sin phi) with both laws; dust that flies apart has no stress
+and conserves its kinetic energy; a collapsing pile has no stress beyond the yield surface, which is
+evaluated here independently of the package, and no spurious energy.
 """
 
 from __future__ import annotations
@@ -25,29 +25,29 @@ Array = npt.NDArray[np.float64]
 LAWS = {"Drucker-Prager": tawami.drucker_prager, "Mohr-Coulomb": tawami.mohr_coulomb}
 P = 1.0e-3 * block.E  # pressure [Pa]
 G = 10.0
-#: Of states beyond the yield surface: the return is exact but for round-off. Of energy from nowhere:
-#: what grid and particles make of the work of the weight differs.
-YIELD, NOWHERE = 1e-9, 0.02
+#: Bound of the yield function: the return is exact up to round-off. Bound of the spurious energy:
+#: grid and particles compute the work of the weight differently.
+YIELD, SPURIOUS = 1e-9, 0.02
 
 
 def law(name: str, phi: float, **options: Any) -> tawami.Material:
-    """Angles below 1.6 degrees are meant."""
+    """A law without cohesion; angles below 1.6 degrees are intended."""
     elastic = tawami.linear_elastic(E=block.E, nu=0.3)
     return LAWS[name](elastic, phi=phi, tiny_angle=phi < 1.6, **options)
 
 
 def biaxial(name: str, phi: float) -> float:
-    """Error of the ratio of the stresses that the plates give at the end, as a share.
+    """Relative error of the ratio of the stresses between the plates at the end.
 
-    One cell of bilinear functions, all of them held by the plates: without dilatancy the same strain
-    everywhere is no stable state at large angles (Rudnicki and Rice 1975).
+    The block is one cell with bilinear functions, all of them held by the plates. Without dilatancy a
+    homogeneous strain is unstable at large angles (Rudnicki and Rice 1975).
     """
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=1.0, cells=(1, 1))
     body = tawami.box(grid, (0, 0), (1, 1))
     scene = tawami.Scene(grid, body, law(name, phi), form="u_epsv", basis="bilinear")
     scene.particles.stress[:, :3] = -P
     ratio = (1 + np.sin(np.radians(phi))) / (1 - np.sin(np.radians(phi)))
-    # in plane strain the third stress creeps to its place in many elastic strains of the strength
+    # in plane strain the out-of-plane stress needs many times the elastic strain to reach its limit
     strain = 40 * P * ratio / block.E
     scene.fix("left", "x")
     scene.fix("bottom", "y")
@@ -59,7 +59,7 @@ def biaxial(name: str, phi: float) -> float:
 
 
 def beyond(name: str, phi: float, stress: Array) -> float:
-    """The most that a state is beyond its yield surface, over the largest stress."""
+    """Largest value of the yield function, over the largest stress."""
     s = np.radians(phi)
     mean = stress[:, :3].mean(axis=1)
     if name == "Mohr-Coulomb":
@@ -75,7 +75,7 @@ def beyond(name: str, phi: float, stress: Array) -> float:
 
 
 def dust(name: str, phi: float, form: str) -> float:
-    """Loss of kinetic energy of a block that flies apart, and its largest stress over E."""
+    """The larger of the loss of kinetic energy of a block that flies apart, and its stress over E."""
     rate = np.array([[3.0, 1.0], [0.0, 2.0]])
     scene = block.scene(form, law=law(name, phi))
     motion = tawami.Dynamics(scene, velocity=np.array(scene.particles.x) @ rate.T)
@@ -88,7 +88,7 @@ def dust(name: str, phi: float, form: str) -> float:
 
 
 def pile(name: str, phi: float, form: str) -> float:
-    """States beyond the yield surface and energy from nowhere, over their bounds: 1 is what is borne."""
+    """The larger of yield function and spurious energy of a pile, over its bound; the limit is 1."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=block.H, cells=(40, 8))
     body = tawami.box(grid, (0, 0), (8 * block.H, 4 * block.H))
     options: dict[str, Any] = {"alpha": 0.01} if form == "u_epsv_finite" else {}
@@ -104,23 +104,23 @@ def pile(name: str, phi: float, form: str) -> float:
     motion.run(0.4, 0.004, each=lambda solution: states.append(beyond(name, phi, solution.stress)))
     work = G * float(motion.mass @ (y - np.array(scene.particles.x)[:, 1]))
     e = motion.energies
-    nowhere = (e.kinetic + e.elastic + e.dissipated) / (start + work) - 1
-    return float(max(max(states) / YIELD, nowhere / NOWHERE))
+    spurious = (e.kinetic + e.elastic + e.dissipated) / (start + work) - 1
+    return float(max(max(states) / YIELD, spurious / SPURIOUS))
 
 
 def attempts(short: bool) -> Iterator[Attempt]:
-    """Both laws; angles to the ends of what they take."""
+    """Both laws, with angles up to their limits."""
     angles = (0.0, 5.0, 50.0) if short else (0.0, 0.1, 5.0, 20.0, 35.0, 50.0, 70.0, 89.0, 90.0)
     for name in LAWS:
         for phi in angles:
-            # round-off, times the ratio of the stresses: 1e4 at 89 degrees
+            # round-off times the ratio of the stresses, which is 1e4 at 89 degrees
             yield attempted(
                 SUBJECT, f"{name}, {phi:g} degrees, biaxial", 1e-8,
                 partial(biaxial, name, phi),
             )  # fmt: skip
         for form in block.FINITE[:1] if short else block.FINITE:
             for phi in (30.0,) if short else (5.0, 30.0, 50.0):
-                # no stress, but for what Newton's tolerance leaves of the trial states
+                # no stress, up to Newton's tolerance of the trial states
                 yield attempted(
                     SUBJECT, f"{name}, {phi:g} degrees, {form}, dust", 1e-6,
                     partial(dust, name, phi, form),

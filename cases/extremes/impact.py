@@ -1,8 +1,8 @@
-"""An elastic block hits a wall, at 1e-3 of the speed of its pressure waves to beyond that speed.
+"""An elastic block hits a wall with 1e-6 to 100 times the speed of its pressure waves.
 
-References: momentum equals the sum of what the wall gives; kinetic and elastic energy never grow; the
-friction of the wall is at most mu times its push; the block is not beyond the wall, and leaves it no
-faster than it came. Steps that fail are halved; a run that ends so ends with its sentence.
+References: the change of momentum equals the impulse of the wall; kinetic plus elastic energy never
+grows; the friction of the wall is at most mu times its normal force; the block leaves the wall no faster
+than it came. Steps that fail are halved; a run that fails must end with an error message.
 """
 
 from __future__ import annotations
@@ -23,13 +23,14 @@ NU = 0.3
 LAW = tawami.linear_elastic(E=block.E, nu=NU)
 #: Speed of pressure waves [m/s].
 WAVES = float(np.sqrt((LAW.bulk_modulus + 4 / 3 * LAW.shear_modulus) / block.RHO))
-#: Of the momentum: a reaction is the force at the end of a step, and their sum is of first order in dt,
-#: 96 steps for six ways of the wave through the block. Energy and friction have no such excuse.
+#: Bound of the momentum: a reaction is the force at the end of a step, so the sum of impulses is of
+#: first order in dt, with 96 steps for six passages of the wave. Energy and friction have no such
+#: error.
 BALANCE, EXACT = 0.05, 1e-6
 
 
 def hit(form: str, speed: float, friction: float) -> float:
-    """The largest of the errors over its bound: 1 is what is borne."""
+    """The largest error over its bound; the limit is 1."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=block.H, cells=(40, 16))
     body = tawami.box(grid, (0.5, 0.0), (0.5 + block.SIDE, block.SIDE))
     options: dict[str, Any] = {"alpha": 0.01} if form == "u_epsv_finite" else {}
@@ -42,18 +43,18 @@ def hit(form: str, speed: float, friction: float) -> float:
     impulse, highest = np.zeros(2), [energy]
     last = 0.0
 
-    def keep(solution: tawami.Solution) -> None:
+    def record(solution: tawami.Solution) -> None:
         nonlocal impulse, last
         impulse = impulse + (motion.time - last) * solution.reaction("bottom")
         last = motion.time
         highest.append(motion.kinetic_energy + motion.elastic_energy)
 
     dt = min(0.25 * block.H / WAVES, 0.1 * block.H / down)
-    motion.run(6 * block.SIDE / WAVES, dt, each=keep)
+    motion.run(6 * block.SIDE / WAVES, dt, each=record)
     change = motion.linear_momentum - start
     size = np.linalg.norm(start)
     if not impulse[1] > size * 0.5:
-        return np.inf  # it never met the wall
+        return np.inf  # the block did not reach the wall
     return float(max(
         np.abs(change - impulse).max() / size / BALANCE,
         (max(highest) / energy - 1) / EXACT,
@@ -63,7 +64,7 @@ def hit(form: str, speed: float, friction: float) -> float:
 
 
 def attempts(short: bool) -> Iterator[Attempt]:
-    """Speeds, with and without friction."""
+    """Each speed, with and without friction."""
     every: tuple[float, ...] = (1e-6, 1e-3, 0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0)
     some = (1e-3, 1.0, 10.0)
     for form in block.FINITE[:1] if short else block.FINITE:

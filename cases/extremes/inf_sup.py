@@ -1,11 +1,12 @@
-"""The inf-sup constant of each basis and body, with the stabilisations and without.
+"""The inf-sup constant of each basis and body, without and with the stabilisations.
 
-beta^2 is the smallest singular value, 0 of a constant pressure apart, of S q = lambda M q with
+beta^2 is the smallest singular value, except the 0 of a constant pressure, of S q = lambda M q with
 
     S = B A^-1 B^T + alpha T      A: 2 mu dev eps(w) : dev eps(u),  B: q div u,  T: the stabilisation
 
-all sums over the particles, A in mu and q in p/mu, M the mass of q: a number without units. Taken apart
-from tangents of `u_epsv` at two alphas, in which the field is eps_v = p/K.
+All sums are over the particles. A is divided by mu, q is p/mu, and M is the mass matrix of q, so
+that beta is a number without units. The blocks are taken from tangents of `u_epsv` at two values of
+alpha; the field of this form is eps_v = p/K.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import scipy.linalg as la
 from mpi4py import MPI
 
 import tawami
+from cases.common.tangent import reduced_tangent
 from cases.extremes.attempt import Attempt, attempted
 from cases.extremes.forms import BASES
 
@@ -28,12 +30,18 @@ Array = npt.NDArray[np.float64]
 STABILISATIONS = ("laplacian", "residual_based", "projection")
 BODIES = ("filled", "cut", "random")
 ALPHAS = (0.0, 0.01, 0.1, 1.0, 10.0)
-MU, K = 1.0, 3.0  # any will do: they are taken out again
+MU, K = 1.0, 3.0  # any values; they cancel
 
 
 @dataclass(frozen=True)
 class Blocks:
-    """A, B, T (for alpha = 1, its coupling to u apart) and M, dense, on the free functions."""
+    """The dense matrices A, B, T and M on the free functions.
+
+    Attributes:
+        A, B, M: As above.
+        T_u: Coupling of the stabilisation to u, for alpha = 1.
+        T: The rest of the stabilisation, for alpha = 1.
+    """
 
     A: Array
     B: Array
@@ -42,20 +50,21 @@ class Blocks:
     M: Array
 
     def schur(self, alpha: float) -> Array:
-        """S."""
+        """The matrix S."""
         return (self.B + alpha * self.T_u) @ np.linalg.solve(self.A, self.B.T) + alpha * self.T
 
     @property
     def coercive_to(self) -> float:
-        """The largest alpha at which (u, p) -> u A u + alpha p T_u u + alpha p T p is not negative: what
-        makes an unsymmetric stabilisation stable for any load.
+        """The largest alpha for which u A u + alpha p T_u u + alpha p T p is not negative for any u, p.
+
+        Up to this value an unsymmetric stabilisation is stable for any load.
         """
         back = np.linalg.pinv(self.T, rcond=1e-10, hermitian=True)
         product = self.T_u.T @ back @ self.T_u
         return float(4 / la.eigh(product, self.A, eigvals_only=True)[-1])
 
     def constant(self, alpha: float) -> float:
-        """beta, of all pressures but constant ones."""
+        """beta over all pressures except constant ones."""
         root = la.cholesky(self.M)
         half = la.solve_triangular(root, self.schur(alpha), trans="T")
         scaled = la.solve_triangular(root, half.T, trans="T").T
@@ -71,12 +80,13 @@ def scene_of(
     """A unit square, n x n cells.
 
     Args:
-        body: 'filled', held on all sides, 3 x 3 Gauss points; held on the left and at the bottom: 'cut',
-            its right end in a cell and its top slanted, or 'random', 9 n^2 particles anywhere.
+        body: 'filled': 3 x 3 Gauss points, held on all sides. The others are held on the left and at the
+            bottom: 'cut' has its right end inside a cell and a slanted top, 'random' has 9 n^2 particles
+            at random positions.
         n: Cells along a side.
-        basis: Of the displacement.
-        alpha: Of the stabilisation.
-        stabilisation: As `u_epsv` has it.
+        basis: Basis of the displacement.
+        alpha: Stabilisation.
+        stabilisation: Kind of stabilisation of `u_epsv`.
     """
     more = 1 if body == "cut" else 0
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=1 / n, cells=(n + more, n + more))
@@ -101,15 +111,9 @@ def scene_of(
 def blocks(body: str, n: int, basis: str, stabilisation: str) -> Blocks:
     """The matrices of a body."""
     step = 0.1
-    tangents = []
-    for alpha in (0.0, step):
-        scene = scene_of(body, n, basis, alpha, stabilisation)
-        selection = scene.reduction().selection
-        tangent = scene.tangent(np.zeros(scene.num_coefficients))
-        tangents.append((selection.T @ tangent @ selection).toarray())
-    layout, unknowns = scene.configuration.domain.layout, scene.reduction().unknowns
-    of_u = unknowns < layout.num_displacement
-    plain, change = tangents[0], (tangents[1] - tangents[0]) / step
+    plain, of_u = reduced_tangent(scene_of(body, n, basis, 0.0, stabilisation))
+    stabilised, _ = reduced_tangent(scene_of(body, n, basis, step, stabilisation))
+    change = (stabilised - plain) / step
     return Blocks(
         A=plain[of_u][:, of_u] / MU,
         B=plain[~of_u][:, of_u] / K,
@@ -120,31 +124,33 @@ def blocks(body: str, n: int, basis: str, stabilisation: str) -> Blocks:
 
 
 SUBJECT = "inf-sup"
-#: Constant of the stable pair of Taylor and Hood, biquadratic - bilinear, on a square; printed here with
-#: the rows 'biquadratic, filled: alpha = 0'.
+#: Constant of the stable pair of Taylor and Hood, biquadratic - bilinear, on a square. The rows
+#: 'biquadratic, filled: alpha = 0' print it.
 TAYLOR_HOOD = 0.43
 
 
 def constants(
     body: str, basis: str, name: str, alpha: float, cells: tuple[int, ...]
 ) -> list[float]:
-    """On finer and finer grids."""
+    """The inf-sup constants on finer and finer grids."""
     return [blocks(body, n, basis, name).constant(alpha) for n in cells]
 
 
 def in_words(values: list[float], cells: tuple[int, ...]) -> str:
-    """They, with their grids."""
+    """The constants and their grids as text."""
     numbers = ", ".join(f"{value:.3g}" for value in values)
     return f"beta = {numbers} at {', '.join(map(str, cells))} cells"
 
 
-def stabilised(
+def shortfall(
     body: str, basis: str, name: str, alpha: float, cells: tuple[int, ...]
 ) -> tuple[float, str]:
-    """How far the constant falls below what it must have on every grid: that of Taylor and Hood, or
-    sqrt(alpha) where the term alone controls a pressure (Dohrmann and Bochev 2004).
+    """Relative shortfall of the constant below its floor on every grid.
+
+    The floor is the constant of Taylor and Hood, or sqrt(alpha) where the term alone controls a pressure
+    (Dohrmann and Bochev 2004).
     """
-    if name == "residual_based":  # so that the warning of solve() is heard
+    if name == "residual_based":  # solve() issues the warning
         scene_of(body, cells[-1], basis, alpha, name).solve()
     values = constants(body, basis, name, alpha, cells)
     floor = min(TAYLOR_HOOD, alpha**0.5)
@@ -152,8 +158,10 @@ def stabilised(
 
 
 def bare(body: str, basis: str, cells: tuple[int, ...]) -> tuple[float, str]:
-    """alpha = 0. Biquadratic: how far it falls below the constant of Taylor and Hood. The others are
-    known to be unstable: their constant on the finest grid over that of alpha = 0.01.
+    """The constant without stabilisation.
+
+    For the biquadratic basis it is the shortfall below the constant of Taylor and Hood. The other bases
+    are known to be unstable: for them it is the constant on the finest grid over that with alpha = 0.01.
     """
     values = constants(body, basis, "laplacian", 0.0, cells)
     words = in_words(values, cells)
@@ -164,15 +172,17 @@ def bare(body: str, basis: str, cells: tuple[int, ...]) -> tuple[float, str]:
 
 
 def coercive(basis: str, cells: tuple[int, ...]) -> tuple[float, str]:
-    """The largest alpha that the form admits over the one up to which it is coercive."""
+    """The largest alpha that the form accepts, over the largest for which it is coercive."""
     limit = min(blocks("filled", n, basis, "residual_based").coercive_to for n in cells)
     form = tawami.Form.load("u_epsv").parameters["alpha"]
     return form["maximum"]["residual_based"] / limit, f"coercive up to alpha = {limit:.3g}"
 
 
 def attempts(short: bool) -> Iterator[Attempt]:
-    """Each basis, body and stabilisation; the bounds allow 30 % below a floor that does not know h, and
-    half of the healthy constant where none is expected.
+    """Each basis, body and stabilisation.
+
+    The bounds allow 30 % below a floor that does not depend on h, and half of the stable constant where
+    the basis is unstable.
     """
     cells = (4, 8) if short else (4, 8, 16)
     for body in BODIES[:1] if short else BODIES:
@@ -183,12 +193,12 @@ def attempts(short: bool) -> Iterator[Attempt]:
             for name in STABILISATIONS:
                 for alpha in (a for a in ALPHAS if a > 0):
                     if name == "residual_based" and alpha > 0.1:
-                        continue  # refused: see the subject alpha
+                        continue  # rejected, see the subject alpha
                     yield attempted(
                         SUBJECT,
                         f"{basis}, {body}, {name}: alpha = {alpha:g}",
                         0.3,
-                        lambda o=body, b=basis, s=name, a=alpha: stabilised(o, b, s, a, cells),
+                        lambda o=body, b=basis, s=name, a=alpha: shortfall(o, b, s, a, cells),
                     )
     for basis in BASES:
         setting = f"{basis}, filled, residual_based: coercive"

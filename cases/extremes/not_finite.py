@@ -1,7 +1,7 @@
-"""NaN or infinity in any array of the particles between two static steps, and in what a script passes.
+"""NaN and infinity in any array of the particles between two static steps, and in input of a script.
 
-Refused with a sentence that names array and particle, before anything is solved; mended, the scene goes
-on as if nothing had happened. Positions, numbers and materials cannot be written at all.
+An error message must name the array and the particle before anything is solved. Once corrected, the
+scene must continue as if nothing had happened. Positions, numbers and materials are read-only.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ HISTORY = ("plastic_strain", "dilatancy")
 
 
 def scene_of(form: str = "u_epsv", **options: Any) -> tawami.Scene:
-    """A strip of Drucker-Prager material that yields a little under its weight."""
+    """A strip of Drucker-Prager material that yields slightly under its weight."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(8, 4))
     body = tawami.box(grid, grid.origin, grid.upper)
     law = tawami.drucker_prager(tawami.linear_elastic(E=1e6, nu=0.3), phi=30.0, c=1e3, psi=5.0)
@@ -45,7 +45,7 @@ def array_of(scene: tawami.Scene, name: str) -> npt.NDArray[np.float64]:
 
 
 def after_a_step() -> tawami.Scene:
-    """A scene with the loads of the next step."""
+    """A scene after one step, with the loads of the next."""
     scene = scene_of()
     scene.solve()
     scene.gravity((0.02, -0.22))
@@ -53,7 +53,7 @@ def after_a_step() -> tawami.Scene:
 
 
 def spoiled(name: str, value: float) -> float:
-    """A value written into an array; the sentence has to name it."""
+    """Write a value into an array; the error message must name array and particle."""
     scene = after_a_step()
     array_of(scene, name)[PARTICLE] = value
     try:
@@ -62,15 +62,15 @@ def spoiled(name: str, value: float) -> float:
         sentence = rf"^{name}: \d+ entries are not finite; .* at particle {PARTICLE}\b"
         if not re.search(sentence, str(error)):
             raise RuntimeError(
-                f"it does not name {name} and particle {PARTICLE}: {error}"
+                f"the message does not name {name} and particle {PARTICLE}: {error}"
             ) from error
         raise
     return 0.0
 
 
 def mended(name: str, value: float) -> float:
-    """Largest difference of any array from that of a scene that was never spoiled."""
-    whole, scene = after_a_step(), after_a_step()
+    """Largest difference from an undisturbed scene after the array was corrected."""
+    undisturbed, scene = after_a_step(), after_a_step()
     array = array_of(scene, name)
     before = array[PARTICLE].copy()
     array[PARTICLE] = value
@@ -79,13 +79,13 @@ def mended(name: str, value: float) -> float:
     except tawami.InputError:
         array[PARTICLE] = before
     scene.solve()
-    whole.solve()
+    undisturbed.solve()
     names = [*READ_ONLY, *STATIC, *HISTORY]
-    return max(float(np.abs(array_of(scene, n) - array_of(whole, n)).max()) for n in names)
+    return max(float(np.abs(array_of(scene, n) - array_of(undisturbed, n)).max()) for n in names)
 
 
 def passed(value: float) -> dict[str, Callable[[], object]]:
-    """The same value in what a driver script passes."""
+    """Calls of a driver script that pass the value, by name."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(8, 4))
     body, law = tawami.box(grid, (0, 0), (2, 1)), tawami.linear_elastic(E=1.0, nu=0.3)
     bad = np.array(body.volume)
@@ -125,7 +125,7 @@ def passed(value: float) -> dict[str, Callable[[], object]]:
 
 
 def attempts(short: bool) -> Iterator[Attempt]:
-    """Each array and value; a mended scene is the same to the bit."""
+    """Each array, call and value. A corrected scene agrees bit for bit."""
     for value in VALUES[:1] if short else VALUES:
         for name in READ_ONLY:
             yield attempted(
@@ -133,7 +133,7 @@ def attempts(short: bool) -> Iterator[Attempt]:
                 f"{value} in {name}",
                 None,
                 lambda n=name, v=value: spoiled(n, v),
-                refusals=(ValueError,),  # NumPy's: assignment destination is read-only
+                refusals=(ValueError,),  # of NumPy: assignment destination is read-only
             )
         for name in (*STATIC, *HISTORY):
             yield attempted(

@@ -1,9 +1,9 @@
-"""A static load a thousand times too large.
+"""A static load that is a thousand times too large.
 
-A linear body bears it. A perfectly plastic one cannot, and a bar of Hencky's material has a largest dead
-load: held from the sides, tau = M ln(lambda), so that the load per area M ln(lambda) / lambda is at most
-M/e, at lambda = e. What is refused leaves the particles as they were; a ramp leaves them in the last
-equilibrium and says how far it came.
+A linear body carries it. A perfectly plastic body cannot. A bar of Hencky material has a largest dead
+load: between smooth sides tau = M ln(lambda), so that the load per area M ln(lambda) / lambda is at most
+M/e, at lambda = e. An error must leave the particles unchanged. A ramp must leave them in the last
+equilibrium and report the load that was reached.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from cases.verification.cantilever import beam, mpm
 
 SUBJECT = "overload"
 E, NU = 1e6, 0.3  # [Pa], [-]
-M = E * (1 - NU) / ((1 + NU) * (1 - 2 * NU))  # stiffness of a bar held from the sides [Pa]
+M = E * (1 - NU) / ((1 + NU) * (1 - 2 * NU))  # stiffness of a bar between smooth sides [Pa]
 FORMS = ("u", "u_bbar", "u_epsv", "u_p")
 FINITE = ("u_finite", "u_bbar_finite", "u_epsv_finite")
 
 
 def linear(form: str, factor: float) -> float:
-    """Change of the cantilever's answer over the load."""
+    """Change of the cantilever's solution divided by the load."""
     answers = []
     for f in (1.0, factor):
         scene = mpm.build(form, "clamped", 4)
@@ -39,7 +39,7 @@ def linear(form: str, factor: float) -> float:
 
 
 def plastic(law: tawami.Material, factor: float) -> float:
-    """A cantilever that yields: it must be refused, with nothing changed."""
+    """A cantilever that yields: the load must be rejected, with the particles unchanged."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(8, 4))
     scene = tawami.Scene(grid, tawami.box(grid, grid.origin, grid.upper), law)
     scene.fix("left", "x")
@@ -65,7 +65,7 @@ def _elastic() -> tawami.Material:
 
 
 def bar(form: str, load: float, **options: Any) -> tawami.Scene:
-    """A bar of 4 x 1 cells between smooth walls, room for five times its length, a dead load [Pa]."""
+    """A bar of 4 x 2 cells between smooth sides under a dead load [Pa], in a grid five times as long."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=1.0, cells=(20, 2))
     body = tawami.box(grid, (0.0, 0.0), (4.0, 2.0), per_axis=3)
     scene = tawami.Scene(grid, body, _elastic(), form=form, **options)
@@ -77,7 +77,7 @@ def bar(form: str, load: float, **options: Any) -> tawami.Scene:
 
 
 def at_once(form: str, factor: float) -> float:
-    """Hencky's bar, all of the load in one step: refused, with nothing changed."""
+    """The whole load on Hencky's bar in one step: rejected, with the particles unchanged."""
     scene = bar(form, factor * 1e-2 * M)
     with untouched(scene):
         scene.solve()
@@ -85,7 +85,7 @@ def at_once(form: str, factor: float) -> float:
 
 
 def by_ramp(form: str, factor: float) -> tuple[float, str]:
-    """Hencky's bar by a ramp: by how much the load that it reached goes beyond M/e."""
+    """A load beyond M/e on Hencky's bar by a ramp: excess of the reached load over M/e, as a share."""
     load = factor * 1e-2 * M
     scene = bar(form, load)
     try:
@@ -94,14 +94,14 @@ def by_ramp(form: str, factor: float) -> tuple[float, str]:
         sentence = " ".join([str(error), *getattr(error, "__notes__", [])])
         reached = re.search(r"at ([\d.e+-]+) of the load", sentence)
         if reached is None:
-            raise RuntimeError(f"it does not say how far it came: {sentence}") from error
+            raise RuntimeError(f"the message does not tell the load reached: {sentence}") from error
         part = float(reached[1]) * load / (M / e)
-        return max(0.0, part - 1), f"refused at {part:.2f} of M/e"
-    raise RuntimeError("a load beyond M/e was borne")
+        return max(0.0, part - 1), f"rejected at {part:.2f} of M/e"
+    raise RuntimeError("a load beyond M/e was accepted")
 
 
 def ramped(form: str, load: float) -> tuple[float, str]:
-    """Hencky's bar by a ramp: mean error of the stress in the half that is not loaded."""
+    """A load on Hencky's bar by a ramp: mean error of the stress in the half that is not loaded."""
     scene = bar(form, load)
     steps = tawami.ramp(scene, 0.05)
     stretch = closed_form(load)
@@ -111,7 +111,7 @@ def ramped(form: str, load: float) -> tuple[float, str]:
 
 
 def closed_form(load: float) -> float:
-    """lambda, the smaller one: M ln(lambda) / lambda = load, by Newton's method."""
+    """The smaller solution lambda of M ln(lambda) / lambda = load, by Newton's method."""
     stretch = 1.0
     for _ in range(100):
         stretch -= (np.log(stretch) - load / M * stretch) / (1 / stretch - load / M)
@@ -119,7 +119,7 @@ def closed_form(load: float) -> float:
 
 
 def inside_out() -> float:
-    """A bar pressed together by a load that turns particles inside out at once."""
+    """A bar compressed by a load that turns particles inside out in one step."""
     scene = bar("u_epsv_finite", -10 * M)
     with untouched(scene):
         scene.solve()
@@ -129,11 +129,11 @@ def inside_out() -> float:
 def attempts(short: bool) -> Iterator[Attempt]:
     """Each law and form.
 
-    Perfectly plastic: the wall shears off at a mean traction of c at most, by the upper bound theorem
-    of limit analysis; that is 50 times the load. A linear body: round-off times a condition number of
-    1e6. Hencky's bar by a ramp: a moved body is integrated over cells that it cuts anywhere, which
-    costs a spinning disc 0.11 of its mean stress (README, Motion) and B-bar 0.22 in plain tension
-    (`tests/field/test_patch.py`). Beyond M/e nothing may be borne, but for as much.
+    Perfectly plastic body: by the upper bound theorem of limit analysis it shears off at the wall at a
+    mean traction of at most c, which is 50 times the load. Linear body: round-off times a condition
+    number of 1e6. Hencky's bar by a ramp: a moved body is integrated over cells that it cuts anywhere;
+    this costs a spinning disc 0.11 of its mean stress (README, Motion) and B-bar 0.22 in plain tension
+    (`tests/field/test_patch.py`). The load reached may exceed M/e by the same share.
     """
     for form in FORMS[::2] if short else FORMS:
         yield attempted(SUBJECT, f"elastic, {form}: 1e3", 1e-9, lambda f=form: linear(f, 1e3))

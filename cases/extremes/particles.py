@@ -1,8 +1,9 @@
-"""Particles in any number and any place: a patch test that no quadrature spoils.
+"""Particles in any number and at any place: a patch test that does not depend on quadrature.
 
-The body carries the stress -C : eps at the start, and its border is displaced by u = eps x: then no
-stress is left anywhere, and internal forces vanish for every arrangement of particles. Whether a loaded
-body is also right is a matter of how well the particles integrate: plain tension.
+The body starts with the stress -C : eps, and its border is displaced by u = eps x. Then no stress
+remains anywhere, and the internal forces vanish for every arrangement of particles. Whether a
+loaded body is also right depends on how well the particles integrate: this is tried in plain
+tension.
 """
 
 from __future__ import annotations
@@ -27,18 +28,18 @@ GRADIENT = np.array([[2e-3, -1e-3], [4e-4, -1.5e-3]])
 
 
 def even(per_axis: int) -> Array:
-    """Positions in a cell, evenly."""
+    """Evenly spaced positions in a unit cell."""
     t = (np.arange(per_axis) + 0.5) / per_axis
     return np.column_stack([np.tile(t, per_axis), np.repeat(t, per_axis)])
 
 
 def edges() -> Array:
-    """On corners and the middles of edges; neighbours have theirs at the same places."""
+    """Positions on corners and middles of edges; neighbouring cells share them."""
     return np.array([(a, b) for a in (0, 0.5, 1) for b in (0, 0.5, 1) if (a, b) != (0.5, 0.5)])
 
 
 def in_cells(of_cell: Callable[[int], Array]) -> tawami.Body:
-    """A body of such particles in all cells."""
+    """A body with the particles `of_cell(number)` in each cell."""
     nx, ny = CELLS
     x = [(of_cell(c) + np.array([c % nx, c // nx])) * H for c in range(nx * ny)]
     volume = [np.full(len(part), H * H / len(part)) for part in x]
@@ -46,7 +47,7 @@ def in_cells(of_cell: Callable[[int], Array]) -> tawami.Body:
 
 
 def arrangements() -> dict[str, tawami.Body]:
-    """Bodies of the same rectangle."""
+    """The same rectangle with different particles, by name."""
     random = np.random.default_rng(0)
     bodies = {f"{k * k} in each cell": in_cells(lambda c, k=k: even(k)) for k in range(1, 9)}
     bodies["9 within 1/10 of a corner"] = in_cells(lambda c: 0.1 * even(3))
@@ -61,14 +62,14 @@ def arrangements() -> dict[str, tawami.Body]:
 
 
 def scene_of(body: tawami.Body, form: str, basis: Any) -> tawami.Scene:
-    """The rectangle, without supports."""
+    """The rectangle as a scene without supports."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=H, cells=CELLS)
     law = tawami.linear_elastic(E=E, nu=NU)
     return tawami.Scene(grid, body, law, basis=basis, **FORMS[form])
 
 
 def patch(body: tawami.Body, form: str, basis: str) -> tuple[float, str]:
-    """Stress that is left, and error of the displacement, relative; what else there is to say."""
+    """The larger of the remaining stress and the displacement error, relative; a remark."""
     scene = scene_of(body, form, basis)
     div = np.trace(GRADIENT)
     strain = np.array([GRADIENT[0, 0], GRADIENT[1, 1], 0.0]) - div / 3
@@ -96,10 +97,11 @@ def tension(body: tawami.Body, form: str, basis: str) -> float:
 
 
 def midpoint(body: tawami.Body, form: str, basis: str) -> float:
-    """Bound in tension: how much too small the midpoint rule with k points along an axis makes the
-    integral of the last function at a border, (1 - s)^2 of splines (1/(4 k^2)), (1 - s)(1 - 2 s) of
-    biquadratic ones (1/k^2); bilinear ones it has exactly. B-bar misses 0.22 and 0.42 by any rule
-    (`tests/field/test_patch.py`).
+    """Bound in tension: the error of the midpoint rule for the last function at a border.
+
+    With k points along an axis the integral of (1 - s)^2 (splines) is too small by 1/(4 k^2), that of
+    (1 - s)(1 - 2 s) (biquadratic) by 1/k^2; bilinear functions are integrated exactly. B-bar is off by
+    0.22 and 0.42 with any rule (`tests/field/test_patch.py`).
     """
     k = np.sqrt(len(body.x) / (CELLS[0] * CELLS[1]))
     of_rule = {"quadratic_spline": 1 / (4 * k**2), "biquadratic": 1 / k**2, "bilinear": 1e-9}
@@ -110,7 +112,7 @@ def midpoint(body: tawami.Body, form: str, basis: str) -> float:
 def attempts(short: bool) -> Iterator[Attempt]:
     """Each arrangement, basis and form.
 
-    The patch test's bound is Newton's tolerance; most are at round-off.
+    The bound of the patch test is Newton's tolerance; most errors are at round-off.
     """
     for name, body in list(arrangements().items())[:: 4 if short else 1]:
         for basis in BASES:

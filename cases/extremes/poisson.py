@@ -1,4 +1,4 @@
-"""Poisson's ratio up to 0.5 on the cantilever, beside its closed form."""
+"""Poisson's ratio up to 0.5 on the cantilever, compared with its closed form."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ METHODS = {
     "u_epsv, alpha = 0": {"method": "u_epsv", "alpha": 0.0},
     "u_p": {"method": "u_p", "alpha": 0.1},
 }
-#: 1 - 2 nu; 0 is nu = 0.5 exactly.
+#: Values of 1 - 2 nu; 0 is nu = 0.5 exactly.
 COMPRESSIBILITY = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14, 0.0)
 N = 8  # cells over the height
 
@@ -35,13 +35,13 @@ def errors(name: str, one_minus_2nu: float, n: int = N) -> tuple[float, float]:
 
 
 def measured(name: str, one_minus_2nu: float) -> tuple[float, str]:
-    """The larger error, and the deflection's in words."""
+    """The larger error, and the error of the deflection as a remark."""
     of_stress, of_deflection = errors(name, one_minus_2nu)
     return max(of_stress, of_deflection), f"deflection {100 * of_deflection:.2g} % off"
 
 
 def enclosed() -> float:
-    """A body of nu = 0.5 held all around: its pressure is free by a constant."""
+    """A body with nu = 0.5 held on all sides: a constant pressure is undetermined."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(4, 4))
     body = tawami.box(grid, grid.origin, grid.upper, per_axis=3, gauss=True)
     law = tawami.linear_elastic(E=1.0, nu=0.5)
@@ -57,8 +57,8 @@ def enclosed() -> float:
 def attempts(short: bool) -> Iterator[Attempt]:
     """Each form at each Poisson's ratio.
 
-    The bound is twice the error at nu = 0.3, where nothing locks: an error that does not depend on nu is
-    what free of locking means (Babuska and Suri 1992).
+    The bound is twice the error at nu = 0.3, where no form locks. A method is free of locking if its
+    error does not depend on nu (Babuska and Suri 1992).
     """
     for name in METHODS:
         bound = 2 * max(errors(name, 0.4))

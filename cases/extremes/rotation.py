@@ -1,8 +1,8 @@
-"""A hundred turns of a free block, and a block that flies over many lines of the grid.
+"""A hundred turns of a free block, and a block that flies across many grid lines.
 
-The block spins with rho omega^2 R^2/E = 1e-3, R half its side, 40 steps a turn. Angular momentum,
-linear momentum, energy and shape are compared with those of the start. The trapezoidal rule itself
-takes up to twice (omega dt)^2/4 = 1.2 % of sum m x x v (`cases.verification.spinning_disc` says why).
+The block spins with rho omega^2 R^2/E = 1e-3, where R is half its side, in 40 steps per turn. Angular
+momentum, linear momentum, energy and shape are compared with the start. The trapezoidal rule itself
+takes up to twice (omega dt)^2/4 = 1.2 % of sum m x x v (see `cases.verification.spinning_disc`).
 """
 
 from __future__ import annotations
@@ -19,28 +19,27 @@ from cases.extremes.attempt import Attempt, Measured, attempted
 
 SUBJECT = "rotation, flight"
 Array = npt.NDArray[np.float64]
-STEPS = 40  # a turn
+STEPS = 40  # per turn
 SPIN = float(np.sqrt(1e-3 * block.E / block.RHO) / (block.SIDE / 2))  # [rad/s]
-#: Of the angular momentum: the rule's 1.2 %, and what the transfer takes a turn (README: 8e-5 in ten
-#: turns of a disc of 12 cells over its diameter; this block has four over its side).
+#: Bounds of the angular momentum: 1.2 % of the trapezoidal rule, and the loss of the transfer in a turn
+#: (README: 8e-5 in ten turns of a disc with 12 cells over its diameter; this block has four).
 MOMENTUM, TRANSFER = 0.012, 1e-4
-#: Of the energy, which should not grow at all. Forms with eps_v load particles, turn by turn, in ways
-#: that no function of the grid sees; the stress of that grows like the turns, its energy like their
-#: square. A limit of the method (README, Limits), beyond which a warning comes.
+#: Bound of the energy, which should not grow at all. In forms with eps_v the particles gradually
+#: accumulate stresses that no function of the grid resists. These grow like the number of turns, their
+#: energy like its square. This is a limit of the method (README, Limits); a warning is issued beyond it.
 ENERGY = 0.01
-#: Of the shape, over half the side: 2e-4 a turn at first, half of it later, of particles between the
-#: functions of four cells.
+#: Bound of the shape, over half the side: measured are 2e-4 in the first turns and half of it later.
 SHAPE = 5e-4
 
 
 def spinning(form: str, turns: int) -> Measured:
-    """The largest of the errors over their bounds: 1 is what is borne."""
+    """The largest error over its bound; the limit is 1."""
     law = tawami.linear_elastic(E=block.E, nu=0.3)
     scene = block.scene(form, law=law, cells=(8, 8), per_axis=3, shift=(0.13, 0.07))
     motion = block.spinning(scene, SPIN)
     begin, dt = np.array(scene.particles.x), 2 * np.pi / SPIN / STEPS
     about = begin.mean(axis=0)
-    # the middle of the block is not the origin: it has to stay where it is
+    # the block spins about its middle, which is not the origin
     motion.velocity[:] -= motion.linear_momentum / block.MASS
     angular, energy = motion.angular_momentum(about), motion.kinetic_energy
     highest = 0.0
@@ -65,30 +64,30 @@ def spinning(form: str, turns: int) -> Measured:
 
 
 def shape_error(before: Array, now: Array) -> float:
-    """Largest distance [m] from the rigid motion that is nearest (Kabsch 1976)."""
+    """Largest distance [m] from the nearest rigid motion (Kabsch 1976)."""
     a, b = before - before.mean(axis=0), now - now.mean(axis=0)
     left, _, right = np.linalg.svd(b.T @ a)
     return float(np.linalg.norm(b - a @ (left @ right).T, axis=1).max())
 
 
 def flying(form: str, step: float) -> float:
-    """Free flight over 60 cells, `step` of them in a step: errors of way and velocity, stress over E."""
+    """Fly freely over 60 cells, `step` of them in a step: errors of path and velocity, stress over E."""
     scene = block.scene(form, cells=(128, 12), shift=(-58.3, 0.21))
     velocity = np.array([1.0, 0.02])
     motion = tawami.Dynamics(scene, velocity=velocity)
     before, dt = np.array(scene.particles.x), step * block.H
     for _ in range(round(60 / step)):
         motion.step(dt)
-    way = np.array(scene.particles.x) - before - motion.time * velocity
+    error = np.array(scene.particles.x) - before - motion.time * velocity
     return float(max(
-        np.abs(way).max() / motion.time,
+        np.abs(error).max() / motion.time,
         np.abs(motion.velocity - velocity).max(),
         np.abs(scene.particles.stress).max() / block.E,
     ))  # fmt: skip
 
 
 def attempts(short: bool) -> Iterator[Attempt]:
-    """One turn to a hundred; flights in short and in long steps."""
+    """One to a hundred turns, and flights with short and long steps."""
     for form in block.FINITE[:1] if short else ("u_epsv_finite", "u_finite"):
         for turns in (1, 3) if short else (1, 10, 100) if form == "u_epsv_finite" else (1, 30):
             yield attempted(
@@ -97,7 +96,7 @@ def attempts(short: bool) -> Iterator[Attempt]:
             )  # fmt: skip
     for form in block.FINITE[:1] if short else block.FINITE:
         for step in (0.31, 7.3) if short else (0.31, 1.0, 7.3, 30.0):
-            # round-off of the places, of the size of the grid
+            # round-off of positions, relative to the size of the grid
             yield attempted(
                 SUBJECT, f"{form}, flies 60 cells by {step:g} a step", 1e-12,
                 partial(flying, form, step),

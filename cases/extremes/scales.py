@@ -1,7 +1,7 @@
-"""Bodies of 1e-6 m to 1e4 m, and other units: the same numbers once units are taken out again.
+"""Bodies of 1e-6 m to 1e4 m, and other units: the results must agree once the units are removed.
 
-A beam under an edge load; a strip of Drucker-Prager material pressed beyond yield; a dynamic step at
-finite strain. Everything is multiplied by powers of the units of length, stress and time.
+A beam under a load on its edge, a strip of Drucker-Prager material beyond yield, and dynamic steps at
+finite strain. All data are multiplied by powers of the units of length, stress and time.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SUBJECT = "scales and units"
 
 @dataclass(frozen=True)
 class Units:
-    """How many of the new unit a metre, a pascal and a second are."""
+    """Values of a metre, a pascal and a second in the new units."""
 
     metre: float = 1.0
     pascal: float = 1.0
@@ -31,7 +31,7 @@ class Units:
 
     @property
     def kg_per_m3(self) -> float:
-        """Of a density: Pa s2/m2."""
+        """Value of a kg/m3 in the new units, as Pa s2/m2."""
         return self.pascal * self.second**2 / self.metre**2
 
 
@@ -47,12 +47,12 @@ SETTINGS = {
     "soft: 1e-6 of the stiffness": Units(pascal=1e-6),
     "stiff: 1e9 of the stiffness": Units(pascal=1e9),
 }
-#: Forms and nu; without a field for the volume the condition number grows with K/mu.
+#: Forms and Poisson's ratios. Without a field for the volume the condition number grows with K/mu.
 ELASTIC = {"u": 0.3, "u_bbar": 0.3, "u_epsv": 0.4999, "u_p": 0.4999}
 
 
 def strip(units: Units, law: tawami.Material, form: str, **options: Any) -> tawami.Scene:
-    """2 x 1 unit lengths, 8 x 4 cells, held on the left."""
+    """A strip of 2 m x 1 m, 8 x 4 cells, held on the left."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25 * units.metre, cells=(8, 4))
     scene = tawami.Scene(grid, tawami.box(grid, grid.origin, grid.upper), law, form=form, **options)
     scene.fix("left", "x")
@@ -67,7 +67,7 @@ def numbers(scene: tawami.Scene, units: Units) -> list[Array]:
 
 
 def beam(units: Units, form: str) -> list[Array]:
-    """An elastic beam."""
+    """Displacement, stress and reaction of an elastic beam."""
     law = tawami.linear_elastic(E=3e6 * units.pascal, nu=ELASTIC[form])
     scene = strip(units, law, form)
     scene.traction("right", (0.0, -1e3 * units.pascal))
@@ -77,7 +77,7 @@ def beam(units: Units, form: str) -> list[Array]:
 
 
 def pressed(units: Units) -> list[Array]:
-    """Drucker-Prager beyond yield."""
+    """Displacement, stress and plastic strain of Drucker-Prager material beyond yield."""
     elastic = tawami.linear_elastic(E=1e6 * units.pascal, nu=0.3)
     law = tawami.drucker_prager(elastic, phi=30.0, c=1e3 * units.pascal, psi=5.0)
     scene = strip(units, law, "u_epsv")
@@ -85,12 +85,12 @@ def pressed(units: Units) -> list[Array]:
     scene.traction("right", (-3.3e3 * units.pascal, 0.0))
     scene.solve()
     strain = np.array(scene.particles.history("plastic_strain"))
-    assert (strain > 0).any()  # otherwise this would be the beam again
+    assert (strain > 0).any()  # otherwise this is only the beam again
     return [*numbers(scene, units), strain]
 
 
 def dropped(units: Units) -> list[Array]:
-    """Six steps of a cantilever that is let go under its weight."""
+    """Displacement, stress and velocity of a cantilever after six steps under its weight."""
     law = tawami.linear_elastic(E=1e6 * units.pascal, nu=0.3)
     scene = strip(units, law, "u_epsv_finite", density=1e3 * units.kg_per_m3)
     scene.gravity((0.0, -10 * units.metre / units.second**2))
@@ -106,7 +106,7 @@ def difference(run: Callable[[Units], list[Array]], units: Units) -> float:
 
 
 def attempts(short: bool) -> Iterator[Attempt]:
-    """Each problem in each setting; 1e-9 is the demand, round-off times the condition number is less."""
+    """Each problem in each setting. The bound 1e-9 exceeds round-off times the condition number."""
     runs: dict[str, Callable[[Units], list[Array]]] = {
         f"beam, {form}": lambda units, form=form: beam(units, form) for form in ELASTIC
     }

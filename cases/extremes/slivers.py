@@ -1,7 +1,7 @@
-"""A last row of cells that the body fills to 1e-2 ... 1e-12: a block in plain tension along it.
+"""A block in tension along a last row of cells that it fills to a fraction of 1e-2 to 1e-12.
 
-The sliver is down to 1 of 10^12 parts of a cell: it must not change the answer of the cells beside it,
-nor be singular without a sentence. From 1e-9 of a cell on it lies on the border of the cell below.
+The sliver must not change the solution in the cells next to it. A singular tangent must be reported by
+an error message. From 1e-9 of a cell on the sliver lies on the border of the cell below.
 """
 
 from __future__ import annotations
@@ -33,26 +33,26 @@ BASES = ("quadratic_spline", "bilinear", "biquadratic")
 
 
 def body_of(grid: tawami.Grid, width: float) -> tawami.Body:
-    """N x N full cells with Gauss points, and a row with `width` of each cell filled, likewise."""
+    """N x N full cells with Gauss points, and a row of cells of which `width` is filled, likewise."""
     block = tawami.box(grid, (0.0, 0.0), (N * H, N * H), per_axis=3, gauss=True)
-    below = block.x[:, 1] < H  # the lowest row, to be copied above and pressed together
-    x = block.x[below] * [1.0, width] + [0.0, N * H]
+    lowest = block.x[:, 1] < H  # a row to copy to the top and to compress
+    x = block.x[lowest] * [1.0, width] + [0.0, N * H]
     return tawami.Body(
-        np.concatenate([block.x, x]), np.concatenate([block.volume, width * block.volume[below]])
+        np.concatenate([block.x, x]), np.concatenate([block.volume, width * block.volume[lowest]])
     )
 
 
 def stress_error(form: str, basis: Any, width: float) -> tuple[float, str]:
-    """Largest error of the stress of the particles over the tension."""
+    """Largest error of the stress outside the sliver, over the tension."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=H, cells=(N, N + 2))
     body = body_of(grid, width)
     law = tawami.linear_elastic(E=E, nu=NU)
     scene = tawami.Scene(grid, body, law, basis=basis, **FORMS[form])
     scene.fix("left", "x")
     scene.fix("bottom", "y")
-    # the edge of the grid is loaded over the full height of its cells: the body's own border is not
+    # a traction acts on whole cells of the edge, so the sliver is loaded by forces on its last cell
     scene.traction("right", (PULL, 0.0), between=(0.0, N * H))
-    load = np.abs(body.x[:, 0] - N * H) < H  # the sliver's share, by its own last cell
+    load = np.abs(body.x[:, 0] - N * H) < H
     scene.load(load & (body.x[:, 1] > N * H), (PULL * width * H, 0.0))
     solution = scene.solve()
     exact = PULL * np.array([1.0, 0.0, NU, 0.0])
@@ -64,10 +64,10 @@ def stress_error(form: str, basis: Any, width: float) -> tuple[float, str]:
 def attempts(short: bool) -> Iterator[Attempt]:
     """Each form and basis at each width.
 
-    The sliver's share of the load is spread over its last cell instead of its end. That is `width` of
-    the load of a cell, misplaced within a cell, and by Saint-Venant does no more than a few times as
-    much to the cell beside it: 5 times is allowed, and round-off. B-bar misses tension by 0.22 and 0.43
-    with splines and biquadratic functions whatever the width (`tests/field/test_patch.py`).
+    The load of the sliver is spread over its last cell instead of its end: `width` of the load of a
+    cell, misplaced within a cell. By Saint-Venant the error in the neighbouring cell is at most a
+    few times as large; the bound is 5 times, plus round-off. B-bar is off by 0.22 and 0.43 in
+    tension with splines and biquadratic functions, for any width (`tests/field/test_patch.py`).
     """
     for basis in BASES[:1] if short else BASES:
         for form in list(FORMS)[::3] if short else FORMS:

@@ -1,4 +1,4 @@
-"""A map of stability and accuracy: form x nu x alpha, on the cantilever with the support 'exact'."""
+"""A map of stability and accuracy over form, nu and alpha, for the cantilever with support 'exact'."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import tawami
 from cases.common.figure import save
 from cases.verification.cantilever import beam, mpm
 
-#: Columns of the figure: what stands above, form, and its options.
+#: Columns of the figure: title, form, and its options.
 FORMS: dict[str, tuple[str, dict[str, str]]] = {
     "u": ("u", {}),
     "u_bbar": ("u_bbar", {}),
@@ -38,7 +38,7 @@ N = 8  # cells over the height
 
 @dataclass(frozen=True)
 class Point:
-    """One computation; NaN where it was refused, alpha None where the form has none."""
+    """One computation: NaN if it was rejected, alpha None if the form has none."""
 
     form: str
     one_minus_2nu: float
@@ -49,7 +49,7 @@ class Point:
 
 
 def point(name: str, one_minus_2nu: float, alpha: float | None) -> Point:
-    """Errors against the closed form, and the condition number."""
+    """Compute the errors against the closed form, and the condition number."""
     form, options = FORMS[name]
     nu = (1 - one_minus_2nu) / 2
     given: dict[str, Any] = dict(options) if alpha is None else {**options, "alpha": alpha}
@@ -64,8 +64,8 @@ def point(name: str, one_minus_2nu: float, alpha: float | None) -> Point:
 
 
 def points(short: bool) -> list[Point]:
-    """All of the map, or its corners."""
-    with warnings.catch_warnings():  # the map shows what they say
+    """Compute the whole map, or every third point in each direction."""
+    with warnings.catch_warnings():  # the map shows these errors
         warnings.simplefilter("ignore", tawami.LockingWarning)
         warnings.simplefilter("ignore", tawami.ParameterWarning)
         return _points(short)
@@ -81,7 +81,7 @@ def _points(short: bool) -> list[Point]:
 
 
 def draw(found: Sequence[Point], path: Path) -> None:
-    """A row of panels a quantity, a column a form; hatched where it is refused."""
+    """Draw the map: one row of panels per quantity, one column per form, hatched where rejected."""
     figure, panels = plt.subplots(
         len(ROWS), len(FORMS), figsize=(15, 10), layout="constrained",
         gridspec_kw={"width_ratios": [0.35, 0.35, 1, 1, 1, 1]},
@@ -97,13 +97,13 @@ def draw(found: Sequence[Point], path: Path) -> None:
         row[0].set_ylabel(r"$1 - 2\nu$ [-]")
     figure.suptitle(
         f"Cantilever, {2 * N} x {N} cells, 2 x 2 particles, support 'exact': errors against the closed "
-        "form and condition; hatched: refused with a sentence"
+        "form and condition; hatched: rejected with an error message"
     )
     save(figure, path)
 
 
 def _panel(axes: Any, mine: Sequence[Point], attribute: str, limits: tuple[float, float]) -> Any:
-    """1 - 2 nu downwards over alpha."""
+    """Draw a panel: 1 - 2 nu downwards over alpha."""
     rows = list(dict.fromkeys(p.one_minus_2nu for p in mine))
     columns = list(dict.fromkeys(p.alpha for p in mine))
     values = np.array([getattr(p, attribute) for p in mine]).reshape(len(rows), len(columns))

@@ -1,12 +1,12 @@
-"""Stretch by 100 % and more, compression to a tenth and less, at finite strain.
+"""Stretch by 100 % and more, and compression to a tenth and less, at finite strain.
 
-Two ways, for edges of the grid stay where they are and move a body by a quarter of a cell at most:
+Edges of the grid do not move, and move a body by a quarter of a cell at most. So there are two cases:
 
-coasting  A block flies apart, or together, with the velocity (A - I) X, so heavy that its stress does
-          not hold it: F = I + t (A - I), the same everywhere. The stress is the closed form of F.
-hanging   A column between smooth sides, held at its foot, under its weight, up or down. The weight of
-          what is above, w (1 - Y), is tau(stretch)/stretch there. Hencky's law bears at most
-          (K + 4/3 mu)/e, at a stretch of e: more has no equilibrium.
+coasting  A block flies apart, or together, with the velocity (A - I) X. It is so heavy that its stress
+          does not slow it down: F = I + t (A - I) everywhere. The stress is the closed form of F.
+hanging   A column between smooth sides is held at its foot and loaded by its weight, upward or downward.
+          The weight of the part above, w (1 - Y), is tau(stretch)/stretch at Y. Hencky's law carries at
+          most (K + 4/3 mu)/e, at a stretch of e. There is no equilibrium beyond this load.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from cases.extremes.attempt import Attempt, attempted
 SUBJECT = "stretch"
 Array = npt.NDArray[np.float64]
 LAWS = {"Hencky": tawami.linear_elastic, "neo-Hookean": tawami.neo_hookean}
-#: Of the column, along its height of 1 m; particles per cell and axis, so many that there are two where
-#: it is twice as long.
+#: Cells over the height of the column, 1 m, and particles per cell and axis: two remain in a cell
+#: where the column is stretched to twice its length.
 CELLS, PER_AXIS = 16, 4
-#: Of `coasting`: moving particles are kept 1e-5 of a cell off its sides.
+#: Bound of `coasting`: moving particles stay 1e-5 of a cell away from its sides.
 COASTING = 1e-5
-#: Of `hanging`: the rms error of two particles a cell in tension is 1.3 and 2 % where a body ends
-#: (README, Limits), and stretched twice as long it has two; B-bar misses the patch test by up to 22 %.
+#: Bounds of `hanging`: with two particles per cell the rms error in tension is 1.3 and 2 % at the end of
+#: a body (README, Limits). B-bar misses the patch test by up to 22 %.
 HANGING = {"u_epsv_finite": 0.05, "u_finite": 0.05, "u_bbar_finite": 0.22}
 
 
 def stress(law: str, K: float, mu: float, stretches: Array) -> Array:
-    """Principal Kirchhoff stresses of principal stretches (three), written out once more [Pa]."""
+    """Principal Kirchhoff stresses [Pa] of three principal stretches, independently of the package."""
     if law == "Hencky":
         e = np.log(stretches)
         return np.asarray(2 * mu * (e - e.mean()) + K * e.sum())
@@ -50,11 +50,11 @@ def stress(law: str, K: float, mu: float, stretches: Array) -> Array:
 def coasting(
     form: str, law: str, nu: float, stretches: tuple[float, float], steps: int = 40
 ) -> float:
-    """Largest error of the elastic strain (mean stress over K, deviator over 2 mu) and of place."""
+    """Largest relative error of the elastic strain (mean stress/K, deviator/2 mu) and the positions."""
     made = LAWS[law](E=1.0, nu=nu)
     n = 2 * int(np.ceil(2 * max(1.0, *stretches))) + 4
-    # E t^2/(rho L^2) = 1e-20: the stress does nothing to the motion, even through functions that hold
-    # little mass (the mean of B-bar is tested at the centre of a cell, wherever its particles are)
+    # E t^2/(rho L^2) = 1e-20: the stress does not affect the motion, even through functions with little
+    # mass (the mean of B-bar is tested at the centre of a cell, wherever its particles are)
     scene = block.scene(form, law=made, cells=(n, n), density=1e20 / block.SIDE**2, tolerance=1e-10)
     begin, rate = np.array(scene.particles.x), np.diag(stretches) - np.eye(2)
     motion = tawami.Dynamics(scene, velocity=begin @ rate)
@@ -71,14 +71,14 @@ def coasting(
 
 
 def hanging(form: str, law: str, nu: float, most: float) -> float:
-    """rms error of the stress of the particles, over its largest, and of the height."""
+    """The larger of the rms error of the stress, over the largest stress, and the height error."""
     made = LAWS[law](E=1.0, nu=nu)
 
     def nominal(stretch: float) -> float:
         both = np.array([1.0, stretch, 1.0])
         return float(stress(law, made.bulk_modulus, made.shear_modulus, both)[1] / stretch)
 
-    weight = nominal(most)  # of the whole column, upwards
+    weight = nominal(most)  # of the whole column, upward
     y, stretch = (np.arange(1000) + 0.5) / 1000, np.empty(1000)
     for k, share in enumerate(weight * (1 - y)):
         stretch[k] = brentq(
@@ -91,13 +91,13 @@ def hanging(form: str, law: str, nu: float, most: float) -> float:
     exact = np.interp(start, y, stretch) * weight * (1 - start)
     found = scene.particles.stress[:, 1]
     top = start > start.max() - 1e-9
-    way = np.interp(start[top][0], y, np.cumsum(stretch) / 1000)
-    place = abs(scene.particles.x[top, 1].mean() / way - 1)
+    expected = np.interp(start[top][0], y, np.cumsum(stretch) / 1000)
+    place = abs(scene.particles.x[top, 1].mean() / expected - 1)
     return float(max(np.sqrt(np.mean((found - exact) ** 2)) / np.abs(exact).max(), place))
 
 
 def column(made: tawami.Material, form: str, height: float, weight: float) -> tawami.Scene:
-    """1 m high, between smooth sides, held at its foot; its weight as if it were 1 m wide [N]."""
+    """A column of 1 m between smooth sides, held at its foot; weight [N] per metre of width."""
     grid = tawami.Grid(
         MPI.COMM_WORLD, origin=(0, 0), h=1 / CELLS,
         cells=(2, int(np.ceil(CELLS * max(1.0, height))) + 4),
@@ -113,7 +113,7 @@ def column(made: tawami.Material, form: str, height: float, weight: float) -> ta
 
 
 def without_equilibrium(form: str) -> float:
-    """1.1 times what a Hencky column bears."""
+    """A weight of 1.1 times the largest that a Hencky column carries."""
     made = tawami.linear_elastic(E=1.0, nu=0.3)
     most = (made.bulk_modulus + 4 / 3 * made.shear_modulus) / np.e
     tawami.ramp(column(made, form, 3.0, 1.1 * most), 0.1)
@@ -121,7 +121,7 @@ def without_equilibrium(form: str) -> float:
 
 
 def attempts(short: bool) -> Iterator[Attempt]:
-    """Each finite form and law, compressible or not."""
+    """Each finite form and law, compressible and nearly incompressible."""
     forms = block.FINITE[:1] if short else block.FINITE
     shapes = {"2 x 1": (2.0, 1.0), "0.1 x 1": (0.1, 1.0)}
     if not short:

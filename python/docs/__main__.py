@@ -1,9 +1,9 @@
-"""The site: pages are put together in results/docs and made into results/docs/html.
+"""Build the site: assemble the pages in results/docs and convert them to results/docs/html.
 
 python python/docs [--links]
 
-Pages are copied; what stands in double braces is generated, and code marked `{run}` is run
-(`executed`). Warnings are errors.
+Pages are copied. Names in double braces are replaced by generated text, and code marked `{run}` is run
+(`executed`). Warnings are errors, and so is a page that loads something from the web.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from sphinx.cmd.build import main as sphinx
 
 
 def build(links: bool) -> int:
-    """Put the pages together and run Sphinx; its exit code."""
+    """Assemble the pages and run Sphinx; return the exit code."""
     start = perf_counter()
     try:
         names = pages.assemble(executed.RESULTS)
@@ -31,6 +31,9 @@ def build(links: bool) -> int:
     options = ["-W", "--keep-going", "-q", "-c", str(Path(__file__).parent)]
     options += ["-d", f"{source}/doctrees", source]
     code = sphinx(["-b", "html", *options, f"{source}/html"])
+    for reference in pages.loaded_from_web(executed.RESULTS / "html"):
+        print(f"docs: {reference} would be loaded from the web", file=sys.stderr)
+        code = 1
     if code == 0 and links:
         code = sphinx(["-b", "linkcheck", *options, f"{source}/links"])
     minutes = (perf_counter() - start) / 60
@@ -40,7 +43,7 @@ def build(links: bool) -> int:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python python/docs", description=__doc__)
-    parser.add_argument("--links", action="store_true", help="check links to the web too")
+    parser.add_argument("--links", action="store_true", help="also check links to the web")
     with contextlib.suppress(KeyboardInterrupt):
         sys.exit(build(parser.parse_args().links))
     sys.exit(130)

@@ -1,10 +1,10 @@
-"""What goes with what, found out by trying: form x law x time x ranks, each on a small body.
+"""Run combinations of form, law, time and ranks on a small body, and table which of them work.
 
-python python/docs/compatibility.py            on this many ranks: JSON of every cell, for `table`
+python python/docs/compatibility.py            on the present ranks: JSON of every cell, for `table`
 
-Static: a block on a smooth floor is pressed down by 1 % in four steps; floor and top must give opposite
-forces. Dynamic: a block stretches in free fall for three steps; its momentum must be m (v + g t). A
-law with history must have flowed. On two ranks the same numbers must come out.
+Static: a block on a smooth floor is compressed by 1 % in four steps; the forces of floor and top must be
+opposite. Dynamic: a block stretches in free fall for three steps; its momentum must be m (v + g t). A
+law with history must have flowed. Two ranks must give the same numbers.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ FORMS: dict[str, dict[str, Any]] = {
 
 
 def _numpy_law() -> tawami.NumpyLaw:
-    """Linear elasticity once more."""
+    """Linear elasticity in NumPy."""
     K, mu = E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU))
     one = np.array([1.0, 1.0, 1.0, 0.0])
     C = K * np.outer(one, one) + mu * (np.diag([2.0, 2.0, 2.0, 1.0]) - 2 / 3 * np.outer(one, one))
@@ -74,14 +74,14 @@ LAWS: dict[str, Callable[[], Any]] = {
 
 @dataclass(frozen=True)
 class Cell:
-    """What became of a combination.
+    """Result of a combination.
 
     Attributes:
-        form, law, time: Of `FORMS`, `LAWS`, `TIMES`.
-        ranks: On how many.
-        error: Class of the exception; empty where it works.
-        says: Its sentence.
-        numbers: Forces or momenta, mean of the stress: what other ranks must find too.
+        form, law, time: Keys of `FORMS` and `LAWS`, one of `TIMES`.
+        ranks: Number of ranks.
+        error: Class of the exception; empty if the combination works.
+        says: Message of the exception.
+        numbers: Forces or momenta, mean of the stress, to compare with other numbers of ranks.
     """
 
     form: str
@@ -94,10 +94,10 @@ class Cell:
 
 
 def attempt(form: str, law: str, time: str) -> Cell:
-    """Try one combination on the present ranks.
+    """Run one combination on the present ranks.
 
     Raises:
-        AssertionError: It went through, and the numbers are wrong.
+        AssertionError: It ran, but the numbers are wrong.
     """
     ranks = MPI.COMM_WORLD.size
     try:
@@ -145,7 +145,7 @@ def _fall(scene: tawami.Scene, law: str) -> tuple[float, ...]:
 
 
 def _positions(scene: tawami.Scene) -> Any:
-    """Of the body, in its order, on every rank."""
+    """Positions of all particles of the body, in its order, on every rank."""
     low = 2 * CELL
     return tawami.box(scene.grid, (low, low), (low + 1, low + 1), per_axis=3, gauss=True).x
 
@@ -157,10 +157,10 @@ def _check_flow(scene: tawami.Scene, law: str) -> None:
 
 
 def difference(cells: Sequence[Cell]) -> float:
-    """Largest difference, relative, of what the ranks found for a combination.
+    """Largest relative difference of a combination between numbers of ranks.
 
     Raises:
-        AssertionError: One refused what the other did not, or with another sentence.
+        AssertionError: One rejected the combination and the other did not, or with another message.
     """
     largest = 0.0
     groups: dict[tuple[str, str, str], list[Cell]] = {}
@@ -176,7 +176,7 @@ def difference(cells: Sequence[Cell]) -> float:
 
 
 def table(cells: Sequence[Cell], time: str, footnotes: dict[str, int]) -> str:
-    """A table of Markdown: forms down, laws across; sentences of refusals become footnotes."""
+    """Markdown table of forms by laws; messages of rejected combinations become footnotes."""
     mine = {(c.form, c.law): c for c in cells if c.time == time}
     forms = list(dict.fromkeys(form for form, _ in mine))
     laws = list(dict.fromkeys(law for _, law in mine))
@@ -195,28 +195,30 @@ def _entry(cell: Cell, footnotes: dict[str, int]) -> str:
         return "works"
     says = cell.says.replace(f"form '{FORMS[cell.form]['form']}'", "form '...'", 1)
     number = footnotes.setdefault(f"`{cell.error}`: {says}", len(footnotes) + 1)
-    return f"refused {number}"
+    return f"rejected {number}"
 
 
 def page(cells: Sequence[Cell], seconds: Mapping[int, float]) -> str:
-    """The tables with their footnotes, and what they took."""
+    """The tables with their footnotes and the time they took."""
     footnotes: dict[str, int] = {}
     text = [f"## {time.capitalize()}\n\n{table(cells, time, footnotes)}" for time in TIMES]
-    text.append("## Refusals\n\n" + "\n".join(f"{n}. {says}" for says, n in footnotes.items()))
+    text.append(
+        "## Rejected combinations\n\n" + "\n".join(f"{n}. {says}" for says, n in footnotes.items())
+    )
     works = sum(not cell.error for cell in cells)
     took = " and ".join(f"{s:.0f} s on {n} rank{'s' * (n > 1)}" for n, s in seconds.items())
     several = sum(cell.ranks > 1 for cell in cells)
     text.append(
-        f"{len(cells)} were tried, {several} of them on 2 ranks (each form, without options); {works} "
-        f"work, {len(cells) - works} are refused; {took}. What 1 and 2 ranks find differs by "
-        f"{difference(cells):.1e} at most, and refusals are the same."
+        f"{len(cells)} combinations were run, {several} of them on 2 ranks (each form without options): "
+        f"{works} work, {len(cells) - works} are rejected. This took {took}. Results of 1 and 2 ranks "
+        f"differ by at most {difference(cells):.1e}, and they reject the same combinations."
     )
     return "\n\n".join(text) + "\n"
 
 
 def main() -> None:
-    """Every cell; on several ranks those of the forms as they are, without options."""
-    logging.disable(logging.INFO)  # the compilation of forms is talkative
+    """Run all combinations; on several ranks only forms without options."""
+    logging.disable(logging.INFO)  # compiling forms logs much
     forms = [f for f in FORMS if MPI.COMM_WORLD.size == 1 or FORMS[f] == {"form": f}]
     cells = [attempt(f, law, time) for f in forms for law in LAWS for time in TIMES]
     if MPI.COMM_WORLD.rank == 0:

@@ -1,7 +1,7 @@
-"""What pages show is run: cases, and code marked `{run}`. What has not changed is not run again.
+"""Run the cases and the code marked `{run}` that pages show, unless nothing has changed.
 
-A record holds the fingerprint of all that a run read; it is written last. A run that fails is an error
-of `make docs`.
+A record holds the fingerprint of all files that a run read; it is written last. A run that fails is an
+error of `make docs`.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ from typing import Any
 from sources import ROOT
 
 RESULTS = ROOT / "results" / "docs"
-#: A block of code that is run: the class after `{run}` is that of the error it must end with.
+#: A block of code that is run; after `{run}` the class of the error that it must raise, if any.
 BLOCK = re.compile(r"^```\{run\} *(\w*)\n(.*?)^```\n", flags=re.DOTALL | re.MULTILINE)
-#: What every run reads.
+#: Files that every run reads.
 SHARED = ("python/tawami/**/*.py", "forms/*.py", "rust/**/*.rs", "Cargo.lock")
 MINUTES = 60
 #: Cases that only print.
 WITHOUT_FILES = ("self_weight", "projection", "writing")
-#: Options of cases that run for more than three minutes without.
+#: Options of cases that would run for more than three minutes.
 SHORTER = {"elastica": ("--steps", "40"), "footing": ("--cells", "8")}
 
 
 class RunError(Exception):
-    """A run that failed, or did not end as it should."""
+    """A run that failed, or did not raise the expected error."""
 
 
 @dataclass(frozen=True)
 class Output:
-    """What a run left: its text, its pictures, how long it took [s]."""
+    """Printed text, pictures and duration [s] of a run."""
 
     text: str
     pictures: list[Path]
@@ -53,7 +53,7 @@ class Output:
 
 
 def fingerprint(patterns: Iterable[str], *more: str) -> str:
-    """Of the files that patterns name, from the top of the repository, and of texts."""
+    """Fingerprint of the files that match patterns, from the top of the repository, and of texts."""
     total = hashlib.sha256("\0".join(more).encode())
     for path in sorted({path for pattern in patterns for path in ROOT.glob(pattern)}):
         if path.is_file():
@@ -61,8 +61,8 @@ def fingerprint(patterns: Iterable[str], *more: str) -> str:
     return total.hexdigest()
 
 
-def kept(folder: Path, mark: str, work: Callable[[], str]) -> Output:
-    """What `work` prints and draws into a folder, from the last time if the mark is still that."""
+def cached(folder: Path, mark: str, work: Callable[[], str]) -> Output:
+    """Output of `work`, which draws into a folder; of the last run if that had the same fingerprint."""
     record = folder / "record.json"
     with contextlib.suppress(OSError, ValueError):
         old = json.loads(record.read_text())
@@ -80,10 +80,10 @@ def kept(folder: Path, mark: str, work: Callable[[], str]) -> Output:
 def command(
     words: Sequence[str], folder: Path, what: str, environment: Mapping[str, str] = os.environ
 ) -> str:
-    """What a command prints.
+    """Standard output of a command.
 
     Raises:
-        RunError: It ended with another code than 0, or not at all.
+        RunError: Its exit code is not 0, or it does not end.
     """
     own = {**environment, "MPLBACKEND": "Agg", "PYTHONPATH": str(ROOT)}
     print(f"docs: {what}", file=sys.stderr, flush=True)
@@ -106,14 +106,12 @@ def case(room: str, name: str) -> Output:
     options = [] if name in WITHOUT_FILES else ["--results", str(folder)]
     words = [sys.executable, "-m", module, *SHORTER.get(name, ()), *options]
     mark = fingerprint((*SHARED, *own), *SHORTER.get(name, ()))
-    output = kept(folder, mark, lambda: command(words, ROOT, f"python -m {module}"))
+    output = cached(folder, mark, lambda: command(words, ROOT, f"python -m {module}"))
     return Output(output.text.replace(f"{ROOT}/", ""), output.pictures, output.seconds)
 
 
 def blocks(page: str, text: str) -> str:
-    """A page with its `{run}` blocks replaced by code and what it prints; pictures they drew are in
-    `executed/PAGE`.
-    """
+    """A page with its `{run}` blocks replaced by code and output; pictures are in `executed/PAGE`."""
     found = BLOCK.findall(text)
     if not found:
         return text
@@ -123,7 +121,7 @@ def blocks(page: str, text: str) -> str:
         (folder / "blocks.json").write_text(json.dumps(found))
         return command([sys.executable, __file__, "blocks.json"], folder, f"the code of {page}.md")
 
-    output = kept(folder, fingerprint(SHARED, *map("\0".join, found)), work)
+    output = cached(folder, fingerprint(SHARED, *map("\0".join, found)), work)
     printed = iter(json.loads(output.text.splitlines()[-1]))
 
     def shown(match: re.Match[str]) -> str:
@@ -135,7 +133,7 @@ def blocks(page: str, text: str) -> str:
 
 
 def _wrapped(text: str) -> str:
-    """Sentences of errors and warnings in lines that fit."""
+    """Messages of errors and warnings in short lines."""
     lines = text.splitlines()
     sentence = re.compile(r"\w+(Error|Warning): ")
     return "\n".join(
@@ -145,10 +143,10 @@ def _wrapped(text: str) -> str:
 
 
 def run_blocks(found: Sequence[tuple[str, str]]) -> list[str]:
-    """What each block prints, one after the other in one namespace.
+    """Output of each block, run one after another in one namespace.
 
     Raises:
-        RunError: A block raised what it should not, or did not raise what it should.
+        RunError: A block raised another error than expected, or none.
     """
     names: dict[str, Any] = {"__name__": "__page__"}
     return [_printed(code, expected, names) for expected, code in found]
@@ -169,11 +167,11 @@ def _printed(code: str, expected: str, names: dict[str, Any]) -> str:
                 raise RunError(f"{code}\n{traceback.format_exc()}") from error
             out.write(f"{raised}: {error}\n")
     if raised != expected:
-        raise RunError(f"{code}\nexpected {expected}, and nothing was raised")
+        raise RunError(f"{code}\nexpected {expected}, but nothing was raised")
     said = [f"{m.category.__name__}: {m.message}" for m in w if issubclass(m.category, UserWarning)]
     return "\n".join([*said, out.getvalue()])
 
 
 if __name__ == "__main__":
-    importlib.import_module("logging").disable(20)  # the compilation of forms is talkative
+    importlib.import_module("logging").disable(20)  # compiling forms logs much
     print(json.dumps(run_blocks(json.loads(Path(sys.argv[1]).read_text()))))

@@ -1,4 +1,4 @@
-"""Every error and warning of the code with the pattern of its sentence, found in the sources."""
+"""All errors and warnings of the code with the pattern of their messages, read from the sources."""
 
 from __future__ import annotations
 
@@ -10,32 +10,35 @@ from pathlib import Path
 
 from sources import ROOT
 
+from tawami.base import errors
+
 PACKAGE = ROOT / "python" / "tawami"
-#: Subject of the modules; others stand under their own name.
+#: Headings of the list, and the rooms whose messages they hold.
 SUBJECTS: dict[str, tuple[str, ...]] = {
-    "Installation and ranks": ("_dolfinx", "ranks", "environment", "provenance"),
-    "Grid and body": ("grid", "body", "placement", "quadrature", "level_set", "mesh", "geometry"),
-    "Forms": ("formulation", "symbols", "density", "compilation", "ghost", "attached"),
-    "Materials": ("materials", "numpy_law", "rust/material"),
-    "Scene and inputs": ("scene", "inputs", "numerics", "contents", "initial", "rust/error.rs"),
-    "Supports and loads": ("supports", "boundary", "reduction", "loads", "wall"),
-    "Solving": ("newton", "linear", "krylov", "singularity", "solver", "field", "fast_field"),
-    "Steps and motion": ("stepping", "dynamics", "energy", "inertia"),
-    "Results": ("solution", "output", "results", "checkpoint", "checkpoints", "plot", "log"),
-    "Command line": ("command_line",),
+    "Inputs, installation and ranks": ("base", "fem"),
+    "Grid and body": ("grid", "body"),
+    "Forms": ("form", "check"),
+    "Particles and laws": ("particles", "rust"),
+    "Supports and fields": ("field",),
+    "Solving": ("solve",),
+    "Scene": ("scene",),
+    "Steps and motion": ("motion",),
+    "Results": ("results",),
     "Studies": ("study",),
+    "Command line": ("command",),
 }
-INTERNAL = ("RuntimeError", "NotImplementedError", "ValueError", "SystemExit", "TypeError")
+#: Classes of errors and warnings that users see.
+KINDS = {*errors.__all__, "InvertedError"}
 
 
 @dataclass(frozen=True)
 class Message:
-    """A sentence of the code.
+    """A message of the code.
 
     Attributes:
         kind: Class of the exception or warning.
-        says: The sentence; what is filled in stands between angle brackets.
-        file: Where, from the top of the repository.
+        says: The text, with expressions in angle brackets.
+        file: Path from the top of the repository.
     """
 
     kind: str
@@ -44,32 +47,33 @@ class Message:
 
 
 def collected() -> list[Message]:
-    """Every message that a user may meet."""
+    """All messages that a user may see."""
     found: list[Message] = []
     for path in sorted(PACKAGE.rglob("*.py")):
         name = str(path.relative_to(ROOT))
         for kind, says in _of_module(ast.parse(path.read_text())):
-            if kind not in INTERNAL:
+            if kind in KINDS:
                 found.append(Message(kind, says, name))
-    # of a class with sentences of its own, what is handed on from elsewhere says nothing
-    spoken = {m.kind for m in found if _letters(m.says) > 12}
-    kept = [m for m in found if _letters(m.says) > 12 or m.kind not in spoken]
-    return list(dict.fromkeys([*kept, *_of_rust()]))
+    # a pattern without text only passes on a message that is collected elsewhere
+    with_text = {m.kind for m in found if _letters(m.says) > 12}
+    useful = [m for m in found if _letters(m.says) > 12 or m.kind not in with_text]
+    return list(dict.fromkeys([*useful, *_of_rust()]))
 
 
 def _letters(pattern: str) -> int:
-    """Of a sentence, without what is filled in."""
+    """Number of letters of a pattern without its expressions."""
     return len(re.sub(r"<.*?>", "", pattern))
 
 
 def _of_module(tree: ast.Module) -> Iterator[tuple[str, str]]:
-    """Class and sentence of what a module raises, and of its warnings."""
+    """Class and pattern of the errors that a module raises, and of its warnings."""
     fails = _kind_of_fail(tree)
     for node in ast.walk(tree):
         if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and node.exc.args:
-            kind = ast.unparse(node.exc.func)
-            if kind.isidentifier():
-                yield kind, _pattern(node.exc.args[0])
+            yield ast.unparse(node.exc.func), _pattern(node.exc.args[0])
+        elif isinstance(node, ast.Return) and isinstance(node.value, ast.Call) and node.value.args:
+            call = node.value  # an error that the caller raises
+            yield ast.unparse(call.func), _pattern(call.args[0])
         elif isinstance(node, ast.Call) and node.args:
             called = ast.unparse(node.func)
             if called in ("warn", "warnings.warn"):
@@ -80,7 +84,7 @@ def _of_module(tree: ast.Module) -> Iterator[tuple[str, str]]:
 
 
 def _kind_of_fail(tree: ast.Module) -> str:
-    """What a method `_fail` of the module raises."""
+    """Class of the error that a method `_fail` of the module raises."""
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef) and node.name == "_fail":
             for inner in ast.walk(node):
@@ -90,7 +94,7 @@ def _kind_of_fail(tree: ast.Module) -> str:
 
 
 def _pattern(node: ast.expr) -> str:
-    """A sentence with its expressions in angle brackets."""
+    """Pattern of a message, with its expressions in angle brackets."""
     if isinstance(node, ast.Constant):
         return str(node.value)
     if isinstance(node, ast.JoinedStr):
@@ -103,20 +107,19 @@ def _pattern(node: ast.expr) -> str:
 
 
 def _of_rust() -> Iterator[Message]:
-    """What the compiled part says: `#[error(...)]`, and what it expects of parameters."""
-    text = (ROOT / "rust" / "error.rs").read_text()
-    for says in re.findall(r'#\[error\(\s*"((?:[^"\\]|\\.)*)"\s*\)\]', text, flags=re.DOTALL):
-        sentence = re.sub(r"\\\n\s*", "", says)
-        kind = "InvertedError" if "inside out" in sentence else "InputError"
-        yield Message(kind, re.sub(r"\{(\w+)(:\?)?\}", r"<\1>", sentence), "rust/error.rs")
-    for path in sorted((ROOT / "rust" / "material").glob("*.rs")):
-        file = str(path.relative_to(ROOT))
-        for name, expected in _parameters(path.read_text()):
+    """Messages of the Rust part: `#[error(...)]`, and the expected values of parameters."""
+    for path in sorted((ROOT / "rust").rglob("*.rs")):
+        text, file = path.read_text(), str(path.relative_to(ROOT))
+        for says in re.findall(r'#\[error\(\s*"((?:[^"\\]|\\.)*)"\s*\)\]', text, flags=re.DOTALL):
+            message = re.sub(r"\\\n\s*", "", says)
+            kind = "InvertedError" if "inside out" in message else "InputError"
+            yield Message(kind, re.sub(r"\{(\w+)(:\?)?\}", r"<\1>", message), file)
+        for name, expected in _parameters(text):
             yield Message("InputError", f"{name} = <value>: expected {expected}", file)
 
 
 def _parameters(text: str) -> Iterator[tuple[str, str]]:
-    """Name of each parameter that a law refuses, and what it expects."""
+    """Name of each parameter that a law checks, and the expected values."""
     string = r'"((?:[^"\\]|\\.)*)"'
     yield from re.findall(rf'name: "(\w+)",\s*value: \w+,\s*expected: {string}', text)
     for expected in re.findall(rf"\{{ name, value, expected: {string}", text):
@@ -129,20 +132,17 @@ def _parameters(text: str) -> Iterator[tuple[str, str]]:
 
 
 def subject(file: str) -> str:
-    """Under which heading the messages of a file stand."""
-    path = Path(file)
-    if file.startswith("rust/"):
-        keys = {"rust/error.rs", "rust/material"} & {file, str(path.parent)}
-    else:
-        keys = {path.relative_to("python/tawami").parts[0].removesuffix(".py")}
-    for title, modules in SUBJECTS.items():
-        if keys & set(modules):
-            return title
-    return path.stem.replace("_", " ").capitalize()
+    """Heading of the messages of a file.
+
+    Raises:
+        KeyError: The file is in no room.
+    """
+    room = "rust" if file.startswith("rust/") else Path(file).parts[2]
+    return {room: title for title, rooms in SUBJECTS.items() for room in rooms}[room]
 
 
 def plain(text: str) -> str:
-    """Text that Markdown leaves as it is."""
+    """Text with the special characters of Markdown escaped."""
     return re.sub(r"([\\`*_{}\[\]<>()#+.!|$~&^:-])", r"\\\1", text.replace("\n", " "))
 
 

@@ -1,4 +1,4 @@
-"""Pages of the site: copied, with what they leave to be generated."""
+"""Pages of the site: copies of the Markdown files, with code run and generated parts inserted."""
 
 from __future__ import annotations
 
@@ -39,6 +39,10 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
 }
 TRADE = ("cantilever", "cook", "collapse", "self_weight", "spinning_disc")
 LINK = re.compile(r"https?://[^\s)>\"'`]+")
+#: Elements of HTML that a browser loads with the page.
+LOADED = re.compile(
+    r"<(?:script|img|iframe|link [^>]*stylesheet)[^>]*(?:src|href)=[\"']((?:https?:)?//[^\"']+)"
+)
 
 
 def assemble(target: Path) -> list[str]:
@@ -65,7 +69,7 @@ def assemble(target: Path) -> list[str]:
 
 
 def _write(path: Path, text: str) -> None:
-    """Unless it is there as it is: Sphinx reads what is newer."""
+    """Write a file if it changes: Sphinx reads files that are newer."""
     if not path.exists() or path.read_text() != text:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
@@ -78,8 +82,17 @@ def _check_links(name: str, text: str) -> None:
             raise executed.RunError(f"{name}.md: the link {link} is not well-formed")
 
 
+def loaded_from_web(html: Path) -> list[str]:
+    """Addresses that pages would load from the web when they are viewed, with the page."""
+    return [
+        f"{page.name}: {address}"
+        for page in sorted(html.rglob("*.html"))
+        for address in LOADED.findall(page.read_text())
+    ]
+
+
 def complete(name: str, text: str) -> str:
-    """A page with its code run and its generated parts."""
+    """A page with its code run and its generated parts inserted."""
     text = executed.blocks(name, text)
     return re.sub(r"^\{\{(.+)\}\}$|\{\{(.+?)\}\}", _generated, text, flags=re.MULTILINE)
 
@@ -89,7 +102,7 @@ def _generated(match: re.Match[str]) -> str:
 
 
 def exists(dotted: str) -> bool:
-    """Whether an attribute, or a module, of that name is there."""
+    """Whether a module or an attribute of that name exists."""
     module, _, attribute = dotted.rpartition(".")
     try:
         importlib.import_module(dotted)
@@ -112,7 +125,7 @@ def exists(dotted: str) -> bool:
 
 
 def case_page(name: str) -> str:
-    """A case: what it is about, its pictures, what it printed."""
+    """Page of a case: its description, its pictures and its output."""
     title, room, beside = CASES[name]
     output = executed.case(room, name)
     folder = ROOT / "cases" / room / name
@@ -131,7 +144,7 @@ def case_page(name: str) -> str:
     return (
         f"# {title}\n\n`{command}`, {_duration(output.seconds)}; {named}.{shorter}\n\n"
         f"````text\n{about}\n````\n\n{pictures}\n\n"
-        f"## What it printed\n\n````text\n{output.text.strip()}\n````\n"
+        f"## Output\n\n````text\n{output.text.strip()}\n````\n"
     )
 
 
@@ -164,10 +177,10 @@ def _paragraphs(words: str) -> str:
 
 
 def _compatibility() -> str:
-    """The tables, from the last time if nothing has changed."""
+    """The tables, of the last run if nothing has changed."""
     patterns = (*executed.SHARED, "python/docs/compatibility.py")
     folder = executed.RESULTS / "executed" / "compatibility"
-    return executed.kept(folder, executed.fingerprint(patterns), _try_all).text
+    return executed.cached(folder, executed.fingerprint(patterns), _try_all).text
 
 
 def _try_all() -> str:
@@ -187,7 +200,7 @@ def _try_all() -> str:
 
 
 def _peers() -> str:
-    """Deflection and mean stress of the cantilever with the formulations of the peers."""
+    """Errors of deflection and mean stress of the cantilever, by formulation."""
     with open(executed.RESULTS / "cases" / "cantilever" / "cantilever.csv") as file:
         rows = [row for row in csv.DictReader(file) if row["support"] == "exact"]
     methods = {
@@ -214,13 +227,13 @@ def _peers() -> str:
 
 
 def _sizes() -> str:
-    """Of the forms, lines and characters."""
+    """Lines and characters of the mixed forms."""
     texts = [(ROOT / "forms" / f"{name}.py").read_text() for name in ("u_epsv", "u_p")]
     return " and ".join(f"{len(t.splitlines())} lines ({len(t)} characters)" for t in texts)
 
 
 def _classes() -> str:
-    """Exceptions and warnings with what they inherit and say."""
+    """Table of exceptions and warnings with base class and description."""
     lines = ["| class | is a | when |", "| --- | --- | --- |"]
     for name in sorted(errors.__all__, key=lambda name: (name.endswith("Warning"), name)):
         kind = getattr(errors, name)

@@ -1,4 +1,4 @@
-"""Files of the repository and symbols in them, as pages name them: `forms/u.py residual`."""
+"""References of pages to files of the repository and symbols in them: `forms/u.py residual`."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ ROLE = re.compile(r"\{src\}`([^`]+)`")
 
 
 def missing(reference: str) -> str | None:
-    """What is wrong with a reference; None if nothing is.
+    """Error message of a reference, or None if it is right.
 
     Args:
-        reference: Path from the top of the repository, and a symbol of the file after a blank:
+        reference: Path from the top of the repository, and after a blank a symbol of the file:
             `Class.method` in Python, `Type::function` in Rust.
     """
     path, _, symbol = reference.partition(" ")
@@ -38,7 +38,7 @@ def missing(reference: str) -> str | None:
 
 
 def _names(node: ast.AST, prefix: str = "") -> Iterator[str]:
-    """Qualified names of what a module defines."""
+    """Qualified names that a module defines."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.FunctionDef | ast.ClassDef):
             yield prefix + child.name

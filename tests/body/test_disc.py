@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
+from profiles import examples
 from scenes import grid_of, linear_field
 
 import tawami
@@ -21,7 +22,7 @@ def most_in_a_cell(grid, body):
     return np.unique(cell, axis=0, return_counts=True)[1].max()
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(
     place=st.tuples(st.floats(0, 1), st.floats(0, 1)),
     size=st.floats(1e-3, 1.0),

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
+from profiles import examples
 from scenes import grid_of
 
 import tawami
@@ -37,7 +38,7 @@ def square(side, angle):
     return f
 
 
-@settings(max_examples=8)
+@settings(max_examples=examples(8))
 @given(
     centre=st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1)),
     axes=st.tuples(st.floats(0.1, 0.8), st.floats(0.1, 0.8)),

@@ -9,6 +9,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
+from profiles import examples
 from scenes import grid_of
 
 import tawami
@@ -134,7 +135,7 @@ AREAS = {"disc": np.pi * 0.21, "polygon": SIDE**2 - 0.09, "mesh": SIDE**2, "leve
 
 
 @pytest.mark.parametrize("kind", AREAS)
-@settings(max_examples=4)
+@settings(max_examples=examples(4))
 @given(move=st.tuples(st.floats(-0.125, 0.125), st.floats(-0.125, 0.125)))
 def test_area_and_centroid_of_shapes_moved_by_part_of_a_cell(kind, move):
     body = particles_of(kind, grid_of_two(), np.array(move))

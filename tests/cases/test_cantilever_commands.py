@@ -7,7 +7,8 @@ import csv
 import pytest
 from programs import python
 
-from cases.costs import bench, writing
+from cases.costs import writing
+from cases.costs.bench import __main__ as bench
 from cases.verification.cantilever import __main__ as study
 from cases.verification.cantilever.beam import COLUMNS, SUPPORTS
 

@@ -1,4 +1,4 @@
-"""The extremes in short: what has to survive does, what has to be refused is, with its sentence."""
+"""Extremes of statics, the short forms of `cases.extremes`: what survives, what is rejected and how."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def outcomes(subject: str, setting: str) -> dict[str, Attempt]:
 
 
 @pytest.mark.parametrize("subject", SUBJECTS)
-def test_nothing_wrong_is_delivered_as_right(subject):
+def test_no_result_is_wrong(subject):
     assert subject in extremes.SUBJECTS
     assert len(rows(subject)) > 5
     assert not [(row.setting, row.error, row.bound, row.says) for row in rows(subject) if row.wrong]
@@ -55,7 +55,7 @@ def test_nothing_wrong_is_delivered_as_right(subject):
     ("overload", r"elastic|Hencky's bar, .* ramp to"),
     ("not_finite", r"mended"),
 ])  # fmt: skip
-def test_what_survives(subject, setting):
+def test_extremes_that_survive(subject, setting):
     if (subject, setting) == ("poisson", r"^u_p: "):
         found = {s: row for s, row in outcomes(subject, setting).items() if "held" not in s}
     else:
@@ -63,7 +63,7 @@ def test_what_survives(subject, setting):
     assert {s: row.outcome for s, row in found.items() if row.outcome != "survived"} == {}
 
 
-@pytest.mark.parametrize(("subject", "setting", "sentence"), [
+@pytest.mark.parametrize(("subject", "setting", "message"), [
     ("poisson", "^u: 1 - 2 nu = 1e-10", "K/mu is 1.0e.10: .* has no digits left.* use form 'u_epsv'"),
     ("poisson", "held all around", "the tangent is singular"),
     ("alpha", "residual_based: alpha = (1|1000)$", "expected at most 0.14.* use a smaller alpha"),
@@ -79,13 +79,13 @@ def test_what_survives(subject, setting):
     ("not_finite", "nan in stress", ": 4 entries are not finite.* NaN at particle 3"),
     ("not_finite", "nan as", "not finite|finite number|finite modulus"),
 ])  # fmt: skip
-def test_what_is_refused_and_how(subject, setting, sentence):
+def test_extremes_that_are_rejected(subject, setting, message):
     for row in outcomes(subject, setting).values():
         assert row.outcome == "refused", row
-        assert re.search(sentence, row.says), row
+        assert re.search(message, row.says), row
 
 
-def test_what_is_said_beforehand():
+def test_extremes_with_a_warning():
     for row in outcomes("poisson", "^u: 1 - 2 nu = 0.0001").values():
         assert row.outcome == "warned"
         assert "K/mu = 1e+04 at particle 0: it locks" in row.says
@@ -97,7 +97,7 @@ def test_what_is_said_beforehand():
     assert all("has its particles on one side" in row.says for row in crowded.values())
 
 
-def test_an_attempt_that_is_worse_than_its_bound_or_no_sentence_is_wrong():
+def test_an_attempt_beyond_its_bound_or_without_a_message_is_wrong():
     def fails():
         raise KeyError("x")
 
@@ -113,7 +113,7 @@ def test_an_attempt_that_is_worse_than_its_bound_or_no_sentence_is_wrong():
     assert not attempted("s", "t", 1.0, refuses).wrong
 
 
-def test_a_refusal_that_leaves_traces_is_found_out():
+def test_a_rejection_that_changes_particles_is_found():
     grid = grid_of()
     body, law = tawami.box(grid, grid.origin, grid.upper), tawami.linear_elastic(E=1.0, nu=0.3)
     scene = tawami.Scene(grid, body, law)
@@ -127,9 +127,7 @@ def test_a_refusal_that_leaves_traces_is_found_out():
         change_and_refuse()
 
 
-def test_the_command_writes_what_it_found_and_fails_if_anything_is_wrong(
-    tmp_path, monkeypatch, capsys
-):
+def test_the_command_writes_a_table_and_fails_if_a_result_is_wrong(tmp_path, monkeypatch, capsys):
     class Broken:
         @staticmethod
         def attempts(short):
@@ -147,7 +145,8 @@ def test_the_command_writes_what_it_found_and_fails_if_anything_is_wrong(
     assert len((tmp_path / "extremes.csv").read_text().splitlines()) == 3
 
 
-def test_the_map(tmp_path):
+@pytest.mark.slow
+def test_the_map_of_stability(tmp_path):
     found = stability_map.points(short=True)
     refused = {(p.form, p.one_minus_2nu) for p in found if np.isnan(p.stress)}
     assert ("u_p", 0.0) not in refused
@@ -159,8 +158,8 @@ def test_the_map(tmp_path):
     assert (tmp_path / "map.png").stat().st_size > 20000
 
 
-def test_the_inf_sup_constant_is_the_one_of_the_biquadratic_pair_assembled_by_hand():
-    """One-dimensional integrals of Lagrange functions by NumPy, A and B as Kronecker products."""
+def test_the_inf_sup_constant_agrees_with_one_assembled_by_hand():
+    """The biquadratic pair: one-dimensional integrals by NumPy, A and B as Kronecker products."""
     n = 4
     points, weights = np.polynomial.legendre.leggauss(5)
     points, weights = (points + 1) / 2, weights / 2
@@ -197,15 +196,15 @@ def test_the_inf_sup_constant_is_the_one_of_the_biquadratic_pair_assembled_by_ha
     assert beta == pytest.approx(np.sqrt(values[1]), rel=1e-8)
 
 
-def test_a_box_off_the_lines_of_a_long_grid_is_refused():
+def test_a_box_off_the_lines_of_a_long_grid_is_rejected():
     """By 0.01 of a cell, 2000 cells away."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=1.0, cells=(2002, 1))
     with pytest.raises(tawami.InputError, match="must lie on lines of the grid"):
         tawami.box(grid, (2000.01, 0.0), (2002.0, 1.0))
 
 
-def test_points_of_a_tiny_body_are_told_apart():
-    """Two points held 1e-9 m apart, on cells of 4e-9 m, each with its own reaction."""
+def test_points_of_a_tiny_body_are_distinguished():
+    """Two points held 4e-9 m apart, on cells of 4e-9 m, each with its own reaction."""
     h = 4e-9
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=h, cells=(4, 4))
     body, law = tawami.box(grid, grid.origin, grid.upper), tawami.linear_elastic(E=1e6, nu=0.3)
@@ -223,7 +222,7 @@ def test_points_of_a_tiny_body_are_told_apart():
 
 
 def test_a_soft_part_beside_a_stiff_one_is_no_rigid_motion():
-    """Its forces are round-off of the stiff one: refused at 1e11, as if nothing moved before."""
+    """Its forces are round-off of the stiff one: a contrast of 1e13 is rejected."""
     rows_of = outcomes("contrast", r"^series, u, bilinear: 1e\+13")
     assert {row.outcome for row in rows_of.values()} == {"refused"}
     grid = grid_of()
@@ -236,7 +235,7 @@ def test_a_soft_part_beside_a_stiff_one_is_no_rigid_motion():
 
 @pytest.mark.parametrize("size", [1e-15, 1e-12])
 def test_a_tiny_prescribed_displacement_strains_the_body(size):
-    """In proportion to it: none is taken for round-off of nothing."""
+    """In proportion: no displacement is taken for round-off."""
     grid = grid_of()
     body, law = tawami.box(grid, grid.origin, grid.upper), tawami.linear_elastic(E=1e6, nu=0.0)
     scene = tawami.Scene(grid, body, law, form="u")

@@ -1,4 +1,4 @@
-"""The spinning disc, coarser: what is conserved."""
+"""The spinning disc on a coarse grid: what is conserved."""
 
 from __future__ import annotations
 
@@ -33,10 +33,15 @@ def test_the_closed_form_obeys_the_virial_theorem():
 
 @pytest.mark.parametrize(
     ("kind", "nu"),
-    [(AFFINE_FLIP, 0.49), (AFFINE_FLIP, 0.499), (TPIC, 0.49), (DISPLACEMENT, 0.49)],
+    [
+        (AFFINE_FLIP, 0.49),
+        pytest.param(AFFINE_FLIP, 0.499, marks=pytest.mark.slow),
+        pytest.param(TPIC, 0.49, marks=pytest.mark.slow),
+        pytest.param(DISPLACEMENT, 0.49, marks=pytest.mark.slow),
+    ],
     ids=lambda value: getattr(value, "name", str(value)),
 )
-def test_momentum_energy_and_shape_are_kept(kind, nu):
+def test_momentum_energy_and_shape_are_conserved(kind, nu):
     run = disc.solve(kind, n=4, turns=1, nu=nu)
     assert max(run.linear) < 1e-13
     assert run.drift < 1e-3
@@ -46,7 +51,8 @@ def test_momentum_energy_and_shape_are_kept(kind, nu):
     assert max(run.roundness) < 2e-4
 
 
-def test_plain_flip_loses_the_rotation():
+@pytest.mark.slow
+def test_plain_flip_loses_angular_momentum():
     run = disc.solve(FLIP, n=4, turns=1)
     assert max(run.linear) < 1e-13
     assert run.angular[-1] < 0.95
@@ -57,12 +63,12 @@ def coarse_steps():
     return disc.solve(n=4, turns=1, steps=60)
 
 
-def test_what_the_trapezoidal_rule_takes(coarse_steps):
-    """Up to twice (omega dt)^2/4 while the disc pulsates; what the rule keeps is kept."""
+def test_the_loss_of_the_trapezoidal_rule_is_known(coarse_steps):
+    """Up to twice (omega dt)^2/4 while the disc pulsates; the transfer takes little."""
     taken = (2 * np.pi / 60) ** 2 / 4
     assert 1.7 * taken < coarse_steps.drift < 2 * taken
     assert coarse_steps.drift_of_transfer < 0.05 * taken
 
 
-def test_mean_stress_averaged_over_a_turn(coarse_steps):
+def test_the_mean_stress_averaged_over_a_turn_is_accurate(coarse_steps):
     assert coarse_steps.stress_error[0] < 0.08

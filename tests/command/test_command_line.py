@@ -78,7 +78,7 @@ def test_new_writes_a_script_but_not_over_another(capsys, rejected, tmp_path, ki
     assert "SCRIPT" not in text
     assert "`tawami run mycase.py`" in text
     path.write_text("mine")
-    assert "is there already, and was not touched" in rejected("new", path)
+    assert "exists already, and was not changed" in rejected("new", path)
     assert path.read_text() == "mine"
     assert "expected a name of letters" in rejected("new", tmp_path / "my-case")
     assert main.main(["new", str(tmp_path / "nowhere" / "case")]) == 1
@@ -123,7 +123,7 @@ def test_the_new_script_of_dynamics_is_stopped_resumed_and_drawn(here, process, 
     # the code's own number: the script printed 0.56 when it was written
     assert "run-out [m]: 0.56" in resumed.stdout
     folder = tmp_path / "results" / "slump"
-    assert "goes on" in (folder / "log.txt").read_text()
+    assert "resumes at" in (folder / "log.txt").read_text()
     drawn = here("plot", "results/slump", "--quantity", "plastic_strain", cwd=tmp_path)
     assert drawn.returncode == 0, drawn.stderr
     pictures = [tmp_path / line for line in drawn.stdout.splitlines()]

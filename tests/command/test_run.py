@@ -10,7 +10,8 @@ import sys
 import pytest
 from programs import PYTHONPATH, python
 
-from tawami.command import launch, main
+from tawami.command import main
+from tawami.command.script import Script
 
 
 def test_a_script_runs_as_python_runs_it(script, process):
@@ -80,8 +81,10 @@ def test_ctrl_c_ends_a_script_without_a_traceback(script, ranks):
 
 
 def test_a_script_or_module_that_cannot_be_run_is_rejected(script, rejected, tmp_path, monkeypatch):
-    assert "script 'nowhere.py' does not exist: expected" in rejected("run", "nowhere.py")
-    assert "is a folder: expected" in rejected("run", tmp_path)
+    assert "script 'nowhere.py' cannot be read (No such file or directory): expected" in rejected(
+        "run", "nowhere.py"
+    )
+    assert "cannot be read (Is a directory): expected" in rejected("run", tmp_path)
     script.write_text("a = 1\nb = = 2\n")
     assert "case.py', line 2 is not Python: invalid syntax" in rejected("run", script)
     script.write_bytes(b"\x00\xff\x00")
@@ -118,5 +121,8 @@ def test_wrong_arguments_are_rejected(capsys, arguments, message):
 
 
 def test_a_script_knows_its_name_and_its_command():
-    script = launch.Script(None, "cases.cook", ("--n", "4"))
-    assert (script.name, script.command) == ("cases.cook", ["-m", "cases.cook"])
+    script = Script(None, "cases.verification.cook", ("--n", "4"))
+    assert (script.name, script.command) == (
+        "cases.verification.cook",
+        ["-m", "cases.verification.cook"],
+    )

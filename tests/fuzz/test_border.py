@@ -1,7 +1,7 @@
-"""The border of the compiled module: whatever comes, an exception that a driver can catch, no panic.
+"""The border of the compiled module: any argument works, or raises an error that a driver can catch.
 
-A panic of Rust reaches Python as pyo3's PanicException, which is no `Exception` and passes by every
-`except Exception`: a test fails on one.
+A panic of Rust reaches Python as pyo3's PanicException, which is no `Exception` and passes every
+`except Exception`. A test fails on one.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given, seed, settings
 from hypothesis import strategies as st
+from profiles import examples, seed_of
 from scenes import grid_of
 
 import tawami
@@ -96,7 +97,7 @@ NASTY = st.one_of(
 
 
 class Sample:
-    """Small objects of each kind, new for each example: what a call has changed is gone with it."""
+    """Small objects of each kind, new for each example, because calls change them."""
 
     def __init__(self) -> None:
         self.grid = _rust.Grid((-1.0, 0.5), 0.5, (4, 3))
@@ -131,7 +132,7 @@ class Sample:
         self.none = [_rust.Kernels(self.assembler, rank, []) for rank in (1, 2)]
 
 
-#: What is called, and good arguments; one after the other is replaced.
+#: Functions and good arguments.
 CALLS: dict[str, Callable[[Sample], tuple[Any, ...]]] = {
     "Grid": lambda s: (_rust.Grid, (0.0, 0.0), 1.0, (2, 3)),
     "Grid.locate": lambda s: (s.grid.locate, s.x),
@@ -199,8 +200,8 @@ CALLS: dict[str, Callable[[Sample], tuple[Any, ...]]] = {
 
 
 def called(function: Callable[..., Any], *arguments: Any) -> None:
-    """Works, or raises what a driver can catch; pyo3 itself raises OverflowError for whole numbers that
-    no machine word holds.
+    """Call, and let pass what a driver can catch. pyo3 raises OverflowError for whole numbers that are
+    too large for a machine word.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # NumPy's, of arrays as numbers
@@ -212,12 +213,14 @@ def called(function: Callable[..., Any], *arguments: Any) -> None:
             assert str(error).startswith("internal: "), error
 
 
+@pytest.mark.fuzz
 @pytest.mark.parametrize("name", CALLS)
 def test_any_argument_works_or_raises(name):
     function, *arguments = CALLS[name](Sample())
     function(*arguments)  # the good ones are good
 
-    @settings(max_examples=40)
+    @seed(seed_of(name))
+    @settings(max_examples=examples(40))
     @given(st.integers(0, len(arguments) - 1), NASTY, st.booleans())
     def replaced(which: int, value: Any, part: bool) -> None:
         function, *arguments = CALLS[name](Sample())
@@ -234,8 +237,8 @@ def test_any_argument_works_or_raises(name):
     st.integers(0, 80),
     st.integers(0, 2**31 - 1),
 )
-def test_any_selection_has_a_pattern_inside_or_is_refused(counts, unknowns, seed):
-    """Rows with so many entries each, of unknowns that are any of the coefficients."""
+def test_any_selection_has_a_pattern_or_is_rejected(counts, unknowns, seed):
+    """Rows with these numbers of entries, of unknowns that are any of the coefficients."""
     s, random = Sample(), np.random.default_rng(seed)
     start = np.cumsum([0, *counts]).astype(np.int32)
     unknown = random.integers(0, max(unknowns, 1) + (seed % 3 == 0), start[-1]).astype(np.int32)
@@ -253,7 +256,7 @@ def test_any_selection_has_a_pattern_inside_or_is_refused(counts, unknowns, seed
 
 
 def test_every_function_and_method_is_in_the_table():
-    """Those that take arguments."""
+    """All of them that take arguments."""
     without = {"check", "rows", "add_eps_v", "elastic_energy"}
     there = set()
     for name in _rust.__all__:
@@ -273,7 +276,7 @@ def test_every_function_and_method_is_in_the_table():
     assert there == set(CALLS)
 
 
-def test_an_array_to_write_that_cannot_be_written():
+def test_an_array_that_cannot_be_written_raises_an_error():
     s = Sample()
     s.data.setflags(write=False)
     with pytest.raises(TypeError, match="not writeable"):
@@ -284,7 +287,7 @@ def test_an_array_to_write_that_cannot_be_written():
         s.assembler.matrix(s.none[1], s.none[0], [], s.volume, s.values[:80], s.pattern, s.values)
 
 
-def test_positions_that_are_a_view_of_the_particles_own():
+def test_positions_may_be_a_view_of_those_of_the_particles():
     s = Sample()
     s.particles.move_to(s.particles.x)
     np.testing.assert_array_equal(s.particles.x, s.x)
@@ -292,14 +295,14 @@ def test_positions_that_are_a_view_of_the_particles_own():
     np.testing.assert_array_equal(s.particles.x, s.x[::-1])
 
 
-def test_the_particles_own_stress_as_that_of_the_law():
+def test_the_stress_of_a_law_may_be_a_view_of_that_of_the_particles():
     s = Sample()
     s.particles.stress[:] = np.arange(4.0 * N).reshape(N, 4)
     s.stage.commit(s.u, s.v, (s.particles.stress.ravel(), np.zeros(16 * N)))
     np.testing.assert_allclose(s.particles.stress.ravel(), np.arange(4.0 * N), atol=1e-12)
 
 
-def test_objects_of_other_particles_or_of_another_grid():
+def test_objects_of_other_particles_or_of_another_grid_raise_an_error():
     s, other = Sample(), Sample()
     few, elsewhere = s.location.select(s.few), _rust.Grid((-1, 0), 9.0, (2, 2)).locate(s.x)
     plain = _rust.Particles(s.x, s.volume, s.material)
@@ -326,7 +329,7 @@ def test_objects_of_other_particles_or_of_another_grid():
             call()
 
 
-def test_an_index_that_looks_at_the_particles_while_they_are_changed():
+def test_a_call_that_reads_particles_while_they_change_raises_an_error():
     s = Sample()
 
     class Width:
@@ -383,7 +386,7 @@ print(len(found), len({array.tobytes() for array in found}))
 
 
 def test_a_view_stays_readable_when_the_storage_is_replaced():
-    """Particles that leave the grid make another storage; a view holds the old one."""
+    """Particles that leave the grid make a new storage; a view holds the old one."""
     grid = grid_of((6, 2))
     body = tawami.box(grid, (1.0, 0.5), (2.0, 1.5))
     scene = tawami.Scene(
@@ -399,7 +402,7 @@ def test_a_view_stays_readable_when_the_storage_is_replaced():
     kept = {name: view.copy() for name, view in views.items()}
     del scene, motion
     gc.collect()
-    _ = [np.full((before, 4), 7.0) for _ in range(100)]  # takes what was free
+    _ = [np.full((before, 4), 7.0) for _ in range(100)]  # uses memory that was freed
     for name, view in views.items():
         assert len(view) == before
         np.testing.assert_array_equal(view, kept[name])

@@ -1,4 +1,4 @@
-"""What test_ranks.py runs on 1, 2 and 4 ranks: results go into one file, from the first rank.
+"""Scenes that test_ranks.py solves on several ranks; the first rank writes the results to a file.
 
 python tests/processes/on_ranks.py FILE
 """
@@ -6,6 +6,8 @@ python tests/processes/on_ranks.py FILE
 from __future__ import annotations
 
 import sys
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -14,12 +16,17 @@ from scenes import BASES, FORMS, grid_of
 import tawami
 from cases.showcase.collapse.pile import build as pile_of_rods
 from cases.verification.cantilever import fem, mpm
+from tawami import _rust
 from tawami.base.ranks import allgathered
 from tawami.form.form import Form
+from tawami.results import write_grid, write_particles
+from tawami.solve.newton import Newton
+
+COMM = MPI.COMM_WORLD
 
 
 def beams() -> dict[str, float | np.ndarray]:
-    """The cantilever by every form, support and path."""
+    """The cantilever by every form, support and assembly."""
     found: dict[str, float | np.ndarray] = {}
     for support in ("paper", "exact", "clamped"):
         for method, alpha in (("u", None), ("u_bbar", None), ("u_epsv", 0.1), ("u_p", 0.1)):
@@ -41,7 +48,7 @@ def beams() -> dict[str, float | np.ndarray]:
 
 
 def random_clouds() -> dict[str, np.ndarray]:
-    """Residual and tangent of random particles in one corner: some ranks have none."""
+    """Residual and tangent of random particles in one corner; some ranks have no particle."""
     found = {}
     for name, options in FORMS.items():
         for basis in BASES:
@@ -62,7 +69,7 @@ def random_clouds() -> dict[str, np.ndarray]:
 
 
 def nonlinear() -> dict[str, np.ndarray]:
-    """Several iterations on one factorisation, points held in cells of other ranks, a second step."""
+    """Several iterations with one factorisation, points held in cells of other ranks, a second step."""
     from ufl import div, dot, grad
 
     def stiff(u, w, sigma, mu, sum_p, t, ds):
@@ -91,7 +98,7 @@ def nonlinear() -> dict[str, np.ndarray]:
 
 
 def singular() -> dict[str, np.ndarray]:
-    """A singular tangent is one on any number of ranks, and cells are named."""
+    """The error of a singular tangent names cells."""
     grid = grid_of((6, 5))
     body = tawami.box(grid, grid.origin, grid.upper)
     material = tawami.linear_elastic(E=1.0, nu=0.3)
@@ -108,40 +115,38 @@ def singular() -> dict[str, np.ndarray]:
 
 
 def motion() -> dict[str, np.ndarray]:
-    """A pile that collapses across the ranks' cells, a block that slides into those of another rank;
-    one that loses particles.
-    """
+    """A pile that collapses, a block that slides to another rank, one that loses particles."""
     found = {}
     pile = pile_of_rods("u_epsv_finite", h=0.02)
-    pile.run(0.1, 1e-3)
+    pile.run(0.006, 1e-3)
     found["motion pile momentum"] = pile.linear_momentum
     found["motion pile energy"] = np.array(pile.energies.dissipated)
     found |= {f"motion pile {k}": v for k, v in whole(pile).items()}
-    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(16, 8))
-    body = tawami.box(grid, (0.25, 0), (0.75, 0.5))
+    grid = tawami.Grid(COMM, origin=(0, 0), h=0.25, cells=(8, 4))
+    body = tawami.box(grid, (1.0, 0), (1.5, 0.5))
     law = tawami.linear_elastic(E=1e5, nu=0.4)
     for leaving, speed in (("stop", 5.0), ("remove", 9.0)):
         scene = tawami.Scene(grid, body, law, form="u_epsv_finite", density=1e3, leaving=leaving)
         scene.gravity((0, -10))
         scene.wall("bottom", 0.2)
-        scene.load(body.x[:, 1] > 0.4, (10.0, -5.0))
+        scene.load(body.x[:, 1] > 0.3, (10.0, -5.0))
         block = tawami.Dynamics(scene, velocity=np.column_stack([speed + 0 * body.x[:, 0],
                                                                  0 * body.x[:, 0]]))  # fmt: skip
-        block.run(0.15, 5e-3)
+        block.run(0.08, 1e-2)
         found |= {f"motion {leaving} {k}": v for k, v in whole(block).items()}
         found[f"motion {leaving} left"] = np.array([len(scene.left)])
     return found
 
 
 def initial() -> dict[str, np.ndarray]:
-    """A ring in a stress of its own, some of it beyond the yield surface: some ranks have none of it."""
+    """A ring with an initial stress, beyond the yield surface in part; some ranks have no particle."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(16, 16))
     ring = tawami.disc(grid, (0.6, 0.7), 0.5, inner=0.2)
     elastic = tawami.linear_elastic(E=1e6, nu=0.3)
     steel = tawami.von_mises(elastic, yield_stress=1e3)
     stress = np.column_stack([4e3 * (ring.x[:, 0] - 0.6), *(3 * [0 * ring.x[:, 0]])])
     plastic = tawami.Scene(grid, ring, steel)
-    told = "nothing"
+    told = "no error"
     try:
         plastic.initial("stress", stress)
     except tawami.InputError as error:
@@ -161,14 +166,124 @@ def initial() -> dict[str, np.ndarray]:
 
 
 def whole(motion: tawami.Dynamics) -> dict[str, np.ndarray]:
-    """What the particles carry, in the order of their numbers."""
+    """Arrays of the particles in the order of their numbers."""
     particles, comm = motion.scene.particles, motion.scene.grid.comm
     order = np.argsort(allgathered(comm, particles.number))
     arrays = {"x": particles.x, "stress": particles.stress, "velocity": motion.velocity}
     return {name: allgathered(comm, np.array(values))[order] for name, values in arrays.items()}
 
 
-if __name__ == "__main__":
+def beam(**options: Any) -> tawami.Scene:
+    """A clamped beam of 128 particles, of a law that may be given."""
+    grid = tawami.Grid(COMM, origin=(0, 0), h=0.25, cells=(8, 4))
+    law = options.pop("law", tawami.linear_elastic(E=1.0, nu=0.3))
+    scene = tawami.Scene(grid, tawami.box(grid, (0, 0), (2, 1)), law, **options)
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    return scene
+
+
+class BrokenError(Exception):
+    """An error that cannot be pickled."""
+
+    def __init__(self, one: str, two: str) -> None:
+        super().__init__(f"{one} {two}")
+
+
+def errors() -> dict[str, np.ndarray]:
+    """Errors that one rank raises and all catch, and that the ranks compute together afterwards."""
+
+    def respond(strain, stress):
+        if COMM.rank == COMM.size - 1:
+            raise BrokenError("of the law,", "on one rank")
+        return stress, np.broadcast_to(np.eye(4), (len(strain), 4, 4))
+
+    found = {}
+    try:
+        beam(law=tawami.NumpyLaw(respond, K=1.0, mu=1.0)).solve()
+    except (BrokenError, RuntimeError) as error:  # the first on one rank
+        found["errors law"] = np.array(COMM.allgather(str(error)))
+    scene = beam()
+    scene.traction("right", (0.0, 1e-3))
+    found["errors iterations"] = np.array(COMM.allgather(scene.solve().iterations))
+    scene.particles.stress[np.flatnonzero(scene.particles.number == 101)] = np.nan
+    try:
+        scene.solve()
+    except tawami.InputError as error:
+        found["errors nan"] = np.array(COMM.allgather(str(error)))
+    return found
+
+
+def inverted() -> dict[str, np.ndarray]:
+    """A step whose first iterate turns a particle inside out: on some rank, and it is tried again."""
+    grid = tawami.Grid(COMM, origin=(0, 0), h=0.25, cells=(6, 4))
+    body = tawami.box(grid, (0, 0), (1, 1), per_axis=3, gauss=True)
+    law = tawami.von_mises(tawami.linear_elastic(E=1e6, nu=0.3), yield_stress=2e3)
+    scene = tawami.Scene(grid, body, law, form="u_epsv_finite")
+    scene.fix("left", "x")
+    scene.fix("bottom", "y")
+    scene.fix("top", "y", -0.01)
+    evaluate, seen = Newton.internal, list[int]()
+
+    def internal(self, coefficients):
+        try:
+            return evaluate(self, coefficients)
+        except _rust.InvertedError:
+            seen.append(1)
+            raise
+
+    Newton.internal, last = internal, list[tawami.Solution]()
+    try:
+        tawami.ramp(scene, 0.25, each=last.append)
+    finally:
+        Newton.internal = evaluate
+    times = sum(COMM.allgather(len(seen)))
+    return {
+        "times inverted": np.array(times),
+        "inverted floor": np.array(last[-1].reaction("bottom")[1]),
+    }
+
+
+def few_cells() -> dict[str, np.ndarray]:
+    """Two cells, of which some ranks have none; a load that is a function of the whole edge."""
+    grid = tawami.Grid(COMM, origin=(0, 0), h=1.0, cells=(2, 1))
+    law = tawami.linear_elastic(E=1.0, nu=0.3)
+    scene = tawami.Scene(grid, tawami.box(grid, (0, 0), (2, 1)), law)
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    for _ in range(2):
+        scene.traction("right", (0.0, lambda x, y: 1e-3 * y / y.max()))
+        solution = scene.solve()
+    tip = solution.displacement((2, 0))[1]
+    return {"few tip": np.array(COMM.allgather(tip)), "few krylov": np.array(solution.krylov)}
+
+
+def output(folder: Path) -> dict[str, np.ndarray]:
+    """Files of the whole body, and the header on every rank."""
+    scene = beam(density=1.0)
+    header = scene.header()
+    scene.traction("right", (0.0, 1e-3))
+    solution = scene.solve()
+    write_particles(folder / "particles.vtu", solution)
+    write_grid(folder / "grid.vtu", solution)
+    counts = [scene.particles_per_cell.sum(), scene.num_particles, len(solution.stress)]
+    print("solved and written")
+    return {"output counts": np.array(counts), "output header": np.array(COMM.allgather(header))}
+
+
+def results(folder: Path) -> dict[str, Any]:
+    """Results of all scenes; files are written to the folder."""
     found = beams() | random_clouds() | nonlinear() | singular() | motion() | initial()
-    if MPI.COMM_WORLD.rank == 0:
-        np.savez(sys.argv[1], **found)
+    return found | errors() | inverted() | few_cells() | output(folder)
+
+
+def main() -> None:
+    """Write the results of all scenes beside the files of the last one."""
+    file = Path(sys.argv[1])
+    found = results(file.parent)
+    if COMM.rank == 0:
+        np.savez(file, **found)
+
+
+if __name__ == "__main__":
+    tawami.run(main, "on_ranks")

@@ -1,4 +1,4 @@
-"""The documentation: whole, and true where that can be seen without building it."""
+"""The documentation, as far as it can be checked without building it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FENCE = re.compile(r"^(```+).*?^\1\n", flags=re.DOTALL | re.MULTILINE)
 
 
 def prose(text):
-    """Without its blocks of code and equations."""
+    """Text without its blocks of code and equations."""
     return FENCE.sub("", text)
 
 
@@ -41,7 +41,7 @@ def test_every_page_has_one_title_and_a_place():
     assert placed == set(PAGES) | GENERATED
 
 
-def test_links_lead_somewhere():
+def test_links_have_targets():
     labels = [x for t in PAGES.values() for x in re.findall(r"^:label: (\w+)$", t, re.MULTILINE)]
     assert len(labels) == len(set(labels)) > 30
     for name, text in PAGES.items():
@@ -59,9 +59,17 @@ def test_links_lead_somewhere():
         pages._check_links(name, text)
 
 
-def test_a_link_that_is_not_well_formed_is_refused():
+def test_a_malformed_link_is_rejected():
     with pytest.raises(executed.RunError, match="not well-formed"):
         pages._check_links("page", "see [it](https://nowhere)")
+
+
+def test_pages_that_would_load_something_from_the_web(tmp_path):
+    head = '<link rel="stylesheet" href="{0}"><script defer src="{0}"></script><a href="https://x.org">x</a>'
+    (tmp_path / "local.html").write_text(head.format("_static/mathjax/tex-svg.js"))
+    assert pages.loaded_from_web(tmp_path) == []
+    (tmp_path / "remote.html").write_text(head.format("//cdn.net/mathjax.js"))
+    assert pages.loaded_from_web(tmp_path) == ["remote.html: //cdn.net/mathjax.js"] * 2
 
 
 def test_files_and_symbols_that_pages_name_exist():
@@ -76,15 +84,15 @@ def test_files_and_symbols_that_pages_name_exist():
         "forms/none.py",
         "forms/u.py none",
         "python/tawami/solve/newton.py Newton.none",
-        "rust/basis.rs Basis::none",
+        "rust/grid/basis.rs Basis::none",
     ],
 )
-def test_what_does_not_exist_is_told(reference):
+def test_references_to_missing_files_and_symbols(reference):
     assert reference.split()[-1].split(".")[-1].split("::")[-1] in sources.missing(reference)
 
 
-def test_every_equation_of_the_theory_is_beside_its_file():
-    """Between two headings there is a file for the equations there."""
+def test_every_section_of_the_theory_names_its_files():
+    """Each section with equations has a reference to a file."""
     for section in re.split(r"^##+ ", PAGES["theory"], flags=re.MULTILINE)[2:]:
         if ":label:" in section:
             assert sources.ROLE.search(section), section[:60]
@@ -93,8 +101,10 @@ def test_every_equation_of_the_theory_is_beside_its_file():
 def test_every_form_and_law_is_in_the_theory():
     named = {reference.split()[0] for reference in sources.ROLE.findall(PAGES["theory"])}
     forms = {f"forms/{path.name}" for path in (sources.ROOT / "forms").glob("[!_]*.py")}
-    laws = {f"rust/material/{path.name}" for path in (sources.ROOT / "rust/material").glob("*.rs")}
-    assert forms | laws - {"rust/material/friction.rs"} <= named
+    folder = sources.ROOT / "rust" / "law"
+    laws = {f"rust/law/{p.name}" for p in folder.glob("*.rs") if "impl Law for" in p.read_text()}
+    assert len(laws) >= 5
+    assert forms | laws <= named
 
 
 def test_every_public_name_is_in_the_api():
@@ -104,16 +114,20 @@ def test_every_public_name_is_in_the_api():
     assert named <= set(tawami.__all__)
 
 
-def test_what_exists():
-    assert pages.exists("tawami.scene.scene.Scene.solve")
-    assert pages.exists("tawami.motion.stepping")
+def test_names_in_pages_exist():
+    """Names of the API, and imports in the code of pages."""
+    for name, text in PAGES.items():
+        named = re.findall(r"^\.\. auto\w+:: (\S+)$", text, re.MULTILINE)
+        for module, imported in re.findall(r"^from (tawami\S*) import (.+)$", text, re.MULTILINE):
+            named += [f"{module}.{part.split()[0]}" for part in imported.split(",")]
+        assert [dotted for dotted in named if not pages.exists(dotted)] == [], name
     assert not pages.exists("tawami.scene.scene.Scene.nothing")
 
 
-def test_every_class_of_error_and_warning_has_its_sentence():
+def test_every_class_of_error_and_warning_has_a_message():
     collected = messages.collected()
     kinds = {message.kind for message in collected}
-    bases = {"TawamiError", "TawamiWarning"}  # never raised themselves
+    bases = {"TawamiError", "TawamiWarning"}  # they are never raised
     assert set(errors.__all__) - bases <= kinds
     table = pages._classes()
     assert all(f"`{kind}`" in table for kind in kinds - {"InvertedError"})
@@ -122,8 +136,8 @@ def test_every_class_of_error_and_warning_has_its_sentence():
     assert set(listed) == kinds
 
 
-def test_help_is_for_sentences_that_exist():
-    """Each heading is a part of a sentence of the code, with dots for what is filled in."""
+def test_help_is_for_messages_that_exist():
+    """Each heading is a part of a message of the code, with dots for expressions."""
     headings = re.findall(r"^### `(.+)`$", PAGES["messages"], flags=re.MULTILINE)
     assert len(headings) >= 25
     says = [re.sub(r"<.*?>", "...", message.says) for message in messages.collected()]
@@ -134,29 +148,29 @@ def test_help_is_for_sentences_that_exist():
         assert any(re.search(pattern, text) for text in says), heading
 
 
-def test_messages_are_found_where_they_stand():
-    """Some of each way to raise: with a name, through a helper, as a warning, from Rust."""
+def test_messages_are_collected():
+    """Examples of errors raised directly and by a helper, and of errors of Rust."""
     found = {(message.kind, message.says) for message in messages.collected()}
     for kind, says in (
         ("InputError", "edge <shown(name)>: expected 'left', 'right', 'bottom' or 'top'"),
-        ("FormError", "field '<name>' is of kind '<kind>': expected one of <listed(FIELD_UNITS)>"),
+        ("FormError", "field '<name>' is of kind '<kind>': expected one of <quoted(FIELD_UNITS)>"),
         ("InputError", "volume of particle <index> is <value> m2: expected a positive number"),
         ("InputError", "phi = <value>: expected a friction angle in degrees, 0 <= phi < 90"),
     ):
         assert (kind, says) in found
 
 
-def test_code_of_a_page_is_run_and_must_end_as_it_says():
+def test_code_of_a_page_must_raise_the_expected_error():
     printed = executed.run_blocks([("", "x = 2"), ("", "print(x + 1)"), ("ValueError", "int('x')")])
     assert printed[1] == "3\n"
     assert printed[2].startswith("ValueError: invalid literal")
     with pytest.raises(executed.RunError, match="ZeroDivisionError"):
         executed.run_blocks([("", "1 / 0")])
-    with pytest.raises(executed.RunError, match="nothing was raised"):
+    with pytest.raises(executed.RunError, match="but nothing was raised"):
         executed.run_blocks([("ValueError", "1 + 1")])
 
 
-def test_nothing_runs_twice_unless_its_sources_changed(tmp_path):
+def test_a_run_is_repeated_only_if_its_sources_changed(tmp_path):
     runs = []
 
     def work():
@@ -164,19 +178,19 @@ def test_nothing_runs_twice_unless_its_sources_changed(tmp_path):
         return "said"
 
     for mark in ("a", "a", "b"):
-        assert executed.kept(tmp_path / "case", mark, work).text == "said"
+        assert executed.cached(tmp_path / "case", mark, work).text == "said"
     assert len(runs) == 2
 
     def fail():
         raise executed.RunError("no")
 
     with pytest.raises(executed.RunError):
-        executed.kept(tmp_path / "case", "c", fail)
-    executed.kept(tmp_path / "case", "c", work)  # a failure is no record
+        executed.cached(tmp_path / "case", "c", fail)
+    executed.cached(tmp_path / "case", "c", work)  # a failure is not recorded
     assert len(runs) == 3
 
 
-def test_a_fingerprint_follows_its_files():
+def test_a_fingerprint_depends_on_its_files():
     one = executed.fingerprint(["forms/*.py"])
     assert one == executed.fingerprint(["forms/*.py"])
     assert one != executed.fingerprint(["forms/u*.py", "Cargo.lock"])
@@ -205,32 +219,34 @@ def tried():
     ]  # fmt: skip
 
 
-def test_a_part_of_the_compatibility(tried):
-    refused = {(cell.form, cell.law): cell.says for cell in tried if cell.error}
-    assert set(refused) == {("u_p", "mohr_coulomb"), ("u_epsv_finite", "NumpyLaw")}
+def test_combinations_that_are_rejected(tried):
+    rejected = {(cell.form, cell.law): cell.says for cell in tried if cell.error}
+    assert set(rejected) == {("u_p", "mohr_coulomb"), ("u_epsv_finite", "NumpyLaw")}
     assert {cell.error for cell in tried if cell.error} == {"InputError"}
-    assert "depends on the mean stress" in refused["u_p", "mohr_coulomb"]
-    assert "expected a law in Rust" in refused["u_epsv_finite", "NumpyLaw"]
+    assert "depends on the mean stress" in rejected["u_p", "mohr_coulomb"]
+    assert "expected a law in Rust" in rejected["u_epsv_finite", "NumpyLaw"]
 
 
-def test_a_block_of_a_linear_law_is_pressed_as_by_hand(tried):
-    """K, mu once more: with free sides sigma_yy = E/(1 - nu^2) eps_yy; finite strain, less 1 %."""
+def test_stress_of_a_compressed_block_of_a_linear_law(tried):
+    """With free sides sigma_yy = E/(1 - nu^2) eps_yy; finite strain differs by 1 %."""
     exact = compatibility.E / (1 - compatibility.NU**2) * compatibility.PRESSED
     for cell in tried:
         if (cell.law, cell.time, cell.error) == ("linear_elastic", "static", ""):
             assert cell.numbers[0] == pytest.approx(exact, rel=0.03)
 
 
-def test_the_table_shows_what_was_found(tried):
+def test_the_table_shows_the_results(tried):
     text = compatibility.page(tried, {1: 1.0})
     assert text.count("| works |") + text.count("| works ") >= 6
-    assert text.count("refused 1") == text.count("refused 2") == 2
+    assert text.count("rejected 1") == text.count("rejected 2") == 2
     assert re.search(
-        r"^12 were tried, 0 of them on 2 ranks .*; 8 work, 4 are refused", text, re.MULTILINE
+        r"^12 combinations were run, 0 of them on 2 ranks .*: 8 work, 4 are rejected",
+        text,
+        re.MULTILINE,
     )
 
 
-def test_ranks_that_differ_are_told():
+def test_different_results_on_several_ranks_are_an_error():
     one = compatibility.Cell("u", "von_mises", "static", 1, numbers=(1.0, 2.0))
     two = compatibility.Cell("u", "von_mises", "static", 2, numbers=(1.0, 2.2))
     assert compatibility.difference([one, two]) == pytest.approx(0.1)
@@ -247,8 +263,8 @@ def test_the_matrix_of_the_readme_has_the_columns_of_make_matrix():
     assert "SUITES:-bookworm trixie sid}" in script
 
 
-def test_make_matrix_says_what_it_needs():
-    """Whichever comes first here: root, its tools, or a suite that it knows."""
+def test_error_messages_of_make_matrix():
+    """The first of: root is missing, a tool is missing, the suite is unknown."""
     script = sources.ROOT / "tests" / "matrix.sh"
     run = subprocess.run(
         [script], env=os.environ | {"SUITES": "buster"}, capture_output=True, text=True, check=False

@@ -1,4 +1,4 @@
-"""Ctrl-C at any line of a step: the particles are as before the step or as after it, never between."""
+"""Ctrl-C at any line of a step: the state is that before the step or that after it, never between."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def falling(form: str) -> tawami.Dynamics:
 
 
 def state(motion: tawami.Dynamics) -> dict[str, Any]:
-    """All that a step changes."""
+    """Everything that a step changes."""
     scene, particles, energies = motion.scene, motion.scene.particles, motion.energies
     arrays = {
         name: getattr(particles, name)
@@ -61,7 +61,12 @@ def same(one: dict[str, Any], other: dict[str, Any]) -> bool:
 
 
 def traced(run: Callable[[], object], at: int) -> int:
-    """Run with Ctrl-C at a line of the package, counted as they are run; how many lines were run."""
+    """Run, with Ctrl-C at one line of the package; the number of lines that were run.
+
+    Args:
+        run: What is run.
+        at: Number of the line that Ctrl-C arrives at, counted as lines are run.
+    """
     lines = 0
 
     def local(frame: FrameType, event: str, _: Any) -> Any:
@@ -73,7 +78,7 @@ def traced(run: Callable[[], object], at: int) -> int:
         return local
 
     def tracer(frame: FrameType, *_: Any) -> Any:
-        # what is raised where Python drops an object goes nowhere, in any program
+        # Python ignores exceptions in destructors, which petsc.py frees its objects in
         name = frame.f_code.co_filename
         return local if name.startswith(PACKAGE) and not name.endswith("petsc.py") else None
 
@@ -87,7 +92,7 @@ def traced(run: Callable[[], object], at: int) -> int:
 
 
 @pytest.mark.parametrize("form", ["u_epsv", "u_epsv_finite"])
-def test_an_interrupted_step_is_there_or_not(form):
+def test_an_interrupted_step_is_complete_or_undone(form):
     motion = falling(form)
     before = state(motion)
     lines = traced(lambda: motion.step(0.01), 0)
@@ -96,7 +101,7 @@ def test_an_interrupted_step_is_there_or_not(form):
     if form.endswith("finite"):
         assert len(after["x"]) < len(before["x"])
     seen = {"before": 0, "after": 0}
-    # everywhere, and more where a step is stored, which is near its end
+    # everywhere, and at more lines near the end, where the step is stored
     for at in sorted(
         {*range(1, lines, lines // 8), *range(lines // 2, lines, max(lines // 30, 1))}
     ):
@@ -108,13 +113,13 @@ def test_an_interrupted_step_is_there_or_not(form):
             which = "before" if same(now, before) else "after"
             assert same(now, before if which == "before" else after), f"line {at} of {lines}"
             seen[which] += 1
-            if which == "before":  # and it goes on from there
+            if which == "before":  # and the step can be taken again
                 motion.step(0.01)
                 np.testing.assert_allclose(motion.scene.particles.x, after["x"], atol=1e-5)
     assert min(seen.values()) > 0, seen
 
 
-def test_signals_wait_for_the_end_of_a_block():
+def test_a_deferred_signal_waits_for_the_end_of_the_block():
     said = []
 
     def twice() -> None:
@@ -126,11 +131,11 @@ def test_signals_wait_for_the_end_of_a_block():
     with pytest.raises(KeyboardInterrupt):
         twice()
     assert said == ["done"]
-    with pytest.raises(KeyboardInterrupt):  # the handler is there again
+    with pytest.raises(KeyboardInterrupt):  # the handler is restored
         signal.raise_signal(signal.SIGINT)
 
 
-def test_other_threads_have_no_signals():
+def test_other_threads_leave_the_handlers_alone():
     handler, seen = signal.getsignal(signal.SIGINT), []
 
     def look() -> None:

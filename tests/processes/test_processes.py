@@ -1,4 +1,4 @@
-"""Copies, other processes and threads: it works, or a sentence says what does."""
+"""Copies, other processes and threads: they work, or an error message says what does."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def deflection(material: tawami.Material | None = None) -> float:
 
 
 def outcome(_: int) -> float | str:
-    """What another process finds."""
+    """The deflection, or the error message, in another process."""
     try:
         return deflection()
     except tawami.TawamiError as error:
@@ -60,7 +60,7 @@ def test_materials_are_copied_and_pickled(law):
     assert pickle.loads(pickle.dumps(hyper)).bulk_modulus == hyper.bulk_modulus
 
 
-def test_what_holds_objects_of_mpi_is_not_copied():
+def test_objects_that_hold_a_communicator_cannot_be_copied():
     scene = scene_of()
     for one in (scene, scene.grid, scene.solve(), tawami.Dynamics(scene_of())):
         for double in (copy.copy, copy.deepcopy, pickle.dumps):
@@ -72,8 +72,8 @@ def test_what_holds_objects_of_mpi_is_not_copied():
     assert np.array_equal(pickle.loads(pickle.dumps(body)).x, body.x)
 
 
-def test_a_forked_process_is_told_apart():
-    """In a fork the threads of Rust are gone: what they should do was waited for, for ever."""
+def test_a_forked_process_raises_an_error():
+    """A fork has none of the threads of Rust and would wait for them forever."""
     deflection()
     with multiprocessing.get_context("fork").Pool(1) as pool:
         said = pool.map_async(outcome, [0]).get(60)[0]
@@ -86,8 +86,8 @@ def test_a_spawned_process_computes():
         assert pool.map_async(outcome, [0]).get(120) == [deflection()]
 
 
-def test_two_threads_at_once():
-    """The interpreter's lock lets one compute at a time."""
+def test_two_threads_compute_the_same():
+    """They take turns."""
     expected, found = deflection(), list[float | str]()
     threads = [
         threading.Thread(target=lambda: found.extend(map(outcome, range(5)))) for _ in range(2)

@@ -1,6 +1,6 @@
-"""What users write, with annotations: checked by mypy (tests/processes/test_typing.py), never run.
+"""A driver with annotations: checked by mypy (tests/processes/test_typing.py), never run.
 
-A line that ends in `# wrong: CODE ...` must be refused with one of these codes, any other must not.
+mypy must report the lines that end in `# wrong: CODE ...`, with one of these codes, and no others.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def statics(comm: MPI.Comm) -> float:
 
 
 def dynamics(comm: MPI.Comm) -> None:
-    """A motion, and what brings it about."""
+    """Ramp, settle, motion and results."""
     grid = tawami.Grid(comm, origin=(0.0, 0.0), h=0.1, cells=[10, 10])
     block = tawami.box(grid, (0, 0), (0.5, 0.5))
     law = tawami.NumpyLaw(respond, K=1e6, mu=1e6)
@@ -116,7 +116,7 @@ def weak_form() -> bool:
 
 
 def run(n: int, alpha: float) -> dict[str, float]:
-    """What a study runs."""
+    """The function of a study."""
     return {"error": n * alpha}
 
 

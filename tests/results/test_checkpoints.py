@@ -40,7 +40,6 @@ def test_without_a_valid_checkpoint_nothing_is_solved(interrupted):
         run(interrupted, each=kill)
 
 
-@pytest.mark.fuzz
 @given(st.data())
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_any_damage_to_a_file_is_found(tmp_path, data):

@@ -82,7 +82,7 @@ def test_a_killed_run_resumes_to_the_bit(tmp_path, form, law, transfer, kills):
     reused = any(step.krylov[0] > 0 for step in whole["steps"][-1])
     assert reused == (form == "u_epsv")  # the factorisation of an earlier step
     assert recorders["killed"].seen == recorders["whole"].seen
-    # resumed once more: nothing is solved, the end is loaded
+    # resumed again: nothing is solved, the end is loaded
     again = fall(results_of(tmp_path / "killed"), each=Kill(1), **options)
     assert again.pop("rows").tobytes() != b""
     assert again == found

@@ -20,7 +20,6 @@ def scene_of(grid, x, volume=None):
     return tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3), form="u")
 
 
-@pytest.mark.fuzz
 @given(cloud=clouds((4, 3), 30), seed=st.integers(0, 9))
 def test_constants_are_exact_and_means_stay_in_range(cloud, seed):
     grid, x = cloud
@@ -41,7 +40,6 @@ def test_constants_are_exact_and_means_stay_in_range(cloud, seed):
         assert (found[vertex] <= around.max(axis=0) + 1e-12).all()
 
 
-@pytest.mark.fuzz
 @given(seed=st.integers(0, 99), method=st.sampled_from(METHODS))
 def test_the_volume_integral_is_conserved(seed, method):
     """sum_i (sum_p V_p M_i) f_i = sum_p V_p f_p, the functions M_i summing to 1."""

@@ -14,10 +14,13 @@ P, G, T = tawami.ParticleOutput, tawami.GridOutput, tawami.TableOutput
     ("output", "message"),
     [
         (P("velocity"), r"velocity: a scene by itself is static.*Dynamics\(scene, velocity"),
-        (P("plastic_strain"), r"'plastic_strain': the laws of this scene have none: .*von_mises"),
+        (
+            P("plastic_strain"),
+            r"'plastic_strain': the laws of this scene have no history: .*von_mises",
+        ),
         (P("eps_v"), r"eps_v: .*expected one with.*form='u_epsv'"),
         (G("velocity"), r"velocity: a scene by itself is static"),
-        (G("mean stress", "dilatancy"), "'dilatancy': the laws of this scene have none"),
+        (G("mean stress", "dilatancy"), "'dilatancy': the laws of this scene have no history"),
         (G("eps_v"), r"eps_v: .*form='u_epsv'"),
         (G("p"), r"p: form 'u' has no pressure: expected form='u_p'"),
         (T("energies"), r"energies: a scene by itself is static"),
@@ -48,5 +51,7 @@ def test_an_unknown_quantity_is_rejected_with_the_known_ones(output, message, tm
 
 
 def test_a_point_away_from_the_body_is_rejected(tmp_path):
-    with pytest.raises(tawami.InputError, match="no particle was within a cell of it, 0.25 m: exp"):
+    with pytest.raises(
+        tawami.InputError, match=r"no particle was within a cell \(0.25 m\) of it: exp"
+    ):
         T("displacement (0.45, 1.7)").begin(tmp_path, plastic_block().scene, None)

@@ -1,4 +1,4 @@
-"""The folder of a run: what happens where it exists, what it holds, what later scenes read from it."""
+"""The folder of a run: what happens where it exists, its content, what later scenes read from it."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def test_results_of_another_type_are_rejected():
         motion.run(0.1, 0.01, results="folder")
 
 
-# -- what it holds ----------------------------------------------------------------
+# -- its content ------------------------------------------------------------------
 
 
 def test_the_end_of_a_run_is_the_initial_state_of_another_scene(tmp_path):

@@ -44,7 +44,6 @@ def observed(output, scene, times, state=None, first=0):
         look(output, scene, None, None, times[step], step, last=step == len(times) - 1)
 
 
-@pytest.mark.fuzz
 @given(
     every=st.sampled_from([0.1, 0.25, 1.0, 3.0]),
     sizes=st.lists(st.sampled_from([0.1, 0.05, 1 / 3, 0.7, 2.0]), min_size=1, max_size=40),

@@ -24,7 +24,9 @@ from cases.common import figure
 from tawami.base.files import atomic_file, result_folder
 from tawami.results.single import write_grid, write_particles
 from tawami.study import process
-from tawami.study.table import COSTS, Row, Table
+from tawami.study.figure import picture
+from tawami.study.row import COSTS, Row
+from tawami.study.table import Table
 
 BEFORE = "before"
 
@@ -64,7 +66,7 @@ WRITERS = {
     "p.vtu": lambda path, solution: write_particles(path, solution),
     "g.vtu": lambda path, solution: write_grid(path, solution),
     "figure.png": lambda path, _: drawn(path),
-    "study.png": lambda path, _: table().draw(path),
+    "study.png": lambda path, _: picture(table(), path),
     "study.csv": lambda path, _: csv(path),
 }
 
@@ -157,7 +159,7 @@ def runs(n: int) -> dict[str, float]:
 def test_a_study_keeps_its_runs_on_a_full_disk(folder, monkeypatch):
     """A line that does not fit is removed; earlier runs are kept, and the study can be resumed."""
     outcome = {"values": runs(1)} | dict.fromkeys(COSTS, 1.0)
-    monkeypatch.setattr(process, "measured", lambda *_: outcome)
+    monkeypatch.setattr(process, "measure", lambda *_: outcome)
     study = tawami.Study("toy", runs, {"n": (1,)}, {"x": 1.0}, folder=folder)
     kept = folder / "runs.jsonl"
     kept.write_text('{"label": "other", "knobs": {}, "fingerprint": "0"}\n')

@@ -71,7 +71,7 @@ def in_this_process(monkeypatch, tmp_path_factory):
     """Run the functions of studies here: a process of its own costs a second."""
     folder = tmp_path_factory.mktemp("jobs")
 
-    def measured(name, knobs, _limit):
+    def measure(name, knobs, _limit):
         job, result = folder / "job.json", folder / "result.json"
         job.write_text(json.dumps({"name": name, "knobs": dict(knobs)}))
         with monkeypatch.context() as patch:
@@ -79,7 +79,7 @@ def in_this_process(monkeypatch, tmp_path_factory):
             process.main()
         return json.loads(result.read_text())
 
-    monkeypatch.setattr(process, "measured", measured)
+    monkeypatch.setattr(process, "measure", measure)
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -232,7 +232,7 @@ def test_a_study_without_runs_or_without_a_quantity_raises_an_error(tmp_path):
     study = tawami.Study("toy", converges, {"n": (1,)}, {"z": 1.0}, folder=tmp_path)
     with pytest.raises(tawami.InputError, match="nothing has been run"):
         study.table()
-    with pytest.raises(tawami.InputError, match="no quantity 'z' among what its function returned"):
+    with pytest.raises(tawami.InputError, match="its function returned no quantity 'z'"):
         study.run(quiet=True)
 
 

@@ -6,7 +6,7 @@ import pytest
 
 import tawami
 from tawami.study import Row, Table
-from tawami.study.table import error_of
+from tawami.study.row import error_of
 
 
 def table_of(*points: tuple[float, float], **knobs: tuple) -> Table:
@@ -62,7 +62,7 @@ def test_the_cheapest_setting_within_a_tolerance_is_recommended(tmp_path):
         tawami.recommend(table, 1e-6)
     with pytest.raises(tawami.InputError, match="quantity 'y' of study 'toy': expected one of 'x'"):
         tawami.recommend(table, {"y": 0.1})
-    with pytest.raises(tawami.InputError, match=r"nowhere.csv.*expected a CSV file"):
+    with pytest.raises(tawami.InputError, match=r"nowhere.csv.*expected the CSV file"):
         tawami.recommend(tmp_path / "nowhere.csv", 0.1)
 
 

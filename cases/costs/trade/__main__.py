@@ -1,47 +1,45 @@
-"""The studies, one after the other; what has been run is not run again.
+"""Run the studies one after the other. Settings that have been run are not run again.
 
-python -m cases.costs.trade [NAME ...] [--sample N] [--results results/trade]
-python -m cases.costs.trade --words          what the shipped results say, without running anything
+python -m cases.costs.trade [NAME ...]
+python -m cases.costs.trade --words          the results that come with the repository, without running
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-import tawami
+from cases.common.program import Program
 from cases.costs.trade import cantilever, collapse, cook, self_weight, spinning_disc
 from tawami.base.files import atomic_file
-from tawami.fem.environment import header
 from tawami.study import Table
 
 CASES = (cantilever, cook, collapse, self_weight, spinning_disc)
 STUDIES = {case.STUDY.name: case.STUDY for case in CASES}
-#: Results that come with the repository.
+#: Folder of the results that come with the repository.
 SHIPPED = Path(__file__).parent
+
+PROGRAM = Program("cases.costs.trade", __doc__, files=False)
+PROGRAM.option("studies", nargs="*", help=f"among {', '.join(STUDIES)}; all by default")
+PROGRAM.option("--results", default="results/trade", help="folder of the results")
+PROGRAM.option("--sample", type=int, help="run only this many settings, drawn at random")
+PROGRAM.option("--words", action="store_true", help="print the shipped results, run nothing")
 
 
 def in_words(table: Table) -> str:
-    """A paragraph a quantity, and what failed."""
+    """One paragraph per quantity, and one per setting that failed."""
     paragraphs = [table.in_words(quantity) for quantity in table.quantities]
     failed = [f"Failed: {str(row)[:300]}" for row in table.failed]
     return "\n\n".join([f"# {table.name}", *paragraphs, *failed]) + "\n"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run studies and say what they say."""
-    parser = argparse.ArgumentParser(prog="python -m cases.costs.trade", description=__doc__)
-    parser.add_argument("studies", nargs="*", help=f"among {', '.join(STUDIES)}; all by default")
-    parser.add_argument("--results", default="results/trade", help="folder for the results")
-    parser.add_argument("--sample", type=int, help="run so many settings, drawn at random")
-    parser.add_argument("--words", action="store_true", help="of the shipped results, run nothing")
-    options = parser.parse_args(arguments)
+    """Run studies and print their results."""
+    options = PROGRAM.start(arguments)
     names = options.studies or list(STUDIES)
     for name in names:
         if name not in STUDIES:
-            parser.error(f"study {name}: expected one of {', '.join(STUDIES)}")
-    print(header(), flush=True)
+            PROGRAM.error(f"study {name}: expected one of {', '.join(STUDIES)}")
     for name in names:
         if options.words:
             table = Table.read(SHIPPED / f"{name}.csv")
@@ -51,9 +49,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             table = study.run(sample=options.sample)
             with atomic_file(study.path / f"{name}.md") as part:
                 part.write_text(in_words(table))
-            print(f"\nResults: {study.path}/{name}.csv, {name}.md, {name}.png")
+            print(f"\nResults in {study.path}: {name}.csv, {name}.md, {name}.png")
         print(f"\n{in_words(table)}")
 
 
 if __name__ == "__main__":
-    tawami.run(main, "trade")
+    PROGRAM.run(main)

@@ -1,4 +1,4 @@
-"""The cantilever, support `exact`: deflection and mean stress against the closed form."""
+"""The cantilever with the support `exact`: deflection and mean stress against the closed form."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ALPHAS = (0.0, 0.003, 0.01, 0.03, 0.1)
 
 
 def run(n: int, form: str, particles: str, **options: object) -> dict[str, float]:
-    """Deflection [m] and relative L2 error of the mean stress."""
+    """Deflection [m] and relative L2 error of the mean stress by the MPM."""
     per_axis, gauss = BODIES[particles]
     row, _ = mpm.solve(form, "exact", n, per_axis=per_axis, gauss=gauss, **options)
     assert row.mean_stress_l2 is not None
@@ -23,7 +23,7 @@ def run(n: int, form: str, particles: str, **options: object) -> dict[str, float
 
 
 def run_fem(n: int, element: str) -> dict[str, float]:
-    """The same by finite elements."""
+    """Deflection [m] and relative L2 error of the mean stress by finite elements."""
     row = fem.solve(element, "exact", n)
     assert row.mean_stress_l2 is not None
     return {

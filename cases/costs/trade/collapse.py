@@ -1,4 +1,4 @@
-"""The collapse of a pile, until 0.3 s: run-out, profile and mean stress against the finest run."""
+"""The collapse of a pile to 0.3 s: run-out, profile and mean stress against the finest run."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import tawami
 from cases.showcase.collapse import pile
 
 END = 0.3  # [s]
-#: Side of the squares that heights and mean stress are averaged over [m].
+#: Side of the squares over which heights and mean stress are averaged [m].
 BOX = 0.02
-#: Number of them along x and y.
+#: Number of squares along x and y.
 BOXES = (30, 6)
 
 
 def run(form: str, h: float, dt: float, **options: Any) -> dict[str, Any]:
-    """At the end: run-out [m], height in strips [m], mean stress in boxes [Pa], its roughness."""
+    """Run-out [m], heights of strips [m], mean stress of squares [Pa] and its roughness at the end."""
     motion = pile.build(form, h=h, **options)
     motion.run(END, dt)
     particles = motion.scene.particles

@@ -1,7 +1,8 @@
-"""Cook's membrane, nu = 0.4999: the deflection against what finite elements converge to.
+"""Cook's membrane, nu = 0.4999: the deflection against the limit of finite elements.
 
-Of the settings on the front some are there because two faults cancel: a lattice without the particles
-outside is too soft, displacement alone too stiff. Their error has no order; take it for none of theirs.
+Some settings are on the front because two errors cancel: a lattice without the particles outside the
+membrane is too soft, displacement only is too stiff. Their error has no order of convergence and does
+not measure the method.
 """
 
 from __future__ import annotations
@@ -16,13 +17,13 @@ ALPHAS = (0.0, 0.003, 0.01, 0.03, 0.1)
 
 
 def run(h: float, body: str, form: str, **options: object) -> dict[str, float]:
-    """Deflection."""
+    """Deflection by the MPM."""
     scene = mpm.scene_of(NU, h, body, form=form, **options)
     return {"deflection": scene.solve().displacement(MIDDLE)[1]}
 
 
 def run_fem(element: str, h: float) -> dict[str, float]:
-    """The same by finite elements."""
+    """Deflection by finite elements."""
     row = fem.solve(element, NU, round(LENGTH / h))
     return {
         "deflection": row.deflection, "unknowns": row.unknowns, "newton_iterations": 1, "steps": 1

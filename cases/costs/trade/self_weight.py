@@ -1,4 +1,4 @@
-"""A column under its own weight: small or finite strain, static or in motion until it rests."""
+"""A column under its own weight: small or finite strain, static or in motion until it is at rest."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import tawami
 from cases.verification import self_weight
 from cases.verification.self_weight import WEIGHT, E, G, H
 
-#: First natural period of the column before it is loaded [s].
+#: First natural period of the unloaded column [s].
 PERIOD = 4 * H / float(np.sqrt(E / (WEIGHT / G)))
 SIZES = (5.0, 2.5, 1.0, 0.5)
-#: Without inertia, or with it and damped (gamma = 1) until it is at rest.
+#: Without inertia, or with inertia and damped (gamma = 1) until the column is at rest.
 INERTIA = ("none", "damped")
 
 
 def run(form: str, h: float, inertia: str, increments: int, **options: object) -> dict[str, float]:
-    """Errors of height and stress; `increments` of the weight, or time steps of a natural period."""
+    """Errors of height and stress, with `increments` of the weight or time steps of a natural period."""
     scene = self_weight.build(form, h, **options)
     if inertia == "none":
         for k in range(1, increments + 1):

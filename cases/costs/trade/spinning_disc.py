@@ -1,4 +1,4 @@
-"""A free disc spins once: what is kept of momentum and energy, and its mean stress."""
+"""A free disc spins once: conservation of momentum and energy, and the mean stress."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cases.verification.spinning_disc.disc import Kind
 
 
 def run(form: str, transfer: Any, n: int, steps: int, **options: Any) -> dict[str, float]:
-    """Largest changes, as shares, of the momenta; change of the energy; rms error of the mean stress."""
+    """Relative changes of momenta and energy, and rms error of the mean stress."""
     spun = disc.solve(Kind(form, transfer, form, ""), turns=1, steps=steps, n=n, **options)
     return {
         "momentum": max(spun.linear),

@@ -1,4 +1,4 @@
-"""The figures of the paper: deflection error over cell size, and mean stress at 32 x 16 cells."""
+"""Figures of the paper: deflection error over the cell size, mean stress at 32 x 16 cells."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from cases.verification.cantilever.beam import (
 )  # fmt: skip
 
 Values = npt.NDArray[np.float64]
-#: Largest mean stress of the closed form [Pa]: the range of the colours.
+#: Largest mean stress of the closed form [Pa], the range of the colours.
 ROOT_STRESS = float(mean_stress(0.0, D / 2))
 
 STYLES = {
@@ -40,9 +40,7 @@ TITLES = {
     "exact": "exact: closed-form displacement and tractions\n(limit: eq. (3); dotted: second order)",
     "clamped": "clamped root\n(dotted: its own limit)",
 }
-
-
-#: Scale of the error axis, its ticks and its label.
+#: Scale, ticks and label of the error axis.
 SCALES = {
     "paper": ("log", (2, 5, 10, 20, 50, 100), "error of the tip deflection [%]"),
     "exact": (
@@ -55,7 +53,7 @@ SCALES = {
 
 
 def deflection_error(rows: Sequence[Row], path: Path) -> None:
-    """Error of the tip deflection, eq. (4), over the cell size; one panel per support."""
+    """Draw the error of the tip deflection, eq. (4), over the cell size, one panel per support."""
     figure, panels = plt.subplots(1, 3, figsize=(13.5, 5.2), layout="constrained")
     for axes, support in zip(panels, SUPPORTS, strict=True):
         mine = [row for row in rows if row.support == support]
@@ -89,7 +87,7 @@ def deflection_error(rows: Sequence[Row], path: Path) -> None:
 
 
 def _reference(axes: Axes, support: str, rows: Sequence[Row]) -> None:
-    """What the lines of a support tend to, dotted."""
+    """Draw the expected asymptote of a support, dotted."""
     dotted = {"color": "black", "linewidth": 1, "linestyle": ":"}
     if support == "paper":
         fine = [row for row in rows if row.method == "fem_taylor_hood"]
@@ -106,7 +104,7 @@ def _reference(axes: Axes, support: str, rows: Sequence[Row]) -> None:
 
 
 def mean_stress_paper(solutions: Mapping[str, tawami.Solution], path: Path) -> None:
-    """Mean stress at the particles for the support `paper`, one panel per solution (Fig. 3)."""
+    """Draw the mean stress at the particles for the support `paper`, one panel per solution (Fig. 3)."""
     figure, panels = plt.subplots(
         len(solutions), 1, figsize=(6.6, 3.1 * len(solutions)), layout="constrained", sharex=True
     )
@@ -122,8 +120,9 @@ def mean_stress_paper(solutions: Mapping[str, tawami.Solution], path: Path) -> N
 
 
 def mean_stress_exact(solutions: Mapping[str, tawami.Solution], path: Path) -> None:
-    """Mean stress at the particles for the support `exact` beside the closed form: the fields on
-    the left, their differences from it on the right.
+    """Draw the mean stress at the particles for the support `exact`.
+
+    Fields are on the left, their differences from the closed form on the right.
     """
     figure, panels = plt.subplots(
         len(solutions) + 1, 2, figsize=(12, 2.9 * (len(solutions) + 1)), layout="constrained"
@@ -167,7 +166,7 @@ def _titled(title: str, values: Values) -> str:
 
 
 def _field(axes: Axes, solution: tawami.Solution, values: Values, scale: float) -> PolyCollection:
-    """Each particle as the square of its volume, coloured from -scale to scale [Pa]."""
+    """Draw each particle as a square of its volume, coloured from -scale to scale [Pa]."""
     corners = 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     side = np.sqrt(solution.volume)[:, None, None]
     squares = PolyCollection(

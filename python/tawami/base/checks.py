@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 
-Array = npt.NDArray[np.float64]
 #: The smallest number above 0.
 LEAST = sys.float_info.min
 #: Characters of a value that a message shows.

@@ -89,7 +89,7 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
                 part.unlink(missing_ok=True)
 
 
-def append_line(path: Path, line: str, *, sync: bool = False) -> None:
+def append_line(path: str | Path, line: str, *, sync: bool = False) -> None:
     """Append a line to a file; a line before it that was cut off is ended first.
 
     Args:
@@ -100,9 +100,10 @@ def append_line(path: Path, line: str, *, sync: bool = False) -> None:
     Raises:
         OutputError: The file cannot be written; it is as it was before.
     """
-    with writing(path):
-        check_regular(path, new=True)
-        with path.open("a+b", buffering=0) as file:
+    file_path = checks.path("path", path)
+    with writing(file_path):
+        check_regular(file_path, new=True)
+        with file_path.open("a+b", buffering=0) as file:
             size = file.seek(0, os.SEEK_END)
             if size:
                 file.seek(-1, os.SEEK_END)

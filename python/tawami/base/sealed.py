@@ -19,11 +19,11 @@ class Sealed:
 
     _is_sealed = False
 
-    def seal(self) -> None:
+    def _seal(self) -> None:
         """Allow no further public attributes to be set; called at the end of `__init__`."""
         self._is_sealed = True
 
-    def how_to_set(self, name: str) -> str:
+    def _how_to_set(self, name: str) -> str:
         """What to do instead of setting an attribute; subclasses know better."""
         return f"a {type(self).__name__} is changed by its methods only"
 
@@ -32,7 +32,7 @@ class Sealed:
             descriptor = inspect.getattr_static(type(self), name, None)
             if isinstance(descriptor, property | None) or not hasattr(descriptor, "__set__"):
                 raise InputError(
-                    f"{type(self).__name__}.{name} cannot be set: {self.how_to_set(name)}"
+                    f"{type(self).__name__}.{name} cannot be set: {self._how_to_set(name)}"
                 )
         super().__setattr__(name, value)
 

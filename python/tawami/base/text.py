@@ -1,9 +1,9 @@
-"""Lines of text with a label, as the headers of runs have them."""
+"""Text for headers and messages: labelled lines, lists of names, sizes."""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 WIDTH, LABEL = 100, 13
 #: Names that a line lists before it counts the rest.
@@ -27,6 +27,11 @@ def listed(texts: Sequence[str]) -> str:
         return "none"
     more = [f"{len(texts) - MOST} others"] if len(texts) > MOST else []
     return ", ".join([*texts[:MOST], *more])
+
+
+def quoted(names: Iterable[object]) -> str:
+    """Names in quotes, for messages."""
+    return ", ".join(f"'{name}'" for name in names)
 
 
 def size(number: int) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from tawami.base.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -25,3 +25,9 @@ class Body:
     volume: Array
     material_of: npt.NDArray[np.uint32] | None = None
     names: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        materials = f", materials {', '.join(self.names)}" if self.names else ""
+        return (
+            f"Body({len(self.x)} particles, {np.sum(self.volume):g} m2 per metre depth{materials})"
+        )

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import InputError
-from tawami.body.points import Array, Mask, Numbers, areas
+from tawami.body.points import areas
 
 #: Bisections that find where the sign changes.
 BISECTIONS = 46
@@ -21,7 +22,7 @@ MANY = 20_000
 CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 HALVES = np.array([[[0, 1, 3], [0, 3, 2]], [[0, 1, 2], [1, 3, 2]]])
 #: Sign of the user's function at positions (..., 2) in cells: -1 inside the body, else 1.
-Sign = Callable[[Array], Numbers]
+Sign = Callable[[Array], Indices]
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Squares:
 
     corner: Array
     size: float
-    sign: Numbers
+    sign: Indices
 
     def __getitem__(self, chosen: Any) -> Squares:
         return Squares(self.corner[chosen], self.size, self.sign[chosen])
@@ -110,7 +111,7 @@ def _quarters(sign: Sign, squares: Squares) -> Squares:
     return Squares(corner.reshape(-1, 2), half, signs[:, of_quarter].reshape(-1, 4))
 
 
-def _pieces(sign: Sign, squares: Squares) -> tuple[Array, Numbers]:
+def _pieces(sign: Sign, squares: Squares) -> tuple[Array, Indices]:
     """Triangles that fill the body in squares, and the square of each.
 
     A square is two triangles. The border crosses a triangle from side to side through a point in

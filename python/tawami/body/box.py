@@ -7,13 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tawami.base.arrays import Indices
 from tawami.base.checks import point
 from tawami.base.errors import InputError
+from tawami.base.space import lattice, tensor_product
 from tawami.body.body import Body
 from tawami.body.filling import Filling
-from tawami.body.points import Numbers
 from tawami.grid.grid import Grid
-from tawami.grid.space import lattice, tensor_product
 
 
 def box(
@@ -48,7 +48,7 @@ def box(
     return Body(grid.in_metres(lattice(along)), tensor_product(lengths))
 
 
-def _cells(grid: Grid, axis: int, low: float, high: float) -> Numbers:
+def _cells(grid: Grid, axis: int, low: float, high: float) -> Indices:
     """Cells of the box along an axis."""
     name = grid.space.axes[axis]
     found = grid.cells_between(axis, low, high)

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from tawami.body.points import ROUND_OFF, Array, Numbers
+from tawami.base.arrays import Array, Indices
+from tawami.base.space import lattice
+from tawami.body.points import ROUND_OFF
 from tawami.grid.grid import ON_LINE, Grid
-from tawami.grid.space import lattice
 
 
 def on_lines(grid: Grid, x: Array) -> Array:
@@ -21,14 +22,14 @@ def on_lines(grid: Grid, x: Array) -> Array:
     return np.where(near, np.rint(scaled), scaled)
 
 
-def squares(index: Numbers) -> Any:
+def squares(index: Indices) -> Any:
     """Cells as boxes of shapely, given their indices (i, j), n x 2."""
     import shapely
 
     return shapely.box(*index.T, *(index + 1).T)
 
 
-def clipped(grid: Grid, shape: Any) -> tuple[Numbers, Array, Numbers]:
+def clipped(grid: Grid, shape: Any) -> tuple[Indices, Array, Indices]:
     """A polygon or multipolygon in cells, clipped by the cells.
 
     Returns:

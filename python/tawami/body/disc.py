@@ -7,12 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from tawami import _rust
+from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.checks import LEAST, number, point
 from tawami.base.errors import InputError
 from tawami.body import clipping
 from tawami.body.body import Body
 from tawami.body.filling import Filling
-from tawami.body.points import ROUND_OFF, Array, Mask, Numbers, Points, halves, in_triangles, joined
+from tawami.body.points import ROUND_OFF, Points, halves, in_triangles, joined
 from tawami.grid.grid import ON_LINE, Grid
 
 #: Least number of chords around a circle.
@@ -128,8 +129,8 @@ def _caps(grid: Grid, middle: Array, r: float, ends: Array) -> Points:
 
 
 def _refined(
-    grid: Grid, full: Numbers, triangles: Array, cell: Numbers, hole: Numbers
-) -> tuple[Numbers, Array, Numbers]:
+    grid: Grid, full: Indices, triangles: Array, cell: Indices, hole: Indices
+) -> tuple[Indices, Array, Indices]:
     """Full cells, and triangles with their cells, refined in the cells along a hole.
 
     The hole extends beyond its chords into these cells: they are not full, and their triangles are

@@ -7,9 +7,10 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from tawami.base.arrays import Array, Indices
 from tawami.base.errors import InputError
 from tawami.body import clipping
-from tawami.body.points import ROUND_OFF, Array, Numbers, Points, areas, in_triangles
+from tawami.body.points import ROUND_OFF, Points, areas, in_triangles
 from tawami.grid.grid import Grid
 
 #: A cell is full if less than this share is not covered. More than this share above 1 is an overlap.
@@ -28,12 +29,12 @@ class Elements:
     """
 
     corners: Array
-    nodes: Numbers
-    number: Numbers
-    material: Numbers
+    nodes: Indices
+    number: Indices
+    material: Indices
 
 
-def triangles(grid: Grid, x: Array, blocks: list[Numbers], material: Numbers) -> Elements:
+def triangles(grid: Grid, x: Array, blocks: list[Indices], material: Indices) -> Elements:
     """The elements of a mesh as triangles.
 
     Args:
@@ -46,7 +47,7 @@ def triangles(grid: Grid, x: Array, blocks: list[Numbers], material: Numbers) ->
         InputError: An element is outside the grid, has no area, or crosses itself.
     """
     scaled = clipping.on_lines(grid, x)
-    nodes, number, first = list[Numbers](), list[Numbers](), 0
+    nodes, number, first = list[Indices](), list[Indices](), 0
     for block in blocks:
         count = np.arange(first, first + len(block))
         _check_nodes(grid, x, scaled, block, first)
@@ -70,7 +71,7 @@ def triangles(grid: Grid, x: Array, blocks: list[Numbers], material: Numbers) ->
     return Elements(scaled[all_nodes], all_nodes, all_numbers, material[all_numbers])
 
 
-def _check_nodes(grid: Grid, x: Array, scaled: Array, block: Numbers, first: int) -> None:
+def _check_nodes(grid: Grid, x: Array, scaled: Array, block: Indices, first: int) -> None:
     inside = (scaled >= 0) & (scaled <= grid.cells)
     wrong = np.argwhere(~inside.all(axis=1)[block])
     if len(wrong):
@@ -82,7 +83,7 @@ def _check_nodes(grid: Grid, x: Array, scaled: Array, block: Numbers, first: int
         )
 
 
-def _halves(x: Array, quads: Numbers, first: int) -> tuple[Numbers, Numbers]:
+def _halves(x: Array, quads: Indices, first: int) -> tuple[Indices, Indices]:
     """Two triangles of each quadrilateral, divided along a diagonal that is inside it."""
     along = (quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]), (quads[:, [1, 2, 3]], quads[:, [1, 3, 0]])
     signs = [np.sign(areas(x[a])) * np.sign(areas(x[b])) for a, b in along]
@@ -139,7 +140,7 @@ def _overlap(grid: Grid, elements: Elements, a: int, b: int) -> NoReturn:
     )
 
 
-def by_cells(grid: Grid, elements: Elements, num_materials: int) -> tuple[Numbers, Numbers, Points]:
+def by_cells(grid: Grid, elements: Elements, num_materials: int) -> tuple[Indices, Indices, Points]:
     """The parts of elements in each cell.
 
     Returns:
@@ -170,7 +171,7 @@ def by_cells(grid: Grid, elements: Elements, num_materials: int) -> tuple[Number
     return full // num_materials, full % num_materials, cut
 
 
-def _cut(corners: Array) -> tuple[Array, Numbers]:
+def _cut(corners: Array) -> tuple[Array, Indices]:
     """Triangles cut by the cells into triangles, and the triangle that each is a part of."""
     import shapely
 
@@ -195,7 +196,7 @@ def _cut(corners: Array) -> tuple[Array, Numbers]:
     )
 
 
-def _fans(parts: Any) -> tuple[Array, Numbers]:
+def _fans(parts: Any) -> tuple[Array, Indices]:
     """Triangles of convex polygons, counter-clockwise, and the polygon of each."""
     import shapely
 

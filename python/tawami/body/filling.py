@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 
 from tawami import _rust
+from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.checks import instance, room, shown, switch, whole_number
 from tawami.base.errors import InputError
+from tawami.base.space import lattice, tensor_product
 from tawami.body.body import Body
 from tawami.body.moment_fitting import fewer
-from tawami.body.points import ROUND_OFF, Array, Mask, Numbers, Points, joined
+from tawami.body.points import ROUND_OFF, Points, joined
 from tawami.grid.grid import Grid
-from tawami.grid.space import lattice, tensor_product
 
 #: Largest Gauss rule along an axis.
 MOST_POINTS = 1000
@@ -73,7 +74,7 @@ class Filling:
         what = f"per_axis = {shown(self.per_axis)} in {cells} cell{'s' if cells > 1 else ''}"
         room(what, cells * self.per_cell, BYTES_PER_PARTICLE, "expected fewer particles")
 
-    def in_full_cells(self, cell: Numbers, material: Numbers) -> Points:
+    def in_full_cells(self, cell: Indices, material: Indices) -> Points:
         """The particles of full cells, given the numbers of cells and of their materials."""
         self.check_memory(max(len(cell), 1))
         dim = self.grid.space.dim
@@ -87,10 +88,10 @@ class Filling:
 
     def body(
         self,
-        full: Numbers,
+        full: Indices,
         cut: Points,
         *,
-        material: Numbers | None = None,
+        material: Indices | None = None,
         names: tuple[str, ...] | None = None,
         allowed: Callable[[Array], Mask] | None = None,
     ) -> Body:

@@ -7,14 +7,15 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from tawami.base.arrays import Array, Indices
 from tawami.base.checks import names, number, room, shown, whole_number
 from tawami.base.errors import InputError
+from tawami.base.space import lattice
 from tawami.body.body import Body
 from tawami.body.border_squares import Squares, triangulated
 from tawami.body.filling import Filling
-from tawami.body.points import ROUND_OFF, Array, Numbers, areas, halves, in_triangles
+from tawami.body.points import ROUND_OFF, areas, halves, in_triangles
 from tawami.grid.grid import EDGES, Edge, Grid
-from tawami.grid.space import lattice
 
 #: Memory of a sample while the function is evaluated [bytes].
 BYTES_PER_SAMPLE = 64.0
@@ -28,7 +29,7 @@ class Function:
             raise InputError(f"level_set: f = {shown(f)}: expected a function f(x, y) on arrays")
         self.grid, self.f = grid, f
 
-    def __call__(self, x: Array) -> Numbers:
+    def __call__(self, x: Array) -> Indices:
         """-1 if the function is negative, else 1; for positions of shape (..., 2)."""
         points = self.grid.in_metres(x).reshape(-1, 2)
         try:
@@ -115,7 +116,7 @@ def level_set(
     return _filled(filling, inside, triangles, samples)
 
 
-def _check_ends(signs: Numbers, ends: Sequence[str]) -> None:
+def _check_ends(signs: Indices, ends: Sequence[str]) -> None:
     """Check that the body only ends at these edges of the grid; signs at the samples, y by x."""
     along = {"left": signs[:, 0], "right": signs[:, -1], "bottom": signs[0], "top": signs[-1]}
     for edge in EDGES:

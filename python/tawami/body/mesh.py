@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tawami.base.checks import one_of, shown
+from tawami.base.arrays import Array, Indices
+from tawami.base.checks import one_of, path, shown
 from tawami.base.errors import GeometryWarning, InputError
+from tawami.base.files import unreadable
+from tawami.base.warn import warn
 from tawami.body import elements
 from tawami.body.body import Body
 from tawami.body.filling import Filling
-from tawami.body.points import Array, Numbers
 from tawami.grid.grid import Grid
 
 if TYPE_CHECKING:
@@ -88,8 +89,11 @@ def _read(source: Any) -> Any:
         raise InputError(
             f"mesh: source = {shown(source)}: expected the path of a mesh file or a meshio.Mesh"
         )
-    if not Path(source).is_file():
-        raise InputError(f"mesh: '{source}' is not a file: expected a mesh that meshio reads")
+    problem = unreadable(path("mesh: source", source))
+    if problem is not None:
+        raise InputError(
+            f"mesh: '{source}' cannot be read ({problem}): expected a mesh that meshio reads"
+        )
     try:
         return meshio.read(source)
     except (Exception, SystemExit) as error:  # meshio ends the program if no reader fits
@@ -135,7 +139,7 @@ def _blocks(read: Any) -> list[tuple[int, Any]]:
 
 def _materials(
     read: Any, blocks: list[tuple[int, Any]], tags: str | None
-) -> tuple[Numbers, tuple[str, ...]]:
+) -> tuple[Indices, tuple[str, ...]]:
     """Number of the material of each element, and the names of the materials."""
     sets = {name: s for name, s in read.cell_sets.items() if not name.startswith("gmsh:")}
     if tags is None:
@@ -165,7 +169,7 @@ def _materials(
 
 def _of_sets(
     sets: dict[str, Any], blocks: list[tuple[int, Any]]
-) -> tuple[Numbers, tuple[str, ...]]:
+) -> tuple[Indices, tuple[str, ...]]:
     """The same from cell sets; sets without plane elements are ignored."""
     group = [np.full(len(block.data), -1) for _, block in blocks]
     names = list[str]()
@@ -204,9 +208,8 @@ def _warn_of_curved_sides(read: Any, blocks: list[tuple[int, Any]], x: Array) ->
             off = np.linalg.norm(middle - (corner + after) / 2, axis=2)
             furthest = max(furthest, float((off / np.maximum(side, 1e-300)).max()))
     if furthest > STRAIGHT:
-        warnings.warn(
+        warn(
             f"mesh: quadratic elements have curved sides, by up to {furthest:.2g} of a side: they are "
-            "taken as straight between their corners; refine the mesh where that matters",
+            "taken as straight between their corners; refine the mesh if this is not accurate enough",
             GeometryWarning,
-            stacklevel=3,
         )

@@ -10,13 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-import numpy.typing as npt
 
+from tawami.base.arrays import Array, Indices, Mask
 from tawami.fem import rules
 
-Array = npt.NDArray[np.float64]
-Numbers = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 #: Degree of the rule on the triangles of a cut cell: grad w : C : grad u of quadratic splines.
 DEGREE = 6
 #: A part of a cell this small, or this share of a body smaller than a cell, is round-off.
@@ -36,10 +33,10 @@ class Points:
 
     x: Array
     weight: Array
-    cell: Numbers
-    material: Numbers
+    cell: Indices
+    material: Indices
 
-    def __getitem__(self, chosen: Mask | Numbers) -> Points:
+    def __getitem__(self, chosen: Mask | Indices) -> Points:
         """Some of the points."""
         return Points(self.x[chosen], self.weight[chosen], self.cell[chosen], self.material[chosen])
 
@@ -57,13 +54,13 @@ def areas(triangles: Array) -> Array:
     return np.asarray(0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]))
 
 
-def halves(corner: Array | Numbers, size: float = 1.0) -> Array:
+def halves(corner: Array | Indices, size: float = 1.0) -> Array:
     """Two triangles for each square, counter-clockwise, n x 2 x 3 x 2, given its lower left corner."""
     triangles = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], dtype=float)
     return np.asarray(corner[:, None, None] + size * triangles)
 
 
-def in_triangles(corners: Array, cell: Numbers, material: Numbers | None = None) -> Points:
+def in_triangles(corners: Array, cell: Indices, material: Indices | None = None) -> Points:
     """Gauss points of triangles (n x 3 x 2) of either orientation, each triangle in one cell."""
     points, weights = rules.triangle_rule(DEGREE)
     barycentric = np.column_stack([1 - points.sum(axis=1), points])

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from tawami.base.arrays import Array
 from tawami.base.checks import array, shown
 from tawami.base.errors import InputError
 from tawami.body import clipping
 from tawami.body.body import Body
 from tawami.body.filling import Filling
-from tawami.body.points import ROUND_OFF, Array, in_triangles
+from tawami.body.points import ROUND_OFF, in_triangles
 from tawami.grid.grid import Grid
 
 if TYPE_CHECKING:

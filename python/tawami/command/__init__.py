@@ -1,1 +1,1 @@
-"""The command `tawami`."""
+"""The command `tawami`; its entry point is `tawami.command.main.run`."""

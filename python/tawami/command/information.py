@@ -1,5 +1,5 @@
-"""What `tawami info` says: versions, BLAS, threads, memory, ranks, compiler, kernels, what is missing,
-and whether a small scene is solved rightly.
+"""The command `tawami info`: versions, BLAS, threads, memory, ranks, compiler, missing packages, and a
+self test.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from tawami.fem import environment, kernels
 from tawami.form.form import Form
 
 MEMORY = Path("/proc/meminfo")
-#: Packages that only some things need: name, what for.
+#: Optional packages and their purposes.
 OPTIONAL = (("matplotlib", "figures, tawami plot"), ("tqdm", "progress of the cases"))
 
 
 def lines() -> Iterator[tuple[str, str]]:
-    """Label and text of each line but the self test."""
+    """Label and text of each line except the self test."""
     versions, *warning = environment.header().splitlines()
     yield "versions", versions
     if warning:
@@ -38,14 +38,14 @@ def lines() -> Iterator[tuple[str, str]]:
     yield "memory", _memory()
     yield "ranks", _ranks()
     yield "compiler", _compiler()
-    yield "kernels", f"of forms, compiled once, in {kernels.cache_directory()}"
+    yield "kernels", f"compiled forms, in {kernels.cache_directory()}"
     for name, purpose in OPTIONAL:
         yield name, _package(name, purpose)
     yield "ffmpeg", _program("ffmpeg", "movies as MP4")
 
 
 def show() -> int:
-    """Print all of them and the self test; the exit code."""
+    """Print the lines and the self test; return the exit code."""
     for label, text in lines():
         print(labelled(label, text))
     good, text = self_test()
@@ -62,7 +62,7 @@ def _threads() -> str:
 
 
 def _memory() -> str:
-    """Linux' own figures."""
+    """Memory as Linux reports it."""
     try:
         told = dict(line.split(":") for line in MEMORY.read_text().splitlines())
         total, free = (int(told[key].split()[0]) / 2**20 for key in ("MemTotal", "MemAvailable"))
@@ -78,7 +78,7 @@ def _ranks() -> str:
 
 
 def _compiler() -> str:
-    """The one that FFCx' code is compiled with."""
+    """The compiler of the code of FFCx."""
     command = (os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc").split()[0]
     advice = "apt install g++ python3-dev"
     try:
@@ -101,7 +101,7 @@ def _program(name: str, purpose: str) -> str:
 
 
 def self_test() -> tuple[bool, str]:
-    """Whether a small scene gives the stress of its closed form."""
+    """Compare the stress of a small scene with its closed form."""
     start = perf_counter()
     try:
         error = scenes.compressed(Form.load("u_epsv"), {}, "quadratic_spline")

@@ -1,7 +1,6 @@
-"""The command `tawami`: run and resume driver scripts, begin one, check a weak form, look at the set-up.
+"""The command `tawami`: run and resume driver scripts, draw results, check a weak form, show the set-up.
 
-A user's mistake is one line and exit code 2, as of any command that cannot be carried out as given; what
-was run and failed is exit code 1.
+Wrong input gives one line and exit code 2, a run or check that fails gives exit code 1.
 """
 
 from __future__ import annotations
@@ -14,21 +13,24 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from tawami.base.errors import InputError, OutputError, TawamiError
-from tawami.command import launch
+from tawami.base import checks
+from tawami.base.errors import InputError, TawamiError
+from tawami.base.files import writing
+from tawami.command.resume import resume
+from tawami.command.script import INTERRUPTED, Script, start
 from tawami.results.progress import LOG_LEVEL
 from tawami.results.results import EXISTING
 
-CODES = "Exit codes: 0 done; 1 what was run or checked failed; 2 not possible as given; 130 Ctrl-C"
+CODES = "Exit codes: 0 success; 1 the run or check failed; 2 wrong input; 130 Ctrl-C"
 TEMPLATES = Path(__file__).parent / "templates"
 LEVELS = ("debug", "info", "warning", "error")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Carry out a command; the exit code.
+    """Carry out a command and return the exit code.
 
     Args:
-        arguments: Those of the command line by default.
+        arguments: By default those of the command line.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     asked = _parsed(given)
@@ -42,18 +44,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2 if isinstance(error, InputError) else 1
     except KeyboardInterrupt:
         print(f"{asked.name}: interrupted", file=sys.stderr)
-        return launch.INTERRUPTED
+        return INTERRUPTED
     except BrokenPipeError:  # | head
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
 
 
 def run() -> int:
-    """As :func:`main`, for the command itself: what Ctrl-C ended ends at once. Open MPI's own processes
-    got it too, and the end of MPI would wait for them.
+    """As :func:`main`, for the command itself.
+
+    After Ctrl-C the process ends at once: the processes of Open MPI received it too, and the end of MPI
+    would wait for them.
     """
     code = main()
-    if code == launch.INTERRUPTED:
+    if code == INTERRUPTED:
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)
@@ -61,14 +65,14 @@ def run() -> int:
 
 
 def _parsed(given: list[str]) -> argparse.Namespace:
-    """Arguments of tawami, and after -- those of the script."""
+    """Split the arguments of tawami from those of the script after --."""
     own, rest = given, list[str]()
     if "--" in given:
         own, rest = given[: given.index("--")], given[given.index("--") + 1 :]
     parser = _parser()
     asked = parser.parse_args(own)
     if rest and asked.name != "tawami run":
-        parser.error(f"arguments after -- belong to a script: {asked.name} has none")
+        parser.error(f"arguments after -- belong to a script: {asked.name} does not run one")
     asked.arguments = rest
     return asked
 
@@ -76,9 +80,9 @@ def _parsed(given: list[str]) -> argparse.Namespace:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="tawami",
-        description="Implicit material point method with the mixed u-eps_v formulation: runs driver "
-        "scripts, on one rank or several, and what goes with them.",
-        epilog=f"tawami COMMAND --help says more of each. {CODES}.",
+        description="Implicit material point method with the mixed u-eps_v formulation: run driver "
+        "scripts on one rank or several, resume them, draw their results.",
+        epilog=f"tawami COMMAND --help describes a command. {CODES}.",
         allow_abbrev=False,
     )
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
@@ -87,10 +91,10 @@ def _parser() -> argparse.ArgumentParser:
     _add_plot(commands)
     _add_new(commands)
     _add_form(commands)
-    _add(commands, "info", _info, "versions, BLAS, threads, what is missing, a self test", (
-        "Versions of everything, which BLAS is loaded, threads, memory, MPI, the compiler of forms and "
-        "where their kernels are; what is missing and the command that gets it; and a small scene, "
-        "solved and compared with its closed form. Exit code 1 where that is wrong."
+    _add(commands, "info", _info, "versions, BLAS, threads, missing packages, a self test", (
+        "Shows the versions, the loaded BLAS, threads, memory, MPI, the compiler of forms and the "
+        "folder of their kernels; missing packages and the commands that install them; and a self "
+        "test: a small scene is compared with its closed form. Exit code 1 if they differ."
     ))  # fmt: skip
     return parser
 
@@ -119,8 +123,8 @@ def _add(
 
 def _add_run(commands: Any) -> None:
     run = _add(commands, "run", _run, "run a driver script, on one rank or several", (
-        "Runs a script as python would. An error of tawami is one line, others keep their\n"
-        "traceback; on several ranks only the first one's prints appear."
+        "Runs a script as python would. An error of tawami is printed as one line, others keep\n"
+        "their traceback; on several ranks only the first one prints."
     ), epilog=(
         "examples:\n"
         "  tawami run pile.py\n"
@@ -137,34 +141,34 @@ def _add_run(commands: Any) -> None:
         dest="existing",
         action="store_const",
         const="replace",
-        help="where the folder of results holds a run: replace it",
+        help="replace an earlier run in the folder of results",
     )
     existing.add_argument(
         "--resume",
         dest="existing",
         action="store_const",
         const="resume",
-        help="where the folder of results holds a run: go on from it",
+        help="resume an earlier run in the folder of results",
     )
     _add_log_level(run)
 
 
 def _add_resume(commands: Any) -> None:
-    resume = _add(commands, "resume", _resume, "go on with a run that was stopped", (
-        "Runs the script (or module) that left these results again, with the same arguments, in the "
-        "same directory: finished phases are loaded, the one that was stopped goes on from its newest "
+    parser = _add(commands, "resume", _resume, "resume an interrupted run", (
+        "Runs the script or module of these results again, with the same arguments, in the same "
+        "directory: finished phases are loaded, the interrupted phase continues from its newest "
         "checkpoint."
     ))  # fmt: skip
-    resume.add_argument("folder", metavar="FOLDER", help="of the results, as results/pile")
-    _add_ranks(resume)
-    _add_log_level(resume)
+    parser.add_argument("folder", metavar="FOLDER", help="folder of results, as results/pile")
+    _add_ranks(parser)
+    _add_log_level(parser)
 
 
 def _add_plot(commands: Any) -> None:
     plot = _add(commands, "plot", _plot, "pictures and a movie of results", (
-        "Draws what a run wrote, beside it, and says which files these are."
+        "Draws the results of a run into its folder figures, and prints the names of the files."
     ))  # fmt: skip
-    plot.add_argument("folder", metavar="FOLDER", help="of the results, as results/pile")
+    plot.add_argument("folder", metavar="FOLDER", help="folder of results, as results/pile")
     plot.add_argument(
         "--quantity", default="mean stress", metavar="Q", help="colour (default: mean stress)"
     )
@@ -172,8 +176,8 @@ def _add_plot(commands: Any) -> None:
 
 
 def _add_new(commands: Any) -> None:
-    new = _add(commands, "new", _new, "begin a driver script", (
-        "Writes NAME.py, a commented script that runs as it is. A file that is there is not touched."
+    new = _add(commands, "new", _new, "write a driver script", (
+        "Writes NAME.py, a commented script that runs as it is. An existing file is not changed."
     ))  # fmt: skip
     new.add_argument("file", metavar="NAME", help="as mycase, or folder/mycase.py")
     kind = new.add_mutually_exclusive_group()
@@ -185,13 +189,13 @@ def _add_new(commands: Any) -> None:
 
 def _add_form(commands: Any) -> None:
     form = commands.add_parser(
-        "form", help="check a weak form", description="What to do with forms."
+        "form", help="check a weak form", description="Commands for weak forms."
     )
     actions = form.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    check = _add(actions, "check", _form_check, "try a weak form and say what it does wrong", (
-        "Loads a form and tries it: declaration, arguments, symmetry, the tangent against differences,\n"
-        "rigid motions, patch tests, both assemblies, stability and locking. A table with numbers;\n"
-        "FAILED (exit code 1) makes a form useless, a note (0) costs or misleads only."
+    check = _add(actions, "check", _form_check, "test a weak form", (
+        "Loads a form and tests it: declaration, arguments, symmetry, the tangent against differences,\n"
+        "rigid motions, patch tests, both assemblies, stability and locking. Prints a table.\n"
+        "FAILED (exit code 1): the form cannot be used. A note (exit code 0): it is slow or inaccurate."
     ), under="tawami form", epilog=(
         "examples:\n"
         "  tawami form check my_form.py\n"
@@ -204,13 +208,13 @@ def _add_form(commands: Any) -> None:
         default=[],
         metavar="NAME=VALUE",
         dest="settings",
-        help="a parameter or option of the form; may be given again",
+        help="a parameter or option of the form; may be repeated",
     )
 
 
 def _add_ranks(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--ranks", type=_number_of_ranks, metavar="N", help="start so many ranks with mpirun"
+        "--ranks", type=_number_of_ranks, metavar="N", help="start N ranks with mpirun"
     )
 
 
@@ -229,24 +233,26 @@ def _number_of_ranks(text: str) -> int:
 
 
 def _environment(asked: argparse.Namespace) -> dict[str, str]:
-    """Variables that the script finds."""
+    """Environment variables for the script."""
     level = {LOG_LEVEL: asked.log_level} if asked.log_level else {}
     existing = getattr(asked, "existing", None)
     return level | ({EXISTING: existing} if existing else {})
 
 
 def _run(asked: argparse.Namespace) -> int:
-    path = None if asked.script is None else Path(asked.script)
-    script = launch.Script(path, asked.module, tuple(asked.arguments))
-    return launch.start(script, asked.ranks, _environment(asked))
+    path = None if asked.script is None else checks.path("script", asked.script)
+    script = Script(path, asked.module, tuple(asked.arguments))
+    return start(script, asked.ranks, _environment(asked))
 
 
 def _resume(asked: argparse.Namespace) -> int:
-    return launch.resume(Path(asked.folder), asked.ranks, _environment(asked))
+    return resume(
+        checks.path("tawami resume: folder", asked.folder), asked.ranks, _environment(asked)
+    )
 
 
 def _plot(asked: argparse.Namespace) -> int:
-    plot = importlib.import_module("tawami.results.plot")  # here: it needs matplotlib
+    plot = importlib.import_module("tawami.results.plot")  # here: it imports matplotlib
     movie = None if asked.movie == "none" else asked.movie
     for path in plot.plot(asked.folder, quantity=asked.quantity, movie=movie):
         print(path)
@@ -254,23 +260,18 @@ def _plot(asked: argparse.Namespace) -> int:
 
 
 def _new(asked: argparse.Namespace) -> int:
-    path = Path(asked.file)
-    path = path.with_name(path.name + ".py") if path.suffix != ".py" else path
+    path = checks.path("tawami new: NAME", asked.file)
+    path = path if path.suffix == ".py" else path.parent / f"{path.name}.py"
     if not path.stem.isidentifier():
         raise InputError(
             f"'{asked.file}': expected a name of letters, digits and _, as mycase: other Python files "
             "can then import it"
         )
     text = (TEMPLATES / f"{asked.kind}.py").read_text(encoding="utf-8")
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text.replace("SCRIPT.py", path.name).replace("SCRIPT", path.stem))
-    except FileExistsError:
-        raise InputError(
-            f"'{path}' is there already, and was not touched: expected a new name"
-        ) from None
-    except OSError as error:
-        raise OutputError(f"'{path}' cannot be written: {error.strerror}") from error
+    if os.path.lexists(path):
+        raise InputError(f"'{path}' exists already, and was not changed: expected a new name")
+    with writing(path), path.open("x", encoding="utf-8") as file:
+        file.write(text.replace("SCRIPT.py", path.name).replace("SCRIPT", path.stem))
     print(f"{path} is written; run it with: tawami run {path}")
     return 0
 

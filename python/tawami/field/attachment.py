@@ -13,7 +13,8 @@ from tawami.base.arrays import Array, Mask
 from tawami.base.timing import Stopwatch
 from tawami.fem.rules import Rule, rule_points
 from tawami.field.layout import Layout
-from tawami.form.compilation import CompiledForm, Integral
+from tawami.form.compilation import CompiledForm
+from tawami.form.integral import Integral
 from tawami.grid.basis import Basis
 from tawami.grid.grid import Grid
 

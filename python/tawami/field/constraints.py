@@ -13,6 +13,7 @@ from scipy.sparse.linalg import spsolve
 from tawami import _rust
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import SupportError
+from tawami.base.space import Position, lattice, tensor_product
 from tawami.grid.basis import Basis, values_1d
 from tawami.grid.edges import (
     Interval,
@@ -23,7 +24,6 @@ from tawami.grid.edges import (
     locate_point,
 )
 from tawami.grid.grid import Edge, Grid
-from tawami.grid.space import Position, lattice, tensor_product
 
 #: Points of the Gauss rule along a cell of an edge, for the projection of profiles.
 POINTS = 5
@@ -130,7 +130,7 @@ def held_point(
     """Prescribe a displacement component at a point.
 
     A point at the border of a moving body may reach a cell without particles. Then the functions with
-    particles stand for all, if they make up most of the value at the point.
+    particles replace all, if they make up most of the value at the point.
 
     Args:
         grid: The grid.

@@ -17,7 +17,7 @@ from tawami.field.assembly import Assembly
 from tawami.field.attachment import Attachment
 from tawami.field.ghost import GhostPenalty
 from tawami.field.reduction import Reduction
-from tawami.form.compilation import Integral
+from tawami.form.integral import Integral
 
 
 class ReferenceAssembly(Assembly):

@@ -1,40 +1,38 @@
 """The contract of a weak form: what a file in `forms/` declares.
 
-A form declares `fields`, `kinematics`, optionally `parameters`, `options`, `strain` and `whole_cells`,
-and a function `residual` whose arguments are picked by their names:
+A form declares `fields` and `kinematics`, optionally `parameters`, `options`, `strain` and
+`whole_cells`, and a function `residual`. The names of its arguments select from the following:
 
 ========================= ========================================================================
-the fields, the tests     u, w, eps_v, q, ... as declared in `fields`
-sigma, s, sigma_m         in-plane stress, its (three-dimensional) deviator, mean stress: of the law
-P, P_s, tau_m, ln_J       instead of these with `strain = "finite"`: tau f^-T, s f^-T and ln det f of the
-                          step, f = I + grad u, tau = s + tau_m I the Kirchhoff stress of the law;
-                          `K * ln_J` works
-K, mu                     bulk and shear modulus of the particle; `K**2 / mu`, `1 / K` work
+fields, test functions    u, w, eps_v, q, ... as declared in `fields`
+sigma, s, sigma_m         stress of the law in the plane, its three-dimensional deviator, mean stress
+P, P_s, tau_m, ln_J       with `strain = "finite"`, instead of these: tau f^-T, s f^-T, mean Kirchhoff
+                          stress and ln det f of the step, where f = I + grad u and
+                          tau = s + tau_m I is the Kirchhoff stress of the law
+K, mu                     bulk and shear modulus of the particle, also in K**2 / mu, 1 / K, K * ln_J
 sum_p(D, f), sum_p(f)     sum over particles of V_p D_p : f(x_p), and of V_p f(x_p); exact for f up
-                          to degree 4 along x and along y (a warning tells of more)
-sum_c(D, f), sum_c(f)     the same with f taken at the centre of the particle's cell
-sum_v(D, f), sum_v(f)     the same with f taken at the vertices of the particle's cell and summed with
-                          the weights of the bilinear functions: q eps_v is row-sum lumped
+                          to degree 4 along x and along y (a warning reports a higher degree)
+sum_c(D, f), sum_c(f)     the same, with f at the centre of the particle's cell
+sum_v(D, f), sum_v(f)     the same, with f at the vertices of the particle's cell, interpolated by the
+                          bilinear functions: q eps_v is row-sum lumped
 cell_mean(D)              volume-weighted mean over the particles of each cell
 dx, dx_c, ds              area of the cells with particles (full rule, one point); loaded edges
-dG, facet_mean(D)         sides that partly filled cells share with others, and cell_mean(D) there
-jump_n(f), jump_nn(f)     across these sides, the jump of the first and second normal derivative of a
-                          field or test function: for ghost penalties, linear in the fields
+dG, facet_mean(D)         sides of partially filled cells, and cell_mean(D) there
+jump_n(f), jump_nn(f)     jump across these sides of the first and second normal derivative of a field
+                          or test function, for ghost penalties that are linear in the fields
 t, h                      traction [Pa], cell size [m]
-parameters, options       alpha, ...: as declared
+parameters, options       alpha, ... as declared
 ========================= ========================================================================
 
-Particle data enter as volume-weighted densities on the points of a fixed rule; there is exactly one
-in each `sum_p`, which makes the integral equal to the sum over the particles (README,
-The method). The tangent is derived (`tawami.form.compilation`).
+Particle data enter as volume-weighted densities at the points of a fixed rule. Each `sum_p` contains
+exactly one of them, so that the integral equals the sum over the particles (README, The method). The
+tangent is derived (`tawami.form.tangent`).
 """
 
 from __future__ import annotations
 
 import functools
 import hashlib
-import importlib.util
-import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -44,8 +42,10 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from tawami.base.checks import TEXT, number, one_of, real, shown
-from tawami.base.checks import path as as_path
 from tawami.base.errors import FormError, InputError
+from tawami.base.source import source_of
+from tawami.base.text import quoted
+from tawami.form.files import module_of
 from tawami.form.kinematics import (
     FIELD_UNITS,
     KINEMATICS,
@@ -55,10 +55,9 @@ from tawami.form.kinematics import (
 )
 from tawami.form.quantities import COMPONENTS
 
-#: The shipped forms, `tawami/forms`.
-SHIPPED = Path(__file__).parents[1] / "forms"
+#: Default of declarations that are optional.
 NOTHING: Mapping[str, Any] = {}
-#: What a parameter may declare.
+#: Keys that a parameter may declare.
 LIMITS = ("default", "minimum", "maximum", "usual")
 #: Names that every form has.
 RESERVED = frozenset(
@@ -71,25 +70,25 @@ RESERVED = frozenset(
 
 @dataclass(frozen=True, eq=False, init=False)
 class Form:
-    """A weak form; compared by identity.
+    """A weak form. Forms are compared by identity.
 
     Args:
-        fields: Unknowns: name -> (kind, name of the test function). Kinds are 'displacement' (in
-            the basis the scene chooses), 'volumetric_strain' and 'pressure' [Pa] (both bilinear).
-        kinematics: The strain that the material law receives: 'displacement', 'mixed', 'cell' or
+        fields: Unknowns: name -> (kind, name of the test function). Kinds are 'displacement' (in the
+            basis of the scene), 'volumetric_strain' and 'pressure' [Pa] (both bilinear).
+        kinematics: Strain that the material law receives: 'displacement', 'mixed', 'cell' or
             'deviatoric'. The attribute is a `Kinematics`.
         residual: Function that returns the residual as a UFL form.
-        parameters: Numbers that may change without compiling again: name -> {"default": ...,
-            "minimum": ..., "maximum": ..., "usual": ...}, the limits optional; a maximum may be
-            {option: maximum}; beyond what is usual a scene warns.
+        parameters: Numbers that may change without another compilation: name -> {"default": ...,
+            "minimum": ..., "maximum": ..., "usual": ...}. Only the default is required. A maximum may
+            depend on an option: {option: maximum}. A scene warns of a value above the usual one.
         options: Choices that make a different form: name -> the possible values, default first.
-        strain: 'small', or 'finite': logarithmic elastic strains, the grid reset after each step. The
-            attribute is a `StrainMeasure`.
-        whole_cells: Those of the options that need cells which the body fills.
-        name: What messages call it.
+        strain: 'small', or 'finite' for logarithmic elastic strains, with a reset of the grid after each
+            step. The attribute is a `StrainMeasure`.
+        whole_cells: Values of options that are not stable in partially filled cells.
+        name: Name in messages.
 
     Raises:
-        FormError: A declaration that does not fit together.
+        FormError: The declarations are wrong or do not fit together.
     """
 
     fields: Mapping[str, tuple[str, str]]
@@ -121,20 +120,25 @@ class Form:
         self._check_declarations()
         object.__setattr__(self, "kinematics", self._named("kinematics", kinematics, KINEMATICS))
         object.__setattr__(self, "strain", self._named("strain", strain, STRAIN_MEASURES))
-        self._check()
+        self._check_limits()
+        self._check_names()
+        self._check_fields()
 
-    def _check(self) -> None:
+    def _check_names(self) -> None:
+        """Check that no name is declared twice."""
         names = [*self.fields, *(test for _, test in self.fields.values())]
         names += [*self.parameters, *self.options, *RESERVED]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
-            self._fail(f"{listed(twice)} stands for two things: expected another name for one")
-        self._check_limits()
+            self._fail(f"{quoted(twice)} has two meanings: expected another name for one of them")
+
+    def _check_fields(self) -> None:
+        """Check that the fields are those of the kinematics."""
         kinds = [kind for kind, _ in self.fields.values()]
         for name, (kind, _) in self.fields.items():
             if kind not in FIELD_UNITS:
                 self._fail(
-                    f"field '{name}' is of kind '{kind}': expected one of {listed(FIELD_UNITS)}"
+                    f"field '{name}' is of kind '{kind}': expected one of {quoted(FIELD_UNITS)}"
                 )
         if self.strain.finite and self.kinematics.deviatoric:
             self._fail(
@@ -144,14 +148,14 @@ class Form:
         wanted = ("displacement", *self.kinematics.volume_fields)
         if tuple(kinds) != wanted:
             self._fail(
-                f"kinematics '{self.kinematics}' needs fields of the kinds {listed(wanted)}, in this "
-                f"order; it declares {listed(kinds)}"
+                f"kinematics '{self.kinematics}' needs fields of the kinds {quoted(wanted)}, in this "
+                f"order; it declares {quoted(kinds)}"
             )
         if not callable(self.residual):
             self._fail(f"residual = {shown(self.residual)}: expected a function")
 
     def _check_declarations(self) -> None:
-        """Whether what is declared is of the kind that it has to be."""
+        """Check the types of all declarations."""
         for what in ("fields", "parameters", "options"):
             declared = getattr(self, what)
             if not isinstance(declared, Mapping) or not all(isinstance(n, str) for n in declared):
@@ -177,9 +181,9 @@ class Form:
             self._fail(f"whole_cells = {shown(self.whole_cells)}: expected names of options")
 
     def _named(self, what: str, given: Any, known: Mapping[str, Any]) -> Any:
-        """The object that a declaration names."""
+        """The kinematics or strain measure of that name."""
         if not isinstance(given, str | Kinematics | StrainMeasure) or str(given) not in known:
-            self._fail(f"{what} = {shown(given)}: expected one of {listed(known)}")
+            self._fail(f"{what} = {shown(given)}: expected one of {quoted(known)}")
         return known[str(given)]
 
     def _fail(self, message: str) -> NoReturn:
@@ -187,10 +191,13 @@ class Form:
 
     @staticmethod
     def load(source: str | Path | ModuleType | Form) -> Form:
-        """The form of a shipped name ('u_epsv'), a file, or a module; a `Form` passes through.
+        """Load a form.
+
+        Args:
+            source: Name of a shipped form ('u_epsv'), path of a .py file, module, or a `Form` itself.
 
         Raises:
-            FormError: No such form, or a file that does not declare what a form needs.
+            FormError: The form does not exist, or lacks a declaration.
         """
         if isinstance(source, Form):
             return source
@@ -201,22 +208,13 @@ class Form:
                 f"form = {shown(source)}: expected the name of a shipped form, the path of a .py file, "
                 "a module or a Form"
             )
-        path = as_path("form", source)
-        if path.suffix != ".py":
-            path = SHIPPED / f"{source}.py"
-            if not _is_there(path):
-                raise FormError(
-                    f"form '{source}' is not shipped: expected one of {listed(shipped())}, "
-                    "or the path of a .py file"
-                )
-        elif not _is_there(path):
-            raise FormError(f"form file '{source}' does not exist, or cannot be read")
-        resolved = path.resolve()
-        return _from_file(resolved, resolved.stat().st_mtime_ns)
+        module = module_of(source)
+        name = f"'{Path(str(module.__file__)).stem}'"
+        return _from_module(module, getattr(module, "residual", None), name)
 
     @property
     def source(self) -> str:
-        """Text of the residual."""
+        """Source text of the residual."""
         return source_of(self.residual)
 
     def identity(self) -> dict[str, Any]:
@@ -227,10 +225,10 @@ class Form:
         }
 
     def settings(self, given: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, str]]:
-        """Parameters and options of this form, defaults filled in.
+        """Parameters and options of this form, with the defaults of those that are not given.
 
         Raises:
-            InputError: An unknown name, or a value out of its limits.
+            InputError: A name is unknown, or a value is out of its limits.
         """
         parameters = {name: declared["default"] for name, declared in self.parameters.items()}
         options = {name: choices[0] for name, choices in self.options.items()}
@@ -240,34 +238,34 @@ class Form:
             elif name in options:
                 if not one_of(value, self.options[name]):
                     raise InputError(
-                        f"{name} = {shown(value)}: expected one of {listed(self.options[name])}"
+                        f"{name} = {shown(value)}: expected one of {quoted(self.options[name])}"
                     )
                 options[name] = value
             else:
                 known = [*parameters, *options]
-                has = f"it has {listed(known)}" if known else "it has none"
+                has = f"it has {quoted(known)}" if known else "it has none"
                 raise InputError(f"form {self.name} has no parameter '{name}': {has}")
         return {n: self._limited(n, v, options) for n, v in parameters.items()}, options
 
     def _check_limits(self) -> None:
-        """Whether parameters declare what is looked at only: another word would limit nothing."""
+        """Check that parameters declare known keys only: another key would limit nothing."""
         for name, limits in self.parameters.items():
             unknown = [key for key in limits if key not in LIMITS]
             if unknown:
-                expected = f"expected among {listed(LIMITS)}"
-                self._fail(f"parameter '{name}' declares {listed(unknown)}: {expected}")
+                expected = f"expected among {quoted(LIMITS)}"
+                self._fail(f"parameter '{name}' declares {quoted(unknown)}: {expected}")
 
     def unusual(self, parameters: Mapping[str, float]) -> list[str]:
-        """What to say of parameters beyond their usual range."""
+        """A warning for each parameter above its usual range."""
         return [
             f"{name} = {value:g}: expected at most {self.parameters[name]['usual']:g}, beyond which the "
-            f"answers of form {self.name} are far off; use a smaller {name}"
+            f"results of form {self.name} are far off; use a smaller {name}"
             for name, value in parameters.items()
             if value > self.parameters[name].get("usual", math.inf)
         ]
 
     def _limited(self, name: str, value: Any, options: Mapping[str, str]) -> float:
-        """The value of a parameter, within its limits."""
+        """The value of a parameter, checked against its limits."""
         limits = self.parameters[name]
         value, high = real(name, value), limits.get("maximum", math.inf)
         if isinstance(high, Mapping):
@@ -282,52 +280,18 @@ class Form:
 
 
 def _are_names(value: Any) -> bool:
-    """Whether it is a sequence of names."""
+    """Whether a value is a sequence of strings."""
     sequence = isinstance(value, Sequence) and not isinstance(value, TEXT)
     return sequence and all(isinstance(name, str) for name in value)
 
 
-def _is_there(path: Path) -> bool:
-    try:
-        return path.exists()
-    except OSError:  # a name too long, a folder without permission
-        return False
-
-
-def source_of(function: Callable[..., Any]) -> str:
-    """Text of a function; its byte code where there is no text."""
-    try:
-        return inspect.getsource(function)
-    except (OSError, TypeError):
-        code = getattr(function, "__code__", None)
-        return type(function).__name__ if code is None else code.co_code.hex()
-
-
-def shipped() -> list[str]:
-    """Names of the forms that come with tawami."""
-    return sorted(path.stem for path in SHIPPED.glob("[!_]*.py"))
-
-
-@functools.cache
-def _from_file(path: Path, _modified: int) -> Form:
-    specification = importlib.util.spec_from_file_location(f"tawami_form_{path.stem}", path)
-    assert specification is not None
-    assert specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    try:
-        specification.loader.exec_module(module)
-    except Exception as error:
-        raise FormError(f"form file '{path.name}' cannot be read: {error!r}") from error
-    return _from_module(module, getattr(module, "residual", None), f"'{path.stem}'")
-
-
 @functools.cache
 def _from_module(module: ModuleType, _residual: Any, name: str | None = None) -> Form:
-    """The form of a module; another one once the module is reloaded with another residual."""
+    """The form of a module; a module that is reloaded with another residual gives another form."""
     missing = [n for n in ("fields", "kinematics", "residual") if not hasattr(module, n)]
     name = name or f"'{module.__name__}'"
     if missing:
-        raise FormError(f"form {name} declares no {listed(missing)}: see tawami.form.form")
+        raise FormError(f"form {name} declares no {quoted(missing)}: see tawami.form.form")
     return Form(
         fields=module.fields,
         kinematics=module.kinematics,
@@ -338,8 +302,3 @@ def _from_module(module: ModuleType, _residual: Any, name: str | None = None) ->
         whole_cells=getattr(module, "whole_cells", ()),
         name=name,
     )
-
-
-def listed(names: Any) -> str:
-    """Names in quotes, for messages."""
-    return ", ".join(f"'{name}'" for name in names)

@@ -1,7 +1,7 @@
-"""Particle data that a form may name, and the densities it enters the field problem with.
+"""Particle data that a form may name, and the densities through which they enter the field problem.
 
-On the points of a fixed rule, particle data D become the volume-weighted densities of
-README, The method: `D_q = (sum_p V_p D_p l_q(x_p)) / (w_q |J|)` (`rust/adjoint.rs`).
+At the points q of a fixed rule, particle data D become volume-weighted densities (README, The method):
+D_q = (sum_p V_p D_p l_q(x_p)) / (w_q |J|).
 """
 
 from __future__ import annotations
@@ -13,17 +13,20 @@ from typing import Any, Literal
 import numpy as np
 
 from tawami.base.errors import FormError
+from tawami.base.space import PLANE
 from tawami.fem.rules import Rule
 
 Part = Literal["value", "strain", "gradient", "volume"]
 
-#: Components of the quantities that the material law gives: (xx, yy, xy) or (xx, xy, yx, yy).
+#: Components of a strain or a stress, (xx, yy, xy), and of a gradient, (xx, xy, yx, yy).
+STRAIN, GRADIENT = PLANE.num_strains, len(PLANE.gradient)
+#: Components of the quantities that the material law gives.
 COMPONENTS: Mapping[str, int] = {
-    "sigma": 3, "s": 3, "sigma_m": 1, "P": 4, "P_s": 4, "tau_m": 1, "ln_J": 1
+    "sigma": STRAIN, "s": STRAIN, "sigma_m": 1, "P": GRADIENT, "P_s": GRADIENT, "tau_m": 1, "ln_J": 1
 }  # fmt: skip
-#: Numbers per component of the parts of a law quantity: itself, and its derivatives with respect to
+#: Numbers per component of the parts of a law quantity: its value, and its derivatives with respect to
 #: the strain (xx, yy, gamma_xy), grad u (xx, xy, yx, yy) and the volumetric strain.
-WIDTH: Mapping[Part, int] = {"value": 1, "strain": 3, "gradient": 4, "volume": 1}
+WIDTH: Mapping[Part, int] = {"value": 1, "strain": STRAIN, "gradient": GRADIENT, "volume": 1}
 
 OPERATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
     "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power
@@ -32,11 +35,11 @@ OPERATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
 
 @dataclass(frozen=True)
 class ParticleScalar:
-    """A constant of the particle, as K or K**2/mu: an expression to be evaluated at the particles.
+    """An expression of constants of the particle, as K or K**2/mu.
 
     Attributes:
-        text: How it was written; two with the same text are the same density.
-        evaluate: From the named arrays (one entry per particle) to its values.
+        text: The expression; two with the same text are the same density.
+        evaluate: Gives its values from arrays by name, with one entry per particle.
     """
 
     text: str
@@ -49,8 +52,8 @@ class ParticleScalar:
             if not isinstance(other, (int, float)):
                 raise FormError(
                     f"'{self.text} {symbol} ...': a particle constant combines with numbers and other "
-                    f"particle constants only, not with {type(other).__name__}. Put it into "
-                    "sum_p(constant, expression) instead"
+                    f"particle constants only, not with {type(other).__name__}: expected "
+                    "sum_p(constant, expression)"
                 )
             number = float(other)
             other = ParticleScalar(repr(other), lambda _: number)
@@ -90,8 +93,11 @@ class ParticleScalar:
 
 @dataclass(frozen=True)
 class LawQuantity:
-    """A quantity that the material law gives, with its consistent tangent; times a constant of the
-    particle where there is one.
+    """A quantity of the material law, with its consistent tangent.
+
+    Attributes:
+        name: Name of the quantity.
+        factor: Constant of the particle that multiplies it.
     """
 
     name: str
@@ -101,7 +107,7 @@ class LawQuantity:
         if not isinstance(other, (int, float, ParticleScalar)):
             raise FormError(
                 f"'{self.name} * ...': a quantity of the law combines with particle constants only, not "
-                f"with {type(other).__name__}. Put it into sum_p({self.name}, expression) instead"
+                f"with {type(other).__name__}: expected sum_p({self.name}, expression)"
             )
         return LawQuantity(self.name, (self.factor or ONE) * other)
 
@@ -116,7 +122,7 @@ ONE = ParticleScalar("1", lambda values: np.ones_like(values["mu"]))
 
 @dataclass(frozen=True)
 class Density:
-    """Particle data on the points of a rule: `part` of `quantity`, with `size` components."""
+    """Particle data at the points of a rule: `part` of `quantity`, with `size` components."""
 
     rule: Rule
     quantity: Quantity

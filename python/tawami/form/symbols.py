@@ -1,4 +1,4 @@
-"""Everything that a residual may name, as UFL on a mesh that is not there yet."""
+"""The names that a residual may use, as UFL symbols on a mesh without cells."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from typing import Any
 import ufl
 
 from tawami.base.errors import FormError, InexactSumWarning
+from tawami.base.space import PLANE
+from tawami.base.text import quoted
 from tawami.fem import dolfinx
 from tawami.fem.rules import DEGREE, FAMILY, Rule
-from tawami.form.form import Form, listed
+from tawami.form.form import Form
 from tawami.form.quantities import (
-    COMPONENTS,
     MU,
     ONE,
     Density,
@@ -25,20 +26,31 @@ from tawami.form.quantities import (
     Quantity,
 )
 
-#: FFCx 0.5 writes C that does not compile when a coefficient's number has two digits, so those that
-#: reach it are numbered from 0 and those that only stand in while a form is written from here.
+#: First number of placeholders. FFCx 0.5 writes C code that does not compile if the number of a
+#: coefficient has two digits, so the coefficients that reach FFCx are numbered from 0.
 PLACEHOLDERS = 1000
-#: Degree along x and y that the densities of `sum_p` integrate exactly.
+#: Degree along x and along y up to which the densities of `sum_p` integrate exactly.
 EXACT_DEGREE = 4
 
 
 class Symbols:
-    """Everything a residual may name, on a mesh that is not there yet."""
+    """The names that a residual may use.
+
+    Args:
+        form: The form.
+        options: The value of each of its options.
+
+    Attributes:
+        names: Symbols by name.
+        placeholders: Coefficient for each density that the residual, or its tangent, uses.
+        increments, trial: Increments of all fields, and their trial function.
+        fields, tests, trials: The parts of these for each field; test functions by their own name.
+    """
 
     def __init__(self, form: Form, options: Mapping[str, str]) -> None:
         self.form = form
         domain = dolfinx.domain()
-        elements = [dolfinx.lagrange(2, 2)] + [dolfinx.lagrange(1)] * (len(form.fields) - 1)
+        elements = [dolfinx.lagrange(2, PLANE.dim)] + [dolfinx.lagrange(1)] * (len(form.fields) - 1)
         self.element = elements[0] if len(elements) == 1 else dolfinx.mixed(elements)
         space = ufl.FunctionSpace(domain, self.element)
         self.domain = domain
@@ -89,7 +101,7 @@ class Symbols:
         return dict(zip(names, parts, strict=True))
 
     def space(self, rule: Rule, size: int) -> Any:
-        """Space of vectors of a size at the points of a rule."""
+        """Space of vectors with `size` components at the points of a rule."""
         if rule == "mean":
             element = dolfinx.per_cell(size)
         elif rule == "vertex":
@@ -99,7 +111,7 @@ class Symbols:
         return ufl.FunctionSpace(self.domain, element)
 
     def density(self, density: Density) -> Any:
-        """The coefficient that stands for a density while the form is being written."""
+        """The placeholder of a density."""
         if density not in self.placeholders:
             count = PLACEHOLDERS + len(self.placeholders)
             self.placeholders[density] = ufl.Coefficient(
@@ -145,8 +157,9 @@ class Symbols:
         return ufl.inner(weight, expression) * self.measures[rule]
 
     def _check_place(self, rule: Rule, quantity: LawQuantity, caller: str) -> None:
-        """In B-bar the deviator is taken at the particle and the mean stress at the centre: only
-        there are their tangents known.
+        """Check that a law quantity is used at a place where its tangent is known.
+
+        In B-bar this is the particle for the deviator, and the centre of the cell for the mean stress.
         """
         if rule == "vertex":
             raise FormError(
@@ -167,15 +180,15 @@ class Symbols:
             )
 
     def _check_degree(self, expression: Any) -> None:
-        # UFL's estimate for squares is a multiple of the degree along one axis; 1 for u_x would be 2.
+        # on squares, UFL's estimate is a multiple of the degree along one axis; u_x has degree 2
         unit = ufl.algorithms.estimate_total_polynomial_degree(self.traction[0]) / 2
         expanded = ufl.algorithms.apply_algebra_lowering.apply_algebra_lowering(expression)
         degree = ufl.algorithms.estimate_total_polynomial_degree(expanded) / unit
         if degree > EXACT_DEGREE:
             warnings.warn(
-                f"form {self.form.name}: sum_p of an expression of degree {degree:g} (products count "
-                f"together) is not exactly the sum over the particles, which it is up to "
-                f"{EXACT_DEGREE}; what is nonlinear in the fields belongs into the material law",
+                f"form {self.form.name}: sum_p of an expression of degree {degree:g} (degrees of "
+                "factors add up) differs from the sum over the particles: expected at most degree "
+                f"{EXACT_DEGREE}; put what is nonlinear in the fields into the material law",
                 InexactSumWarning,
                 stacklevel=2,
             )
@@ -189,19 +202,19 @@ class Symbols:
         return self.density(Density("mean", quantity))[0]
 
     def _jump_n(self, f: Any) -> Any:
-        """Jump of the normal derivative across a facet."""
+        """Jump of the normal derivative across a side."""
         n = ufl.FacetNormal(self.domain)
         slope = ufl.dot(ufl.grad(f), n)
         return slope("+") + slope("-")
 
     def _jump_nn(self, f: Any) -> Any:
-        """Jump of the second normal derivative across a facet."""
+        """Jump of the second normal derivative across a side."""
         n = ufl.FacetNormal(self.domain)
         bend = ufl.dot(ufl.dot(ufl.grad(ufl.grad(f)), n), n)
         return bend("+") - bend("-")
 
     def call(self, **other: Any) -> Any:
-        """The residual as the form file states it, with some names standing for something else."""
+        """The residual of the form file, with other symbols for some names."""
         form = self.form
         names = {**self.names, **other}
         try:
@@ -214,8 +227,8 @@ class Symbols:
         unknown = [name for name in wanted if name not in names]
         if unknown:
             raise FormError(
-                f"form {form.name}: residual asks for {listed(unknown)}, which is neither a field nor "
-                f"anything else it can have: expected names among {listed(sorted(names))}"
+                f"form {form.name}: residual asks for {quoted(unknown)}, which is not defined: expected "
+                f"names among {quoted(sorted(names))}"
             )
         try:
             return form.residual(**{name: names[name] for name in wanted})
@@ -225,7 +238,7 @@ class Symbols:
             raise FormError(f"form {form.name}: its residual raised {error!r}") from error
 
     def residual(self) -> Any:
-        """The residual, checked to be a UFL form that uses every test function."""
+        """The residual, after a check that it is a UFL form with every test function."""
         residual = self.call()
         if not isinstance(residual, ufl.Form):
             raise FormError(
@@ -243,76 +256,3 @@ class Symbols:
                     "appear in its residual: every field needs its equation"
                 )
         return residual
-
-    def _strain_change(self, quantity: LawQuantity, du: Any) -> list[Any]:
-        """Change of a law quantity with the strain (or grad u) at the particle."""
-        direction = self.form.strain.direction(du)
-        part = self.form.strain.gradient_part
-        c, m = self.density(Density("particle", quantity, part)), len(direction)
-        n = COMPONENTS[quantity.name]
-        return [sum(c[m * i + j] * direction[j] for j in range(m)) for i in range(n)]
-
-    def _volume_change(self, du: Any) -> Any:
-        """Change of div u (ln det f) where it is taken from the displacement."""
-        return self.form.strain.volume_change(next(iter(self.fields.values())), du)
-
-    def _direction(self, density: Density) -> Any:
-        """Change of a law quantity with the fields: C : strain(du) (or grad(du)) + c d_eps_v."""
-        assert isinstance(density.quantity, LawQuantity)
-        kinematics, n = self.form.kinematics, COMPONENTS[density.quantity.name]
-        du, *volumetric = self.trials.values()
-        change = [ufl.as_ufl(0.0)] * n
-        if density.rule == "particle":
-            change = self._strain_change(density.quantity, du)
-        volume = None
-        if kinematics.has_eps_v and density.quantity.name != "ln_J":
-            volume = volumetric[0]
-        elif kinematics.volume_at_centre and density.rule == "centre":
-            volume = self._volume_change(du)
-        if volume is not None:
-            c = self.density(Density(density.rule, density.quantity, "volume"))
-            change = [change[i] + c[i] * volume for i in range(n)]
-        return ufl.as_vector(change)
-
-    def couplings(self, residual: Any) -> list[tuple[Any, Any]]:
-        """What the tangent of B-bar has besides: the deviator at the particles changes with the volume
-        at the centre, and the mean stress there with the strain at the particles. The centre being
-        one point of the cell, each is a product of two linear forms of the cell, (left, right).
-        """
-        if not self.form.kinematics.volume_at_centre:
-            return []
-        du = next(iter(self.tests.values()))
-        at_centre, at_particles = self.measures["centre"], self.measures["particle"]
-        area = self.constants["h"] ** 2
-        products = []
-        for density, symbol in list(self.placeholders.items()):
-            if not isinstance(density.quantity, LawQuantity) or density.part != "value":
-                continue
-            if density.rule == "particle":
-                change = self.density(Density("particle", density.quantity, "volume"))
-                of_volume = self._volume_change(du) / area * at_centre
-                products.append((_with(residual, symbol, change), of_volume))
-            else:
-                (of_strain,) = self._strain_change(density.quantity, du)
-                one = ufl.as_vector([1 / area])
-                products.append((_with(residual, symbol, one), of_strain * at_particles))
-        return products
-
-    def tangent(self, residual: Any) -> Any:
-        """Derivative with respect to the fields, the law's part by its consistent tangent."""
-        tangent = ufl.algorithms.expand_derivatives(
-            ufl.derivative(residual, self.increments, self.trial)
-        )
-        for density, symbol in list(self.placeholders.items()):
-            if isinstance(density.quantity, LawQuantity) and density.part == "value":
-                # Linear in each density: what is bilinear after the exchange is its share.
-                tangent += ufl.lhs(ufl.replace(residual, {symbol: self._direction(density)}))
-        return tangent
-
-
-def _with(form: Any, symbol: Any, value: Any) -> Any:
-    """The terms of a form with a symbol that they are linear in, another value in its place."""
-    slope = ufl.derivative(form, symbol, ufl.Argument(symbol.ufl_function_space(), 2))
-    slope = ufl.algorithms.expand_derivatives(slope)
-    (argument,) = (a for a in slope.arguments() if a.number() == 2)
-    return ufl.replace(slope, {argument: value})

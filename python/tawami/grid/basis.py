@@ -16,9 +16,9 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from tawami import _rust
-from tawami.grid.space import Counts
+from tawami.base.arrays import Array
+from tawami.base.space import Counts
 
-Array = npt.NDArray[np.float64]
 Basis = Literal["quadratic_spline", "bilinear", "biquadratic"]
 BASES: tuple[Basis, ...] = get_args(Basis)
 

@@ -6,30 +6,19 @@ from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks
+from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import InputError
 from tawami.grid.basis import Basis
 from tawami.grid.grid import Edge, Grid
-from tawami.grid.space import PLANE
 
-Array = npt.NDArray[np.float64]
 Component = Literal["x", "y"]
 #: A part of an edge: from one line of the grid to another [m].
 Interval = tuple[float, float]
 #: A number, or a function of position f(x, y) on arrays.
 Profile = float | Callable[[Array, Array], Any]
-
-
-def component_index(component: str) -> int:
-    """Number of a component of a vector: 0 for 'x', 1 for 'y'.
-
-    Raises:
-        InputError: Anything else.
-    """
-    return PLANE.axis(component)
 
 
 def evaluate(profile: Profile, x: Array, y: Array, what: str) -> Array:
@@ -55,7 +44,7 @@ def evaluate(profile: Profile, x: Array, y: Array, what: str) -> Array:
     return values
 
 
-def cells_between(grid: Grid, edge: Edge, between: Interval | None) -> npt.NDArray[np.bool_]:
+def cells_between(grid: Grid, edge: Edge, between: Interval | None) -> Mask:
     """Mask of the cells along an edge that lie in a part of it.
 
     Raises:
@@ -78,12 +67,12 @@ def cells_between(grid: Grid, edge: Edge, between: Interval | None) -> npt.NDArr
     return inside
 
 
-def edge_functions(grid: Grid, basis: Basis, edge: Edge) -> npt.NDArray[np.int64]:
+def edge_functions(grid: Grid, basis: Basis, edge: Edge) -> Indices:
     """Numbers of the displacement functions that do not vanish on an edge of the grid, along it."""
     axis, end = grid.edge(edge)
     shape = [_rust.basis_len(basis, n) for n in grid.cells]
     numbers = np.arange(np.prod(shape)).reshape(shape, order="F")
-    functions: npt.NDArray[np.int64] = np.take(numbers, end, axis=axis)
+    functions: Indices = np.take(numbers, end, axis=axis)
     return functions
 
 

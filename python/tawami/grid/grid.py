@@ -8,19 +8,17 @@ from collections.abc import Sequence
 from typing import Any, Literal, cast, get_args
 
 import numpy as np
-import numpy.typing as npt
 from mpi4py import MPI
 
 from tawami import _rust
 from tawami.base import program, ranks
+from tawami.base.arrays import Array, Indices
 from tawami.base.checks import number, one_of, pair, point, room, shown, whole_number
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
+from tawami.base.space import PLANE, Counts, Position
 from tawami.fem import mesh
-from tawami.grid.space import PLANE, Counts, Position
 
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int64]
 Edge = Literal["left", "right", "bottom", "top"]
 EDGES: tuple[Edge, ...] = get_args(Edge)
 #: A position is on a line of the grid if it is this near to it [cells].
@@ -91,6 +89,17 @@ class Grid(Unique):
         """Its range along each axis [m], as text."""
         ends = zip(self.origin, self.upper, strict=True)
         return " x ".join(f"[{low:g}, {high:g}]" for low, high in ends)
+
+    @property
+    def line(self) -> str:
+        """The grid in words, for the header of a run."""
+        cells = " x ".join(map(str, self.cells))
+        corners = (", ".join(f"{x:g}" for x in corner) for corner in (self.origin, self.upper))
+        return f"{cells} cells of {self.h:g} m from ({next(corners)}) to ({next(corners)})"
+
+    def __repr__(self) -> str:
+        cells = " x ".join(map(str, self.cells))
+        return f"Grid({cells} cells of {self.h:g} m, {self.extent} m)"
 
     def identity(self) -> dict[str, Any]:
         """What distinguishes it from another grid, for checkpoints."""

@@ -16,8 +16,8 @@ from tawami.motion.transfer import Transfer, gradient_of, to_grid
 from tawami.scene.configuration import Configuration
 
 Array = npt.NDArray[np.float64]
-#: Arrays of the particles with their numbers of components per particle.
-ARRAYS = {"velocity": 2, "acceleration": 2, "velocity_gradient": 4, "acceleration_gradient": 4}
+#: Arrays of the particles, with the rank of their values: vectors and tensors.
+ARRAYS = {"velocity": 1, "acceleration": 1, "velocity_gradient": 2, "acceleration_gradient": 2}
 
 
 class Carried:
@@ -32,38 +32,39 @@ class Carried:
     def __init__(self, configuration: Configuration, transfer: Transfer, damping: float) -> None:
         self._now, self.transfer, self.damping = configuration, transfer, damping
         particles = configuration.domain.particles
-        for name, width in ARRAYS.items():
-            particles.carry(name, width)
+        self._space = configuration.model.space
+        for name, rank in ARRAYS.items():
+            particles.carry(name, self._space.dim**rank)
             particles.carried(name)[:] = 0.0
-        #: v and a of a grid that stays (functions x 2), and the velocities that the particles got.
+        #: v and a of a grid that stays (functions x dim), and the velocities that the particles got.
         self._stationary: tuple[Array, Array, Array] | None = None
 
     @property
     def velocity(self) -> Array:
-        """v_p [m/s], a view: particles x 2."""
+        """v_p [m/s], a view: particles x dim."""
         return self._view("velocity")
 
     @property
     def acceleration(self) -> Array:
-        """a_p [m/s2], a view: particles x 2."""
+        """a_p [m/s2], a view: particles x dim."""
         return self._view("acceleration")
 
     @property
     def velocity_gradient(self) -> Array:
-        """C_p [1/s], a view: particles x 2 x 2."""
-        return self._view("velocity_gradient").reshape(-1, 2, 2)
+        """C_p [1/s], a view: particles x dim x dim."""
+        return self._space.tensors(self._view("velocity_gradient"))
 
     @property
     def acceleration_gradient(self) -> Array:
-        """Gradient of the acceleration [1/s2], a view: particles x 2 x 2."""
-        return self._view("acceleration_gradient").reshape(-1, 2, 2)
+        """Gradient of the acceleration [1/s2], a view: particles x dim x dim."""
+        return self._space.tensors(self._view("acceleration_gradient"))
 
     def _view(self, name: str) -> Array:
         return self._now.domain.particles.carried(name)
 
     @property
     def on_grid(self) -> tuple[Array, Array] | None:
-        """v and a of a grid that stays, functions x 2; None once velocities were written."""
+        """v and a of a grid that stays, functions x dim; None once velocities were written."""
         if self._stationary is None:
             return None
         v, a, given = self._stationary
@@ -71,7 +72,7 @@ class Carried:
         return None if ranks.any_of(self._now.model.grid.comm, written)[0] else (v, a)
 
     def mapped(self, mass: Array) -> tuple[Array, Array]:
-        """v and a of the grid at the start of a step, functions x 2.
+        """v and a of the grid at the start of a step, functions x dim.
 
         Args:
             mass: Lumped mass of each function [kg per metre depth].
@@ -93,7 +94,7 @@ class Carried:
         """The arrays of the particles at the end of a step, by name.
 
         Args:
-            u: Increments of the displacement, functions x 2 [m].
+            u: Increments of the displacement, functions x dim [m].
             before: Velocity of the grid as mapped from the particles.
             v1, a1: Velocity and acceleration of the grid at the end of the step.
             dt: Length of the step [s].
@@ -103,7 +104,7 @@ class Carried:
         if self.transfer.flip and self._now.model.moves:
             flip = self.velocity + domain.at_particles(v1 - before)
             velocity = pic + np.exp(-dt / self.damping) * (flip - pic)
-        f = np.eye(2) + domain.gradients(u)
+        f = np.eye(self._space.dim) + domain.gradients(u)
         return {
             "velocity": velocity,
             "acceleration": domain.at_particles(a1),

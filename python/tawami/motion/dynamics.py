@@ -76,14 +76,16 @@ class Dynamics(Sealed, Unique):
         self.beta = (self.gamma + 0.5) ** 2 / 4
         self._now = scene.configuration
         with ranks.raise_together(scene.grid.comm):
-            given = sources.values(self._now.domain, "velocity", velocity, "x y", "m/s")
+            given = sources.values(
+                self._now.domain, "velocity", velocity, " ".join(scene.grid.space.axes), "m/s"
+            )
         self._carried = Carried(self._now, self.transfer, self.damping)
         self.velocity[:] = given
         self._clock = Clock()
         self._balance = Balance(self._now, self._carried)
-        self.seal()
+        self._seal()
 
-    def how_to_set(self, name: str) -> str:
+    def _how_to_set(self, name: str) -> str:
         """What to do instead of setting an attribute."""
         if name in ("velocity", "acceleration", "velocity_gradient"):
             return f"write into the array, as motion.{name}[:] = ..."

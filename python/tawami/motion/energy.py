@@ -150,12 +150,12 @@ class Balance:
         Args:
             mass: Lumped mass of each function [kg per metre depth].
             velocities: As mapped from the particles, with the supports imposed, and at the end of the
-                step, functions x 2 [m/s].
+                step, functions x dim [m/s].
             accepted: The step.
         """
         mapped, imposed, end = (0.5 * float(mass @ (v**2).sum(axis=1)) for v in velocities)
         friction, u = accepted.friction, accepted.u
-        work = accepted.problem.external[: u.size].reshape(-1, 2) + accepted.forces_at_end
+        work = accepted.problem.external[: u.size].reshape(u.shape) + accepted.forces_at_end
         return Energies(
             kinetic=end,
             external=float((work - friction).ravel() @ u.ravel()),

@@ -43,7 +43,7 @@ class Clock:
 
 @dataclass(frozen=True)
 class Start:
-    """v and a that a step starts from, functions x 2, with the supports imposed.
+    """v and a that a step starts from, functions x dim, with the supports imposed.
 
     Attributes:
         v, a: [m/s], [m/s2]
@@ -86,7 +86,7 @@ class NewmarkStep:
         domain = configuration.domain
         self._loads = signature(configuration)
         self._mass = domain.sums(domain.mass, np.ones((len(domain.particles), 1)))[:, 0]
-        self._masses = np.repeat(self._mass, 2)
+        self._masses = np.repeat(self._mass, configuration.model.space.dim)
         self._external = configuration.external()
         self._mapped = carried.mapped(self._mass)
         self._speed = self._prescribed(lambda support: support.velocity_at(clock.time))
@@ -116,8 +116,8 @@ class NewmarkStep:
         v, a = self._mapped
         if self._loads != self._clock.loads:  # a belongs to other loads
             a = self._first_acceleration(a)
-        v = reduction.imposed(v.ravel(), self._masses, self._speed).reshape(-1, 2)
-        a = reduction.imposed(a.ravel(), self._masses, self._speed_rate).reshape(-1, 2)
+        v = reduction.imposed(v.ravel(), self._masses, self._speed).reshape(v.shape)
+        a = reduction.imposed(a.ravel(), self._masses, self._speed_rate).reshape(a.shape)
         slope = 1 / (self._beta * dt**2)
         back = (0.5 / self._beta - 1) * a.ravel()
         impulse = self._masses * (v - self._mapped[0]).ravel() / dt
@@ -131,7 +131,7 @@ class NewmarkStep:
         """Acceleration by the momentum equation: g in free fall, 0 at rest."""
         domain = self._now.domain
         internal = domain.newton.internal(np.zeros(domain.layout.size))
-        force = (self._external - internal)[: like.size].reshape(-1, 2)
+        force = (self._external - internal)[: like.size].reshape(like.shape)
         return divided(force, self._mass[:, None])
 
     def _guess(self, u: Array) -> Array:
@@ -154,8 +154,8 @@ class NewmarkStep:
         assert accepted.acceleration is not None
         start, dt, a1 = self._start, self._dt, accepted.acceleration
         v1 = start.v + dt * ((1 - self._gamma) * start.a + self._gamma * a1)
-        v1 = start.reduction.imposed(v1.ravel(), self._masses, self._speed1).reshape(-1, 2)
-        a1 = start.reduction.imposed(a1.ravel(), self._masses, self._speed_rate).reshape(-1, 2)
+        v1 = start.reduction.imposed(v1.ravel(), self._masses, self._speed1).reshape(v1.shape)
+        a1 = start.reduction.imposed(a1.ravel(), self._masses, self._speed_rate).reshape(a1.shape)
         before = self._mapped[0]
         arrays = self._carried.at_end(accepted.u, before, v1, a1, dt)
         energies = self._balance.of_step(self._mass, (before, start.v, v1), accepted)
@@ -177,7 +177,7 @@ class NewmarkUpdate:
         configuration, carried, balance, clock: What it changes.
         time: The clock at the end of the step.
         arrays: Of the particles.
-        on_grid: v1 and a1, functions x 2.
+        on_grid: v1 and a1, functions x dim.
         energies: Terms of the balance.
         left: Number of particles that had left the grid before.
     """

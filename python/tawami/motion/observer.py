@@ -10,17 +10,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, Self, runtime_checkable
 
-import numpy as np
-import numpy.typing as npt
-
 from tawami.base import checks
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.motion.energy import Energies
 from tawami.motion.pace import Pace, Step
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
-
-Array = npt.NDArray[np.float64]
 
 
 class Subject(Protocol):

@@ -1,4 +1,4 @@
-"""Steps of a run: how large the next one is, and what is kept of those that were accepted."""
+"""Steps of a run: the size of the next step, and a record of every accepted step."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from tawami.solve.measures import History
 
 @dataclass
 class Pace:
-    """Where a run is and how large its next step.
+    """Position of a run, and size of its next step.
 
     Attributes:
         at: Time [s], or share of the load.
         size: Size of the next step.
-        good: Steps of this size that were accepted.
+        good: Number of accepted steps of this size.
     """
 
     at: float
@@ -28,13 +28,13 @@ class Pace:
 
 @dataclass(frozen=True)
 class Step:
-    """What is kept of an accepted step.
+    """Record of an accepted step.
 
     Attributes:
         end: Time [s], or share of the load, at its end.
-        size: Its size, likewise.
+        size: Its size [s], or share of the load.
         history: (momentum, volume) measures of every residual.
-        krylov: FGMRES iterations of every linear solve; 0 where the tangent was factorised.
+        krylov: FGMRES iterations of every linear solve; 0 if the tangent was factorised.
     """
 
     end: float
@@ -44,12 +44,12 @@ class Step:
 
     @property
     def iterations(self) -> int:
-        """Newton iterations."""
+        """Number of Newton iterations."""
         return len(self.history) - 1
 
 
-def packed(steps: Sequence[Step]) -> dict[str, Any]:
-    """Steps as a few arrays; NaN for a volume that is not measured."""
+def pack(steps: Sequence[Step]) -> dict[str, Any]:
+    """Steps as a few arrays for a checkpoint; NaN for a volume that is not measured."""
     history = [(u, np.nan if q is None else q) for step in steps for u, q in step.history]
     return {
         "end": np.array([step.end for step in steps]),
@@ -61,8 +61,8 @@ def packed(steps: Sequence[Step]) -> dict[str, Any]:
     }
 
 
-def unpacked(arrays: Mapping[str, Any]) -> list[Step]:
-    """The reverse of :func:`packed`."""
+def unpack(arrays: Mapping[str, Any]) -> list[Step]:
+    """The reverse of :func:`pack`."""
     histories = np.split(arrays["history"], np.cumsum(arrays["residuals"])[:-1])
     krylov = np.split(arrays["krylov"], np.cumsum(arrays["solves"])[:-1])
     return [

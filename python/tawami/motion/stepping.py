@@ -1,4 +1,4 @@
-"""Steps of a size that adapts: halved where one fails, grown again; loads that come in such steps."""
+"""Steps with an adaptive size: load ramps, and resets of the grid until equilibrium."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ def march(
     observer: Observer,
     each: Callable[[Solution], None] | None = None,
 ) -> list[Step]:
-    """Steps to an end.
+    """Take steps until an end. A step that fails is halved; after three accepted steps the size doubles.
 
     Args:
-        pace: Where they begin, and their largest size; one that fails is halved, after three good ones
-            it doubles.
-        end: Where they end.
-        smallest: Size below which no step is tried again.
-        attempt: Takes a step to a place, of a size; raises and leaves everything as it was if it fails.
-        observer: What observes them.
-        each: Called with each accepted step.
+        pace: Start, and largest size of a step.
+        end: Time [s] or share at which the steps end.
+        smallest: Size below which a step is not tried again.
+        attempt: Function of the end of a step and its size that takes the step; if it raises, it must
+            leave everything as it was.
+        observer: Observer of the steps.
+        each: Called with the solution of each accepted step.
 
     Raises:
         ConvergenceError, SingularError: At the smallest size.
@@ -38,7 +38,7 @@ def march(
     observer.begin(pace, steps)
     while end - pace.at > 1e-9 * largest:
         now = min(pace.size, end - pace.at)
-        # no crumb is left for the last step
+        # the last step must not be tiny
         target = end if end - pace.at - now < 1e-6 * largest else pace.at + now
         try:
             solution = attempt(target, target - pace.at)
@@ -70,28 +70,27 @@ def ramp(
     each: Callable[[Solution], None] | None = None,
     results: Recorder | None = None,
 ) -> list[Step]:
-    """Bring up, without inertia, the loads and prescribed displacements that are new to a scene.
+    """Apply the new loads and prescribed displacements of a scene in steps, without inertia.
 
-    What it has borne already stays. Loads grow in proportion, from 0 to 1 of what was asked for.
+    New loads grow in proportion from 0 to their values; loads that are in equilibrium already stay.
 
     Args:
         scene: The scene.
         size: Largest share of the load in a step, above 0 to 1.
-        smallest: Share below which the run ends; size/1024 by default.
+        smallest: Share below which a step is not halved any more; size/1024 by default.
         each: Called with the solution of each accepted step.
-        results: Where the run writes its results and checkpoints.
+        results: `tawami.Results` of the run, with outputs and checkpoints.
 
     Returns:
-        The accepted steps, with those of a run that is gone on with.
+        The accepted steps; those before a resumed run are included.
 
     Raises:
-        ConvergenceError, SingularError: At the smallest step, with its history; the scene is in the
-            last equilibrium that was found.
+        ConvergenceError, SingularError: The smallest step failed; the scene is in its last equilibrium.
         InputError: A size out of its range, or as `Scene.solve`.
     """
     checks.instance("ramp: scene", scene, Scene, "a tawami.Scene")
     size = checks.number("size", size, low=checks.LEAST, high=1.0)
-    checks.number("size", size, low=1e-9)  # more steps than that would never end
+    checks.number("size", size, low=1e-9)  # with smaller steps it would not end
     least = size / 1024 if smallest is None else checks.number("smallest", smallest, low=0.0)
     each = checks.function("each", each, "of a solution")
     pace = Pace(0.0, size)
@@ -112,18 +111,22 @@ def settle(
     max_resets: int = 200,
     results: Recorder | None = None,
 ) -> list[Step]:
-    """Solve under the present loads, the grid reset each time, until nothing is out of balance.
+    """Solve under the present loads, with a reset of the grid after each solve, until the scene is in
+    equilibrium right after a reset.
 
-    With each reset the particles meet other functions, and what was in balance is so no longer.
+    A reset moves the particles relative to the functions of the grid, which disturbs the equilibrium.
 
     Args:
-        scene: A scene of finite strain.
+        scene: A scene with a form of finite strain.
         tolerance: Of the momentum measure right after a reset.
-        max_resets: Number of solves after which it is given up.
-        results: Where the run writes its results and checkpoints.
+        max_resets: Largest number of solves.
+        results: `tawami.Results` of the run, with outputs and checkpoints.
+
+    Returns:
+        The solves as steps.
 
     Raises:
-        ConvergenceError: Not within `max_resets` solves.
+        ConvergenceError: No equilibrium after `max_resets` solves.
     """
     checks.instance("settle: scene", scene, Scene, "a tawami.Scene")
     tolerance = checks.number("tolerance", tolerance, low=1e-14, high=0.1)

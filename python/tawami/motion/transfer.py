@@ -56,27 +56,29 @@ TRANSFERS: dict[str, Transfer] = {
 
 
 def to_grid(domain: Domain, mass: Array, values: Array, gradient: Array) -> Array:
-    """Momentum per component of a particle field and its gradient: functions x 2.
+    """Momentum per component of a particle field and its gradient: functions x dim.
 
     Args:
         domain: The particles where they are.
         mass: Their masses [kg per metre depth].
-        values: v_p or a_p, particles x 2.
-        gradient: Its gradient, particles x 2 x 2.
+        values: v_p or a_p, particles x dim.
+        gradient: Its gradient, particles x dim x dim.
     """
     points, at = _positions(domain)
     at_origin = values - np.einsum("pij,pj->pi", gradient, at)
-    sums = domain.sums(mass, np.column_stack([at_origin, gradient.reshape(-1, 4)]))
-    return np.asarray(sums[:, :2] + np.einsum("ikl,il->ik", sums[:, 2:].reshape(-1, 2, 2), points))
+    space = domain.model.space
+    sums = domain.sums(mass, np.column_stack([at_origin, gradient.reshape(-1, space.dim**2)]))
+    values, gradients = sums[:, : space.dim], space.tensors(sums[:, space.dim :])
+    return np.asarray(values + np.einsum("ikl,il->ik", gradients, points))
 
 
 def gradient_of(transfer: Transfer, domain: Domain, field: Array, f: Array) -> Array:
-    """C_p of a field of the grid at the end of the step: particles x 2 x 2.
+    """C_p of a field of the grid at the end of the step: particles x dim x dim.
 
     Args:
         transfer: How.
         domain: The particles where they were at the start of the step.
-        field: v1 or a1, functions x 2.
+        field: v1 or a1, functions x dim.
         f: I + grad u of the step.
     """
     if transfer.gradient == "none":
@@ -85,7 +87,7 @@ def gradient_of(transfer: Transfer, domain: Domain, field: Array, f: Array) -> A
     if transfer.gradient == "moments":
         spread = _moments(domain, None)
         # at the ends of the grid, and on its lines with bilinear functions, D_p is singular
-        enough = np.linalg.det(spread) > 1e-8 * domain.model.grid.h**4
+        enough = np.linalg.det(spread) > 1e-8 * domain.model.grid.h ** (2 * domain.model.space.dim)
         moments = _moments(domain, field)[enough]
         gradient[enough] = moments @ np.linalg.inv(spread[enough])
     return np.asarray(gradient @ np.linalg.inv(f))
@@ -106,5 +108,5 @@ def _moments(domain: Domain, field: Array | None) -> Array:
     points, at = _positions(domain)
     given = points if field is None else field
     mean = at if field is None else domain.at_particles(field)
-    columns = [domain.at_particles(given * points[:, [k]]) for k in range(2)]
+    columns = [domain.at_particles(given * points[:, [k]]) for k in range(points.shape[1])]
     return np.asarray(np.stack(columns, axis=-1) - mean[:, :, None] * at[:, None, :])

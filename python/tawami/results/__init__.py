@@ -1,1 +1,20 @@
-"""Observers of a run: files, checkpoints, log and pictures."""
+"""Results of a run: files, tables, checkpoints, log and pictures, made by observers of its phases.
+
+`tawami.results.plot.plot` draws a run.
+"""
+
+from tawami.results.output import Output
+from tawami.results.outputs import GridOutput, ParticleOutput
+from tawami.results.results import Results
+from tawami.results.single import write_grid, write_particles
+from tawami.results.table import TableOutput
+
+__all__ = [
+    "GridOutput",
+    "Output",
+    "ParticleOutput",
+    "Results",
+    "TableOutput",
+    "write_grid",
+    "write_particles",
+]

@@ -1,4 +1,4 @@
-"""Columns of a table, by name: energies, reactions, displacements of points, momentum, iterations."""
+"""Columns of tables, by name: energies, reactions, displacements of points, momentum, iterations."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-import numpy.typing as npt
 from mpi4py import MPI
 
 from tawami import _rust
 from tawami.base import checks
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError, NotModelledError
 from tawami.grid import edges
 from tawami.motion.energy import Energies
@@ -20,8 +20,7 @@ from tawami.results.quantities import body_view
 from tawami.scene.reactions import supported_edge
 from tawami.scene.scene import Scene
 
-Array = npt.NDArray[np.float64]
-#: Particles whose displacements a linear fit around a point takes, where strains are finite.
+#: Particles that a linear fit of displacements around a point uses at finite strain.
 NEIGHBOURS = 12
 
 
@@ -31,14 +30,14 @@ class Columns:
 
     Attributes:
         labels: Their names and units.
-        of: Their values; `size` is what lies between a moment and the one before. A call for all ranks.
+        of: Their values, from a snapshot and the step size before it; a call for all ranks.
     """
 
     labels: tuple[str, ...]
     of: Callable[[Snapshot, float], Sequence[float]]
 
 
-#: What is known, as messages list it.
+#: Names of quantities, as messages list them.
 KNOWN = (
     "energies", "momentum", "angular momentum", "reaction EDGE", "reaction (X, Y)",
     "displacement (X, Y)", "run-out", "particles", "Newton iterations", "step size",
@@ -50,13 +49,13 @@ def columns(names: Iterable[str], subject: Subject) -> list[Columns]:
 
     Raises:
         NotModelledError: One that the scene does not have; the message names the switch that adds it.
-        InputError: An unknown name, a point outside the grid, an edge that nothing supports.
+        InputError: An unknown name, a point outside the grid, an edge without a support.
     """
     return [_columns(name, subject) for name in names]
 
 
 def usual_columns(subject: Subject) -> tuple[str, ...]:
-    """What a table has where nothing is asked for."""
+    """Columns of a table without names."""
     return (
         *(("energies",) if subject.motion is not None else ()),
         "Newton iterations",
@@ -134,7 +133,7 @@ def _reaction(name: str, place: str, scene: Scene) -> Columns:
 
     def of(now: Snapshot, _: float) -> list[float]:
         if now.solution is None:
-            return [np.nan, np.nan]  # not known before anything is solved
+            return [np.nan, np.nan]  # unknown before the first step
         return list(now.solution.reaction(at))
 
     return Columns((f"{name} x [N/m]", f"{name} y [N/m]"), of)
@@ -148,7 +147,7 @@ def _point(name: str, text: str) -> tuple[float, float]:
 
 
 def _displacement(name: str, point: tuple[float, float], scene: Scene) -> Columns:
-    """Of the grid where it stays, of the particles that were around the point where it does not."""
+    """Displacement of the grid; at finite strain, of the particles that were around the point."""
     location = edges.locate_point(scene.grid, point, name)
     moves = scene.form.strain.finite
     if moves:
@@ -163,21 +162,26 @@ def _displacement(name: str, point: tuple[float, float], scene: Scene) -> Column
     return Columns((f"{name} x [m]", f"{name} y [m]"), of)
 
 
-def displacement_near(scene: Scene, point: tuple[float, float], what: str) -> Array:
-    """Displacement (u_x, u_y) [m] since the start of what was at a point then: of a linear fit to the
-    particles that were around it; a call for all ranks.
+def displacement_near(subject: Subject, point: tuple[float, float], what: str) -> Array:
+    """Displacement (u_x, u_y) [m] of a material point since the start: a linear fit to the particles
+    that were around it; a call for all ranks.
+
+    Args:
+        subject: Scene or motion.
+        point: Its position at the start [m].
+        what: Name of the point in messages.
 
     Raises:
         InputError: No particle was within a cell of it.
     """
-    view = body_view(scene)
+    view, h = body_view(subject), subject.scene.grid.h
     u = view("displacement")
     offset = view("x") - u - np.asarray(point)
     distance = np.linalg.norm(offset, axis=1)
-    if not distance.min(initial=np.inf) <= scene.grid.h:
+    if not distance.min(initial=np.inf) <= h:
         raise InputError(
-            f"{what}: no particle was within a cell of it, {scene.grid.h:g} m: expected a point of the "
-            "body as it was at the start"
+            f"{what}: no particle was within a cell ({h:g} m) of it: expected a point of the body "
+            "at the start"
         )
     near = np.argsort(distance, kind="stable")[:NEIGHBOURS]
     basis = np.column_stack([np.ones(len(near)), offset[near]])

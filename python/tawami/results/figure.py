@@ -1,4 +1,4 @@
-"""Figures as files; matplotlib is imported where one is made."""
+"""Figures as files; matplotlib is imported only when one is made."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """A figure of this size [inches], of no window system.
+    """A figure of this size [inches], without a window system.
 
     Raises:
         MissingDependencyError: matplotlib is not installed.
@@ -29,7 +29,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def save(figure: Figure, path: str | Path, *, dpi: int = 160) -> None:
-    """Write a figure as PNG, whole or not at all.
+    """Write a figure as PNG, atomically.
 
     Raises:
         OutputError: The file cannot be written.

@@ -1,4 +1,4 @@
-"""Folder of a run: what it holds, and `run.json`, the record of the run."""
+"""Folder of a run: its files, and `run.json`, the record of the run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 from tawami.base import archive
 from tawami.base.errors import InputError, OutputError
-from tawami.base.files import atomic_file, reason, result_folder
+from tawami.base.files import atomic_file, reason, result_folder, unreadable
 from tawami.results import provenance
 from tawami.results.output import PHASES
 from tawami.results.progress import LOG
@@ -103,8 +103,11 @@ class RunFolder:
 
     def _record(self) -> dict[str, Any]:
         """Content of run.json; empty if it cannot be read."""
+        run = self.path / RUN
+        if unreadable(run) is not None:
+            return {}
         try:
-            known = json.loads((self.path / RUN).read_text(encoding="utf-8"))
+            known = json.loads(run.read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return {}
         return known if isinstance(known, dict) else {}

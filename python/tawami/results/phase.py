@@ -16,7 +16,7 @@ from tawami.base.files import result_folder
 from tawami.base.ranks import any_of, raise_together
 from tawami.base.signals import Interruption
 from tawami.motion.observer import Snapshot, Subject
-from tawami.motion.pace import Pace, Step, packed, unpacked
+from tawami.motion.pace import Pace, Step, pack, unpack
 from tawami.results import progress
 from tawami.results.checkpoints import Checkpoints
 from tawami.results.folder import RunFolder
@@ -137,7 +137,7 @@ class Phase:
         return {
             "scene": self.subject.state(),
             "pace": asdict(self._pace),
-            "steps": packed(self._steps),
+            "steps": pack(self._steps),
             "largest": self._largest,
             "outputs": {output.name: output.state() for output in self._outputs},
             "finished": self._last,
@@ -148,7 +148,7 @@ class Phase:
         self.subject.restore(state["scene"])
         for name, value in state["pace"].items():
             setattr(self._pace, name, value)
-        self._steps[:] = unpacked(state["steps"])
+        self._steps[:] = unpack(state["steps"])
         self.finished = state["finished"]
         before = state["largest"]
         if before != self._largest:

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from tawami.base import checks
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError, MissingDependencyError, OutputError
 from tawami.base.files import readable_file, reason, result_folder, unreadable
 from tawami.results.figure import new_figure, save
@@ -22,8 +22,6 @@ from tawami.results.series import frames
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-Array = npt.NDArray[np.float64]
 
 
 def plot(

@@ -1,30 +1,31 @@
-"""Particle fields on the vertices of the grid, for smooth pictures: on the bilinear functions M_i.
+"""Projection of particle fields on the vertices of the grid, with the bilinear functions M_i.
 
     lumped        f_i = sum_p V_p M_i f_p / sum_p V_p M_i
     consistent    sum_p V_p M_i (sum_j M_j f_j - f_p) = 0
 
-`lumped` stays within the range of the particles around a vertex; at the border of a body, where they
-stand on one side of it, it is off by the slope. `consistent`, the projection in L2, is exact for
-bilinear fields and may overshoot elsewhere. Its matrix is singular where a cell holds fewer than four
-particles; conjugate gradients from `lumped` leave there what no particle sees
-(`cases/costs/projection.py`: errors of both). Vertices without particles in their cells have no
-value: NaN.
+`lumped` stays within the range of the particles around a vertex. At the border of a body, where they
+are on one side of the vertex, its error is of the size of the gradient times h. `consistent`, the L2
+projection, is exact for bilinear fields and may overshoot. Its matrix is singular if a cell has fewer
+than four particles: conjugate gradients start from `lumped` and do not change what no particle sees.
+Vertices without particles in their cells have the value NaN. `cases/costs/projection.py` measures both
+errors.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks
+from tawami.base.arrays import Array
+from tawami.base.space import lattice
 from tawami.scene.scene import Scene
 
-Array = npt.NDArray[np.float64]
 Projection = Literal["lumped", "consistent"]
-#: Residual, of the field's own size, at which conjugate gradients end, and the most iterations.
+#: Relative residual at which conjugate gradients end, and their largest number of iterations.
 SMALL, MOST = 1e-10, 200
 
 
@@ -38,31 +39,34 @@ def check_projection(method: str) -> Projection:
 
 
 def vertices(scene: Scene) -> Array:
-    """Corners of the cells, x fastest [m]: vertices x 2."""
+    """Corners of the cells, x fastest [m]: vertices x dim."""
     grid = scene.grid
-    x, y = (
-        grid.axis_positions(axis, np.arange(number + 1), 0.0)
-        for axis, number in enumerate(grid.cells)
+    return lattice(
+        [
+            grid.axis_positions(axis, np.arange(number + 1), 0.0)
+            for axis, number in enumerate(grid.cells)
+        ]
     )
-    return np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
 
 
 def nodal(scene: Scene, values: Array, method: Projection = "lumped") -> Array:
-    """A field of the particles on the vertices of the grid; a call for all ranks.
+    """Project a field of the particles on the vertices of the grid; a call for all ranks.
 
     Args:
-        scene: The scene with its particles where they are.
-        values: Of this rank's particles, particles or particles x components.
+        scene: The scene with its particles.
+        values: Field of the particles of this rank, particles or particles x components.
         method: 'lumped' or 'consistent'.
 
     Returns:
-        Vertices (x fastest), by components where there are any; NaN where no particle is near.
+        Vertices (x fastest) or vertices x components; NaN without particles around.
 
     Raises:
         InputError: An unknown method.
     """
     method = check_projection(method)
-    columns = np.asarray(values, dtype=float).reshape(len(scene.particles), -1)
+    values = np.asarray(values, dtype=float)
+    # a rank may be without particles: its number of columns is that of the shape
+    columns = values.reshape(len(values), math.prod(values.shape[1:]))
     sums = _sums(scene, np.column_stack([np.ones(len(columns)), columns]))
     weight, right = sums[:, :1], sums[:, 1:]
     near = weight > 0
@@ -78,9 +82,9 @@ def _sums(scene: Scene, data: Array) -> Array:
 
 
 def _conjugate_gradients(scene: Scene, start: Array, weight: Array, right: Array) -> Array:
-    """The consistent projection, every column by itself, preconditioned by the lumped matrix.
+    """Consistent projection of each column, preconditioned by the lumped matrix.
 
-    Every rank has whole vectors and takes the same steps.
+    Every rank has complete vectors and does the same iterations.
     """
     location = scene.configuration.domain.location
 
@@ -91,20 +95,20 @@ def _conjugate_gradients(scene: Scene, start: Array, weight: Array, right: Array
         ]
         return _sums(scene, np.column_stack(at_particles))
 
-    def over(top: Array, bottom: Array) -> Array:
+    def divide(top: Array, bottom: Array) -> Array:
         return np.divide(top, bottom, out=np.zeros_like(top), where=bottom > 0)
 
     f, r = start.copy(), right - product(start)
-    z = over(r, np.broadcast_to(weight, r.shape))
+    z = divide(r, np.broadcast_to(weight, r.shape))
     d, rz = z.copy(), (r * z).sum(axis=0)
-    enough = SMALL**2 * (right * start).sum(axis=0)  # round-off must not be followed
+    enough = SMALL**2 * (right * start).sum(axis=0)  # below this it is round-off
     for _ in range(MOST):
         if (rz <= enough).all():
             break
         q = product(d)
-        step = np.where(rz > enough, over(rz, (d * q).sum(axis=0)), 0.0)
+        step = np.where(rz > enough, divide(rz, (d * q).sum(axis=0)), 0.0)
         f, r = f + step * d, r - step * q
-        z = over(r, np.broadcast_to(weight, r.shape))
+        z = divide(r, np.broadcast_to(weight, r.shape))
         before, rz = rz, (r * z).sum(axis=0)
-        d = z + over(rz, before) * d
+        d = z + divide(rz, before) * d
     return f

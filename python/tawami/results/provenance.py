@@ -1,4 +1,4 @@
-"""Where results come from: what was run, with what, on what; copies of the driver and of the form."""
+"""Provenance of results: script, form, versions and machine of a run, as `run.json` records them."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from tawami.form.form import Form
 from tawami.form.kinematics import Kinematics, StrainMeasure
 from tawami.motion.observer import Subject
 
-#: What is written: the record, and copies of the driver script and of the form.
+#: Names of the record, and of the copies of the driver script and of the form.
 RUN, SCRIPT, FORM = "run.json", "script.py", "form.py"
-#: Seconds that git gets.
+#: Time limit of git [s].
 PATIENCE = 10
 
 
 def write(folder: str | Path, subject: Subject) -> None:
-    """Write run.json, and beside it form.py and script.py where these can be read; a call for all ranks.
+    """Write run.json, and form.py and script.py if their sources can be read; a call for all ranks.
 
     run.json holds: script (path, or null), module (as in `python -m`, or null), arguments, directory,
     python, ranks, script_sha256, versions, environment, blas, threads, processors, git (revision, and
-    whether tracked files were changed; null without git), form (name, and the file that declares it),
-    input (the header of the scene), grid, started (UTC) and phases, empty at first.
+    whether tracked files were changed; null without git), form (name and file), input (the header of
+    the scene), grid, started (UTC) and phases, empty at first.
 
     Raises:
         OutputError: The folder cannot be written.
@@ -71,17 +71,17 @@ def write(folder: str | Path, subject: Subject) -> None:
             _write(home / RUN, (json.dumps(known, indent=1) + "\n").encode())
 
 
-#: What says how many threads a process takes.
+#: Environment variables with the number of threads.
 THREADS = ("OMP_NUM_THREADS", "RAYON_NUM_THREADS")
 
 
 def now() -> str:
-    """Date and time (UTC), as records have them."""
+    """Date and time (UTC) for records."""
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def driver() -> tuple[Path | None, str | None]:
-    """The script that Python runs, and its name where it was started as `python -m NAME`."""
+    """The script that Python runs, and its name if it was started as `python -m NAME`."""
     main = sys.modules["__main__"]
     file = getattr(main, "__file__", None)
     name = getattr(getattr(main, "__spec__", None), "name", None)
@@ -92,7 +92,7 @@ def driver() -> tuple[Path | None, str | None]:
 
 
 def git(folder: Path) -> dict[str, Any] | None:
-    """Revision of a folder's repository, and whether its tracked files differ from it.
+    """Revision of the repository of a folder, and whether tracked files differ from it.
 
     None without git, a repository, or a revision.
     """
@@ -113,9 +113,10 @@ def git(folder: Path) -> dict[str, Any] | None:
 
 
 def source_of(form: Form) -> bytes | None:
-    """The file of a form; of one defined in a script, its declarations and its residual as such a file,
-    which can be loaded where the residual names nothing else of the script. None where Python does not
-    have its source.
+    """Content of the file of a form.
+
+    For a form defined in a script, a file with its declarations and its residual; it can be loaded if
+    the residual uses nothing else of the script. None if Python does not have the source.
     """
     file = _file_of(form)
     declared = getattr(form.residual, "__globals__", {})

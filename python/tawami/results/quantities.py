@@ -1,7 +1,7 @@
-"""What can be written of the particles and on the grid, by name; columns of a table: `columns`.
+"""Quantities of the particles and of the grid, by name; columns of tables are in `columns`.
 
-Arrays and columns are called "name [unit]", a tensor's "stress xx yy zz xy [Pa]". What a scene does not
-model is an error that says what does; an unknown name lists those that are known.
+Files label them "name [unit]", tensors "stress xx yy zz xy [Pa]". A quantity that the scene does not
+model gives an error that says how to model it; an unknown name gives the list of names.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 
 from tawami import _rust
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError, NotModelledError
 from tawami.form.kinematics import FIELD_UNITS
 from tawami.grid import edges
@@ -22,11 +22,10 @@ from tawami.grid.basis import extraction, greville_1d, values_1d
 from tawami.motion.observer import Snapshot, Subject
 from tawami.motion.transfer import to_grid
 from tawami.particles import placement
-from tawami.results.projection import Projection, nodal
+from tawami.results.projection import Projection, nodal, vertices
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
 
-Array = npt.NDArray[np.float64]
 #: Arrays of the particles by name.
 View = Callable[[str], Array]
 
@@ -36,9 +35,9 @@ class Quantity:
     """A field of the particles.
 
     Attributes:
-        label: How files call it.
+        label: Its name in files.
         of: Its values, particles or particles x components, from the arrays of the particles.
-        nodal: Whether means of it make sense: it can be projected on the grid.
+        nodal: Whether it can be projected on the grid.
     """
 
     label: str
@@ -61,7 +60,7 @@ def _deviatoric_stress(view: View) -> Array:
     return np.asarray(np.sqrt(1.5 * ((s**2).sum(axis=1) + 2 * stress[:, 3] ** 2)))
 
 
-#: Fields of the particles; beside them the history variables of the laws, which are strains.
+#: Fields of the particles. History variables of the laws, which are strains, are added to them.
 PARTICLES = {
     "displacement": Quantity("displacement [m]", _stored("displacement"), nodal=False),
     "stress": Quantity("stress xx yy zz xy [Pa]", _stored("stress")),
@@ -74,7 +73,7 @@ PARTICLES = {
     "material": Quantity("material [-]", _stored("material"), nodal=False),
     "number": Quantity("number [-]", _stored("number"), nodal=False),
 }
-#: Of the laws that come with tawami.
+#: History variables of the laws of tawami.
 HISTORY = ("plastic_strain", "dilatancy")
 
 
@@ -83,7 +82,7 @@ def _history(name: str) -> Quantity:
 
 
 def local_view(subject: Subject) -> View:
-    """The particles of this rank."""
+    """Arrays of the particles of this rank."""
     particles = subject.scene.particles
 
     def view(name: str) -> Array:
@@ -97,21 +96,21 @@ def local_view(subject: Subject) -> View:
 
 
 def body_view(subject: Subject) -> View:
-    """The particles of all ranks in the order of their numbers; calls for all ranks."""
+    """Arrays of the particles of all ranks in the order of their numbers; calls for all ranks."""
     local, comm = local_view(subject), subject.scene.grid.comm
-    whole = placement.in_order(comm, local("number"))
+    gather = placement.in_order(comm, local("number"))
     known: dict[str, Array] = {}
 
     def view(name: str) -> Array:
         if name not in known:
-            known[name] = np.asarray(whole(local(name)))
+            known[name] = np.asarray(gather(local(name)))
         return known[name]
 
     return view
 
 
 def solution_view(solution: Solution) -> View:
-    """The particles as they were when this was solved."""
+    """Arrays of the particles at the time of a solution."""
     other = {"displacement": "displacement_of_particles"}
     return lambda name: np.asarray(getattr(solution, other.get(name, name)))
 
@@ -120,7 +119,7 @@ def of_particles(names: Iterable[str], subject: Subject) -> list[Quantity]:
     """Fields of the particles by their names.
 
     Raises:
-        NotModelledError: One that the scene does not have; the message names the switch that adds it.
+        NotModelledError: The scene does not have one; the message names the switch that adds it.
         InputError: An unknown name.
     """
     known = PARTICLES | {name: _history(name) for name in subject.scene.particles.history_names}
@@ -136,7 +135,7 @@ def of_particles(names: Iterable[str], subject: Subject) -> list[Quantity]:
 
 
 def usual_of_particles(subject: Subject) -> tuple[str, ...]:
-    """What is written where nothing is asked for."""
+    """Quantities of an output without names."""
     scene, names = subject.scene, ["displacement", "stress", "mean stress"]
     names += ["eps_v"] if scene.form.kinematics.has_eps_v else []
     names += ["velocity"] if subject.motion is not None else []
@@ -149,7 +148,7 @@ def _unknown(place: str, name: str, known: Iterable[str]) -> str:
 
 @contextmanager
 def _not_modelled() -> Iterator[None]:
-    """The sentence of whatever is asked, as the error that says that a scene does not have it."""
+    """Raise InputError of the block as NotModelledError."""
     try:
         yield
     except InputError as error:
@@ -164,9 +163,9 @@ class GridQuantity:
     """A field of the grid.
 
     Attributes:
-        label: How files call it.
-        of: Its values at the vertices, or in the cells, x fastest; a call for all ranks.
-        cells: Whether it has one value a cell.
+        label: Its name in files.
+        of: Its values at the vertices or in the cells, x fastest; a call for all ranks.
+        cells: Whether it has one value per cell.
     """
 
     label: str
@@ -177,7 +176,7 @@ class GridQuantity:
 def on_grid(
     names: Iterable[str], subject: Subject, projection: Projection = "lumped"
 ) -> list[GridQuantity]:
-    """Fields of the grid by their names: its own, or those of particles, projected.
+    """Fields of the grid by their names: its own, or projected fields of the particles.
 
     Raises:
         NotModelledError, InputError: As `of_particles`.
@@ -204,7 +203,7 @@ def on_grid(
 
 
 def usual_on_grid(scene: Scene) -> tuple[str, ...]:
-    """What is written where nothing is asked for."""
+    """Quantities of an output without names."""
     return ("displacement", *list(scene.form.fields)[1:], "particles")
 
 
@@ -232,11 +231,11 @@ def _projected(quantity: Quantity, projection: Projection) -> GridQuantity:
 
 def _at_vertices(scene: Scene, coefficients: Array) -> Array:
     matrix = extraction(scene.basis, scene.grid.cells, 1)
-    return np.asarray(matrix @ coefficients.reshape(-1, 2))
+    return np.asarray(matrix @ scene.grid.space.vectors(coefficients))
 
 
 def _displacement(now: Snapshot) -> Array:
-    """Since the start, and of the last step where strains are finite."""
+    """Displacement since the start; at finite strain, of the last step."""
     scene, solution = now.scene, now.solution
     u = scene.split(scene.configuration.before)[0] if solution is None else solution.u
     return _at_vertices(scene, u)
@@ -249,11 +248,11 @@ def _bilinear(now: Snapshot) -> Array:
 
 
 def _velocity(now: Snapshot) -> Array:
-    """That of the particles with its gradient, by their mass; NaN where there are none."""
+    """Velocity of the particles, weighted by mass, with its gradient; NaN without particles around."""
     motion, attached = now.subject.motion, now.scene.configuration.domain
     assert motion is not None
     kept = motion.on_grid
-    if kept is not None:  # a grid that stays has its own
+    if kept is not None:  # a grid that is not reset has its own velocity
         return _at_vertices(now.scene, kept[0])
     momentum = to_grid(attached, motion.mass, motion.velocity, motion.velocity_gradient)
     mass = attached.sums(motion.mass, np.ones((len(motion.mass), 1)))
@@ -263,13 +262,12 @@ def _velocity(now: Snapshot) -> Array:
 
 
 def _reaction(now: Snapshot) -> Array:
-    """Forces of supports and walls [N per metre depth], shared out to the vertices of the cell where
-    they act, with their sum and moment; not known before a solution.
+    """Forces of supports and walls [N per metre depth], distributed to the vertices of their cells with
+    the same sum and moment; NaN before the first solution.
     """
     scene, grid = now.scene, now.scene.grid
-    nx, ny = grid.cells
     if now.solution is None:
-        return np.full(((nx + 1) * (ny + 1), 2), np.nan)
+        return np.full((len(vertices(scene)), grid.space.dim), np.nan)
     along = []
     for n in grid.cells:
         place = greville_1d(scene.basis, n)

@@ -157,17 +157,17 @@ class Configuration:
     def _solve(self, kind: StepKind) -> Accepted:
         """A step in which no wall pulls, is passed through, or exceeds its friction."""
         layout, supports = self.domain.layout, self.supports
-        n, step = layout.num_displacement, None
-        active, before = layout.active[:n:2], self.before[:n].reshape(-1, 2)
+        n, step, space = layout.num_displacement, None, self.model.space
+        active, before = layout.active[: n : space.dim], space.vectors(self.before[:n])
         for wall in supports.walls:
             wall.begin()
         for _ in range(PASSES):
             problem = kind.problem()
             step = self._newton(problem, step)
-            forces, u = (part[:n].reshape(-1, 2) for part in (step.forces, step.coefficients))
+            forces, u = (space.vectors(part[:n]) for part in (step.forces, step.coefficients))
             if not problem.contact.adapt(forces, u, before, active):
                 a = step.acceleration
-                return Accepted(problem, step, u, None if a is None else a.reshape(-1, 2))
+                return Accepted(problem, step, u, None if a is None else space.vectors(a))
         assert step is not None
         raise ConvergenceError(
             f"contact and friction of the walls did not settle in {PASSES} solves. Nothing was changed "

@@ -20,14 +20,14 @@ class ActiveSet:
 
     Attributes:
         walls: The walls; :meth:`adapt` changes their states.
-        prescribed: For each wall whether other supports prescribe its components, functions x 2.
+        prescribed: For each wall whether other supports prescribe its components, functions x dim.
     """
 
     walls: Sequence[Wall] = ()
     prescribed: Sequence[Mask] = ()
 
     def friction(self, forces: Array) -> Array:
-        """Friction on the body (functions x 2) from what supports and walls have to exert on it."""
+        """Friction on the body (functions x dim) from what supports and walls have to exert on it."""
         pairs = zip(self.walls, self.prescribed, strict=True)
         parts = (wall.friction_of(forces, prescribed) for wall, prescribed in pairs)
         return sum(parts, np.zeros_like(forces))
@@ -36,9 +36,9 @@ class ActiveSet:
         """Change the states of the walls that a solution contradicts.
 
         Args:
-            forces: What supports and walls exert on the body, functions x 2.
-            u: Increments of the displacement, functions x 2.
-            before: Displacement before them since the body touched the walls, functions x 2.
+            forces: What supports and walls exert on the body, functions x dim.
+            u: Increments of the displacement, functions x dim.
+            before: Displacement before them since the body touched the walls, functions x dim.
             active: Whether each function has particles.
 
         Returns:

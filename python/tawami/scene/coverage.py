@@ -49,7 +49,7 @@ def _moments(domain: Domain) -> tuple[Array, Array, Array]:
     columns = np.column_stack([np.ones(len(off)), off, off**2])
     columns *= np.asarray(domain.particles.volume)[:, None]
     sums = np.zeros((grid.cells[0] * grid.cells[1], 5))
-    np.add.at(sums, np.asarray(location.cell), columns / grid.h**2)
+    np.add.at(sums, np.asarray(location.cell), columns / grid.space.measure(grid.h))
     sums = ranks.sum_of(grid.comm, sums).reshape(*grid.cells[::-1], 5)
     area = sums[..., 0]
     with np.errstate(invalid="ignore", divide="ignore"):

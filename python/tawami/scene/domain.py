@@ -137,15 +137,17 @@ class Domain:
         return ranks.sum_of(self.model.grid.comm, sums)
 
     def at_particles(self, values: Array) -> Array:
-        """A displacement field (functions x 2) at this rank's particles, particles x 2."""
+        """A displacement field (functions x dim) at this rank's particles, particles x dim."""
         flat = np.ascontiguousarray(values).ravel()
-        return np.asarray(_rust.interpolate(self.location, self.layout.basis, 2, flat))
+        return np.asarray(
+            _rust.interpolate(self.location, self.layout.basis, self.model.space.dim, flat)
+        )
 
     def gradients(self, values: Array) -> Array:
-        """Gradient of a displacement field (functions x 2) at the particles, particles x 2 x 2."""
+        """Gradient of a displacement field (functions x dim) at the particles, particles x dim x dim."""
         flat = np.ascontiguousarray(values).ravel()
         gradients = _rust.gradients(self.location, self.layout.basis, flat)
-        return np.asarray(gradients).reshape(-1, 2, 2)
+        return self.model.space.tensors(np.asarray(gradients))
 
     @property
     def particles_per_cell(self) -> npt.NDArray[np.int64]:
@@ -170,7 +172,7 @@ class Domain:
             self.location.cell, self.particles.volume, minlength=grid.cells[0] * grid.cells[1]
         )
         areas = ranks.sum_of(grid.comm, areas)
-        shares = np.where(areas > 0, areas / grid.h**2, 1.0)
+        shares = np.where(areas > 0, areas / self.model.space.measure(grid.h), 1.0)
         c = int(shares.argmin())
         if shares[c] < WHOLE and not grid.comm.rank:
             i, j = c % grid.cells[0], c // grid.cells[0]

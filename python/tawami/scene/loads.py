@@ -41,7 +41,7 @@ class Traction:
 
 @dataclass
 class Forces:
-    """Forces [N per metre depth] on particles of the body, particles of the body x 2."""
+    """Forces [N per metre depth] on particles of the body, particles of the body x dim."""
 
     force: Array
     share: Share = field(default_factory=Share)
@@ -63,7 +63,7 @@ class Loads:
 
     def __init__(self, grid: Grid, num_particles: int) -> None:
         self.grid, self.num_particles = grid, num_particles
-        self.weight = Share(np.zeros(2), np.zeros(2), np.zeros(2))
+        self.weight = Share(*np.zeros((3, grid.space.dim)))
         self.tractions: list[Traction] = []
         self.forces: list[Forces] = []
 
@@ -106,7 +106,7 @@ class Loads:
         chosen = np.unique(chosen)
         if chosen.size == 0:
             raise InputError("load(...): no particle was chosen; the force would act on nothing")
-        each = np.zeros((self.num_particles, 2))
+        each = np.zeros((self.num_particles, self.grid.space.dim))
         each[chosen] = total / len(chosen)
         self.forces.append(Forces(each))
 
@@ -120,7 +120,7 @@ class Loads:
         gravity, particles = self.weight.at(part), domain.particles
         external = np.zeros(domain.layout.size)
         if self.forces or gravity.any():
-            on_particles = np.zeros((len(particles), 2))
+            on_particles = np.zeros((len(particles), self.grid.space.dim))
             if gravity.any():
                 on_particles += domain.mass[:, None] * gravity
             for forces in self.forces:
@@ -167,8 +167,8 @@ class Loads:
     @property
     def line(self) -> str:
         """The loads in words, for the header of a run."""
-        b_x, b_y = self.gravity
-        texts = [f"gravity ({b_x:g}, {b_y:g}) m/s2"] if self.gravity.any() else []
+        b = ", ".join(f"{component:g}" for component in self.gravity)
+        texts = [f"gravity ({b}) m/s2"] if self.gravity.any() else []
         return listed([*texts, *map(str, self.tractions), *map(str, self.forces)])
 
     def identity(self) -> list[Any]:

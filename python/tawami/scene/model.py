@@ -15,6 +15,7 @@ from tawami import _rust
 from tawami.base import checks
 from tawami.base.errors import InputError, LockingWarning, ParameterWarning
 from tawami.base.sealed import Settings
+from tawami.base.space import Space
 from tawami.base.warn import warn
 from tawami.body.body import Body
 from tawami.fem.rules import TangentRule
@@ -64,6 +65,11 @@ class Model:
     density: Array | None
     leaving: Leaving
     num_particles: int
+
+    @property
+    def space(self) -> Space:
+        """What follows from the dimension."""
+        return self.grid.space
 
     @property
     def moves(self) -> bool:

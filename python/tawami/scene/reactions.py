@@ -58,7 +58,7 @@ class Reactions:
     its length.
 
     Attributes:
-        on_edges: Of edges and walls, functions x 2 [N per metre depth].
+        on_edges: Of edges and walls, functions x dim [N per metre depth].
         at_points: Of points.
         supported: Names of the edges with supports.
     """
@@ -90,7 +90,7 @@ class Reactions:
                 assert not isinstance(support.place, str)
                 places = (support.given, support.place, point.place)
                 at_points.append(AtPoint(places, support.component, float(force)))
-        held = np.where(reduction.fixed[:n], rest, 0.0).reshape(-1, 2)
+        held = np.where(reduction.fixed[:n], rest, 0.0).reshape(accepted.u.shape)
         return cls(held + accepted.friction, at_points, supports.supported_edges)
 
     def at(self, model: Model, place: str | Sequence[float]) -> Array:
@@ -101,7 +101,7 @@ class Reactions:
             return np.asarray(self.on_edges[functions].sum(axis=0))
         place = checks.point("reaction(...)", place)
         near = SAME_POINT * model.grid.h
-        force, found = np.zeros(2), False
+        force, found = np.zeros(model.space.dim), False
         for one in self.at_points:
             if any(np.abs(np.subtract(place, known)).max() <= near for known in one.places):
                 force[one.component] += one.force

@@ -124,9 +124,9 @@ class Scene(Elsewhere, Sealed, Unique):
         self.parameters, self.options = model.parameters, model.options
         self.num_particles = model.num_particles
         self.stopwatch: Stopwatch = self.configuration.stopwatch
-        self.seal()
+        self._seal()
 
-    def how_to_set(self, name: str) -> str:
+    def _how_to_set(self, name: str) -> str:
         """What to do instead of setting an attribute."""
         if name in self.form.parameters or name in self.form.options:
             return f"the form's parameters are fixed when a scene is made: Scene(..., {name}=...)"

@@ -73,7 +73,7 @@ class Solution(Elsewhere, Sealed, Unique):
         self.stress = particles["stress"]
         self.displacement_of_particles = particles["displacement"]
         self._eps_v = particles.get("eps_v")
-        self.seal()
+        self._seal()
 
     def __repr__(self) -> str:
         momentum = self.history[-1][0]
@@ -122,7 +122,7 @@ class Solution(Elsewhere, Sealed, Unique):
             InputError: The point is outside the grid.
         """
         location = edges.locate_point(self._model.grid, point, "displacement(...)")
-        value = _rust.interpolate(location, self._model.basis, 2, self.u)[0]
+        value = _rust.interpolate(location, self._model.basis, self._model.space.dim, self.u)[0]
         return np.asarray(value)
 
     def reaction(self, place: str | Sequence[float]) -> Array:
@@ -145,6 +145,6 @@ class Solution(Elsewhere, Sealed, Unique):
     def on_points(self) -> list[tuple[tuple[float, float], Array]]:
         """Where each point is held (x, y) [m], as the step began, and its force [N per metre depth]."""
         return [
-            (one.places[-1], one.force * np.eye(2)[one.component])
+            (one.places[-1], one.force * np.eye(self._model.space.dim)[one.component])
             for one in self._reactions.at_points
         ]

@@ -5,6 +5,7 @@ position, a table of scattered points, or the particles of an earlier run.
 from __future__ import annotations
 
 import csv
+import os
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ import numpy.typing as npt
 
 from tawami.base import archive, checks
 from tawami.base.errors import InputError
+from tawami.base.files import reason, unreadable
 from tawami.body.body import Body
 from tawami.scene.domain import Domain
 
@@ -71,11 +73,11 @@ class Earlier:
 
     @property
     def body(self) -> Body:
-        """Positions and volumes of these particles, for a scene that goes on with them."""
+        """Positions and volumes of these particles, for a scene that starts from them."""
         return Body(self.x, self.field("volume", 1, f"{self.name}: body")[:, 0])
 
     def field(self, name: str, width: int, what: str) -> Array:
-        """An array of the file, particles x width; its name may go on with components and unit."""
+        """An array of the file, particles x width; components and unit may follow its name."""
         wanted = name.replace("_", " ")
         for known, values in self.fields.items():
             plain = known.split("[")[0].replace("_", " ").strip()
@@ -121,14 +123,19 @@ def table(path: str | Path, *columns: str, outside: Outside = "stop") -> Table:
             number, or two values for one point.
     """
     _check_outside(outside)
-    name = f"'{checks.path('table: path', path)}'"
+    path = checks.path("table: path", path)
+    name, problem = f"'{path}'", unreadable(path)
     if not all(isinstance(column, str) for column in columns):
         raise InputError(f"table: columns = {checks.shown(columns)}: expected their names")
+    if problem is not None:
+        raise InputError(f"table({name}) cannot be read ({problem}): expected a CSV file")
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
             rows = [row for row in csv.reader(file) if row]
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"table({name}) cannot be read: {error}") from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(
+            f"table({name}) cannot be read ({reason(error)}): expected a CSV file"
+        ) from None
     header = [cell.strip() for cell in rows[0]] if rows else []
     wanted = ["x", "y", *(columns or [c for c in header if c not in ("x", "y")])]
     missing = [column for column in wanted if column not in header]
@@ -178,12 +185,14 @@ def earlier(path: str | Path, *, outside: Outside = "stop") -> Earlier:
     _check_outside(outside)
     file = checks.path("earlier: path", path)
     name = f"'{file}'"
-    if file.is_dir():
+    if os.path.isdir(file):
         file = (archive.files(file) or [file])[-1]
-    if file.suffix not in (".vtu", ".npz") or not file.is_file():
+    problem = unreadable(file)
+    if problem is not None or file.suffix not in (".vtu", ".npz"):
         raise InputError(
-            f"earlier({name}) is no such file: expected particles of an earlier run, ending in .vtu, a "
-            "checkpoint, ending in .npz, or a folder of results with checkpoints"
+            f"earlier({name}) cannot be read ({problem or 'another ending'}): expected particles of an "
+            "earlier run, ending in .vtu, a checkpoint, ending in .npz, or a folder of results with "
+            "checkpoints"
         )
     if file.suffix == ".npz":
         _, state = archive.read(file)

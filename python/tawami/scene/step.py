@@ -1,4 +1,4 @@
-"""One accepted step of a scene: what is solved, what comes out, and what is stored."""
+"""One accepted step of a scene: the problem, its solution, and what is stored."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ class Accepted:
     Attributes:
         problem: What was solved.
         step: What Newton's method found.
-        u: Increments of the displacement, functions x 2 [m].
-        acceleration: At the end of a dynamic step, functions x 2 [m/s2].
+        u: Increments of the displacement, functions x dim [m].
+        acceleration: At the end of a dynamic step, functions x dim [m/s2].
     """
 
     problem: Problem
@@ -57,8 +57,8 @@ class Accepted:
 
     @property
     def forces(self) -> Array:
-        """What supports and walls exert on the body, functions x 2 [N per metre depth]."""
-        return self.step.forces[: self.u.size].reshape(-1, 2)
+        """What supports and walls exert on the body, functions x dim [N per metre depth]."""
+        return self.step.forces[: self.u.size].reshape(self.u.shape)
 
     @property
     def forces_at_end(self) -> Array:
@@ -66,11 +66,11 @@ class Accepted:
         inertia = self.problem.inertia
         if inertia is None:
             return self.forces
-        return self.forces - inertia.impulse.reshape(-1, 2)
+        return self.forces - inertia.impulse.reshape(self.u.shape)
 
     @property
     def friction(self) -> Array:
-        """Friction of the walls on the body, functions x 2 [N per metre depth]."""
+        """Friction of the walls on the body, functions x dim [N per metre depth]."""
         return self.problem.contact.friction(self.forces)
 
 

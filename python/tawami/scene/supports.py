@@ -114,7 +114,7 @@ class Supports:
         """Prescribe a component along an edge."""
         edges.cells_between(self.grid, edge, between)
         value = checks.profile(f"fix(edge='{edge}'): value", value)
-        self._add(Support(edge, edges.component_index(component), value, velocity, between))
+        self._add(Support(edge, self.grid.space.axis(component), value, velocity, between))
 
     def hold(
         self,
@@ -128,7 +128,7 @@ class Supports:
         edges.locate_point(self.grid, point, what)
         place = checks.point(what, point)
         held = checks.number(f"{what}: value", value)
-        self._add(Support(place, edges.component_index(component), held, velocity))
+        self._add(Support(place, self.grid.space.axis(component), held, velocity))
 
     def _add(self, support: Support) -> None:
         if support.velocity is not None:
@@ -153,7 +153,7 @@ class Supports:
     def release(self, place: Edge | Sequence[float], component: Component | None) -> None:
         """Take supports away."""
         at = place if isinstance(place, str) else checks.point("release(...)", place)
-        axis = None if component is None else edges.component_index(component)
+        axis = None if component is None else self.grid.space.axis(component)
         gone = [s for s in self.all if at in (s.place, s.given) and axis in (None, s.component)]
         walls = [w for w in self.walls if w.edge == at and axis is None]
         if not gone and not walls:
@@ -181,7 +181,7 @@ class Supports:
         Args:
             domain: The particles where they are.
             amount: Factor of each support's value.
-            start: Coefficients that are there already, which the amounts include.
+            start: Coefficients at the start of the step, which the amounts include.
             before: Displacement coefficients since the start of the scene where particles do not move,
                 0 where they do: what walls measure distances from.
             moving: Inertia holds the body: rigid motions may be free, and edges that are held at rest
@@ -271,12 +271,12 @@ class Supports:
         """Move the points with the body, and record how far it has crossed edges.
 
         Args:
-            u: Increments of the displacement, functions x 2.
+            u: Increments of the displacement, functions x dim.
             points: The constraints of the step, in the order of the supports.
             crossings: As :meth:`crossings` gave them for this step.
         """
         for support, point in zip(self.at_points, points, strict=True):
-            x, y = point.place + point.weights @ u[point.indices // 2]
+            x, y = point.place + point.weights @ u[point.indices // self.grid.space.dim]
             support.place = (float(x), float(y))
         for number, crossing in crossings.items():
             self.all[number].crossing = crossing
@@ -297,7 +297,10 @@ class Supports:
     @property
     def line(self) -> str:
         """The supports in words, for the header of a run."""
-        texts = [f"{support} {'xy'[support.component]}{support.motion}" for support in self.all]
+        texts = [
+            f"{support} {self.grid.space.axes[support.component]}{support.motion}"
+            for support in self.all
+        ]
         texts += [f"wall(edge='{wall.edge}') friction {wall.friction:g}" for wall in self.walls]
         return listed(texts)
 

@@ -93,15 +93,16 @@ class Wall:
     def stopped(self) -> npt.NDArray[np.int64]:
         """Coefficients that it stops from passing through."""
         across, _, _ = self._axes
-        return 2 * self.functions[self.state.touching] + across
+        return self.grid.space.dim * self.functions[self.state.touching] + across
 
     def prescribed(self, fixed: Mask) -> Mask:
-        """Whether other supports prescribe its components, functions x 2.
+        """Whether other supports prescribe its components, functions x dim.
 
         Args:
             fixed: Whether other supports prescribe each displacement coefficient.
         """
-        mask: Mask = fixed[2 * self.functions[:, None] + np.arange(2)]
+        dim = self.grid.space.dim
+        mask: Mask = fixed[dim * self.functions[:, None] + np.arange(dim)]
         return mask
 
     def held(self, active: Mask, prescribed: Mask, start: Array, before: Array) -> list[Held]:
@@ -110,20 +111,21 @@ class Wall:
         Args:
             active: Whether each displacement coefficient has particles.
             prescribed: As :meth:`prescribed` gives it; the wall leaves these to the other supports.
-            start: Coefficients that are there already, which the values include.
+            start: Coefficients at the start of the step, which the values include.
             before: Displacement coefficients since the body touched the wall.
         """
         across, along, _ = self._axes
         touching, supports = self.state.touching, []
         for axis, mask in ((across, touching), (along, touching & (self.state.slip == 0))):
-            indices = 2 * self.functions[mask & ~prescribed[:, axis]] + axis
+            chosen = self.functions[mask & ~prescribed[:, axis]]
+            indices = self.grid.space.dim * chosen + axis
             indices = indices[active[indices]]
             values = start[indices] - (before[indices] if axis == across else 0.0)
             supports.append(Held(indices, values))
         return supports
 
     def friction_of(self, forces: Array, prescribed: Mask) -> Array:
-        """Friction on the body (functions x 2) from what the wall has to exert to hold it."""
+        """Friction on the body (functions x dim) from what the wall has to exert to hold it."""
         across, along, inward = self._axes
         friction = np.zeros_like(forces)
         sliding = self.state.touching & (self.state.slip != 0) & ~prescribed[:, along]
@@ -139,9 +141,9 @@ class Wall:
         keeps its state: otherwise the search could repeat the same states for ever.
 
         Args:
-            forces: What supports and walls exert on the body, functions x 2.
-            u: Displacement increments, functions x 2.
-            before: Displacement before them since the body touched the wall, functions x 2.
+            forces: What supports and walls exert on the body, functions x dim.
+            u: Displacement increments, functions x dim.
+            before: Displacement before them since the body touched the wall, functions x dim.
             active: Whether each function has particles.
             prescribed: As :meth:`prescribed` gives it.
         """

@@ -1,4 +1,4 @@
-"""Studies of cost and accuracy: settings run one by one, their errors, their front, a recommendation.
+"""Studies of cost and accuracy: settings run one by one, errors, Pareto fronts, recommendations.
 
 study = tawami.Study("beam", run, {"n": (4, 8, 16), "alpha": (0.01, 0.1)}, {"deflection_m": 0.01025})
 table = study.run()
@@ -6,7 +6,10 @@ print(table.in_words("deflection_m"))
 print(tawami.recommend(study, tolerance=0.01))
 """
 
-from tawami.study.study import Series, Study
-from tawami.study.table import Row, Table, recommend
+from tawami.study.recommendation import recommend
+from tawami.study.row import Change, Row
+from tawami.study.series import Series
+from tawami.study.study import Study
+from tawami.study.table import Table
 
-__all__ = ["Row", "Series", "Study", "Table", "recommend"]
+__all__ = ["Change", "Row", "Series", "Study", "Table", "recommend"]

@@ -1,4 +1,4 @@
-"""The picture of a study: error over cost, both logarithmic, the front, its knees by number."""
+"""Picture of a study: error over cost in logarithmic axes, fronts, numbered knees."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tawami.results.figure import new_figure, save
-from tawami.study.table import Row, Table, text_of
+from tawami.study.row import Row, text_of
+from tawami.study.table import Table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,14 +33,14 @@ def picture(
     quantities: Sequence[str] | None = None,
     title: str | None = None,
 ) -> None:
-    """Draw a study: a panel a quantity, a marker a series, the fronts as lines.
+    """Draw a study: a panel for each quantity, a marker for each series, the fronts as lines.
 
     Args:
-        table: What was found.
+        table: The runs.
         path: PNG to write.
         colour: Knob whose values have colours.
-        cost: Along the abscissa: 'wall_s', 'cpu_s', 'peak_MB', ...
-        quantities: What is drawn; all with errors by default.
+        cost: Quantity of the abscissa: 'wall_s', 'cpu_s', 'peak_MB', ...
+        quantities: Quantities to draw; by default all that have errors.
         title: Above the panels; the name of the study by default.
 
     Raises:
@@ -72,7 +73,7 @@ def _panel(
     least = min((r.errors[quantity] for r in table.of() if r.errors[quantity] > 0), default=1e-16)
 
     def place(rows: Sequence[Row]) -> tuple[list[float], list[float]]:
-        """Of runs; one without any error stands where the smallest is."""
+        """Coordinates of runs; a run without error is drawn at the smallest error of the others."""
         return [r.costs[cost] for r in rows], [max(r.errors[quantity], least) for r in rows]
 
     own = table.series[0]

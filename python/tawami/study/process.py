@@ -1,4 +1,4 @@
-"""One run of a study in a process of its own, so that memory and threads are its own."""
+"""One run of a study in its own process, so that its memory and threads are measured alone."""
 
 from __future__ import annotations
 
@@ -25,29 +25,30 @@ import numpy as np
 
 from tawami.base import checks
 from tawami.base.errors import InputError, OutputError, TawamiError
+from tawami.base.files import reason
 from tawami.base.program import own_environment
 from tawami.base.timing import tally
 from tawami.fem.environment import peak_memory
 
-#: A run that takes less than this is repeated, so often at most, and the fastest counts [s].
+#: Runs shorter than this [s] are repeated, up to this number of times; the fastest one counts.
 SHORT, REPEATS = 2.0, 3
-#: Set in the processes that studies start.
+#: Environment variable of the processes that studies start.
 MARK = "TAWAMI_STUDY"
 
 Run = Callable[..., Mapping[str, Any]]
 
 
 def name_of(run: Run) -> str:
-    """How another process finds a function: 'module:name' or 'path.py:name'.
+    """Name by which another process finds a function: 'module:name' or 'path.py:name'.
 
     Raises:
-        InputError: It cannot be found by a name.
+        InputError: It has no such name.
     """
     name, module = getattr(run, "__qualname__", checks.shown(run)), getattr(run, "__module__", None)
     if "<" in name or "." in name or module is None:
         raise InputError(
-            f"run = {name}: expected a function at the top level of a file, which a process of its own "
-            "can find by its name"
+            f"run = {name}: expected a function at the top level of a file, which another process can "
+            "find by its name"
         )
     if module == "__main__":
         main = sys.modules["__main__"]
@@ -57,12 +58,14 @@ def name_of(run: Run) -> str:
         elif getattr(main, "__file__", None):
             module = str(Path(str(main.__file__)).resolve())
         else:
-            raise InputError(f"run = {name}: expected a function in a file, not of a session")
+            raise InputError(
+                f"run = {name}: expected a function in a file, not in an interactive session"
+            )
     return f"{module}:{name}"
 
 
-def found(name: str) -> Run:
-    """The function of a name."""
+def load(name: str) -> Run:
+    """The function of a name; the reverse of :func:`name_of`."""
     module, _, function = name.rpartition(":")
     if module.endswith(".py"):
         specification = importlib.util.spec_from_file_location("tawami_study", module)
@@ -78,7 +81,7 @@ def found(name: str) -> Run:
 
 
 def fingerprint(run: Run) -> str:
-    """What a measurement depends on besides its knobs: the function's text, tawami, the machine."""
+    """Hash of what a measurement depends on besides its knobs: function, version, machine."""
     try:
         text = inspect.getsource(run)
     except OSError:
@@ -87,17 +90,17 @@ def fingerprint(run: Run) -> str:
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 
-def measured(name: str, knobs: Mapping[str, Any], limit: float) -> dict[str, Any]:
-    """Run a function in a process of its own.
+def measure(name: str, knobs: Mapping[str, Any], limit: float) -> dict[str, Any]:
+    """Run a function in its own process.
 
     Args:
-        name: As :func:`name_of` gives it.
-        knobs: Its keyword arguments; 'threads' is not passed on but sets those of the Rust part.
-        limit: Wall time after which it is ended [s].
+        name: From :func:`name_of`.
+        knobs: Its keyword arguments; 'threads' is not passed to it but sets the threads of Rust.
+        limit: Wall time after which the process is ended [s].
 
     Returns:
-        values, wall_s, cpu_s, peak_MB, newton_iterations, steps, unknowns; or failure, a sentence, with
-        `cut` where the process did not come to its end.
+        values, wall_s, cpu_s, peak_MB, newton_iterations, steps, unknowns; or failure, a message, with
+        `cut` if the process did not finish.
     """
     environment, knobs = own_environment() | {MARK: "1"}, dict(knobs)
     if "threads" in knobs:
@@ -115,13 +118,13 @@ def measured(name: str, knobs: Mapping[str, Any], limit: float) -> dict[str, Any
         except subprocess.TimeoutExpired:
             return {"failure": f"took longer than the limit of {limit:g} s", "cut": True}
         if not result.exists():
-            last = (ended.stderr.strip().splitlines() or ["it said nothing"])[-1]
+            last = (ended.stderr.strip().splitlines() or ["without a message"])[-1]
             return {"failure": f"ended with code {ended.returncode}: {last}", "cut": True}
         try:
             outcome: dict[str, Any] = json.loads(result.read_text())
         except ValueError:
             return {
-                "failure": "its result is cut off: no room in the temporary folder?",
+                "failure": "its result is incomplete: is the temporary folder full?",
                 "cut": True,
             }
         return outcome
@@ -129,28 +132,28 @@ def measured(name: str, knobs: Mapping[str, Any], limit: float) -> dict[str, Any
 
 @contextmanager
 def _temporary_folder() -> Iterator[str]:
-    """A folder that goes with the block.
+    """A folder that is removed at the end of the block.
 
     Raises:
-        OutputError: It cannot be made or written.
+        OutputError: It cannot be created or written.
     """
     try:
         with tempfile.TemporaryDirectory() as folder:
             yield folder
     except OSError as error:
         raise OutputError(
-            f"the temporary folder cannot be written ({error.strerror or error}): expected room there, "
-            "or another one in the environment variable TMPDIR"
+            f"the temporary folder cannot be written ({reason(error)}): expected free space there, or "
+            "another folder in the environment variable TMPDIR"
         ) from error
 
 
 def main() -> None:
-    """Run the job of a JSON file and write its result to another; their paths are the arguments."""
+    """Run the job of a JSON file and write its result to another one; the arguments are their paths."""
     job, result = map(Path, sys.argv[1:])
-    logging.disable(logging.INFO)  # the compilation of forms is talkative
+    logging.disable(logging.INFO)  # compiling forms logs a lot
     asked = json.loads(job.read_text())
     try:
-        outcome = _outcome(found(asked["name"]), asked["knobs"])
+        outcome = _outcome(load(asked["name"]), asked["knobs"])
     except TawamiError as error:
         outcome = {"failure": f"{type(error).__name__}: {error}"}
     except Exception:
@@ -183,7 +186,7 @@ def _outcome(run: Run, knobs: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _plain(values: Any) -> dict[str, Any]:
-    """Numbers and lists of numbers, checked."""
+    """Quantities as numbers and lists of numbers, checked."""
     if not isinstance(values, Mapping):
         raise InputError(
             f"the function of a study returned {type(values).__name__}: expected a mapping from names "

@@ -1,15 +1,12 @@
-"""What a study runs: functions with knobs, each setting once, in a process of its own."""
+"""Studies: every setting of the knobs of a function, each run once in its own process."""
 
 from __future__ import annotations
 
-import functools
 import importlib.util
-import itertools
 import json
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -19,102 +16,32 @@ import numpy as np
 from mpi4py import MPI
 
 from tawami.base import checks
-from tawami.base.errors import InputError, OutputError
-from tawami.base.files import atomic_file, result_folder
-from tawami.study import process
-from tawami.study.table import COSTS, Row, Table, error_of, text_of
+from tawami.base.errors import InputError
+from tawami.base.files import append_line, atomic_file, result_folder, unreadable
+from tawami.study import figure, process
+from tawami.study.row import COSTS, Row, error_of, text_of
+from tawami.study.series import Grid, Key, Knobs, Series, is_list, knob_values, setting_text
+from tawami.study.table import Table
 
-Knobs = Mapping[str, Any]
-Grid = Mapping[str, Sequence[Any]]
-#: Label, setting and fingerprint.
-Key = tuple[str, str, str]
-#: Longest limit of a run [s]: what the system waits for at most.
+#: Longest time limit of a run [s]: the longest wait that the system supports.
 LONGEST = 2e6
-
-
-@dataclass(frozen=True)
-class Series:
-    """A function with the knobs it is run with; the finite elements beside the particles, say.
-
-    Args:
-        label: What the picture calls it.
-        run: Function at the top level of a file: takes knobs by name and returns a mapping from names of
-            quantities to numbers or lists of numbers. Newton iterations, steps and unknowns are counted;
-            'newton_iterations', 'steps' or 'unknowns' among the quantities count instead.
-        knobs: Values of each knob: their grid. Or several of these: the settings of all of them.
-    """
-
-    label: str
-    run: process.Run
-    knobs: Grid | Sequence[Grid]
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.label, str):
-            raise InputError(f"label = {checks.shown(self.label)}: expected the name of a series")
-        grids = self.knobs if _is_list(self.knobs) else [self.knobs]
-        named = (isinstance(g, Mapping) and all(isinstance(n, str) for n in g) for g in grids)
-        if len(grids) == 0 or not all(named):
-            raise InputError(
-                f"series '{self.label}': knobs = {checks.shown(self.knobs)}: expected a mapping from "
-                "names of knobs to their values, or a list of such"
-            )
-
-    @functools.cached_property
-    def fingerprint(self) -> str:
-        """What its measurements depend on besides the knobs."""
-        return process.fingerprint(self.run)
-
-    def key(self, setting: Knobs) -> Key:
-        """What a kept run of a setting is found by."""
-        return self.label, _text(setting), self.fingerprint
-
-    def settings(self) -> Iterator[dict[str, Any]]:
-        """Every setting once, in the order in which knobs and values were given."""
-        grids = [self.knobs] if isinstance(self.knobs, Mapping) else self.knobs
-        known = set()
-        for grid in grids:
-            for values in itertools.product(*(_values(*knob) for knob in grid.items())):
-                setting = dict(zip(grid, values, strict=True))
-                if _text(setting) not in known:
-                    known.add(_text(setting))
-                    yield setting
-
-
-def _values(name: str, values: Any) -> Sequence[Any]:
-    if not _is_list(values) or len(values) == 0:
-        raise InputError(f"knob '{name}' = {checks.shown(values)}: expected a list of its values")
-    if not all(isinstance(v, str | bool | int | float | None) for v in values):
-        raise InputError(
-            f"knob '{name}' = {checks.shown(values)}: expected numbers, names, booleans or None"
-        )
-    return list(values)
-
-
-def _is_list(value: Any) -> bool:
-    if isinstance(value, np.ndarray):
-        return value.ndim > 0
-    return isinstance(value, Sequence) and not isinstance(value, checks.TEXT)
-
-
-def _text(setting: Knobs) -> str:
-    return json.dumps(setting, sort_keys=True)
 
 
 @dataclass
 class Study:
-    """Runs every setting of its knobs, or a sample of them, and keeps what came out.
+    """Runs of a function for every setting of its knobs, or for a sample of the settings.
 
     Args:
         name: Of the study.
-        function: What is run, see `Series`; or a `Series` itself, with its knobs.
+        function: Function to run, see `Series`; or a `Series`, with its knobs.
         knobs: Values of each knob.
-        reference: Quantity -> what it should be: a number or list of numbers (the error is relative to
-            it, in the norm of Euclid), 0 where the quantity is an error itself, or None: as in the run
+        reference: Quantity -> its correct value: a number or list of numbers (the error is relative, in
+            the Euclidean norm), 0 if the quantity is an error itself, or None for its value in the run
             `finest`.
-        finest: Knobs of the run that others are compared with.
+        finest: Knobs of the run that the others are compared with.
         beside: Other series, compared with the same reference.
         colour: Knob whose values have colours in the picture.
-        folder: Where runs are kept and results are written; results/study/NAME by default.
+        folder: Where runs are stored and results are written; results/study/NAME by default.
 
     Raises:
         InputError: A function that another process cannot find, knobs without values, or no reference.
@@ -175,17 +102,17 @@ class Study:
                 if not np.isfinite(checks.array(what, raw, raw.ndim)).all():
                     raise InputError(f"{what} = {checks.shown(value)}: expected finite numbers")
         for knob, value in (self.finest or {}).items():
-            _values(knob, [value])
-        if not _is_list(self.beside) or not all(isinstance(s, Series) for s in self.beside):
+            knob_values(knob, [value])
+        if not is_list(self.beside) or not all(isinstance(s, Series) for s in self.beside):
             raise InputError(f"study {name}: beside = {checks.shown(self.beside)}: expected Series")
 
-    # -- what has been run -----------------------------------------------------
+    # -- stored runs -----------------------------------------------------------
 
     def table(self) -> Table:
-        """What has been run so far, settings in order.
+        """The stored runs, in the order of their settings.
 
         Raises:
-            InputError: Nothing has, or the finest run failed.
+            InputError: No run is stored, or the finest run failed.
         """
         runs = self._runs()
         found = [
@@ -215,18 +142,20 @@ class Study:
         return reference
 
     def _runs(self) -> dict[Key, dict[str, Any]]:
-        """Kept runs by label, setting and fingerprint; a last line that was cut off does not count."""
+        """Stored runs by label, setting and fingerprint; lines that were cut off are left out."""
         path, runs = self.path / "runs.jsonl", dict[Key, dict[str, Any]]()
-        try:
-            lines = path.read_text(errors="replace").splitlines()
-        except FileNotFoundError:
+        if not os.path.lexists(path):
             return runs
-        except OSError as error:
-            raise InputError(f"study '{self.name}': '{path}': {error.strerror}") from None
-        for line in lines:
+        problem = unreadable(path)
+        if problem is not None:
+            raise InputError(
+                f"study '{self.name}': '{path}' cannot be read ({problem}): expected the runs that it "
+                "has stored; remove it to begin anew"
+            )
+        for line in path.read_text(errors="replace").splitlines():
             try:
                 run = json.loads(line)
-                runs[run["label"], _text(run["knobs"]), run["fingerprint"]] = run
+                runs[run["label"], setting_text(run["knobs"]), run["fingerprint"]] = run
             except (ValueError, TypeError, KeyError):
                 continue
         return runs
@@ -241,23 +170,23 @@ class Study:
         limit: float = 1800.0,
         quiet: bool = False,
     ) -> Table:
-        """Run what has not been run, one process each, one after the other.
+        """Run the settings that are not stored yet, one after the other, each in its own process.
 
-        What is there already is not run again, unless the function, tawami or the machine has changed,
-        or its process was ended before it was done.
+        A stored run is repeated if the function, tawami or the machine has changed, or if its process
+        was ended before it was done.
 
         Args:
             sample: Number of settings drawn at random, instead of all.
             seed: Of the draw.
-            limit: Wall time of a run [s]; one that takes longer counts as failed.
-            quiet: Whether to print no line for each run.
+            limit: Largest wall time of a run [s]; a run that takes longer fails.
+            quiet: Do not print a line for each run.
 
         Returns:
-            All that has been run so far; NAME.csv and NAME.png in the folder hold it too.
+            All stored runs; NAME.csv and NAME.png in the folder show them too.
 
         Raises:
             InputError: No reference for a quantity, or the finest run failed. Other runs may fail: the
-                table has their sentence.
+                table has their error messages.
         """
         checks.whole_number("seed", seed, low=0)
         limit = checks.number("limit", limit, low=checks.LEAST, high=LONGEST)
@@ -269,17 +198,17 @@ class Study:
             )
         if MPI.COMM_WORLD.size > 1:
             raise InputError(
-                f"study '{self.name}' on {MPI.COMM_WORLD.size} ranks: expected one; each run has a "
-                "process of its own"
+                f"study '{self.name}' on {MPI.COMM_WORLD.size} ranks: expected one rank; each run has "
+                "its own process"
             )
         folder, runs = result_folder(self.path), self._runs()
         done = {key for key, run in runs.items() if "cut" not in run}
         work = [(s, k) for s, k in self._work(sample, seed) if s.key(k) not in done]
         start = perf_counter()
         for number, (series, setting) in enumerate(work):
-            outcome = process.measured(process.name_of(series.run), setting, limit)
+            outcome = process.measure(process.name_of(series.run), setting, limit)
             head = {"label": series.label, "knobs": setting, "fingerprint": series.fingerprint}
-            _append(folder / "runs.jsonl", json.dumps(head | outcome))
+            append_line(folder / "runs.jsonl", json.dumps(head | outcome), sync=True)
             if not quiet:
                 left = (perf_counter() - start) / (number + 1) * (len(work) - number - 1)
                 said = outcome.get("failure") or f"{outcome['wall_s']:.3g} s"
@@ -294,7 +223,7 @@ class Study:
         if not table.quantities:
             print(f"study '{self.name}': no run succeeded", file=sys.stderr)
         elif importlib.util.find_spec("matplotlib") is not None:
-            table.draw(folder / f"{self.name}.png", colour=self.colour)
+            figure.picture(table, folder / f"{self.name}.png", colour=self.colour)
         elif not quiet:
             print(f"study '{self.name}': no picture without matplotlib", file=sys.stderr)
         return table
@@ -312,25 +241,6 @@ class Study:
         return work
 
 
-def _append(path: Path, line: str) -> None:
-    """One more line; one that was cut off before it is ended first."""
-    size = None
-    try:
-        with path.open("a+b") as file:
-            size = file.tell()
-            if size:
-                file.seek(-1, os.SEEK_END)
-                line = line if file.read(1) == b"\n" else "\n" + line
-            file.write((line + "\n").encode())
-            file.flush()
-            os.fsync(file.fileno())
-    except OSError as error:
-        if size is not None:
-            with suppress(OSError):
-                os.truncate(path, size)
-        raise OutputError(f"'{path}' cannot be written: {error.strerror or error}") from error
-
-
 def _row(label: str, setting: Knobs, run: Mapping[str, Any], reference: Mapping[str, Any]) -> Row:
     if "failure" in run:
         return Row(label, dict(setting), {}, {}, {}, run["failure"])
@@ -338,8 +248,8 @@ def _row(label: str, setting: Knobs, run: Mapping[str, Any], reference: Mapping[
     missing = [quantity for quantity in reference if quantity not in values]
     if missing:
         raise InputError(
-            f"{label}: {text_of(setting)}: no quantity {', '.join(map(repr, missing))} among what its "
-            f"function returned: {', '.join(map(repr, values))}"
+            f"{label}: {text_of(setting)}: its function returned no quantity "
+            f"{', '.join(map(repr, missing))}, only {', '.join(map(repr, values))}"
         )
     errors = {q: error_of(values[q], value) for q, value in reference.items()}
     scalars = {name: float(value) for name, value in values.items() if np.ndim(value) == 0}

@@ -1,8 +1,8 @@
 """A block of soil slumps under its weight on a rough floor.
 
-Run it with `tawami run SCRIPT.py`, on four ranks with `tawami run SCRIPT.py --ranks 4`; what was
-stopped goes on with `tawami resume results/SCRIPT`, and `tawami plot results/SCRIPT` draws what came
-out. Metres, seconds, pascals, tension positive, plane strain.
+Run it with `tawami run SCRIPT.py`, on four ranks with `tawami run SCRIPT.py --ranks 4`. An interrupted
+run is resumed with `tawami resume results/SCRIPT`; `tawami plot results/SCRIPT` draws the results.
+Metres, seconds, pascals, tension positive, plane strain.
 """
 
 from pathlib import Path
@@ -17,14 +17,14 @@ STEP = 2e-3  # s
 
 
 def main() -> None:
-    """Build the scene, bring it to rest under its weight, let it go, watch it."""
+    """Build the scene, find its equilibrium under the weight, release it, run the motion."""
     # the grid: squares of side h, wide enough for the motion; it is reset after each step
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.05, cells=(16, 6))
 
     # the body: 2 x 2 particles in each cell
     block = tawami.box(grid, (0, 0), (0.4, 0.2), per_axis=2)
 
-    # its material: elastic below the strength of the soil, which flows beyond it; angles in degrees
+    # its material: elastic up to the yield surface; angles in degrees
     elastic = tawami.linear_elastic(E=1e6, nu=0.3)
     soil = tawami.drucker_prager(elastic, phi=20.0, c=10.0)
 
@@ -36,8 +36,8 @@ def main() -> None:
     scene.wall("bottom", friction=0.5)
     scene.gravity((0.0, -9.81))
 
-    # what is written, and how often: particles for ParaView, a table, checkpoints to go on from; in the
-    # ramp below `every` is a share of the load, in the motion it is a time [s]
+    # the results: particles for ParaView, a table, checkpoints from which the run can be resumed;
+    # `every` is a share of the load in the ramp below, and a time [s] in the motion
     results = tawami.Results(
         RESULTS,
         tawami.ParticleOutput(every=0.02),
@@ -45,7 +45,7 @@ def main() -> None:
         checkpoint_steps=50,
     )
 
-    # a gate holds the right side while the weight comes up, without inertia; then it is taken away
+    # a gate holds the right side while the weight is applied without inertia; then it is removed
     gate = [(0.4, 0.025 * k) for k in range(9)]
     for point in gate:
         scene.hold(point, "x")

@@ -9,15 +9,15 @@ from pathlib import Path
 from mpi4py import MPI
 
 import tawami
-from tawami.base.files import result_folder
-from tawami.results.single import write_grid, write_particles
+from tawami.base import result_folder
+from tawami.results import write_grid, write_particles
 
 RESULTS = Path("results") / Path(__file__).stem
 CELLS_OVER_THE_HEIGHT = 16
 
 
 def main() -> None:
-    """Build the scene, solve it, write and print what came out."""
+    """Build the scene, solve it, print and write the results."""
     # the grid: squares of side h; the body has to lie within it
     n = CELLS_OVER_THE_HEIGHT
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, -0.5), h=1 / n, cells=(2 * n, n))
@@ -28,7 +28,7 @@ def main() -> None:
     # its material: also von_mises, drucker_prager, mohr_coulomb, NumpyLaw
     rubber = tawami.linear_elastic(E=3e6, nu=0.4999)
 
-    # the weak form: the mixed u-eps_v one does not lock; or the path of a file of yours
+    # the weak form: the mixed u-eps_v form does not lock; the path of your own file works too
     scene = tawami.Scene(grid, beam, rubber, form="u_epsv")
 
     # supports and loads, on edges of the grid: numbers, or functions of (x, y)
@@ -41,7 +41,7 @@ def main() -> None:
 
     print("tip deflection [m]:", -solution.displacement((2, 0))[1])
     print("Newton iterations:", solution.iterations)
-    print("what the clamp gives [N/m]:", solution.reaction("left"))
+    print("reaction of the clamp [N/m]:", solution.reaction("left"))
 
     # for ParaView
     folder = result_folder(RESULTS)

@@ -7,7 +7,7 @@ import pytest
 from scenes import grid_of
 
 import tawami
-from tawami.grid.space import PLANE, Space, lattice, tensor_product
+from tawami.base.space import PLANE, Space, lattice, tensor_product
 
 #: No grid is three-dimensional yet; the names of its space are known already.
 SOLID = Space(axes=("x", "y", "z"), volume="m3", depth="")
@@ -23,7 +23,7 @@ def test_names_of_components():
 def test_cells_and_units():
     assert (PLANE.dim, PLANE.num_vertices, PLANE.measure(0.5)) == (2, 4, 0.25)
     assert (SOLID.dim, SOLID.num_vertices, SOLID.measure(0.5)) == (3, 8, 0.125)
-    assert (PLANE.unit("N"), SOLID.unit("N")) == ("N per metre depth", "N")
+    assert (PLANE.unit("N"), SOLID.unit("N")) == ("N per m", "N")
     assert (PLANE.other_axes(0), SOLID.other_axes(1)) == ((1,), (0, 2))
 
 

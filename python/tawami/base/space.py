@@ -3,6 +3,7 @@
 This is the only place that says that the grid is plane. Code that is not about the plane itself
 (clipping polygons, discs) asks `grid.space`, and never writes 2, 4, "xy" or h**2. A grid in three
 dimensions needs a second `Space`, a second form of `Position` and `Counts`, and that code.
+`rust/space.rs` is the same for the Rust part.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from tawami.base.arrays import Array
 from tawami.base.checks import one_of, shown
 from tawami.base.errors import InputError
 
@@ -34,7 +36,7 @@ class Space:
     Attributes:
         axes: Names of the axes.
         volume: Unit of the volume of a particle or a cell, in text.
-        depth: What extensive quantities refer to, in text after their unit.
+        depth: Text after the units of extensive quantities, which refer to a metre of depth.
     """
 
     axes: tuple[str, ...]
@@ -48,13 +50,18 @@ class Space:
 
     @property
     def tensor(self) -> tuple[str, ...]:
-        """Names of the components of a symmetric tensor, in the order of `rust/tensor.rs`."""
+        """Names of the components of a symmetric tensor, in the order of `rust/tensor/mod.rs`."""
         return ("xx", "yy", "zz", *("".join(pair) for pair in combinations(self.axes, 2)))
 
     @property
     def gradient(self) -> tuple[str, ...]:
         """Names of the components of the gradient of a vector: component, then derivative."""
         return tuple("".join(pair) for pair in product(self.axes, repeat=2))
+
+    @property
+    def num_strains(self) -> int:
+        """Strain components that a displacement gradient has: xx, yy, gamma_xy in the plane."""
+        return self.dim * (self.dim + 1) // 2
 
     @property
     def num_vertices(self) -> int:
@@ -65,8 +72,16 @@ class Space:
         """Area or volume of a cell of side `h` [m]."""
         return h**self.dim
 
+    def vectors(self, components: Array) -> Array:
+        """Vectors, n x dim, of their components in one array, those of one vector after each other."""
+        return components.reshape(-1, self.dim)
+
+    def tensors(self, components: Array) -> Array:
+        """Tensors, n x dim x dim, of their components in one array, as :meth:`vectors`."""
+        return components.reshape(-1, self.dim, self.dim)
+
     def unit(self, unit: str) -> str:
-        """Unit of an extensive quantity: 'N per metre depth'."""
+        """Unit of an extensive quantity per metre depth: 'N per m'."""
         return unit + self.depth
 
     def axis(self, component: str) -> int:
@@ -89,7 +104,7 @@ class Space:
 PLANE = Space(
     axes=("x", "y"),
     volume="m2",
-    depth=" per metre depth",
+    depth=" per m",
 )
 
 
@@ -98,6 +113,6 @@ def lattice(along: Sequence[npt.NDArray[Scalar]]) -> npt.NDArray[Scalar]:
     return np.stack([c.ravel(order="F") for c in np.meshgrid(*along, indexing="ij")], axis=-1)
 
 
-def tensor_product(along: Sequence[npt.NDArray[np.float64]]) -> npt.NDArray[np.float64]:
+def tensor_product(along: Sequence[Array]) -> Array:
     """Products of weights along each axis at the points of a lattice; x fastest."""
     return reduce(lambda inner, outer: np.outer(outer, inner).ravel(), along)

@@ -1,0 +1,85 @@
+"""Speed and memory of a Newton step, stage by stage.
+
+By default it measures the cantilever for sizes, particles per cell, threads, ranks and both assemblies.
+Every setting runs in a process of its own. One run gives a table, a CSV file and ratios.
+
+With --against it compares this checkout with another one that has been set up, interleaved, and prints
+the ratio new/old of every stage of the cantilever's step and of a step of a collapse of 800 particles.
+
+python -m cases.costs.bench
+python -m cases.costs.bench --cells 32,64 --against ../tawami-before
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from cases.common.program import Program, numbers
+from cases.common.table import as_csv, as_text
+from cases.costs.bench import compare, report
+from cases.costs.bench.measure import empty_cells
+from cases.costs.bench.setting import ROOT, in_own_process, settings
+
+PROGRAM = Program("cases.costs.bench", __doc__)
+WHOLE = numbers(int, lambda n: n > 0, "whole numbers separated by commas, such as 32,64")
+PROGRAM.option("--cells", type=WHOLE, default="32,64,128", help="cells over the height")
+PROGRAM.option("--per-axis", type=WHOLE, default="2,4", help="particles per cell and axis")
+PROGRAM.option("--threads", type=WHOLE, default="1,2", help="threads; with --against the first")
+PROGRAM.option("--ranks", type=WHOLE, default="1,2,4", help="numbers of ranks")
+PROGRAM.option("--against", type=Path, metavar="CHECKOUT", help="compare with this checkout")
+PROGRAM.option("--rounds", type=int, default=5, help="with --against: how often processes start")
+PROGRAM.option("--pairs", type=int, default=20, help="with --against: pairs of steps in a round")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Measure, print the table and the ratios, write the CSV file."""
+    options = PROGRAM.start(arguments)
+    if options.against:
+        against(options)
+    else:
+        survey(options.cells, options.per_axis, options.threads, options.ranks)
+    PROGRAM.list_results()
+
+
+def against(options: argparse.Namespace) -> None:
+    """Compare this checkout with another one."""
+    rounds, pairs, threads = options.rounds, options.pairs, options.threads[0]
+    if min(rounds, pairs) < 1:
+        PROGRAM.error(f"--rounds {rounds} --pairs {pairs}: expected 1 or more")
+    other = options.against.resolve()
+    print(f"new: {ROOT}\nold: {other}", flush=True)
+    rows = list(compare.compare(other, options.cells, rounds=rounds, pairs=pairs, threads=threads))
+    print(
+        f"{rounds} x {pairs} pairs of steps, {threads} threads; low, high: quartiles of the ratio\n"
+    )
+    print(as_text(rows, compare.COLUMNS))
+    PROGRAM.write("against.csv", as_csv(rows, compare.COLUMNS))
+
+
+def survey(
+    cells: Sequence[int], per_axis: Sequence[int], threads: Sequence[int], ranks: Sequence[int]
+) -> None:
+    """Measure all settings of this checkout."""
+    print(report.HEADER)
+    rows: list[dict[str, Any]] = []
+    for setting in settings(cells, per_axis, threads, ranks):
+        rows.append(asdict(setting) | in_own_process(setting))
+        print(report.line(rows[-1]), flush=True)
+    file = io.StringIO()
+    writer = csv.DictWriter(file, rows[0])
+    writer.writeheader()
+    writer.writerows(rows)
+    PROGRAM.write("bench.csv", file.getvalue())
+    report.print_ratios(rows)
+    for assembly in ("reference", "fast"):
+        empty_cells(max(max(cells) // 4, 8), assembly)
+
+
+if __name__ == "__main__":
+    PROGRAM.run(main)

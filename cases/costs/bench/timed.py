@@ -1,0 +1,94 @@
+"""Times of one checkout, on request: a step of the cantilever, or of a collapsing pile.
+
+`compare` runs this file with the package of a checkout on PYTHONPATH. It uses the public API and
+`scene.stopwatch` only, so that it runs with older and newer packages. It repeats the two cases in short,
+because those in `cases/` belong to one version of the package.
+
+Reads requests, one per line: `beam N` for N cells over the height, or `collapse`. Answers each with one
+line of JSON: seconds by stage.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import sys
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+import tawami
+
+RHO, G = 2040.0, 9.81  # of the pile [kg/m3], [m/s2]
+WARM_UP = 5  # steps of the pile before the first that is measured
+
+
+def beam(n: int) -> Any:
+    """The cantilever of the paper as a scene, 2n x n cells with 2 x 2 particles each."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, -0.5), h=1 / n, cells=(2 * n, n))
+    body = tawami.box(grid, (0.0, -0.5), (2.0, 0.5))
+    law = tawami.linear_elastic(E=3e6, nu=0.4999)
+    scene = tawami.Scene(grid, body, law, form="u_epsv", alpha=0.1)
+    scene.fix("left", "x")
+    scene.hold((0.0, 0.0), "y")
+    scene.traction("right", (0.0, -1e3))
+    return scene
+
+
+def pile() -> Any:
+    """The pile of `cases.showcase.collapse` in motion, 800 particles."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.01, cells=(80, 14))
+    body = tawami.box(grid, (0.0, 0.0), (0.2, 0.1))
+    rods = tawami.drucker_prager(tawami.linear_elastic(E=0.84e6, nu=0.3), phi=21.9)
+    scene = tawami.Scene(grid, body, rods, form="u_epsv_finite", density=RHO, alpha=0.01)
+    scene.gravity((0.0, -G))
+    scene.fix("left", "x")
+    scene.fix("bottom", "x")
+    scene.fix("bottom", "y")
+    vertical = -RHO * G * (0.1 - np.array(scene.particles.x[:, 1]))
+    scene.particles.stress[:, :3] = np.outer(vertical, [0.5, 1.0, 0.75])
+    return tawami.Dynamics(scene)
+
+
+class Steps:
+    """Steps to measure; the pile continues from one request to the next."""
+
+    def __init__(self) -> None:
+        beam(2).solve()  # loads libraries and compiles the form
+        self.motion = pile()
+        for _ in range(WARM_UP):
+            self.motion.step(1e-3)
+
+    def beam(self, n: int) -> dict[str, float]:
+        """Solve the beam: seconds of each stage and of the whole step."""
+        scene = beam(n)
+        start = perf_counter()
+        scene.solve()
+        whole = perf_counter() - start
+        return dict(scene.stopwatch.seconds) | {"whole step": whole}
+
+    def collapse(self) -> dict[str, float]:
+        """Take a step of the pile: seconds of each stage and of the whole step."""
+        watch = self.motion.scene.stopwatch
+        before, start = dict(watch.seconds), perf_counter()
+        self.motion.step(1e-3)
+        whole = perf_counter() - start
+        spent = {stage: s - before.get(stage, 0.0) for stage, s in watch.seconds.items()}
+        return spent | {"whole step": whole}
+
+
+def main() -> None:
+    """Say which package is measured, then answer requests until the input ends."""
+    logging.disable(logging.INFO)  # compiling a form logs many lines
+    steps = Steps()
+    print(json.dumps({"package": tawami.__file__}), flush=True)
+    for line in sys.stdin:
+        scene, *number = line.split()
+        seconds = steps.beam(int(number[0])) if scene == "beam" else steps.collapse()
+        print(json.dumps(seconds), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,168 @@
+"""Driver scripts as commands: checked, then run as `python` would, on one rank or several."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import runpy
+import shutil
+import signal
+import subprocess
+import sys
+import traceback
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+from mpi4py import MPI
+
+from tawami.base import program
+from tawami.base.errors import InputError
+from tawami.base.files import readable_file, reason
+
+#: Exit code of a program that Ctrl-C ended, as in a shell.
+INTERRUPTED = 130
+
+
+@dataclass(frozen=True)
+class Script:
+    """A driver script.
+
+    Attributes:
+        path: The file; None for a module.
+        module: The module, as after `python -m`; None for a file.
+        arguments: Its arguments.
+    """
+
+    path: Path | None
+    module: str | None
+    arguments: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Name for messages."""
+        return str(self.module) if self.path is None else self.path.name
+
+    @property
+    def command(self) -> list[str]:
+        """Words after `tawami run` or `python`."""
+        return ["-m", str(self.module)] if self.path is None else [str(self.path)]
+
+    def check(self) -> None:
+        """Check that it can be run, before anything is run.
+
+        Raises:
+            InputError: No such file or module, or a file that is not Python.
+        """
+        if self.path is not None:
+            _check_file(self.path)
+        else:
+            _check_module(str(self.module))
+
+
+def _check_file(path: Path) -> None:
+    readable_file("script", path, "a Python file, as tawami new writes one")
+    try:
+        compile(path.read_bytes(), str(path), "exec", dont_inherit=True)
+    except SyntaxError as error:
+        where = f", line {error.lineno}" if error.lineno else ""
+        raise InputError(f"script '{path}'{where} is not Python: {error.msg}") from error
+    except (OSError, ValueError) as error:
+        raise InputError(f"script '{path}' is not Python: {reason(error)}") from error
+
+
+def _check_module(name: str) -> None:
+    sys.path.insert(0, os.getcwd())
+    try:
+        found = importlib.util.find_spec(name)
+        if found is not None and found.submodule_search_locations is not None:
+            found = importlib.util.find_spec(f"{name}.__main__")
+    except ModuleNotFoundError as error:
+        if error.name is None or not f"{name}.".startswith(f"{error.name}."):
+            raise  # a module that the package itself imports
+        found = None
+    except (ImportError, ValueError):  # a relative or an empty name
+        found = None
+    finally:
+        sys.path.pop(0)
+    if found is None:
+        raise InputError(
+            f"no module '{name}' can be run from '{Path.cwd()}': expected its name as after python -m, "
+            "or the path of a script without -m"
+        )
+
+
+def start(script: Script, number: int | None, environment: dict[str, str]) -> int:
+    """Run a script in this process, or on several ranks.
+
+    Args:
+        script: The script.
+        number: Number of ranks; by default those that run now.
+        environment: Further environment variables for the script.
+
+    Returns:
+        The exit code.
+
+    Raises:
+        InputError: The script cannot be run, or not on that number of ranks.
+    """
+    present = MPI.COMM_WORLD.size
+    if number is not None and present > 1 and number != present:
+        raise InputError(
+            f"--ranks {number}, but mpirun has started {present} already: expected one of the two"
+        )
+    script.check()
+    os.environ.update(environment)
+    if number is None or number == present:
+        return _run_here(script)
+    return _run_on_ranks(script, number)
+
+
+def _run_on_ranks(script: Script, number: int) -> int:
+    if shutil.which("mpirun") is None:
+        raise InputError(
+            f"--ranks {number} needs mpirun, which was not found: on Debian: apt install openmpi-bin"
+        )
+    own = [sys.executable, "-m", "tawami", "run", *script.command, "--", *script.arguments]
+    command, variables = program.mpirun(number, own)
+    process, interrupted = subprocess.Popen(command, env=variables), False
+    while process.poll() is None:
+        try:
+            process.wait()
+        except KeyboardInterrupt:  # mpirun receives it too, and ends its ranks
+            interrupted = True
+    code = int(process.returncode)
+    if interrupted or code == -signal.SIGINT:
+        return INTERRUPTED
+    return 128 - code if code < 0 else code
+
+
+def _run_here(script: Script) -> int:
+    """Run a script under the rules of `tawami.run`."""
+    try:
+        program.run(lambda: _run_as_main(script), script.name)
+    except Exception as error:
+        program.stop("".join(traceback.format_exception(_from_script(error))))
+    return 0
+
+
+def _run_as_main(script: Script) -> None:
+    """Run it as `python script` or `python -m module` would."""
+    if script.path is None:
+        sys.path.insert(0, os.getcwd())
+        sys.argv = [str(script.module), *script.arguments]
+        runpy.run_module(str(script.module), run_name="__main__", alter_sys=True)
+    else:
+        path = script.path.resolve()
+        sys.path.insert(0, str(path.parent))
+        sys.argv = [str(script.path), *script.arguments]
+        runpy.run_path(str(path), run_name="__main__")
+
+
+def _from_script(error: Exception) -> Exception:
+    """The error with a traceback that begins in the script, without the frames of the command."""
+    ours = {__name__, program.__name__, "runpy", "tawami.command.main"}
+    trace: TracebackType | None = error.__traceback__
+    while trace is not None and trace.tb_frame.f_globals.get("__name__") in ours:
+        trace = trace.tb_next
+    return error if trace is None else error.with_traceback(trace)

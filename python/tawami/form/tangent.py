@@ -1,0 +1,108 @@
+"""The derived tangent of a residual.
+
+The tangent is `derivative(R, fields)` plus, for each quantity of the material law, the residual with
+that quantity replaced by its own consistent tangent.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import ufl
+
+from tawami.form.quantities import COMPONENTS, Density, LawQuantity
+from tawami.form.symbols import Symbols
+
+
+class Linearisation:
+    """Derivatives of the terms of a residual over cells.
+
+    Args:
+        symbols: Symbols that the residual uses; the derivatives add densities to them.
+        residual: The terms, a UFL form.
+    """
+
+    def __init__(self, symbols: Symbols, residual: Any) -> None:
+        self._symbols, self._form, self._residual = symbols, symbols.form, residual
+
+    def tangent(self) -> Any:
+        """The derivative with respect to the fields, without :meth:`couplings`."""
+        tangent = ufl.algorithms.expand_derivatives(
+            ufl.derivative(self._residual, self._symbols.increments, self._symbols.trial)
+        )
+        for density, symbol in self._law_densities():
+            # linear in each density: the bilinear terms after the exchange are its contribution
+            tangent += ufl.lhs(ufl.replace(self._residual, {symbol: self._direction(density)}))
+        return tangent
+
+    def couplings(self) -> list[tuple[Any, Any]]:
+        """The other part of the tangent of B-bar, as pairs of linear forms (left, right) of a cell.
+
+        The deviator at the particles changes with the volume at the centre, and the mean stress there
+        with the strain at the particles. Because the centre is one point of the cell, each contribution
+        is the product of the two vectors of a pair.
+        """
+        if not self._form.kinematics.volume_at_centre:
+            return []
+        symbols = self._symbols
+        du = next(iter(symbols.tests.values()))
+        at_centre, at_particles = symbols.measures["centre"], symbols.measures["particle"]
+        area = symbols.constants["h"] ** 2
+        products = []
+        for density, symbol in self._law_densities():
+            if density.rule == "particle":
+                change = symbols.density(Density("particle", density.quantity, "volume"))
+                of_volume = self._volume_change(du) / area * at_centre
+                products.append((_with(self._residual, symbol, change), of_volume))
+            else:
+                (of_strain,) = self._strain_change(density.quantity, du)
+                one = ufl.as_vector([1 / area])
+                products.append((_with(self._residual, symbol, one), of_strain * at_particles))
+        return products
+
+    def _law_densities(self) -> list[tuple[Density, Any]]:
+        """The law quantities of the residual with their placeholders."""
+        return [
+            (density, symbol)
+            for density, symbol in self._symbols.placeholders.items()
+            if isinstance(density.quantity, LawQuantity) and density.part == "value"
+        ]
+
+    def _direction(self, density: Density) -> Any:
+        """Change of a law quantity with the fields: C : strain(du) (or grad(du)) + c d_eps_v."""
+        kinematics, quantity = self._form.kinematics, density.quantity
+        assert isinstance(quantity, LawQuantity)
+        n = COMPONENTS[quantity.name]
+        du, *volumetric = self._symbols.trials.values()
+        change = [ufl.as_ufl(0.0)] * n
+        if density.rule == "particle":
+            change = self._strain_change(quantity, du)
+        volume = None
+        if kinematics.has_eps_v and quantity.name != "ln_J":
+            volume = volumetric[0]
+        elif kinematics.volume_at_centre and density.rule == "centre":
+            volume = self._volume_change(du)
+        if volume is not None:
+            c = self._symbols.density(Density(density.rule, quantity, "volume"))
+            change = [change[i] + c[i] * volume for i in range(n)]
+        return ufl.as_vector(change)
+
+    def _strain_change(self, quantity: Any, du: Any) -> list[Any]:
+        """Change of a law quantity with the strain (or grad u) at the particle."""
+        direction, part = self._form.strain.direction(du), self._form.strain.gradient_part
+        c = self._symbols.density(Density("particle", quantity, part))
+        m, n = len(direction), COMPONENTS[quantity.name]
+        return [sum(c[m * i + j] * direction[j] for j in range(m)) for i in range(n)]
+
+    def _volume_change(self, du: Any) -> Any:
+        """Change of div u (ln det f) with du."""
+        u = next(iter(self._symbols.fields.values()))
+        return self._form.strain.volume_change(u, du)
+
+
+def _with(form: Any, symbol: Any, value: Any) -> Any:
+    """The terms of a form that contain a symbol linearly, with a value in its place."""
+    slope = ufl.derivative(form, symbol, ufl.Argument(symbol.ufl_function_space(), 2))
+    slope = ufl.algorithms.expand_derivatives(slope)
+    (argument,) = (a for a in slope.arguments() if a.number() == 2)
+    return ufl.replace(slope, {argument: value})

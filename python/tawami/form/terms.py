@@ -1,0 +1,131 @@
+"""The terms of a residual by where they are integrated, and what each kind may contain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import ufl
+from ufl import SpatialCoordinate
+from ufl.algorithms.analysis import has_type
+from ufl.algorithms.check_arities import ArityMismatch, check_form_arity
+
+from tawami.base.errors import FormError
+from tawami.fem.rules import DEGREE
+from tawami.form.symbols import PLACEHOLDERS, Symbols
+
+
+@dataclass(frozen=True)
+class Terms:
+    """Terms of a residual as UFL forms.
+
+    Attributes:
+        cells: Sums over particles and integrals over cells.
+        edges: Integrals over loaded edges, linear in the traction.
+        ghost: Matrix of the integrals over sides of partially filled cells, which are linear.
+    """
+
+    cells: Any
+    edges: Any | None
+    ghost: Any | None
+
+
+def terms_of(symbols: Symbols, residual: Any) -> Terms:
+    """The terms of a residual.
+
+    Raises:
+        FormError: A term contains what it cannot contain; the message says what is expected.
+    """
+    name = symbols.form.name
+    for part in residual.integrals():
+        if part.subdomain_id() != "everywhere":
+            raise FormError(
+                f"form {name}: a measure with a number, as dx({part.subdomain_id()}): expected dx, dx_c "
+                "and ds without a number; the particles determine the domain"
+            )
+    if any(has_type(part.integrand(), SpatialCoordinate) for part in residual.integrals()):
+        raise FormError(
+            f"form {name}: the position x in a term: expected position-dependent data at the particles "
+            "(material, volume) or in scene.traction(...)"
+        )
+    kinds = ("cell", "exterior_facet", "interior_facet")
+    cells, edges, sides = (_of_type(residual, kind) for kind in kinds)
+    if edges is not None and not _is_linear_in(edges, symbols.traction):
+        raise FormError(
+            f"form {name}: expected edge terms that are linear in the traction t and contain nothing "
+            "else but test functions, as - dot(t, w) * ds; give other loads through scene.traction(...)"
+        )
+    parts = [part for part in (cells, edges, sides) if part is not None]
+    if cells is None or len(residual.integrals()) > sum(len(part.integrals()) for part in parts):
+        raise FormError(
+            f"form {name}: expected integrals over particles or cells, over edges (ds) and over sides "
+            "of partially filled cells (dG) only"
+        )
+    if symbols.traction in cells.coefficients():
+        raise FormError(
+            f"form {name}: the traction t in a term with dx: expected it in terms with ds only"
+        )
+    return Terms(cells, edges, None if sides is None else _matrix(symbols, sides))
+
+
+def by_rule(form: Any) -> list[Any]:
+    """One form for each quadrature rule.
+
+    FFCx 0.5 puts several rules into one kernel, but evaluates a field under all of them at the point of
+    the one-point rule. UFL 2022 takes integrals of one integrand under two rules for the same.
+    """
+    rules: dict[tuple[int, str], list[Any]] = {}
+    for integral in form.integrals():
+        metadata = integral.metadata()
+        rule = (metadata["quadrature_degree"], metadata.get("quadrature_rule", "default"))
+        rules.setdefault(rule, []).append(integral)
+    return [ufl.Form(rules[rule]) for rule in sorted(rules, reverse=True)]
+
+
+def reduced(tangent: Any) -> Any:
+    """A tangent with the reduced rule in place of the full one."""
+    full, smaller = (DEGREE[rule] for rule in ("particle", "reduced"))
+    parts = []
+    for part in tangent.integrals():
+        metadata = part.metadata()
+        if metadata["quadrature_degree"] == full:
+            part = part.reconstruct(metadata={**metadata, "quadrature_degree": smaller})
+        parts.append(part)
+    return ufl.Form(parts)
+
+
+def _of_type(form: Any, kind: str) -> Any | None:
+    integrals = form.integrals_by_type(kind)
+    return ufl.Form(integrals) if integrals else None
+
+
+def _is_linear_in(form: Any, coefficient: Any) -> bool:
+    """Whether every term of a form contains this coefficient once, and no other."""
+    if set(form.coefficients()) != {coefficient}:
+        return False
+    zero = ufl.zero(coefficient.ufl_shape)
+    expand = ufl.algorithms.expand_derivatives
+    at_zero = expand(ufl.replace(form, {coefficient: zero}))
+    direction = ufl.Coefficient(coefficient.ufl_function_space(), count=PLACEHOLDERS - 2)
+    slope = expand(ufl.derivative(form, coefficient, direction))
+    return at_zero.empty() and coefficient not in slope.coefficients()
+
+
+def _matrix(symbols: Symbols, sides: Any) -> Any:
+    """The matrix of the terms on sides of cells."""
+    used = set(sides.coefficients())
+    others = {density for density, symbol in symbols.placeholders.items() if symbol in used}
+    matrix = ufl.replace(sides, {symbols.increments: symbols.trial})
+    try:
+        expanded = ufl.algorithms.expand_derivatives(matrix)
+        check_form_arity(expanded, matrix.arguments())
+        linear = len(matrix.arguments()) == 2 and symbols.traction not in used
+    except ArityMismatch:
+        linear = False
+    if not linear or any(density.rule != "mean" for density in others):
+        raise FormError(
+            f"form {symbols.form.name}: expected terms with dG that are linear in the fields and "
+            "contain nothing else but h, parameters and facet_mean(...), as "
+            "facet_mean(mu) * h**3 * inner(jump_nn(u), jump_nn(w)) * dG"
+        )
+    return matrix

@@ -1,0 +1,49 @@
+"""The benchmark against another checkout: ratios of paired steps, and checkouts that cannot be used."""
+
+from __future__ import annotations
+
+import csv
+
+import pytest
+
+import tawami
+from cases.costs.bench import __main__ as bench
+from cases.costs.bench import compare
+
+
+def test_ratios_are_medians_over_pairs():
+    new, old = {"tangent": 3.0, "whole step": 5.0}, {"tangent": 6.0, "whole step": 10.0}
+    steps = [(new | {"law": 2.0 * t}, old | {"law": t}) for t in (1.0, 7.0, 2.0)]
+    rows = {row.stage: row for row in compare.rows_of("beam", steps)}
+    assert set(rows) == {"law", "tangent", "residual calls", "tangent calls", "whole step"}
+    assert (rows["law"].ratio, rows["residual calls"].ratio) == (2.0, 2.0)
+    assert rows["tangent"].ratio == rows["tangent calls"].ratio == rows["whole step"].ratio == 0.5
+    assert (rows["law"].new_ms, rows["law"].old_ms) == (4000.0, 2000.0)
+
+
+def test_a_checkout_against_itself(tmp_path, capsys):
+    options = ["--cells", "2", "--rounds", "1", "--pairs", "1", "--results", str(tmp_path)]
+    bench.main([*options, "--against", str(compare.ROOT)])
+    printed = capsys.readouterr().out
+    assert f"old: {compare.ROOT}" in printed
+    with (tmp_path / "against.csv").open(newline="") as file:
+        rows = {(row["scene"], row["stage"]): row for row in csv.DictReader(file)}
+    for scene in ("beam 2", "collapse"):
+        for stage in ("residual calls", "tangent calls", "whole step"):
+            row = rows[scene, stage]
+            ratio = float(row["new_ms"]) / float(row["old_ms"])
+            assert float(row["ratio"]) == pytest.approx(ratio)
+
+
+def test_a_checkout_that_is_not_set_up(tmp_path):
+    with pytest.raises(tawami.InputError, match="run make setup in it"):
+        next(compare.compare(tmp_path, [2], rounds=1, pairs=1, threads=1))
+
+
+def test_a_package_that_cannot_be_imported(tmp_path):
+    package = tmp_path / "python" / "tawami"
+    package.mkdir(parents=True)
+    (package / "_rust.so").touch()
+    (package / "__init__.py").write_text("raise ImportError('broken')")
+    with pytest.raises(tawami.TawamiError, match="(?s)failed: .*ImportError: broken"):
+        next(compare.compare(tmp_path, [2], rounds=1, pairs=1, threads=1))

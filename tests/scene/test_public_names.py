@@ -1,0 +1,94 @@
+"""What a user sees of the objects that a driver script works with, and what cannot be set."""
+
+from __future__ import annotations
+
+import pytest
+from scenes import grid_of
+
+import tawami
+
+#: Attributes that raise an error naming the object or the switch that has them.
+ABSENT = {"velocity", "acceleration", "energies", "plastic_strain", "deformation_gradient"}
+#: What observers and checkpoints of a run use; `configuration` is the way to the rest of the package.
+OF_A_RUN = {"scene", "motion", "state", "restore", "identity", "header"}
+SCENE = {
+    "grid", "form", "basis", "parameters", "options", "numerics", "particles", "num_particles",
+    "laws", "mass", "particles_per_cell", "left", "stopwatch", "configuration",
+    "initial", "fix", "hold", "wall", "release", "traction", "load", "gravity",
+    "solve", "solve_part", "residual", "tangent", "reduction", "split", "num_coefficients",
+}  # fmt: skip
+DYNAMICS = {
+    "transfer", "damping", "gamma", "beta", "time", "steps", "step", "run",
+    "velocity", "acceleration", "velocity_gradient", "mass", "on_grid",
+    "energies", "kinetic_energy", "elastic_energy", "linear_momentum", "angular_momentum",
+}  # fmt: skip
+SOLUTION = {
+    "scene", "u", "volumetric", "unknowns", "iterations", "history", "krylov", "condition",
+    "symmetric", "number", "x", "volume", "stress", "mean_stress", "displacement_of_particles",
+    "eps_v", "displacement", "reaction", "on_edges", "on_points",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def scene():
+    grid = grid_of()
+    body = tawami.box(grid, grid.origin, grid.upper)
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3), density=1.0)
+    scene.fix("bottom", "x")
+    scene.fix("bottom", "y")
+    return scene
+
+
+def names_of(thing: object) -> set[str]:
+    return {name for name in dir(thing) if not name.startswith("_")}
+
+
+def test_public_names(scene):
+    motion = tawami.Dynamics(scene)
+    assert names_of(scene) == SCENE | OF_A_RUN | ABSENT
+    assert names_of(motion) == DYNAMICS | OF_A_RUN
+    assert names_of(motion.step(1e-3)) == SOLUTION | ABSENT
+
+
+def test_every_object_says_what_it_is(scene):
+    motion = tawami.Dynamics(scene)
+    assert repr(scene.grid) == "Grid(4 x 3 cells of 0.5 m, [-1, 1] x [0.5, 2] m)"
+    body = tawami.Body(scene.particles.x, scene.particles.volume, names=("clay",))
+    assert repr(body) == "Body(48 particles, 3 m2 per metre depth, materials clay)"
+    assert repr(scene) == (
+        "Scene(48 particles on 4 x 3 cells of 0.5 m, form 'u_epsv', linear_elastic)"
+    )
+    assert repr(motion) == f"Dynamics({scene!r}, affine_flip, gamma 0.5, at 0 s after 0 steps)"
+    assert repr(motion.step(1e-3)).startswith("Solution('u_epsv': 48 particles, 68 unknowns, ")
+
+
+@pytest.mark.parametrize(
+    ("name", "way"),
+    [
+        ("alpha", r"Scene.alpha cannot be set: .* fixed when a scene is made: Scene\(..., alpha="),
+        ("stabilisation", r"Scene\(..., stabilisation=...\)"),
+        ("particles", r"scene.particles.stress\[:\] = ..."),
+        ("parameters", "Scene.parameters cannot be set"),
+        ("tolerence", r"Scene.tolerence cannot be set: a scene is given by Scene\(...\)"),
+    ],
+)
+def test_attributes_of_a_scene_cannot_be_set(scene, name, way):
+    with pytest.raises(tawami.InputError, match=way):
+        setattr(scene, name, 1.0)
+
+
+@pytest.mark.parametrize("name", ["alpha", "beta"])
+def test_parameters_of_the_form_cannot_be_set(scene, name):
+    with pytest.raises(tawami.InputError, match=rf"'{name}' cannot be set to 1.0: .*Scene\(...,"):
+        scene.parameters[name] = 1.0
+    assert dict(scene.parameters) == {"alpha": 0.01}
+
+
+def test_attributes_of_motions_and_solutions_cannot_be_set(scene):
+    motion = tawami.Dynamics(scene)
+    with pytest.raises(tawami.InputError, match=r"as motion.velocity\[:\] = ..."):
+        motion.velocity = (1.0, 0.0)
+    with pytest.raises(tawami.InputError, match=r"Dynamics.time cannot be set"):
+        motion.time = 0.0
+    with pytest.raises(tawami.InputError, match=r"Solution.stress cannot be set"):
+        motion.step(1e-3).stress = 0.0
