@@ -1,4 +1,4 @@
-"""Energy that nothing gave is told."""
+"""A warning of spurious energy."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import tawami
 from tawami.motion.energy import Energies, Growth
 
 
-def test_energy_that_nothing_gave_is_told_once():
+def test_spurious_energy_gives_one_warning():
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         growth = Growth(1.0)

@@ -11,6 +11,7 @@ from typing import Any
 import ufl
 
 from tawami.base.errors import FormError, InexactSumWarning
+from tawami.base.space import PLANE
 from tawami.base.text import quoted
 from tawami.fem import dolfinx
 from tawami.fem.rules import DEGREE, FAMILY, Rule
@@ -49,7 +50,7 @@ class Symbols:
     def __init__(self, form: Form, options: Mapping[str, str]) -> None:
         self.form = form
         domain = dolfinx.domain()
-        elements = [dolfinx.lagrange(2, 2)] + [dolfinx.lagrange(1)] * (len(form.fields) - 1)
+        elements = [dolfinx.lagrange(2, PLANE.dim)] + [dolfinx.lagrange(1)] * (len(form.fields) - 1)
         self.element = elements[0] if len(elements) == 1 else dolfinx.mixed(elements)
         space = ufl.FunctionSpace(domain, self.element)
         self.domain = domain

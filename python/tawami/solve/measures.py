@@ -89,7 +89,7 @@ class Measures:
             inertia: Inertia of a dynamic step.
         """
         n = self._layout.num_displacement
-        free = reduction.selection.T @ forces.residual
+        free = reduction.restricted(forces.residual)
         of_u = reduction.unknowns < n
         parts = [forces.internal, forces.external]
         parts += [] if forces.inertia is None else [forces.inertia]

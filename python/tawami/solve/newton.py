@@ -12,7 +12,7 @@ import numpy as np
 from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array
-from tawami.base.petsc import clean_up
+from tawami.base.petsc import add_rows, clean_up
 from tawami.base.timing import Stopwatch, tally
 from tawami.field.assembly import Assembly
 from tawami.field.reduction import Reduction
@@ -147,6 +147,7 @@ class Newton:
         self._stopwatch.start()
         self._measures.begin(self.internal if inertia is None else None)
         iterate, history, krylov = Iterate(reduction, guess, inertia), History(), list[int]()
+        mass = None if inertia is None else inertia.reduced(reduction)
         while True:
             try:
                 internal = self.internal(iterate.coefficients)
@@ -171,7 +172,7 @@ class Newton:
             if len(history) > self.numerics.max_iterations:
                 advice = self._diagnosis.material()
                 self._fail(history, advice or "Take a smaller load, or check material and supports")
-            iterate.add(self._change(iterate, forces, reduction, inertia, history))
+            iterate.add(self._change(iterate, forces, reduction, mass, history))
             krylov.append(self._solver.iterations)
             self._stopwatch.lap()
 
@@ -180,20 +181,20 @@ class Newton:
         iterate: Iterate,
         forces: Forces,
         reduction: Reduction,
-        inertia: Inertia | None,
+        mass: Any,
         history: History,
     ) -> Array:
         """Change of all increments by one linear solve."""
         solver, data = self._solver, self._responses.data
         tangent = self._assembly.tangent(iterate.coefficients, data, reduction)
-        if inertia is not None:
-            inertia.add_to(tangent, reduction)
+        if mass is not None:
+            add_rows(tangent, mass)
         if self._stored is not None:
             self._restore(tangent, reduction)
         found = solver.solve(
             tangent,
             functools.partial(self._scaling.factors, tangent, reduction),
-            -(reduction.selection.T @ forces.residual)[reduction.own],
+            -reduction.restricted(forces.residual)[reduction.own],
             forcing(history, self.numerics.tolerance),
             functools.partial(self._scaling.blocks, reduction),
         )
