@@ -7,6 +7,9 @@ A panic of Rust reaches Python as pyo3's PanicException, which is no `Exception`
 from __future__ import annotations
 
 import gc
+import os
+import subprocess
+import sys
 import threading
 import warnings
 from collections.abc import Callable
@@ -358,6 +361,28 @@ def test_other_threads_of_python_run_during_a_long_call():
         running = False
         watcher.join()
     assert any(start < time < end for time in seen)
+
+
+@pytest.mark.parametrize("threads", ["1", "2"])
+def test_every_thread_of_python_computes_without_waiting_for_the_first(threads):
+    code = """
+import threading
+import numpy as np
+from tawami import _rust
+grid = _rust.Grid((0.0, 0.0), 1.0, (9, 9))
+location = grid.locate(np.random.default_rng(0).random((500, 2)) * 9)
+sums = lambda: _rust.nodal_sums(location, np.ones(500), np.ones((500, 2)), "bilinear")
+found = [sums()]
+others = [threading.Thread(target=lambda: found.append(sums())) for _ in range(3)]
+for other in others: other.start()
+for other in others: other.join()
+print(len(found), len({array.tobytes() for array in found}))
+"""
+    run = subprocess.run(
+        [sys.executable, "-c", code], env=os.environ | {"RAYON_NUM_THREADS": threads},
+        capture_output=True, text=True, check=True, timeout=60,
+    )  # fmt: skip
+    assert run.stdout.split()[-2:] == ["4", "1"]
 
 
 def test_a_view_stays_readable_when_the_storage_is_replaced():

@@ -16,7 +16,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from tawami import _rust
-from tawami.base.arrays import Array
+from tawami.base.arrays import Array, Indices
 from tawami.base.space import Counts
 
 Basis = Literal["quadratic_spline", "bilinear", "biquadratic"]
@@ -34,13 +34,25 @@ def values_1d(basis: Basis, n: int, cell: npt.ArrayLike, t: npt.ArrayLike) -> sp
     """
     cells = np.atleast_1d(np.asarray(cell, dtype=np.int64))
     first, values = _rust.basis_1d(basis, n, cells, np.atleast_1d(np.asarray(t, dtype=float)))
-    width = 2 if basis == "bilinear" else 3
+    width = _per_cell(basis)
     rows = np.repeat(np.arange(len(cells)), width)
     columns = (first[:, None] + np.arange(width)).ravel()
     shape = (len(cells), _rust.basis_len(basis, n))
     matrix = sp.csr_matrix((values[:, :width].ravel(), (rows, columns)), shape=shape)
     matrix.eliminate_zeros()
     return matrix
+
+
+def _per_cell(basis: Basis) -> int:
+    """Functions that do not vanish on a cell of a row."""
+    return 2 if basis == "bilinear" else 3
+
+
+def functions_on(basis: Basis, n: int, cells: npt.ArrayLike) -> Indices:
+    """Functions on a row of `n` cells that do not vanish on all of these cells, ascending."""
+    chosen = np.atleast_1d(np.asarray(cells, dtype=np.int64))
+    first, _ = _rust.basis_1d(basis, n, chosen, np.full(len(chosen), 0.5))
+    return np.unique(first[:, None] + np.arange(_per_cell(basis)))
 
 
 def extraction_1d(basis: Basis, n: int, degree: int) -> sp.csr_matrix:
