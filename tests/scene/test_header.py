@@ -1,4 +1,4 @@
-"""The header of a scene: what there is of it, how much, and what is not modelled."""
+"""The header of a scene: what is modelled, how much of it, and what is not modelled."""
 
 from __future__ import annotations
 
