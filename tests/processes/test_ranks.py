@@ -15,7 +15,8 @@ import pytest
 from programs import on_ranks as start
 
 pytestmark = pytest.mark.mpi
-NUMBERS = (2, 3, pytest.param(4, marks=pytest.mark.slow))
+#: Three ranks share no number of cells evenly, and one of them has none of two cells.
+NUMBERS = (3, *(pytest.param(number, marks=pytest.mark.slow) for number in (2, 4)))
 
 
 @dataclass(frozen=True)

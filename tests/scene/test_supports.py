@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from hypothesis import given
 from hypothesis import strategies as st
 from mpi4py import MPI
-from scenes import greville, grid_of
+from scenes import beam, grid_of
 
 import tawami
 from tawami import _rust
@@ -20,13 +20,6 @@ from tawami.field import constraints
 from tawami.field.reduction import Reduction
 from tawami.grid import edges
 from tawami.grid.basis import values_1d
-
-
-def beam(form="u_epsv", basis="quadratic_spline", cells=(4, 3), **options):
-    grid = grid_of(cells)
-    body = tawami.box(grid, grid.origin, grid.upper, per_axis=3)
-    material = tawami.linear_elastic(E=3e3, nu=0.4999)
-    return tawami.Scene(grid, body, material, form=form, basis=basis, **options)
 
 
 @pytest.mark.parametrize("point", [(-1.0, 1.25), (-1.0, 1.0), (-0.63, 1.87), (1.0, 2.0)])
@@ -225,33 +218,6 @@ def test_a_solution_keeps_its_values_in_later_steps():
     np.testing.assert_allclose(second.mean_stress, 2 * before, atol=1e-9 * np.abs(before).max())
 
 
-@pytest.mark.parametrize("edge", ["left", "right", "bottom", "top"])
-def test_a_traction_adds_up_to_its_integral(edge, basis):
-    """A parabola along part of each edge: total force and moment."""
-    grid = grid_of((6, 5))
-    lower = (grid.origin[0], 1.0) if edge != "bottom" else grid.origin
-    upper = (grid.upper[0] if edge == "right" else 1.5, 2.5 if edge != "top" else grid.upper[1])
-    body = tawami.box(grid, lower, upper, per_axis=3)
-    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3), form="u", basis=basis)
-    scene.traction(edge, (lambda x, y: 1 + x * y + x**2 + y**2, lambda x, y: -2 * x + y))
-    force = scene.configuration.external().reshape(-1, 2)
-    along = 1 if edge in ("left", "right") else 0
-    t, w = np.polynomial.legendre.leggauss(4)
-    half = (upper[along] - lower[along]) / 2
-    s = lower[along] + half * (1 + t)
-    fixed = np.full(4, {"left": lower[0], "right": upper[0]}.get(edge, 0.0)
-                    if along == 1 else {"bottom": lower[1], "top": upper[1]}[edge])  # fmt: skip
-    x, y = (fixed, s) if along == 1 else (s, fixed)
-    expected = [half * w @ (1 + x * y + x**2 + y**2), half * w @ (-2 * x + y)]
-    np.testing.assert_allclose(force.sum(axis=0), expected, rtol=1e-12, atol=1e-14)
-    points = [grid.origin[a] + grid.h * greville(basis, grid.cells[a]) for a in range(2)]
-    lever = (
-        np.tile(points[0], len(points[1])) if along == 0 else np.repeat(points[1], len(points[0]))
-    )
-    moment = half * w @ ((1 + x * y + x**2 + y**2) * s)
-    assert lever @ force[:, 0] == pytest.approx(moment, rel=1e-12)
-
-
 def test_coefficients_of_another_length_are_rejected():
     scene = beam()
     with pytest.raises(tawami.InputError, match="coefficients has 3 entries: expected 80"):
@@ -305,32 +271,6 @@ def test_a_support_that_misses_the_body_is_rejected():
         scene.solve()
 
 
-def test_loading_in_two_steps_equals_loading_in_one():
-    def fixed():
-        scene = beam()
-        scene.fix("left", "x", 1e-3)
-        scene.fix("left", "y")
-        return scene
-
-    at_once = fixed()
-    at_once.traction("right", (2.0, -1.0))
-    once = at_once.solve()
-    stepwise = fixed()
-    stepwise.traction("right", (1.5, 0.0))
-    stepwise.solve()
-    stepwise.traction("right", (0.5, -1.0))
-    twice = stepwise.solve()
-    np.testing.assert_allclose(twice.u, once.u, rtol=0, atol=1e-9 * np.abs(once.u).max())
-    scale = np.abs(at_once.particles.stress).max()
-    np.testing.assert_allclose(
-        stepwise.particles.stress, at_once.particles.stress, rtol=0, atol=1e-9 * scale
-    )
-    # nothing left to do: no iteration, no change
-    before = np.array(stepwise.particles.stress)
-    assert stepwise.solve().iterations == 0
-    np.testing.assert_allclose(stepwise.particles.stress, before, rtol=0, atol=1e-12 * scale)
-
-
 @pytest.mark.parametrize("basis", ["bilinear", "biquadratic"])
 def test_cells_without_particles_do_not_change_the_answer(basis):
     """Lagrange functions on the cells of the body are the same on a larger grid. Open splines are
@@ -372,30 +312,3 @@ def test_the_reduction_selects_each_free_coefficient_once():
     reduction = Reduction(layout, held, [], np.zeros(layout.size))
     assert reduction.size == layout.size - 2 * (3 + 2)
     assert (reduction.selection.sum(axis=0) == 1).all()
-
-
-def test_a_part_of_an_edge_is_loaded_and_held():
-    """The load of two of four cells, and only the functions of the held ones."""
-    grid = grid_of((4, 3))
-    body = tawami.box(grid, grid.origin, grid.upper)
-    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=10.0, nu=0.3), basis="bilinear")
-    scene.fix("bottom", "x", between=(-1.0, 0.0))
-    scene.fix("bottom", "y", between=(-1.0, 0.0))
-    scene.traction("top", (0.0, -3.0), between=(-0.5, 0.5))
-    force = scene.configuration.external()[: 2 * 20].reshape(-1, 2)
-    assert force[:, 1].sum() == pytest.approx(-3.0)
-    assert np.flatnonzero(force[15:, 1]).tolist() == [1, 2, 3]
-    reduction = scene.reduction()
-    assert np.flatnonzero(reduction.fixed).tolist() == [0, 1, 2, 3, 4, 5]
-    assert scene.solve().reaction("bottom") == pytest.approx([0.0, 3.0], abs=1e-5)
-
-
-@pytest.mark.parametrize("between", [(0.1, 0.5), (0.5, -0.5), (-1.0, 3.0), (0.0, 0.0)])
-def test_parts_of_edges_consist_of_whole_cells(random_scene, between):
-    scene = random_scene()
-    with pytest.raises(
-        tawami.InputError, match="expected two lines of the grid, in order, every 0.5"
-    ):
-        scene.fix("bottom", "x", between=between)
-    with pytest.raises(tawami.InputError, match="edge='bottom': between"):
-        scene.traction("bottom", (1.0, 0.0), between=between)

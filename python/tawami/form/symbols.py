@@ -61,7 +61,9 @@ class Symbols:
         self.trials = self._split(self.trial)
         tests = self._split(test)
         self.tests = {form.fields[name][1]: tests[name] for name in form.fields}
-        self.traction = ufl.Coefficient(ufl.FunctionSpace(domain, dolfinx.lagrange(2, 2)), count=1)
+        self.traction = ufl.Coefficient(
+            ufl.FunctionSpace(domain, dolfinx.lagrange(2, PLANE.dim)), count=1
+        )
         self.constants = {
             name: ufl.Constant(domain, count=k) for k, name in enumerate(("h", *form.parameters))
         }

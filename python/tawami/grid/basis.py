@@ -2,13 +2,11 @@
 
 Quadratic splines, bilinear and biquadratic Lagrange functions are all biquadratic on a cell. The field
 problem is therefore assembled on the nodes of a continuous Lagrange element: nodal values = E
-coefficients. The extraction matrix E is the Kronecker product of one-dimensional matrices, whose rows
-sum to 1.
+coefficients. The rows of the extraction matrix E sum to 1.
 """
 
 from __future__ import annotations
 
-from functools import reduce
 from typing import Literal, get_args
 
 import numpy as np
@@ -17,7 +15,7 @@ import scipy.sparse as sp
 
 from tawami import _rust
 from tawami.base.arrays import Array, Indices
-from tawami.base.space import Counts
+from tawami.base.space import Counts, lattice
 
 Basis = Literal["quadratic_spline", "bilinear", "biquadratic"]
 BASES: tuple[Basis, ...] = get_args(Basis)
@@ -55,17 +53,25 @@ def functions_on(basis: Basis, n: int, cells: npt.ArrayLike) -> Indices:
     return np.unique(first[:, None] + np.arange(_per_cell(basis)))
 
 
-def extraction_1d(basis: Basis, n: int, degree: int) -> sp.csr_matrix:
-    """Values at the Lagrange nodes (`degree` per cell) of a row of `n` cells, nodes x functions."""
-    node = np.arange(degree * n + 1)
-    cell = np.minimum(node // degree, n - 1)
-    return values_1d(basis, n, cell, (node - degree * cell) / degree)
-
-
 def extraction(basis: Basis, cells: Counts, degree: int) -> sp.csr_matrix:
-    """The extraction matrix E of a scalar field, nodes x functions; x fastest in both."""
-    along = [extraction_1d(basis, n, degree) for n in cells]
-    return reduce(lambda inner, outer: sp.kron(outer, inner, format="csr"), along)
+    """The extraction matrix E of a scalar field on Lagrange nodes (`degree` per cell along each axis).
+
+    Its shape is nodes x functions, x fastest in both.
+    """
+    nodes = lattice([np.arange(degree + 1)] * len(cells))
+    number = np.arange(int(np.prod(cells)))
+    functions, values = _rust.extraction(basis, cells, number, nodes / degree)
+    first = degree * lattice([np.arange(n) for n in cells])
+    shape = [degree * n + 1 for n in cells]
+    row = (first[:, None] + nodes) @ np.cumprod((1, *shape[:-1]))
+    rows, once = np.unique(row, return_index=True)  # a node belongs to several cells
+    columns = functions[once // len(nodes)]
+    entries = values.reshape(-1, values.shape[2])[once]
+    index = (np.repeat(rows, columns.shape[1]), columns.ravel())
+    count = [_rust.basis_len(basis, n) for n in cells]
+    matrix = sp.csr_matrix((entries.ravel(), index), shape=(len(rows), int(np.prod(count))))
+    matrix.eliminate_zeros()
+    return matrix
 
 
 def greville_1d(basis: Basis, n: int) -> Array:

@@ -96,8 +96,8 @@ def scattered(
             f"its particles have other arrays than those of the scene: {differ[0][0]} is in one of them "
             "only, or has another width. Expected the same form, laws and motion"
         )
-    whole = particles.of_rows(np.hstack([arrays[name] for name in wanted]))
-    mine, location = distributed(grid, whole, moving=moving)
+    everything = particles.of_rows(np.hstack([arrays[name] for name in wanted]))
+    mine, location = distributed(grid, everything, moving=moving)
     return (particles if particles.assign(mine) else mine), location
 
 

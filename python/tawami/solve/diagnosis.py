@@ -123,8 +123,7 @@ class Diagnosis:
         own = np.argsort(-np.abs(direction))[:ENTRIES]
         entries = ranks.allgathered(self._comm, np.abs(direction[own]))
         unknowns = ranks.allgathered(self._comm, reduction.own.start + own)
-        cell = self._responses.location.cell
-        counts = ranks.sum_of(self._comm, np.bincount(cell, minlength=grid.num_cells))
+        counts = self._responses.particles_per_cell
         found: list[str] = []
         for unknown in unknowns[np.argsort(-entries, kind="stable")][:ENTRIES]:
             cells = self._layout.cells_of(reduction.unknowns[unknown])

@@ -11,7 +11,7 @@ from tawami.base.arrays import Array
 from tawami.field.reduction import Reduction
 from tawami.solve.inertia import Inertia
 
-#: Gives the friction on the body from the forces of supports and walls, functions x 2 each.
+#: Gives the friction on the body from the forces of supports and walls, functions x dim each.
 Friction = Callable[[Array], Array]
 
 
@@ -50,7 +50,7 @@ class Iterate:
 
     def __init__(self, reduction: Reduction, guess: Array | None, inertia: Inertia | None) -> None:
         unknowns = np.zeros(reduction.size) if guess is None else guess[reduction.unknowns]
-        self._inertia, self._num_displacement = inertia, reduction.layout.num_displacement
+        self._inertia, self._layout = inertia, reduction.layout
         self.coefficients: Array = reduction.selection @ unknowns + reduction.offset
         #: u - dt v, which is updated by itself to keep its digits.
         self._deviation = None if inertia is None else inertia.deviation(self.coefficients)
@@ -78,6 +78,7 @@ class Iterate:
             reactions = residual.copy()
             reactions[: len(self._inertia.impulse)] += self._inertia.impulse
         if friction is not None:
-            n, residual = self._num_displacement, residual.copy()
-            residual[:n] -= friction(reactions[:n].reshape(-1, 2)).ravel()
+            n, space = self._layout.num_displacement, self._layout.grid.space
+            residual = residual.copy()
+            residual[:n] -= friction(space.vectors(reactions[:n])).ravel()
         return Forces(internal, external, inertial, acceleration, reactions, residual)
