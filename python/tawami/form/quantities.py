@@ -22,19 +22,12 @@ Part = Literal["value", "strain", "gradient", "volume"]
 STRAIN, GRADIENT = PLANE.num_strains, len(PLANE.gradient)
 #: Components of the quantities that the material law gives.
 COMPONENTS: Mapping[str, int] = {
-<<<<<<< HEAD
-    "sigma": 3, "s": 3, "sigma_m": 1, "P": 4, "P_s": 4, "tau_m": 1, "ln_J": 1, "eps_p": 1
+    "sigma": STRAIN, "s": STRAIN, "sigma_m": 1, "P": GRADIENT, "P_s": GRADIENT, "tau_m": 1, "ln_J": 1,
+    "eps_p": 1,
 }  # fmt: skip
 #: Numbers per component of the parts of a law quantity: its value, and its derivatives with respect to
 #: the strain (xx, yy, gamma_xy), grad u (xx, xy, yx, yy) and the volumetric field, eps_v or p.
-WIDTH: Mapping[Part, int] = {"value": 1, "strain": 3, "gradient": 4, "volume": 1}
-=======
-    "sigma": STRAIN, "s": STRAIN, "sigma_m": 1, "P": GRADIENT, "P_s": GRADIENT, "tau_m": 1, "ln_J": 1
-}  # fmt: skip
-#: Numbers per component of the parts of a law quantity: its value, and its derivatives with respect to
-#: the strain (xx, yy, gamma_xy), grad u (xx, xy, yx, yy) and the volumetric strain.
 WIDTH: Mapping[Part, int] = {"value": 1, "strain": STRAIN, "gradient": GRADIENT, "volume": 1}
->>>>>>> core
 
 OPERATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
     "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power

@@ -15,8 +15,6 @@ from tawami.base.errors import InputError
 from tawami.base.source import source_of
 from tawami.form.kinematics import Kinematics
 
-<<<<<<< HEAD
-Array = npt.NDArray[np.float64]
 #: Stress, tangent and plastic volumetric strain of the particles, flat.
 Given = tuple[Array, Array, Array]
 #: Share by which the mean stress of a law may differ from that of the form, and share of K below which
@@ -25,8 +23,6 @@ REACHED, FLAT = 1e-13, 1e-9
 #: Iterations for the volume at which a law has a mean stress.
 MOST_ITERATIONS = 60
 
-=======
->>>>>>> core
 
 @dataclass(frozen=True)
 class NumpyLaw:
@@ -95,15 +91,10 @@ class NumpyStage:
         self.volume_strains, self.elastic_energy = stage.volume_strains, stage.elastic_energy
         self._latest: tuple[tuple[Array, ...], Given] | None = None
 
-<<<<<<< HEAD
     def _given(self, u: Array, volumetric: Array | None) -> Given:
-        """Stress, tangent and plastic volume, flat; the last ones are kept: a step is accepted as it was
-        computed.
+        """Stress, tangent and plastic volume, flat; those of the last call are reused, as when a step is
+        accepted.
         """
-=======
-    def _given(self, u: Array, volumetric: Array | None) -> tuple[Array, Array]:
-        """Stress and tangent, flat; those of the last call are reused, as when a step is accepted."""
->>>>>>> core
         state = (u, np.empty(0) if volumetric is None else volumetric, self._particles.stress)
         if self._latest is not None and all(map(np.array_equal, state, self._latest[0])):
             return self._latest[1]
