@@ -88,7 +88,19 @@ class Domain:
             model.compiled, particles, location, stage, _constants(model, particles),
             model.grid.comm, stopwatch,
         )  # fmt: skip
-        newton = Newton(assembly, responses, numerics, stopwatch)
+
+        def elastic() -> Responses:
+            """The same particles with the elastic parts of their laws."""
+            laws = [_rust.Material.linear_elastic_k_mu(*map(float, m)) for m in model.moduli]
+            stage = _rust.Stage(
+                particles, location, laws, form.kinematics.name, model.moves, model.basis
+            )
+            return Responses(
+                model.compiled, particles, location, stage, _constants(model, particles),
+                model.grid.comm, stopwatch,
+            )  # fmt: skip
+
+        newton = Newton(assembly, responses, numerics, stopwatch, elastic)
         return cls(
             model, particles, location, assembly, Tractions(attachment), stage, responses, newton
         )
