@@ -8,9 +8,11 @@ from tawami.base.errors import (
     EnergyWarning,
     FormError,
     GeometryWarning,
+    IncompleteWarning,
     InexactSumWarning,
     InputError,
     InstabilityWarning,
+    LargeStrainWarning,
     LockingWarning,
     MissingDependencyError,
     NotModelledError,
@@ -18,6 +20,7 @@ from tawami.base.errors import (
     ParameterWarning,
     QuadratureWarning,
     SingularError,
+    SofteningWarning,
     SupportError,
     TawamiError,
     TawamiWarning,
@@ -33,6 +36,7 @@ from tawami.check.form_check import FormReport, check_form
 from tawami.form.form import Form
 from tawami.grid.grid import Grid
 from tawami.motion.dynamics import Dynamics
+from tawami.motion.path import follow
 from tawami.motion.stepping import ramp, settle
 from tawami.particles.laws import (
     drucker_prager,
@@ -63,9 +67,11 @@ __all__ = [
     "GeometryWarning",
     "Grid",
     "GridOutput",
+    "IncompleteWarning",
     "InexactSumWarning",
     "InputError",
     "InstabilityWarning",
+    "LargeStrainWarning",
     "LockingWarning",
     "Material",
     "MissingDependencyError",
@@ -79,6 +85,7 @@ __all__ = [
     "Scene",
     "Series",
     "SingularError",
+    "SofteningWarning",
     "Solution",
     "Study",
     "SupportError",
@@ -90,6 +97,7 @@ __all__ = [
     "disc",
     "drucker_prager",
     "earlier",
+    "follow",
     "level_set",
     "linear_elastic",
     "mesh",

@@ -20,10 +20,13 @@ TawamiWarning             base of warnings about results that should not be trus
   EnergyWarning           spurious energy
   GeometryWarning         a body whose shape differs from the given one
   InexactSumWarning       a `sum_p` that is not exactly the sum over the particles
+  IncompleteWarning       a ramp or a path that ended before its end
   InstabilityWarning      an option that is not stable for this body
+  LargeStrainWarning      a form of small strain where displacement gradients are large
   LockingWarning          a form that locks
   ParameterWarning        a parameter beyond its usual range
   QuadratureWarning       particles with large integration errors
+  SofteningWarning        a softening law, whose results depend on the size of the cells
 ========================= ========================================================================
 
 When a step fails, the particles are as they were before it.
@@ -62,8 +65,16 @@ class InexactSumWarning(TawamiWarning):
     """A `sum_p` of an expression whose degree is too high for the exact sum over the particles."""
 
 
+class IncompleteWarning(TawamiWarning):
+    """A ramp or a path that ended before its end; the scene is in its last equilibrium."""
+
+
 class InstabilityWarning(TawamiWarning):
     """An option of a form that is not stable for this body."""
+
+
+class LargeStrainWarning(TawamiWarning):
+    """A form of small strain in a body whose displacement gradients are large."""
 
 
 class LockingWarning(TawamiWarning):
@@ -76,6 +87,10 @@ class ParameterWarning(TawamiWarning):
 
 class QuadratureWarning(TawamiWarning):
     """Particles whose volumes integrate badly over the cells that they fill."""
+
+
+class SofteningWarning(TawamiWarning):
+    """A softening law without an internal length: results depend on the size of the cells."""
 
 
 class SingularError(TawamiError):
@@ -121,9 +136,11 @@ __all__ = [
     "EnergyWarning",
     "FormError",
     "GeometryWarning",
+    "IncompleteWarning",
     "InexactSumWarning",
     "InputError",
     "InstabilityWarning",
+    "LargeStrainWarning",
     "LockingWarning",
     "MissingDependencyError",
     "NotModelledError",
@@ -131,6 +148,7 @@ __all__ = [
     "ParameterWarning",
     "QuadratureWarning",
     "SingularError",
+    "SofteningWarning",
     "SupportError",
     "TawamiError",
     "TawamiWarning",

@@ -31,6 +31,9 @@ from tawami.solve.numerics import Numerics
 from tawami.solve.path import Path
 from tawami.solve.scaling import Scaling
 
+#: Tolerance of linear solves along a path, whose first residual may be zero.
+ON_PATH = 1e-8
+
 
 @dataclass(frozen=True)
 class Converged:
@@ -234,7 +237,9 @@ class Newton:
             equations.inertia.add_to(tangent, reduction)
         if self._stored is not None:
             self._restore(tangent, reduction)
-        tolerance = forcing(history, self.numerics.tolerance)
+        tolerance = ON_PATH
+        if equations.path is None:
+            tolerance = forcing(history, self.numerics.tolerance)
         singular: SingularError | None = None
         try:
             found = solver.solve(

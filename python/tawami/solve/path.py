@@ -104,15 +104,15 @@ class Path:
 
     Attributes:
         start: Load factor at the beginning, which the external forces of the step belong to.
-        guess: Load factor of the first iterate.
+        guess: Load factor that belongs to a guess of the increments; that at the beginning without.
         rate: External forces per load factor, on all coefficients [N per metre depth].
         control: What gives the load factor.
     """
 
     start: float
-    guess: float
     rate: Array
     control: Control
+    guess: float = np.nan
 
     def external(self, given: Array, factor: float) -> Array:
         """External forces at a load factor."""
