@@ -208,7 +208,9 @@ def follow(
 
     The load factor is an unknown of each step: 0 for the loads that are in equilibrium already, 1 for
     all new loads; it may fall and become negative. Each step has a given length, of the displacement of
-    a point (which passes limit loads), or of that of the body (which passes snap-back as well).
+    a point, or of the body. A point must move on steadily along the path. An arc length serves a body
+    that snaps through. It may turn back and unload at a sharp snap-back of a body that softens in one
+    place: control a point next to that place.
 
     Args:
         scene: The scene, with new loads; displacements that supports prescribe are held.
@@ -257,8 +259,7 @@ def follow(
         with observed(results, "path", following, abs(to), "m") as observer:
             march(pace, abs(to), least, lambda _, h: following.step(h), observer, each, steps)
     except ConvergenceError as error:
-        what = f"follow stopped at {pace.at:g} m, with {following.factor:g} of the load"
-        end_early(steps, error, stop, what, scene)
+        end_early(steps, error, stop, f"follow, with {following.factor:g} of the load,", scene)
     finally:
         scene.configuration.accept(following.factor)
     steps.complete = steps.error is None

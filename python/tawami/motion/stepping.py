@@ -81,7 +81,7 @@ def end_early(steps: Steps, error: ConvergenceError, stop: Stop, what: str, scen
     if scene.grid.comm.rank:
         return
     warn(
-        f"{what}: {error.__notes__[0]}, Newton's method did not converge. The scene is in its last "
+        f"{what} stopped {error.__notes__[0]}: Newton did not converge. The scene is in its last "
         "equilibrium; `reached` holds its load. If the body carries more, allow a smaller `smallest`; "
         "follow(scene, ...) passes a limit load; stop='raise' raises the error instead",
         IncompleteWarning,

@@ -54,6 +54,11 @@ class Equations:
         return iterate.forces(internal, external, self.friction)
 
     @property
+    def at_rest(self) -> bool:
+        """Whether it is a static step at a given load without friction, which a line search serves."""
+        return self.inertia is None and self.friction is None and self.path is None
+
+    @property
     def advice(self) -> str:
         """What to do if the step does not converge."""
         if self.inertia is not None:

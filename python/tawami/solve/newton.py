@@ -188,7 +188,7 @@ class Newton:
                 advice = self._diagnosis.material()
                 self._fail(history, advice or equations.advice)
             change, of_factor = self._change(iterate, forces, equations, history)
-            if inertia is None and friction is None and path is None:
+            if equations.at_rest and not self._responses.form.strain.finite:
                 n = reduction.layout.num_displacement
                 search = LineSearch(self._comm, change, forces.residual, n)
             iterate.add(change, of_factor)
