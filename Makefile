@@ -5,9 +5,9 @@
 # make fuzz         look for arguments that fail, at random (SEED=... again with that seed)
 # make docs         the documentation as HTML, every script and case in it run; LINKS=1 checks the web's links
 # make matrix       make test-all on Debian 12, 13 and sid, each in a throw-away root (see tests/matrix.sh)
-# make extremes     try the method at its extremes, say what survives and what is refused
+# make extremes     try the method at its limits, print what survives and what is rejected
 # make bench        speed and memory, stage by stage (AGAINST=../checkout compares with another checkout)
-# make trade        what accuracy costs: every knob of four cases; goes on where it was
+# make trade        what accuracy costs: the settings of five cases; resumes an interrupted study
 # make lint, make format, make clean
 #
 # Set-up needs Debian 12, 13 or sid (root or sudo for the packages that are missing) and Rust.
@@ -83,7 +83,7 @@ format: setup $(STAMPS)/lint
 	.venv/bin/ruff format .
 
 clean:
-	rm -rf .venv target results
+	rm -rf .venv target results .pytest_cache
 
 setup: $(STAMPS)/wheel
 

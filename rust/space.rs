@@ -32,6 +32,9 @@ pub const FUNCTIONS_1D: usize = 3;
 /// Most functions of a basis that do not vanish on a cell.
 pub const FUNCTIONS: usize = FUNCTIONS_1D.pow(DIM as u32);
 
+/// Most rows along x of the functions that do not vanish on a cell.
+pub const ROWS: usize = FUNCTIONS_1D.pow(DIM as u32 - 1);
+
 /// Nodes of a quadratic Lagrange cell along one axis.
 pub const NODES_1D: usize = 3;
 
@@ -77,11 +80,12 @@ pub fn number_of(index: Index, size: Index) -> usize {
 /// The reverse of [`number_of`].
 #[must_use]
 pub fn index_of(mut number: usize, size: Index) -> Index {
-    size.map(|n| {
-        let i = number % n;
-        number /= n;
-        i
-    })
+    let mut index = [0; DIM];
+    for axis in 0..DIM - 1 {
+        (index[axis], number) = (number % size[axis], number / size[axis]);
+    }
+    index[DIM - 1] = number;
+    index
 }
 
 /// Distance of the numbers of two neighbours along each axis.
@@ -96,17 +100,24 @@ pub fn strides(size: Index) -> Index {
 }
 
 /// All indices in a block, x fastest.
-pub fn indices(block: Block) -> impl Iterator<Item = Index> {
-    let size = block.map(|[first, last]| last + 1 - first);
-    (0..count(size)).map(move |number| {
-        let inside = index_of(number, size);
-        std::array::from_fn(|axis| block[axis][0] + inside[axis])
-    })
+pub fn indices(block: Block) -> impl Iterator<Item = Index> + Clone {
+    let next = move |index: &Index| {
+        let mut next = *index;
+        for axis in 0..DIM {
+            if next[axis] < block[axis][1] {
+                next[axis] += 1;
+                return Some(next);
+            }
+            next[axis] = block[axis][0];
+        }
+        None
+    };
+    std::iter::successors(Some(block.map(|[first, _]| first)), next)
 }
 
-/// All indices below `size`, x fastest.
+/// All indices below `size`, which is at least 1 along each axis; x fastest.
 pub fn indices_below(size: Index) -> impl Iterator<Item = Index> {
-    (0..count(size)).map(move |number| index_of(number, size))
+    indices(size.map(|n| [0, n - 1]))
 }
 
 /// A position as it appears in messages: its coordinates in parentheses.

@@ -3,20 +3,38 @@
 from __future__ import annotations
 
 import logging
+import os
 import signal
+import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
-import profiles
-import pytest
-import scenes
+# Kernels are cached in this checkout, here and in the programs that tests start: they depend neither on
+# what other checkouts left behind nor on what they are compiling now. Before dolfinx is imported.
+CACHE = Path(__file__).parents[1] / ".pytest_cache" / "xdg"
+os.environ["XDG_CACHE_HOME"] = str(CACHE)
 
-import tawami
+import profiles  # noqa: E402
+import pytest  # noqa: E402
+import scenes  # noqa: E402
+
+import tawami  # noqa: E402
 
 # A shell that starts pytest in the background ignores Ctrl-C for it and for the processes of its tests.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 logging.disable(logging.INFO)  # FFCx reports every form that it compiles
 profiles.load()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Remove the locks of kernels that a killed session did not finish: FFCx would wait for them."""
+    if hasattr(config, "workerinput"):  # a process of pytest-xdist
+        return
+    for source in CACHE.rglob("*.c"):
+        old = source.stat().st_mtime < time.time() - 60
+        if old and not source.with_suffix(".c.cached").exists():
+            source.unlink(missing_ok=True)
 
 
 @pytest.fixture(params=scenes.FORMS)

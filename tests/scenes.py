@@ -56,6 +56,19 @@ def random_scene(
     return tawami.Scene(grid, body, materials, material_of=numbers, **options)
 
 
+def beam(
+    form: str = "u_epsv",
+    basis: str = "quadratic_spline",
+    cells: tuple[int, int] = (4, 3),
+    **options: Any,
+) -> tawami.Scene:
+    """A nearly incompressible body that fills its grid, without supports and loads."""
+    grid = grid_of(cells)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=3)
+    material = tawami.linear_elastic(E=3e3, nu=0.4999)
+    return tawami.Scene(grid, body, material, form=form, basis=basis, **options)
+
+
 @st.composite
 def clouds(draw: st.DrawFn, cells: tuple[int, int], most: int) -> tuple[tawami.Grid, np.ndarray]:
     """A grid of at most `cells` cells, and up to `most` points in it, also on edges and corners."""

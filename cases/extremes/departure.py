@@ -59,16 +59,16 @@ def removed(speed: float) -> float:
     steps = motion.steps
     times = np.arange(1, steps + 1)
     outside = (np.abs(x + times[:, None, None] * v) > SIDE / 2 + 1e-6).any(axis=2)
-    gone = outside.any(axis=0)
-    first = np.where(gone, outside.argmax(axis=0) + 1, 0)
-    told = {number: (place, time) for number, place, time in scene.left}
-    wrong = set(told) ^ set(np.flatnonzero(gone))
-    for number in set(told) - wrong:
-        place, time = told[number]
+    departed = outside.any(axis=0)
+    first = np.where(departed, outside.argmax(axis=0) + 1, 0)
+    reported = {number: (place, time) for number, place, time in scene.left}
+    wrong = set(reported) ^ set(np.flatnonzero(departed))
+    for number in set(reported) - wrong:
+        place, time = reported[number]
         where = x[number] + first[number] * v[number]
         if time != first[number] or np.abs(np.array(place) / where - 1).max() > 1e-3:
             wrong.add(number)
-    if len(scene.particles) + len(scene.left) != len(x) or len(told) != len(scene.left):
+    if len(scene.particles) + len(scene.left) != len(x) or len(reported) != len(scene.left):
         return np.inf
     return float(len(wrong))
 
@@ -78,18 +78,18 @@ def stopped(speed: float) -> float:
     motion = cloud(speed, "stop")
     x, v = np.array(motion.scene.particles.x), np.array(motion.velocity)
     for step in range(1, STEPS + 1):
-        gone = np.flatnonzero((np.abs(x + step * v) > SIDE / 2 + 1e-6).any(axis=1))
+        departed = np.flatnonzero((np.abs(x + step * v) > SIDE / 2 + 1e-6).any(axis=1))
         before = np.array(motion.scene.particles.x)
         try:
             motion.step(1.0)
         except tawami.InputError as error:
-            words = f"particle {gone[0]} would leave the grid at {step} s"
-            if words not in str(error) or f"and {len(gone) - 1} others" not in str(error):
+            words = f"particle {departed[0]} would leave the grid at {step} s"
+            if words not in str(error) or f"and {len(departed) - 1} others" not in str(error):
                 raise AssertionError(f"'{error}' instead of '{words}'") from error
             if not np.array_equal(before, motion.scene.particles.x):
                 raise AssertionError("the particles moved in spite of the error") from error
             raise
-        if len(gone):
+        if len(departed):
             return np.inf
     return 0.0
 

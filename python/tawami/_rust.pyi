@@ -244,7 +244,7 @@ def densities(
     location: Location,
     volume: _Floats,
     data: _Floats,
-    points: Sequence[tuple[int, int]],
+    points: Sequence[tuple[int, ...]],
     vertices: bool,
     rows: _Numbers,
     columns: Sequence[int],

@@ -1,9 +1,7 @@
 //! One cell: the degrees of freedom of the kernels and the coefficients behind them.
 
 use crate::grid::{extraction, Basis, Extraction, Functions, Location};
-use crate::space::{
-    Index, Point, DIM, DISPLACEMENT_DOFS, FUNCTIONS, MAX_DOFS, NODES, NODES_1D, VERTICES,
-};
+use crate::space::{Index, Point, DIM, DISPLACEMENT_DOFS, MAX_DOFS, NODES, NODES_1D, VERTICES};
 
 /// Coordinates of a vertex that a kernel reads, also in the plane.
 const COORDINATES: usize = 3;
@@ -131,25 +129,36 @@ impl Local {
 
     /// `T^T a` for `columns` vectors at once: `a` is degrees of freedom x columns.
     pub fn transposed(&self, a: &[f64], columns: usize, out: &mut [f64]) {
-        let functions = self.functions();
-        let displacement = DIM * functions * columns;
-        out[..displacement].fill(0.0);
-        for (node, value) in self.extraction.values.iter().enumerate() {
-            for k in 0..DIM {
-                let row = &a[(DIM * node + k) * columns..][..columns];
-                let of_functions: &[f64; FUNCTIONS] = value;
-                for (f, v) in of_functions.iter().take(functions).enumerate() {
-                    if *v == 0.0 {
+        // constant widths, which the compiler turns into vector instructions without loops
+        match columns {
+            1 => self.transposed_of(a, [0.0; 1], out),
+            DISPLACEMENT_DOFS => self.transposed_of(a, [0.0; DISPLACEMENT_DOFS], out),
+            MAX_DOFS => self.transposed_of(a, [0.0; MAX_DOFS], out),
+            _ => self.transposed_of(a, vec![0.0; columns], out),
+        }
+    }
+
+    fn transposed_of(&self, a: &[f64], mut sum: impl AsMut<[f64]>, out: &mut [f64]) {
+        let (functions, sum) = (self.functions(), sum.as_mut());
+        let columns = sum.len();
+        let (displacement, rest) = out.split_at_mut(DIM * functions * columns);
+        for (target, f) in displacement.chunks_exact_mut(DIM * columns).zip(0..) {
+            for (k, target) in target.chunks_exact_mut(columns).enumerate() {
+                sum.fill(0.0);
+                for (node, value) in self.extraction.values.iter().enumerate() {
+                    let v = value[f];
+                    if v == 0.0 {
                         continue;
                     }
-                    let target = &mut out[(DIM * f + k) * columns..][..columns];
-                    for (t, r) in target.iter_mut().zip(row) {
-                        *t += v * r;
+                    let row = &a[(DIM * node + k) * columns..][..columns];
+                    for (s, r) in sum.iter_mut().zip(row) {
+                        *s += v * r;
                     }
                 }
+                target.copy_from_slice(sum);
             }
         }
-        let rest = &a[DISPLACEMENT_DOFS * columns..];
-        out[displacement..][..rest.len()].copy_from_slice(rest);
+        let vertices = &a[DISPLACEMENT_DOFS * columns..];
+        rest[..vertices.len()].copy_from_slice(vertices);
     }
 }

@@ -30,19 +30,26 @@ pub unsafe fn matrix(
     let add = |a: usize, work: &mut Work| {
         // SAFETY: the caller's.
         unsafe { work.reduce(state, form, selection, a) };
-        for &(r, k, wr) in &work.entries {
+        let Work { entries, places, reduced, width, .. } = work;
+        let n = entries.len();
+        places.resize(n * n, 0);
+        for (places, &(r, k, wr)) in places.chunks_mut(n.max(1)).zip(entries.iter()) {
             let row = start[r as usize] as usize..start[r as usize + 1] as usize;
             let columns = &columns[row.clone()];
-            let mut slot = 0;
-            for &(c, l, wc) in &work.entries {
-                slot += columns[slot..].iter().take_while(|&&x| x < c as i32).count();
-                if columns.get(slot) != Some(&(c as i32)) {
-                    return false;
+            let mut latest = 0;
+            for (place, &(c, l, wc)) in places.iter_mut().zip(entries.iter()) {
+                if columns.get(*place) != Some(&(c as i32)) {
+                    let before = columns[latest..].iter().take_while(|&&x| x < c as i32);
+                    *place = latest + before.count();
+                    if columns.get(*place) != Some(&(c as i32)) {
+                        return false;
+                    }
                 }
-                let value = wr * wc * work.reduced[l * work.width + k];
+                latest = *place;
+                let value = wr * wc * reduced[l * *width + k];
                 // SAFETY: inside the row. Rows of the grid of one colour share no unknown; the cells
                 // whose unknowns reach further follow one after the other.
-                unsafe { shared.add(row.start + slot, value) };
+                unsafe { shared.add(row.start + latest, value) };
             }
         }
         true
@@ -65,6 +72,9 @@ pub unsafe fn matrix(
 struct Work {
     packed: Vec<f64>,
     entries: Vec<Entry>,
+    /// Places of the cell's entries in the rows of the matrix. Those of the last cell are tried first: along
+    /// a row of cells they hardly change.
+    places: Vec<usize>,
     element: [f64; MAX_DOFS * MAX_DOFS],
     half: [f64; MAX_DOFS * MAX_DOFS],
     turned: [f64; MAX_DOFS * MAX_DOFS],
@@ -80,6 +90,7 @@ impl Work {
         Self {
             packed: Vec::new(),
             entries: Vec::with_capacity(MAX_DOFS),
+            places: Vec::new(),
             element: zero,
             half: zero,
             turned: zero,

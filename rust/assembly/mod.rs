@@ -20,7 +20,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::grid::Location;
-use crate::space::{number_of, DIM, FUNCTIONS_1D, MAX_DOFS};
+use crate::space::{number_of, DIM, FUNCTIONS_1D, MAX_DOFS, ROWS};
 
 pub use cell::Cells;
 pub use kernel::{Bilinear, Kernel, Slot, State, TabulateTensor};
@@ -28,12 +28,10 @@ pub use matrix::matrix;
 pub use pattern::{pattern, Pattern};
 pub use selection::Selection;
 
-/// Number of colours: functions reach over this many rows along each axis but x.
-const COLOURS: usize = FUNCTIONS_1D.pow(DIM as u32 - 1);
-
-/// Active cells in rows along x, in colours: within a colour no two rows share a function.
-fn colours(location: &Location) -> [Vec<Range<usize>>; COLOURS] {
-    let mut colours: [Vec<Range<usize>>; COLOURS] = Default::default();
+/// Active cells in rows along x, in colours: within a colour no two rows share a function, since a function
+/// reaches over as many rows as a cell has rows of functions.
+fn colours(location: &Location) -> [Vec<Range<usize>>; ROWS] {
+    let mut colours: [Vec<Range<usize>>; ROWS] = Default::default();
     for row in location.rows() {
         let mut index = location.active_index(row.start).map(|i| i % FUNCTIONS_1D);
         index[0] = 0;

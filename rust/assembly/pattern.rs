@@ -53,12 +53,24 @@ impl Field {
     fn sharing(&self, active: &Active, support: Block, selection: &Selection, row: &mut Vec<i32>) {
         let cells: usize = support.iter().map(|[first, last]| last + 1 - first).product();
         let full = active.count(support) == cells;
-        for index in indices(support.map(|cells| self.functions.basis.on(cells))) {
-            let shared = || intersection(support, self.functions.support_at(index));
-            if full || active.count(shared()) > 0 {
-                let function = self.functions.number(index);
-                let first = self.first + self.components * function;
-                row.extend(selection.unknowns(first, self.components));
+        // lines along x have consecutive coefficients
+        let [first, last] = self.functions.basis.on(support[0]);
+        let mut lines = support.map(|cells| self.functions.basis.on(cells));
+        lines[0] = [first, first];
+        for line in indices(lines) {
+            let coefficient = self.first + self.components * self.functions.number(line);
+            if full {
+                row.extend(selection.unknowns(coefficient, self.components * (last + 1 - first)));
+                continue;
+            }
+            for along in 0..=last - first {
+                let mut index = line;
+                index[0] += along;
+                let shared = intersection(support, self.functions.support_at(index));
+                if active.count(shared) > 0 {
+                    let coefficient = coefficient + self.components * along;
+                    row.extend(selection.unknowns(coefficient, self.components));
+                }
             }
         }
     }
@@ -81,21 +93,28 @@ pub fn pattern(cells: &Cells, location: &Location, selection: &Selection) -> Opt
     };
     let (reaching, further) = reach(cells, location, selection, support);
     let of_task = |(task, unknowns): (usize, &[i64])| {
-        let (mut lengths, mut columns, mut row) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut lengths, mut columns) = (Vec::new(), Vec::new());
+        // the components of a function have the same row: it is made once
+        let (mut row, mut of_support) = (Vec::new(), None);
         for (k, &c) in unknowns.iter().enumerate() {
-            row.clear();
             let support = support(c as usize);
-            for field in &fields {
-                field.sharing(&active, support, selection, &mut row);
+            if of_support != Some(support) {
+                row.clear();
+                for field in &fields {
+                    field.sharing(&active, support, selection, &mut row);
+                }
+                sort(&mut row);
+                of_support = Some(support);
             }
-            let more = further.get(&((task * ROWS + k) as u32));
-            row.extend(more.into_iter().flatten().map(|&u| u as i32));
-            if !row.is_sorted() {
-                row.sort_unstable();
-            }
-            row.dedup();
-            lengths.push(row.len());
+            let start = columns.len();
             columns.extend_from_slice(&row);
+            if let Some(more) = further.get(&((task * ROWS + k) as u32)) {
+                let mut all = columns.split_off(start);
+                all.extend(more.iter().map(|&u| u as i32));
+                sort(&mut all);
+                columns.append(&mut all);
+            }
+            lengths.push(columns.len() - start);
         }
         (lengths, columns)
     };
@@ -109,6 +128,14 @@ pub fn pattern(cells: &Cells, location: &Location, selection: &Selection) -> Opt
         start.push(i32::try_from(end).ok()?);
     }
     Some(Pattern { start: start.into(), columns: columns.concat().into(), reaching })
+}
+
+/// Sort the columns of a row, each once.
+fn sort(row: &mut Vec<i32>) {
+    if !row.is_sorted() {
+        row.sort_unstable();
+    }
+    row.dedup();
 }
 
 /// The active cells with coefficients that depend on others, and what they add to the pattern: for each

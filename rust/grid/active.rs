@@ -44,11 +44,12 @@ impl Active {
     pub fn count(&self, block: Block) -> usize {
         let size = corners(self.grid.cells);
         let (mut more, mut less) = (0, 0);
-        for sides in indices_below([2; DIM]) {
-            let corner = std::array::from_fn(|axis| block[axis][sides[axis]] + sides[axis]);
-            let below = self.sums[number_of(corner, size)] as usize;
-            let lower_sides = DIM - sides.iter().sum::<usize>();
-            *if lower_sides % 2 == 0 { &mut more } else { &mut less } += below;
+        for corner in 0..1_usize << DIM {
+            let upper = |axis: usize| corner >> axis & 1;
+            let index = std::array::from_fn(|axis| block[axis][upper(axis)] + upper(axis));
+            let below = self.sums[number_of(index, size)] as usize;
+            *if (DIM as u32 - corner.count_ones()) % 2 == 0 { &mut more } else { &mut less } +=
+                below;
         }
         more - less
     }

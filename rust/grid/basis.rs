@@ -91,6 +91,7 @@ impl Basis {
     /// Quadratic splines: the first function of a cell is `l (1-t)^2`, the last `r t^2`, and they
     /// sum to 1; l = r = 1/2 inside (C1 across the edge), 1 at an open end.
     #[must_use]
+    #[inline]
     pub fn at(self, n: usize, cell: usize, t: f64) -> Local {
         let s = 1.0 - t;
         let (value, derivative) = match self {

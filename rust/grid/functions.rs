@@ -1,10 +1,14 @@
 //! The functions of a basis on a grid: products of one-dimensional functions, numbered x fastest.
 
+// Small functions of the innermost loops: without it, what they share is computed again.
+#![allow(clippy::inline_always)]
+
 use std::ops::Deref;
 
 use super::{Basis, Local};
 use crate::space::{
-    count, index_of, indices_below, number_of, Block, Index, Point, DIM, FUNCTIONS, FUNCTIONS_1D,
+    count, index_of, indices_below, number_of, strides, Block, Index, Point, DIM, FUNCTIONS,
+    FUNCTIONS_1D, ROWS,
 };
 
 /// The functions of a basis on a grid of so many cells.
@@ -64,26 +68,46 @@ impl Functions {
 
     /// The functions that do not vanish on a cell.
     #[must_use]
+    #[inline]
     pub fn on_cell(&self, cell: Index) -> CellFunctions {
-        let width = self.basis.per_cell();
-        let mut functions = CellFunctions { numbers: [0; FUNCTIONS], len: 1 };
-        functions.numbers[0] = self.number(cell.map(|i| self.basis.first(i)));
-        let mut stride = 1;
-        for size in self.size() {
-            let inner = functions.len;
-            for k in 1..width {
-                for f in 0..inner {
-                    functions.numbers[k * inner + f] = functions.numbers[f] + k * stride;
+        match self.basis.per_cell() {
+            2 => self.on_cell_of::<2>(cell),
+            _ => self.on_cell_of::<FUNCTIONS_1D>(cell),
+        }
+    }
+
+    #[inline]
+    fn on_cell_of<const W: usize>(&self, cell: Index) -> CellFunctions {
+        let (mut numbers, mut len) = ([0; FUNCTIONS], 0);
+        for first in self.rows::<W>(cell).into_iter().take(W.pow(DIM as u32 - 1)) {
+            for k in 0..W {
+                numbers[len] = first + k;
+                len += 1;
+            }
+        }
+        CellFunctions { numbers, len }
+    }
+
+    /// First function of each row along x of the functions of a cell.
+    #[inline(always)]
+    pub(crate) fn rows<const W: usize>(&self, cell: Index) -> [usize; ROWS] {
+        let (mut rows, mut count) = ([0; ROWS], 1);
+        rows[0] = self.number(cell.map(|i| self.basis.first(i)));
+        for stride in strides(self.size()).into_iter().skip(1) {
+            // from the last step on, so that the first rows are read before they change
+            for k in (0..W).rev() {
+                for row in 0..count {
+                    rows[k * count + row] = rows[row] + k * stride;
                 }
             }
-            functions.len *= width;
-            stride *= size;
+            count *= W;
         }
-        functions
+        rows
     }
 
     /// One-dimensional functions at a position in a cell, for each axis.
     #[must_use]
+    #[inline]
     pub fn at(&self, cell: Index, xi: Point) -> [Local; DIM] {
         std::array::from_fn(|axis| self.basis.at(self.cells[axis], cell[axis], xi[axis]))
     }
@@ -113,20 +137,48 @@ impl Functions {
     }
 }
 
+/// `sum_i c_i f_i` over the functions of a cell with `C` coefficients each; f are the products of the `W`
+/// factors along each axis.
+#[inline(always)]
+pub(crate) fn sum<const C: usize, const W: usize>(
+    rows: &[usize; ROWS],
+    factors: [&[f64; FUNCTIONS_1D]; DIM],
+    coefficients: &[f64],
+) -> [f64; C] {
+    let weights = products_of::<W>(factors);
+    let mut sum = [0.0; C];
+    for (first, weights) in rows.iter().zip(weights.chunks_exact(W)).take(W.pow(DIM as u32 - 1)) {
+        let coefficients = coefficients[C * first..][..C * W].chunks_exact(C);
+        for (coefficients, weight) in coefficients.zip(weights) {
+            sum.iter_mut().zip(coefficients).for_each(|(s, c)| *s += weight * c);
+        }
+    }
+    sum
+}
+
 /// Products of one factor per axis, x fastest; each axis has `width` factors.
 #[must_use]
 pub fn products(factors: [&[f64; FUNCTIONS_1D]; DIM], width: usize) -> [f64; FUNCTIONS] {
+    match width {
+        2 => products_of::<2>(factors),
+        _ => products_of::<FUNCTIONS_1D>(factors),
+    }
+}
+
+/// A constant width, so that the loops are unrolled.
+#[inline(always)]
+fn products_of<const W: usize>(factors: [&[f64; FUNCTIONS_1D]; DIM]) -> [f64; FUNCTIONS] {
     let mut products = [0.0; FUNCTIONS];
-    products[..width].copy_from_slice(&factors[0][..width]);
-    let mut inner = width;
+    products[..W].copy_from_slice(&factors[0][..W]);
+    let mut inner = W;
     for factor in &factors[1..] {
-        // from the last one, so that the first `inner` products are read before they change
-        for k in (0..width).rev() {
+        // from the last row on, so that the first is read before it changes
+        for k in (0..W).rev() {
             for f in 0..inner {
                 products[k * inner + f] = products[f] * factor[k];
             }
         }
-        inner *= width;
+        inner *= W;
     }
     products
 }

@@ -10,6 +10,7 @@ mod rule;
 pub use active::Active;
 pub use basis::{Basis, Local};
 pub use extraction::{extraction, Extraction};
+pub(crate) use functions::sum;
 pub use functions::{products, CellFunctions, Functions};
 pub use location::Location;
 pub use rule::{Rule, MAX_POINTS};

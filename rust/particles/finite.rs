@@ -31,7 +31,8 @@ pub(super) fn write(
             out.copy_from_slice(&trial.nominal(&tau));
         }
         (Operator::Nominal | Operator::NominalDeviator, Part::Volume) => {
-            out.copy_from_slice(&trial.nominal_change(&tau, &c, &[[0.0; DIM]; DIM], 1.0));
+            let change = Stress { deviator: c.dev_vol, mean: c.mean_vol };
+            out.copy_from_slice(&trial.nominal(&change));
         }
         (Operator::Nominal | Operator::NominalDeviator, Part::Gradient) => {
             for k in 0..GRADIENT {

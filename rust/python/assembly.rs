@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 
 use super::array::{Read1, Read2, Write1};
 use super::grid::PyLocation;
+use super::threads::detached;
 use super::transfer::{check_data, points_per_axis};
 use super::{require, view, InputError};
 use crate::assembly::{
@@ -180,7 +181,7 @@ impl PyAssembler {
         let kernels = kernels.with(self, 1, &data)?;
         let state = self.state(&volume, &coefficients)?;
         // SAFETY: kernels as in `PyKernels::new`, of rank 1; the number of coefficients was checked.
-        let sums = py.detach(|| unsafe { assembly::vector(&state, &kernels) });
+        let sums = detached(py, || unsafe { assembly::vector(&state, &kernels) });
         Ok(sums.to_pyarray(py))
     }
 
@@ -195,7 +196,7 @@ impl PyAssembler {
                 "internal: not a selection of these coefficients (please report this)",
             ));
         };
-        let pattern = py.detach(|| assembly::pattern(&self.cells, &self.location, &selection));
+        let pattern = detached(py, || assembly::pattern(&self.cells, &self.location, &selection));
         let Some(pattern) = pattern else {
             return Err(InputError::new_err(
                 "the reduced matrix has more than 2147483647 entries: expected a coarser grid",
@@ -233,7 +234,7 @@ impl PyAssembler {
         let state = self.state(&volume, &coefficients)?;
         // SAFETY: kernels as in `PyKernels::new`, of the ranks asked for; `assembly::pattern` made the
         // pattern for this location, and the lengths were checked.
-        let fits = py.detach(|| unsafe {
+        let fits = detached(py, || unsafe {
             assembly::matrix(&state, &form, &pattern.selection, &pattern.pattern, values)
         });
         require(fits, "not the pattern of this matrix")

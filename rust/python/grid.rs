@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 
 use super::array::{Read1, Read2};
 use super::require;
+use super::threads::detached;
 use crate::error::Error;
 use crate::grid::{Active, Basis, Functions, Grid, Location, Rule, MAX_CELLS};
 use crate::space::{count, index_of, Index, Point, DIM, FUNCTIONS_1D};
@@ -27,7 +28,7 @@ impl PyGrid {
     /// Cells of points [m] and positions in them.
     fn locate(&self, py: Python, x: Read2<f64>) -> PyResult<PyLocation> {
         let x = points(&x)?;
-        Ok(PyLocation(Arc::new(py.detach(|| self.0.locate(&x))?)))
+        Ok(PyLocation(Arc::new(detached(py, || self.0.locate(&x))?)))
     }
 }
 

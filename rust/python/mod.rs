@@ -7,6 +7,7 @@ mod grid;
 mod law;
 mod particles;
 mod stage;
+mod threads;
 mod transfer;
 
 use ndarray::Dimension;

@@ -11,6 +11,7 @@ use super::grid::PyLocation;
 use super::law::{laws, PyMaterial};
 use super::particles::PyParticles;
 use super::require;
+use super::threads::detached;
 use super::transfer::field;
 use crate::grid::{Basis, Location};
 use crate::law::{Law, MAX_HISTORY};
@@ -123,7 +124,7 @@ impl PyStage {
         of: impl Fn(usize) -> [f64; N] + Sync + Send,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let n = self.location.len();
-        let rows: Vec<[f64; N]> = py.detach(|| (0..n).into_par_iter().map(of).collect());
+        let rows: Vec<[f64; N]> = detached(py, || (0..n).into_par_iter().map(of).collect());
         rows.as_flattened().to_pyarray(py).reshape([n, N])
     }
 }
@@ -190,7 +191,7 @@ impl PyStage {
             return Ok(());
         }
         let stage = self.stage(&u, volumetric.as_ref(), given.as_ref())?;
-        Ok(py.detach(|| stage.evaluate(particles, outputs))?)
+        Ok(detached(py, || stage.evaluate(particles, outputs))?)
     }
 
     /// Accept the increments: stress, displacement and eps_v of the particles. Returns the energy that the
@@ -206,7 +207,7 @@ impl PyStage {
         let mut particles = self.particles.try_borrow_mut(py)?;
         let particles = &mut particles.0;
         let stage = self.stage(&u, volumetric.as_ref(), given.as_ref())?;
-        Ok(py.detach(|| stage.commit(particles))?)
+        Ok(detached(py, || stage.commit(particles))?)
     }
 
     /// Energy that the laws store in the particles [J per metre depth].

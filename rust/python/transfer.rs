@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use super::array::{Read1, Read2, Write2};
 use super::grid::PyLocation;
 use super::require;
+use super::threads::detached;
 use crate::grid::{Basis, Functions, Grid, Location, Rule, MAX_POINTS};
 use crate::space::{Index, DIM, GRADIENT};
 use crate::transfer::cells::{cell_sums as sums_of_cells, mean_of_cell};
@@ -39,11 +40,11 @@ pub(super) fn interpolate<'py>(
     let values = match components {
         1 => {
             let field = field::<1>(location.grid, basis, &coefficients)?;
-            py.detach(|| field.at_particles(location)).into_flattened()
+            detached(py, || field.at_particles(location)).into_flattened()
         }
         DIM => {
             let field = field::<DIM>(location.grid, basis, &coefficients)?;
-            py.detach(|| field.at_particles(location)).into_flattened()
+            detached(py, || field.at_particles(location)).into_flattened()
         }
         _ => return Err(PyRuntimeError::new_err("internal: components of no field")),
     };
@@ -60,7 +61,7 @@ pub(super) fn gradients<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let location = &*location.0;
     let u = field::<DIM>(location.grid, basis.parse()?, &coefficients)?;
-    let gradients = py.detach(|| u.gradients(location));
+    let gradients = detached(py, || u.gradients(location));
     gradients.as_flattened().as_flattened().to_pyarray(py).reshape([location.len(), GRADIENT])
 }
 
@@ -115,7 +116,7 @@ pub(super) fn densities(
     let end = offset.checked_add(length);
     require(end.is_some_and(|end| end <= width), "packed array too narrow")?;
     let place = (offset, length);
-    py.detach(|| {
+    detached(py, || {
         if per_axis == 0 {
             return pack(rows, place, width, out, |a, row| {
                 mean_of_cell(location, a, volume, data, &columns, row);
@@ -141,7 +142,7 @@ pub(super) fn nodal_sums<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (weight, data) = particle_data(location, &weight, &data)?;
     let basis = basis.parse()?;
-    Ok(py.detach(|| sums_of_functions(&location.0, weight, data, basis)).to_pyarray(py))
+    Ok(detached(py, || sums_of_functions(&location.0, weight, data, basis)).to_pyarray(py))
 }
 
 /// `sum_p w_p D_p` over the particles of each cell of the grid: cells x columns.
@@ -153,7 +154,7 @@ pub(super) fn cell_sums<'py>(
     data: Read2<f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (weight, data) = particle_data(location, &weight, &data)?;
-    Ok(py.detach(|| sums_of_cells(&location.0, weight, data)).to_pyarray(py))
+    Ok(detached(py, || sums_of_cells(&location.0, weight, data)).to_pyarray(py))
 }
 
 fn particle_data<'a>(

@@ -6,7 +6,7 @@ use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 
 use crate::grid::{products, Basis, Functions, Location};
-use crate::space::{Index, Point, FUNCTIONS};
+use crate::space::{indices, Index, Point, FUNCTIONS};
 
 /// Sums `sum_p V_p D_p N_i(x_p)` for the functions of a basis: functions x columns.
 ///
@@ -43,17 +43,21 @@ pub fn nodal_sums(
     };
     let rows = location.rows();
     let of_rows: Vec<Vec<f64>> = rows.par_iter().map(of_row).collect();
-    let mut sums = Array2::zeros((functions.len(), columns));
+    let mut sums = vec![0.0; functions.len() * columns];
+    // the functions of a row of cells, line by line along x
+    let mut lines = strip.size().map(|n| [0, n - 1]);
+    lines[0] = [0, 0];
+    let (lines, length) = (indices(lines), columns * strip.size()[0]);
     for (row, part) in rows.iter().zip(&of_rows) {
         let mut first = location.active_index(row.start).map(|i| basis.first(i));
         first[0] = 0;
-        for (inside, part) in strip.indices().zip(part.chunks_exact(columns.max(1))) {
-            let index = std::array::from_fn(|axis| first[axis] + inside[axis]);
-            let mut of_function = sums.row_mut(functions.number(index));
-            of_function.iter_mut().zip(part).for_each(|(s, d)| *s += d);
+        for (line, part) in lines.clone().zip(part.chunks_exact(length.max(1))) {
+            let index = std::array::from_fn(|axis| first[axis] + line[axis]);
+            let of_line = &mut sums[columns * functions.number(index)..][..length];
+            of_line.iter_mut().zip(part).for_each(|(s, d)| *s += d);
         }
     }
-    sums
+    Array2::from_shape_vec((functions.len(), columns), sums).unwrap_or_default()
 }
 
 /// An index along x; the same `others` along the other axes.

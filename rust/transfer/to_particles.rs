@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::grid::{products, Basis, Functions, Grid, Location};
+use crate::grid::{sum, Basis, Functions, Grid, Location};
 use crate::space::{Index, Point, DIM, FUNCTIONS_1D};
 
 /// Coefficients of a field with `C` components: function (x fastest), then component.
@@ -24,37 +24,38 @@ impl<const C: usize> Field<'_, C> {
         Functions { basis: self.basis, cells: self.grid.cells }
     }
 
-    /// `sum_i c_i f_i`, f the products of the given factors along the axes.
-    fn sum(&self, functions: &[usize], factors: [&[f64; FUNCTIONS_1D]; DIM]) -> [f64; C] {
-        let weights = products(factors, self.basis.per_cell());
-        let mut sum = [0.0; C];
-        for (&function, weight) in functions.iter().zip(weights) {
-            for (k, s) in sum.iter_mut().enumerate() {
-                *s += weight * self.coefficients[C * function + k];
-            }
-        }
-        sum
-    }
-
     /// Value at a position in a cell.
     #[must_use]
     pub fn value(&self, cell: Index, xi: Point) -> [f64; C] {
-        let functions = self.functions();
-        let along = functions.at(cell, xi);
-        self.sum(&functions.on_cell(cell), along.each_ref().map(|local| &local.value))
+        match self.basis.per_cell() {
+            2 => self.value_of::<2>(cell, xi),
+            _ => self.value_of::<FUNCTIONS_1D>(cell, xi),
+        }
     }
 
     /// Gradient at a position in a cell: `[k][a]` = d component k / d x_a.
     #[must_use]
     pub fn gradient(&self, cell: Index, xi: Point) -> [[f64; DIM]; C] {
+        match self.basis.per_cell() {
+            2 => self.gradient_of::<2>(cell, xi),
+            _ => self.gradient_of::<FUNCTIONS_1D>(cell, xi),
+        }
+    }
+
+    fn value_of<const W: usize>(&self, cell: Index, xi: Point) -> [f64; C] {
         let functions = self.functions();
-        let along = functions.at(cell, xi);
-        let numbers = functions.on_cell(cell);
+        let (along, rows) = (functions.at(cell, xi), functions.rows::<W>(cell));
+        sum::<C, W>(&rows, along.each_ref().map(|local| &local.value), self.coefficients)
+    }
+
+    fn gradient_of<const W: usize>(&self, cell: Index, xi: Point) -> [[f64; DIM]; C] {
+        let functions = self.functions();
+        let (along, rows) = (functions.at(cell, xi), functions.rows::<W>(cell));
         let mut gradient = [[0.0; DIM]; C];
         for axis in 0..DIM {
             let mut factors = along.each_ref().map(|local| &local.value);
             factors[axis] = &along[axis].derivative;
-            let sum = self.sum(&numbers, factors);
+            let sum = sum::<C, W>(&rows, factors, self.coefficients);
             for (row, s) in gradient.iter_mut().zip(sum) {
                 row[axis] = s / self.grid.h;
             }

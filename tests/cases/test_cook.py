@@ -52,7 +52,7 @@ def test_the_elements_import_nothing_of_tawami():
 )
 def test_error_at_h_2_and_order_towards_h_1(method, body, error, order):
     """[%]. Where all integrals are exact the order is that of finite elements; with alpha = 0.1 the
-    error of the Laplacian, of second order, is larger. The numbers are the code's own: they stand in
+    error of the Laplacian, of second order, is larger. The numbers are results of the code; they are in
     the table of `python -m cases.verification.cook`, against the limit of finite elements.
     """
     coarse, fine = (mpm.solve(method, NU, h, body)[0].error_percent for h in (2.0, 1.0))

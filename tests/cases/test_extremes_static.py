@@ -63,7 +63,7 @@ def test_extremes_that_survive(subject, setting):
     assert {s: row.outcome for s, row in found.items() if row.outcome != "survived"} == {}
 
 
-@pytest.mark.parametrize(("subject", "setting", "sentence"), [
+@pytest.mark.parametrize(("subject", "setting", "message"), [
     ("poisson", "^u: 1 - 2 nu = 1e-10", "K/mu is 1.0e.10: .* has no digits left.* use form 'u_epsv'"),
     ("poisson", "held all around", "the tangent is singular"),
     ("alpha", "residual_based: alpha = (1|1000)$", "expected at most 0.14.* use a smaller alpha"),

@@ -25,7 +25,7 @@ def test_the_mode_is_that_of_a_cantilever(nu):
     assert np.gradient(w, x, edge_order=2) == pytest.approx(dw, abs=1e-6)
     assert np.gradient(phi, x, edge_order=2) == pytest.approx(dphi, abs=1e-6)
     assert (dphi[-1], dw[-1] - phi[-1]) == pytest.approx((0, 0), abs=1e-9)  # moment and shear
-    # Rayleigh's quotient, E bar and kappa G of plane strain written out once more
+    # Rayleigh's quotient, E bar and kappa G of plane strain written out independently
     K, mu = beam.lame(nu)
     bending = 4 * mu * (K + mu / 3) / (K + 4 / 3 * mu) * beam.D**3 / 12
     elastic = bending * dphi**2 + 5 / (6 - nu) * mu * beam.D * (dw - phi) ** 2

@@ -1,4 +1,4 @@
-"""The check of a weak form: shipped ones pass, and each kind of mistake fails on its own line."""
+"""`tawami form check`: shipped forms pass, and each kind of mistake fails on its own line."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_shipped_forms_can_be_used(name):
     assert notes == expected, str(report)
 
 
-def test_b_bar_and_its_known_miss():
+def test_b_bar_fails_the_loaded_patch_test_as_known():
     report = tawami.check_form("u_bbar")
     exact, miss = [line for line in report.lines if line.subject == "patch test, loaded"]
     assert (exact.verdict, miss.verdict) == ("ok", "note")
@@ -45,8 +45,8 @@ def test_b_bar_and_its_known_miss():
     assert "quadratic splines: 2.0e-01" in miss.words
 
 
-def test_the_constant_of_taylor_and_hood():
-    """A biquadratic displacement is that element: 0.43 as `python -m cases.extremes` prints it."""
+def test_the_inf_sup_constant_of_taylor_hood():
+    """0.43 is the code's own number, which `python -m cases.extremes` prints."""
     form = tawami.Form.load("u_epsv")
     assert scenes.inf_sup(form, {"alpha": 0.0, "basis": "biquadratic"}) == pytest.approx(
         0.43, abs=0.02
@@ -110,7 +110,7 @@ def test_wrong_terms_fail_on_their_line(residual, failed):
         assert all(line.verdict == "ok" for line in report.lines if line.subject == fine)
 
 
-def test_what_costs_only_is_a_note():
+def test_a_term_that_only_costs_gives_a_note():
     def twice_the_volume(u, eps_v, w, q, sigma, K, sum_p):
         return sum_p(sigma, grad(w)) + sum_p(K, 2 * q * (div(u) - eps_v))
 
@@ -119,11 +119,11 @@ def test_what_costs_only_is_a_note():
     for subject in ("symmetry", "patch test, loaded", "stability"):
         assert report.line(subject).verdict == "note"
     assert "twice the time" in report.line("symmetry").words
-    assert "traction(...) will be refused" in report.line("patch test, loaded").words
+    assert "traction(...) will be rejected" in report.line("patch test, loaded").words
 
 
 def test_a_wrong_tangent_fails(monkeypatch):
-    """The derived one is right: here it loses what the law adds to it."""
+    """The derived tangent is right: here it loses the derivative of the law."""
     monkeypatch.setattr(
         tangent.Linearisation, "_direction", lambda self, density: 0.9 * right(self, density)
     )
@@ -161,7 +161,7 @@ right = tangent.Linearisation._direction
         ),
     ],
 )
-def test_what_cannot_be_compiled(form, subject, words):
+def test_a_form_that_cannot_be_compiled_fails_on_its_line(form, subject, words):
     report = tawami.check_form(form)
     assert report.line(subject).verdict == "FAILED"
     assert words in report.line(subject).words
@@ -170,7 +170,7 @@ def test_what_cannot_be_compiled(form, subject, words):
     assert "it cannot be used: 1 FAILED" in str(report)
 
 
-def test_parameters_and_a_sum_that_is_not_exact():
+def test_parameters_and_inexact_sums_are_reported():
     with pytest.raises(tawami.InputError, match="has no parameter 'beta'"):
         tawami.check_form("u_epsv", beta=1.0)
     assert "alpha = 2: expected at most 1" in str(tawami.check_form("u_epsv", alpha=2.0))
@@ -184,7 +184,7 @@ def test_parameters_and_a_sum_that_is_not_exact():
 
 
 def test_the_plastic_law_yields_in_the_check():
-    """Half of the particles at least: their tangent is not the elastic one."""
+    """The tangent of at least half of the particles is not the elastic one."""
     form = tawami.Form.load("u_epsv_finite")
     elastic, plastic = (scenes.cloud(form, {}, law) for law in (None, scenes.soil(form)))
     c = (

@@ -1,4 +1,4 @@
-"""Cells that the body fills in part: the ghost penalty, scaling, slivers, particles alone."""
+"""Partially filled cells: the ghost penalty, scaling, slivers, single particles."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ GHOST = {"form": "u_epsv", "ghost_penalty": "on", "k": 0.5}
 
 @pytest.fixture
 def corner(random_scene):
-    """Scenes of particles in one corner of a grid, with the ghost penalty and without."""
+    """Scenes of particles in one corner of a grid, with or without the ghost penalty."""
     grid = grid_of((6, 5))
     x = grid.origin + np.random.default_rng(0).random((80, 2)) * [1.9, 1.4]
     body = tawami.Body(x, np.full(80, 0.05))
@@ -31,7 +31,7 @@ def corner(random_scene):
 
 
 def penalty(corner, **options):
-    """Its matrix alone."""
+    """A scene with the ghost penalty, and the matrix of the penalty alone."""
     with_it, without = corner(**GHOST, **options), corner(form="u_epsv", **options)
     c = np.zeros(with_it.num_coefficients)
     return with_it, (with_it.tangent(c) - without.tangent(c)).toarray()
@@ -39,7 +39,7 @@ def penalty(corner, **options):
 
 @pytest.mark.parametrize("basis", BASES)
 @pytest.mark.parametrize("path", ["fast", "reference"])
-def test_residual_and_tangent_belong_together(corner, basis, path):
+def test_the_tangent_is_the_derivative_of_the_residual(corner, basis, path):
     scene, matrix = penalty(corner, basis=basis, assembly=path)
     c = np.random.default_rng(1).standard_normal(scene.num_coefficients)
     other = corner(form="u_epsv", basis=basis, assembly=path)
@@ -49,7 +49,7 @@ def test_residual_and_tangent_belong_together(corner, basis, path):
 
 
 def second_derivative(n, h, coefficients, x):
-    """Of a clamped quadratic spline, by scipy."""
+    """Second derivative of a clamped quadratic spline, by SciPy."""
     knots = h * np.concatenate([[0, 0], np.arange(n + 1), [n, n]])
     return BSpline(knots, coefficients, 2).derivative(2)(x)
 
@@ -59,7 +59,7 @@ def spline(n, h, coefficients, x):
     return BSpline(knots, coefficients, 2)(x)
 
 
-def test_it_is_the_integral_of_the_jumps(corner):
+def test_the_penalty_is_the_integral_of_the_jumps(corner):
     """sum over sides of k mu h^3 int [u,nn].[u,nn], and of -k K^2/mu h^3 int [eps_v,n]^2."""
     scene, matrix = penalty(corner)
     grid, layout = scene.grid, scene.configuration.domain.layout
@@ -91,7 +91,7 @@ def test_it_is_the_integral_of_the_jumps(corner):
     assert c @ matrix @ c == pytest.approx(expected, rel=1e-9)
 
 
-def test_which_cells_are_partly_filled():
+def test_partly_filled_cells_are_beside_empty_ones():
     active = np.ones((4, 5), dtype=bool)
     active[3, 4] = False
     partly = ghost.partially_filled(active)
@@ -110,7 +110,7 @@ def test_which_cells_are_partly_filled():
         (lambda u, w, dG, jump_nn, mu: jump_nn(w)[0] * dG, "linear in the fields"),
     ],
 )
-def test_terms_on_sides_that_are_not_linear_get_a_sentence(random_scene, term, words):
+def test_terms_on_sides_that_are_not_linear_are_rejected(random_scene, term, words):
     from ufl import grad
 
     def residual(u, w, sigma, mu, sum_p, dG, jump_nn):
@@ -125,8 +125,8 @@ def test_terms_on_sides_that_are_not_linear_get_a_sentence(random_scene, term, w
     ("method", "condition", "change"),
     [("u_epsv", 1e3, 30), ("u_epsv, ghost", 100, 20), ("u", 3e3, 10)],
 )
-def test_a_block_that_slides_over_the_grid(method, condition, change):
-    """Answer and scaled condition stay bounded; the matrix before scaling does not."""
+def test_a_block_may_lie_anywhere_on_the_grid(method, condition, change):
+    """Deflection and scaled condition stay bounded; the condition before scaling does not."""
     rows = [cut_cells.solve(method, 0.0)]
     rows += [cut_cells.solve(method, o, rows[0].stretch) for o in (0.1, 0.3, 0.5, 0.7, 0.9)]
     assert max(row.condition for row in rows) < condition
@@ -135,8 +135,8 @@ def test_a_block_that_slides_over_the_grid(method, condition, change):
         assert max(row.unscaled for row in rows) > 1e11
 
 
-def test_a_sliver_of_1e_8_of_a_cell():
-    """As if the particles were not there yet; well conditioned with the ghost penalty."""
+def test_a_sliver_of_1e_8_of_a_cell_changes_little():
+    """The deflection stays; the matrix is well conditioned with the ghost penalty."""
     for method, condition in (("u_epsv, ghost", 100), ("u_epsv", 1e10), ("u", 3e3)):
         before, after = (cut_cells.solve(method, 0.25 + s) for s in (-1e-8, 1e-8))
         assert after.stretch == pytest.approx(before.stretch, rel=0.02), method
@@ -145,7 +145,7 @@ def test_a_sliver_of_1e_8_of_a_cell():
 
 @pytest.mark.parametrize("penalty", ["off", "on"])
 def test_a_particle_alone_in_its_cell_does_not_stop_a_motion(penalty):
-    """It flies as a point mass does, the block beside it as well."""
+    """It moves as a point mass does, and so does the block beside it."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(16, 16))
     block = tawami.box(grid, (0.25, 1.0), (0.75, 1.5))
     x = np.vstack([block.x, [1.31, 1.27]])

@@ -22,25 +22,25 @@ def compare(scene: tawami.Scene, options: dict[str, object]) -> None:
 
 
 @pytest.mark.parametrize("assembly", ["reference", "fast"])
-def test_random_particles_of_two_materials(random_scene, form, basis, assembly):
+def test_the_tangent_of_random_particles_of_two_materials(random_scene, form, basis, assembly):
     compare(random_scene(basis=basis, assembly=assembly, **form), form)
 
 
 @pytest.mark.parametrize("name", FORMS)
-def test_one_particle_in_a_cell(random_scene, name):
+def test_the_tangent_of_single_particles_in_their_cells(random_scene, name):
     x = np.array([[-0.9, 0.6], [-0.9, 1.9], [0.95, 1.27], [0.1, 0.77], [0.2, 0.83]])
     compare(random_scene(x=x, **FORMS[name]), FORMS[name])
 
 
 @pytest.mark.parametrize("name", ["u_epsv", "u_bbar", "u_epsv_projection"])
-def test_particles_on_edges_and_corners_of_cells(random_scene, name):
+def test_the_tangent_of_particles_on_edges_and_corners_of_cells(random_scene, name):
     x = np.array([[-1, 0.5], [1, 2], [-0.5, 1], [0, 1.2], [-0.3, 1.5], [1, 0.5], [0.25, 2.0]])
     compare(random_scene(x=x, **FORMS[name]), FORMS[name])
 
 
 @settings(max_examples=examples(15))
 @given(data=st.data())
-def test_any_cloud_of_particles(data):
+def test_the_tangent_of_any_cloud_of_particles(data):
     grid, x = data.draw(clouds(cells=(4, 3), most=12))
     basis = data.draw(st.sampled_from(BASES))
     laws = [tawami.linear_elastic(E=2.0, nu=0.3), tawami.linear_elastic(E=7.0, nu=0.49)]

@@ -1,20 +1,17 @@
-"""The fast path gives what plain dolfinx assembly with P^T K P gives, to round-off and to the bit
-whatever the number of threads.
+"""The fast assembly agrees with plain dolfinx and P^T K P, to round-off; its bits do not depend on the
+number of threads.
 """
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from contextlib import nullcontext
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from profiles import examples
+from programs import python
 from scenes import BASES, FORMS, clouds, grid_of
 from scipy.sparse import csr_matrix, identity
 
@@ -36,7 +33,7 @@ SUPPORTS = {
 
 
 def both(make):
-    """The same scene on both paths."""
+    """The same scene with both assemblies."""
     return [make(assembly=path) for path in ("fast", "reference")]
 
 
@@ -45,7 +42,7 @@ def close(a, b):
 
 
 def reduced(scene, c):
-    """P^T K P as the field side gives it to the solver, at increments c."""
+    """P^T K P at increments c, as the solver gets it."""
     reduction = scene.reduction()
     scene.configuration.domain.newton.internal(c)
     field, data = scene.configuration.domain.assembly, scene.configuration.domain.responses.data
@@ -54,7 +51,7 @@ def reduced(scene, c):
 
 
 @pytest.mark.parametrize("support", SUPPORTS)
-def test_residual_and_reduced_tangent(random_scene, form, basis, support):
+def test_residual_and_reduced_tangent_agree(random_scene, form, basis, support):
     scenes = both(lambda **path: random_scene(basis=basis, count=150, **form, **path))
     for scene in scenes:
         SUPPORTS[support](scene)
@@ -64,7 +61,7 @@ def test_residual_and_reduced_tangent(random_scene, form, basis, support):
     close(*[scene.tangent(c).toarray() for scene in scenes])
 
 
-def test_a_form_nonlinear_in_the_fields(random_scene):
+def test_a_form_nonlinear_in_the_fields_agrees(random_scene):
     """Fields as coefficients of the tangent, two rules, cell means, a constant of the form."""
     from ufl import div, dot, grad
 
@@ -85,7 +82,7 @@ def test_a_form_nonlinear_in_the_fields(random_scene):
 
 @settings(max_examples=examples(20))
 @given(data=st.data())
-def test_any_cloud_of_particles(data):
+def test_any_cloud_of_particles_agrees(data):
     grid, x = data.draw(clouds(cells=(7, 7), most=20))
     options = FORMS[data.draw(st.sampled_from(sorted(FORMS)))]
     basis = data.draw(st.sampled_from(BASES))
@@ -98,7 +95,7 @@ def test_any_cloud_of_particles(data):
 
 
 @pytest.mark.parametrize("support", ["paper", "exact", "clamped"])
-def test_the_beam(support):
+def test_the_deflections_of_the_beam_agree(support):
     from cases.verification.cantilever import mpm
 
     rows = [mpm.solve("u_epsv", support, 8, 0.1, assembly=p)[0] for p in ("fast", "reference")]
@@ -107,7 +104,7 @@ def test_the_beam(support):
 
 
 def test_newton_reuses_the_pattern(random_scene):
-    """Several iterations on one pattern: each tangent is that of the reference."""
+    """Several iterations on one pattern: each tangent agrees."""
     from ufl import div, dot, grad
 
     def stiff(u, w, sigma, mu, sum_p, t, ds):
@@ -130,7 +127,7 @@ def test_newton_reuses_the_pattern(random_scene):
     close(solutions[0].u, solutions[1].u)
 
 
-def test_the_same_bits_whatever_the_number_of_threads():
+def test_bits_do_not_depend_on_the_number_of_threads():
     """Residual, tangent, a reduced tangent with points held in every row of cells, steps of a motion."""
     code = """
 import hashlib, logging; logging.disable(logging.INFO)
@@ -165,19 +162,15 @@ for form in ("u_epsv_finite", "u_bbar_finite"):
     total.update(scene.particles.rows().tobytes())
 print(total.hexdigest())
 """
-    outputs = set()
-    for threads in ("1", "2", "7", "2"):
-        environment = os.environ | {"RAYON_NUM_THREADS": threads}
-        run = subprocess.run(
-            [sys.executable, "-c", code], env=environment, cwd=Path(__file__).parents[2],
-            capture_output=True, text=True, check=True,
-        )  # fmt: skip
-        outputs.add(run.stdout.splitlines()[-1])  # MPI may have had its say before
-    assert len(outputs) == 1
+    found = set()
+    for threads in ("1", "2", "7"):
+        run = python("-c", code, variables={"RAYON_NUM_THREADS": threads}, check=True)
+        found.add(run.stdout.splitlines()[-1])  # MPI may print lines before
+    assert len(found) == 1
 
 
-def test_one_field_with_several_reductions_in_turn(random_scene):
-    """Another pattern, the first again, and values that the solver scaled in between."""
+def test_one_field_serves_several_reductions_in_turn(random_scene):
+    """A second pattern, the first again, and values that the solver scaled between them."""
     scenes = both(lambda **path: random_scene(count=150, **path))
     c = np.random.default_rng(0).standard_normal(scenes[0].num_coefficients)
     for scene in scenes:
@@ -203,7 +196,7 @@ def test_one_field_with_several_reductions_in_turn(random_scene):
     assert values[0] == pytest.approx(values[1], rel=1e-9)
 
 
-def test_solving_again_with_other_supports():
+def test_the_solutions_after_a_change_of_supports_agree():
     def run(path):
         grid = grid_of()
         body = tawami.box(grid, grid.origin, grid.upper)
@@ -220,7 +213,7 @@ def test_solving_again_with_other_supports():
     assert np.abs(fast.u - reference.u).max() < 1e-10 * np.abs(reference.u).max()
 
 
-def test_arrays_that_do_not_fit_are_refused_and_never_panic(random_scene):
+def test_arrays_that_do_not_fit_raise_an_error(random_scene):
     scene = random_scene(form="u")
     field, c = scene.configuration.domain.assembly, np.zeros(scene.num_coefficients)
     scene.residual(c)
@@ -251,7 +244,7 @@ def test_arrays_that_do_not_fit_are_refused_and_never_panic(random_scene):
         field._assembler.pattern(_selection(identity(3, format="csr"), np.arange(3)))
 
 
-def test_an_unknown_path_is_refused(random_scene):
+def test_an_unknown_assembly_is_rejected(random_scene):
     with pytest.raises(
         tawami.InputError, match="assembly = 'quick': expected 'fast' or 'reference'"
     ):

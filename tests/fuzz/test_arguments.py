@@ -1,7 +1,7 @@
 """Any argument of any function that a driver script calls works, or an error message names it.
 
-Each function has good arguments in a table, and one of them is replaced. A rejected call has changed
-nothing. `make test` draws a few examples for each function, always the same; `make fuzz` draws many.
+Each function has good arguments in a table, and one of them is replaced. `make test` draws a
+few examples for each function, always the same; `make fuzz` draws many.
 """
 
 from __future__ import annotations
@@ -306,21 +306,19 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
 }  # fmt: skip
 #: Words for an argument in messages that do not name it.
 CALLED = {
-    "place": "release|reaction|edge", "lower": "box", "upper": "box",
-    "shape": "polygon|vertices", "holes": "hole", "radius": "disc", "centre": "disc", "inner": "disc",
-    "f": "level_set", "ends": "level_set|edge", "source": "mesh|initial|stress", "column": "table",
-    "quantity": "particles|grid|table|Output",
-    "coefficients": "residual", "particles": "load", "force": "load", "function": "run|series",
-    "stabilisation": "stabilisation", "label": "series", "main": "run", "path": "'|folder|name",
-    "acceleration": "gravity", "body": "Body|Scene|particles|volume", "grid": "Grid|grid|mesh",
-    "body.x": "x", "value": "fix|traction|hold|Newton", "edge": "edge|wall", "cells": "grid",
-    "folder": "folder|'",
+    "place": "release|reaction|edge", "lower": "box", "upper": "box", "shape": "polygon|vertices",
+    "holes": "hole", "radius": "disc", "centre": "disc", "inner": "disc", "f": "level_set",
+    "ends": "level_set|edge", "source": "mesh|initial|stress", "column": "table",
+    "quantity": "particles|grid|table|Output", "coefficients": "residual", "particles": "load",
+    "force": "load", "function": "run|series", "stabilisation": "stabilisation", "label": "series",
+    "main": "run", "path": "'|folder|name", "acceleration": "gravity",
+    "body": "Body|Scene|particles|volume", "grid": "Grid|grid|mesh", "body.x": "x",
+    "value": "fix|traction|hold|Newton", "edge": "edge|wall", "cells": "grid", "folder": "folder|'",
     "volume": "volume|particle|body", "x": "particle|body", "material": "elastic|particle|law|form",
     "material_of": "particle", "fields": "field|declare|form", "residual": "form",
-    "options": "option|form",
-    "parameters": "parameter|form", "kinematics": "form", "strain": "form", "name": "form|initial",
-    "point": "hold|displacement", "velocity": "velocity|hold|Newton", "tolerance": "within|quantity",
-    "knobs": "knob", "finest": "finest|knob",
+    "options": "option|form", "parameters": "parameter|form", "kinematics": "form", "strain": "form",
+    "name": "form|initial", "point": "hold|displacement", "velocity": "velocity|hold|Newton",
+    "tolerance": "within|quantity", "knobs": "knob", "finest": "finest|knob",
     "density": "density|mass", "h": "origin|h", "origin": "origin",
 }  # fmt: skip
 

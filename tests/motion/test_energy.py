@@ -1,14 +1,103 @@
-"""Energy that nothing gave is told."""
+"""The balance of energy of a motion, and a warning of spurious energy."""
 
 from __future__ import annotations
 
 import warnings
 
+import numpy as np
+import pytest
+from moving_blocks import G, block, falling_on_the_floor
+from mpi4py import MPI
+
 import tawami
 from tawami.motion.energy import Energies, Growth
 
 
-def test_energy_that_nothing_gave_is_told_once():
+def test_gamma_above_one_half_dissipates_energy():
+    energies = []
+    for gamma in (0.5, 1.0):
+        scene = falling_on_the_floor()
+        motion = tawami.Dynamics(scene, velocity=(0.0, -0.05), gamma=gamma)
+        motion.run(0.4, 0.01)
+        energies.append(motion.kinetic_energy)
+    assert energies[1] < 0.5 * energies[0]
+
+
+@pytest.mark.parametrize("form", ["u", "u_epsv"])
+def test_a_form_of_small_strain_conserves_energy(form):
+    """The trapezoidal rule conserves it, and nothing is transferred; alpha takes a little."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(8, 4))
+    body = tawami.box(grid, (0, 0), (1, 0.5))
+    material = tawami.linear_elastic(E=1e6, nu=0.3)
+    scene = tawami.Scene(grid, body, material, form=form, density=1000.0, tolerance=1e-10)
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    motion = tawami.Dynamics(scene, velocity=np.column_stack([0 * body.x[:, 0], body.x[:, 0]]))
+    x = np.array(scene.particles.x)
+    motion.run(0.005, 0.005)
+    start = motion.energies.kinetic + motion.energies.elastic
+    motion.run(1.0, 0.005)
+    now = motion.energies
+    kept = 1e-9 if form == "u" else 0.05
+    assert now.kinetic + now.elastic == pytest.approx(start, rel=kept)
+    assert now.kinetic + now.elastic <= start * (1 + 1e-9)
+    np.testing.assert_array_equal(x, scene.particles.x)
+
+
+def test_the_energy_of_a_thrown_block_is_kinetic_and_external():
+    scene = block(tolerance=1e-9)
+    scene.gravity((0, -G))
+    motion = tawami.Dynamics(scene, velocity=(0.0, 1.0))
+    motion.run(0.2, 0.01)
+    e = motion.energies
+    rise = scene.particles.displacement[:, 1].mean()
+    assert e.external == pytest.approx(-250 * G * rise, rel=1e-9)
+    assert e.kinetic == pytest.approx(125.0 + e.external, rel=1e-9)
+    assert max(map(abs, (e.elastic, e.dissipated, e.transfer, e.impact, e.integration))) < 1e-8
+    assert str(e).startswith("kinetic 125, elastic")
+
+
+def test_the_dissipation_is_the_work_on_plastic_strains():
+    """Displacement only, slow uniform shortening: sigma_y times plastic strain."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(4, 4))
+    body = tawami.box(grid, (0, 0), (1, 1), per_axis=3, gauss=True)
+    law = tawami.von_mises(tawami.linear_elastic(E=1e6, nu=0.3), yield_stress=1e3)
+    scene = tawami.Scene(grid, body, law, form="u_finite", density=1e-6)
+    for edge, component in (("left", "x"), ("bottom", "y"), ("top", "y")):
+        scene.fix(edge, component)
+    scene.fix("right", "x", velocity=-0.1)
+    motion = tawami.Dynamics(scene)
+    motion.run(0.1, 0.02)
+    work = 1e3 * scene.particles.volume @ scene.particles.history("plastic_strain")
+    assert work > 1.0
+    assert motion.energies.dissipated == pytest.approx(work, rel=1e-9)
+
+
+def test_the_impact_of_a_support_that_starts_suddenly_is_known():
+    """An edge that moves at once: 1/2 m (v - v0)^2 of its functions."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(8, 4))
+    body = tawami.box(grid, (0, 0), (1, 0.5))
+    law = tawami.linear_elastic(E=1e6, nu=0.3)
+    scene = tawami.Scene(grid, body, law, form="u", density=1000.0, tolerance=1e-10)
+    scene.fix("left", "x", velocity=0.1)
+    motion = tawami.Dynamics(scene)
+    motion.step(1e-5)
+    t = scene.particles.x[:, 0] / grid.h
+    mass = motion.mass @ np.where(t < 1, (1 - t) ** 2, 0.0)
+    assert motion.energies.impact == pytest.approx(0.5 * mass * 0.1**2, rel=1e-9)
+    assert motion.energies.external == pytest.approx(mass * 0.1**2, rel=0.05)
+
+
+def test_the_energy_of_removed_particles_is_counted():
+    scene = block(leaving="remove")
+    motion = tawami.Dynamics(scene, velocity=(10.0, 0.0))
+    motion.run(0.1, 0.01)
+    e = motion.energies
+    assert e.left == pytest.approx(0.5 * 250 * 100 * len(scene.left) / 64, rel=1e-6)
+    assert abs(e.transfer) + abs(e.integration) < 1e-6 * e.kinetic
+
+
+def test_spurious_energy_gives_one_warning():
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         growth = Growth(1.0)

@@ -69,7 +69,6 @@ def followed(scene, control, size, to):
     ("control", "softening"),
     [("layer", 20.0), ("layer", 60.0), ("arc length", 20.0)],
 )
-@pytest.mark.filterwarnings("ignore:.*soften:tawami.SofteningWarning")
 def test_a_softening_column_beyond_its_peak(control, softening):
     scene = column(softening)
     if control == "layer":
@@ -90,8 +89,7 @@ def test_a_softening_column_beyond_its_peak(control, softening):
     assert scene.particles.stress[:, 3] == pytest.approx(2 * TAU * steps.reached, rel=1e-6)
 
 
-@pytest.mark.filterwarnings("ignore:.*soften:tawami.SofteningWarning")
-def test_a_ramp_stops_at_the_peak_and_says_how_to_go_on():
+def test_a_ramp_stops_at_the_peak_and_says_how_to_continue():
     scene = column(20.0)
     with pytest.warns(tawami.IncompleteWarning, match=r"at 0\.\d+ of the load.*follow\(scene"):
         steps = tawami.ramp(scene, 0.1, smallest=1e-3)

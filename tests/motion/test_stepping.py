@@ -1,4 +1,4 @@
-"""Steps of a size that adapts, loads brought up in them, the stage that comes to rest."""
+"""Adaptive steps, ramps, and the equilibrium at rest."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ELASTIC = tawami.linear_elastic(E=100.0, nu=0.3)
 
 
 class Answer:
-    """What a step gives back, as far as `march` looks."""
+    """The attributes of a step that `march` reads."""
 
     history = ((1.0, None), (1e-9, None))
     krylov = (0,)
@@ -36,13 +36,13 @@ def test_sizes_are_halved_on_failure_and_grow_after_three():
     calls = []
     steps = march(Pace(0.0, 0.25), 1.0, 1e-3, refusing(lambda _: 0.1, calls), NullObserver("s"))
     assert calls[:4] == [0.25, 0.125, 0.0625, 0.0625]
-    assert 0.125 in calls[4:]  # tried again
+    assert 0.125 in calls[4:]  # a larger size is tried again
     assert steps[-1].end == 1.0
     assert sum(step.size for step in steps) == pytest.approx(1.0)
     assert all(step.size <= 0.1 and step.iterations == 1 for step in steps)
 
 
-def test_at_the_smallest_size_the_error_says_where():
+def test_the_error_at_the_smallest_size_names_the_time():
     with pytest.raises(tawami.ConvergenceError) as error:
         march(
             Pace(0.0, 0.5),
@@ -55,7 +55,7 @@ def test_at_the_smallest_size_the_error_says_where():
 
 
 @pytest.mark.parametrize(("size", "count"), [(0.3, 4), (0.1, 10), (1.0, 1)])
-def test_the_end_is_met_exactly_and_without_a_crumb(size, count):
+def test_the_end_is_met_exactly_without_a_tiny_step(size, count):
     steps = march(Pace(0.0, size), 1.0, 0.0, refusing(lambda _: 1.0, []), NullObserver("s"))
     assert len(steps) == count
     assert steps[-1].end == 1.0
@@ -71,7 +71,7 @@ def block(form="u_epsv_finite", **options):
 
 
 @pytest.mark.parametrize("form", ["u_epsv_finite", "u_epsv"])
-def test_loads_in_equilibrium_stay_and_new_loads_grow(form):
+def test_a_ramp_applies_new_loads_in_shares(form):
     scene = block(form)
     tops = []
     scene.gravity((0.0, -2.0))
@@ -82,8 +82,8 @@ def test_loads_in_equilibrium_stay_and_new_loads_grow(form):
     assert scene.solve().reaction("bottom")[1] == pytest.approx(10.0, rel=1e-4)
 
 
-def test_a_prescribed_displacement_comes_once():
-    """In finite strain too it is the displacement from now on, in however many steps it comes."""
+def test_a_prescribed_displacement_is_applied_once():
+    """In finite strain too, in any number of steps."""
     for steps in (1, 5):
         scene = block()
         scene.fix("top", "y", -0.05)
@@ -91,11 +91,11 @@ def test_a_prescribed_displacement_comes_once():
         shortened = np.array(scene.particles.displacement)
         # particles that have left the edge a little are held less by its functions
         assert shortened[:, 1].min() == pytest.approx(-0.05 * 0.9375, rel=0.02 * steps)
-        scene.solve()  # not again
+        scene.solve()  # it is not applied again
         assert scene.particles.displacement == pytest.approx(shortened, abs=0.01)
 
 
-def test_a_load_beyond_the_strength_stops_where_it_is_reached_and_can_be_resumed():
+def test_a_ramp_stops_at_the_limit_load():
     """A von Mises block in uniform shortening under a dead load: the limit is 2/sqrt(3) sigma_y."""
     grid = grid_of((4, 2))
     body = tawami.box(grid, grid.origin, grid.upper, per_axis=3, gauss=True)
@@ -120,7 +120,7 @@ def test_a_load_beyond_the_strength_stops_where_it_is_reached_and_can_be_resumed
     assert scene.solve().reaction("left") == pytest.approx([0.0, 0.0], abs=1e-6)
 
 
-def test_settle_needs_a_grid_that_is_reset_and_says_when_it_gives_up():
+def test_settle_needs_finite_strain_and_ends_after_max_resets():
     with pytest.raises(tawami.InputError, match="expected a scene with a form of finite strain"):
         tawami.settle(block("u"))
     scene = block()
@@ -130,7 +130,7 @@ def test_settle_needs_a_grid_that_is_reset_and_says_when_it_gives_up():
     assert tawami.settle(scene)[-1].history[0][0] < 1e-10
 
 
-def test_reactions_of_edges_and_points_hold_the_weight():
+def test_reactions_balance_the_weight():
     scene = block("u")
     scene.release("bottom")
     scene.hold((0.3, 0.4), "y")
@@ -150,8 +150,8 @@ def test_reactions_of_edges_and_points_hold_the_weight():
         solution.reaction("floor")
 
 
-def test_an_edge_and_a_point_beside_it_share_what_they_give():
-    """What a point gives reaches functions of the edge too, and is not counted twice."""
+def test_an_edge_and_a_point_near_it_share_the_load():
+    """The functions of the edge reach the point, and its reaction is not counted twice."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(8, 4))
     body = tawami.box(grid, (0, 0), (2, 1))
     scene = tawami.Scene(grid, body, ELASTIC, form="u")
@@ -163,7 +163,7 @@ def test_an_edge_and_a_point_beside_it_share_what_they_give():
     assert solution.reaction((0, 0.5)) == pytest.approx([0.0, 2.0], rel=1e-5)
 
 
-def test_an_edge_does_not_move_the_body_away_from_its_functions():
+def test_a_displacement_across_an_edge_is_limited():
     scene = block()
     scene.fix("top", "y", -0.1)
     words = "would have moved the body -0.1 m across its edge.*a quarter of a cell, 0.0625 m"
@@ -171,11 +171,11 @@ def test_an_edge_does_not_move_the_body_away_from_its_functions():
         scene.solve()
     with pytest.raises(tawami.InputError, match="a quarter of a cell"):
         tawami.ramp(scene, 0.25)
-    assert scene.particles.displacement.min() < -0.03  # of the accepted steps
+    assert scene.particles.displacement.min() < -0.03  # the first steps were accepted
 
 
-def test_a_point_of_the_border_is_held_on_its_way_and_found_by_its_names():
-    """Half a cell further its cell has lost its particles, its functions have not."""
+def test_a_held_point_moves_with_the_body():
+    """By half a cell: its cell has lost its particles. It is found by its old and its new place."""
     scene = block()
     scene.configuration.supports.all.clear()
     points = [(0.999, 0.1), (0.999, 0.9)]
@@ -195,7 +195,7 @@ def test_a_point_of_the_border_is_held_on_its_way_and_found_by_its_names():
     scene.release(points[0])
 
 
-def test_wrong_input_raises_an_error():
+def test_wrong_input_is_rejected():
     scene = block()
     with pytest.raises(tawami.InputError, match="size = 2.0: expected a finite number above 0"):
         tawami.ramp(scene, 2.0)

@@ -1,4 +1,4 @@
-"""A law written in NumPy does what one in Rust does."""
+"""Laws written in NumPy, compared with those in Rust."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def elastic(strain, stress):
 
 
 def stiffening(strain, stress):
-    """sigma = (1 + 50 eps:eps) C eps: nonlinear, with a potential of its own kind, no state."""
+    """sigma = (1 + 50 eps:eps) C eps: nonlinear, without history."""
     linear = strain @ ELASTIC
     factor = 1 + 50 * np.sum(strain**2, axis=1)
     tangent = factor[:, None, None] * ELASTIC + 100 * linear[:, :, None] * strain[:, None, :]
@@ -39,7 +39,7 @@ def scene_with(material, form="u_epsv", **options):
 
 
 @pytest.mark.parametrize("form", ["u", "u_bbar", "u_epsv", "u_p"])
-def test_linear_elasticity_in_numpy_is_that_in_rust(form):
+def test_linear_elasticity_in_numpy_agrees_with_rust(form):
     scenes = [
         scene_with(law, form)
         for law in (tawami.NumpyLaw(elastic, K, MU), tawami.linear_elastic(K=K, mu=MU))
@@ -55,7 +55,7 @@ def test_linear_elasticity_in_numpy_is_that_in_rust(form):
 
 
 @pytest.mark.parametrize("form", ["u", "u_bbar", "u_epsv"])
-def test_the_tangent_of_a_nonlinear_law_reaches_newton(form):
+def test_newton_uses_the_tangent_of_a_nonlinear_law(form):
     scene = scene_with(tawami.NumpyLaw(stiffening, K, MU), form)
     random = np.random.default_rng(0)
     c, d = 1e-2 * random.standard_normal((2, scene.num_coefficients))
@@ -75,7 +75,7 @@ def test_newton_converges_quadratically():
 
 
 def test_uniaxial_strain_gives_the_stress_of_the_law():
-    """All of the border displaced linearly: every particle has the strain that was prescribed."""
+    """The border is displaced linearly: every particle has the prescribed strain."""
     grid = grid_of()
     body = tawami.box(grid, grid.origin, grid.upper, per_axis=3, gauss=True)
     scene = tawami.Scene(grid, body, tawami.NumpyLaw(stiffening, K, MU), form="u", tolerance=1e-12)
@@ -103,7 +103,7 @@ def test_uniaxial_strain_gives_the_stress_of_the_law():
         ),
     ],
 )
-def test_what_a_law_returns_is_checked(respond, message):
+def test_wrong_results_of_a_law_are_rejected(respond, message):
     scene = scene_with(tawami.NumpyLaw(respond, K, MU))
     with pytest.raises(tawami.InputError, match=message):
         scene.solve()
@@ -111,6 +111,6 @@ def test_what_a_law_returns_is_checked(respond, message):
 
 
 @pytest.mark.parametrize(("bulk", "mu"), [(0.0, 1.0), (1.0, -1.0), (np.inf, 1.0), ("a", 1.0)])
-def test_moduli_are_checked(bulk, mu):
+def test_wrong_moduli_are_rejected(bulk, mu):
     with pytest.raises(tawami.InputError, match="NumpyLaw: "):
         tawami.NumpyLaw(elastic, bulk, mu)

@@ -1,4 +1,4 @@
-"""Plastic laws in scenes: what Python refuses, history by name, a block beyond its yield stress."""
+"""Plastic laws in scenes: rejected parameters, history by name, a block beyond its yield stress."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ ELASTIC = tawami.linear_elastic(E=100.0, nu=0.3)
     ],
 )
 @pytest.mark.parametrize("law", [tawami.drucker_prager, tawami.mohr_coulomb])
-def test_wrong_angles_get_a_sentence(law, options, words):
+def test_wrong_angles_give_an_error_message(law, options, words):
     with pytest.raises(tawami.InputError) as error:
         law(ELASTIC, **options)
     assert f"{law.__name__}: {words}" in str(error.value)
 
 
-def test_wrong_parameters_of_von_mises():
+def test_wrong_parameters_of_von_mises_are_rejected():
     with pytest.raises(tawami.InputError, match="yield_stress = 0: expected a positive"):
         tawami.von_mises(ELASTIC, yield_stress=0.0)
     with pytest.raises(tawami.InputError, match="expected a material of linear_elastic"):
@@ -65,8 +65,8 @@ def test_the_tangent_is_the_difference_of_the_residual(options, path):
 
 
 @pytest.mark.parametrize("form", ["u", "u_epsv"])
-def test_a_block_in_plane_compression_beyond_yield(form):
-    """Hardening, nu near 0.5, free sides: on the yield surface, and near its plane-strain limit."""
+def test_a_block_in_plane_compression_yields_at_its_limit(form):
+    """Hardening, nu near 0.5, free sides: on the yield surface, and near the limit of plane strain."""
     sigma_y, hardening = 1.0, 2.0
     grid = grid_of((4, 2))
     body = tawami.box(grid, grid.origin, grid.upper, per_axis=3, gauss=True)
@@ -93,7 +93,7 @@ def test_a_block_in_plane_compression_beyond_yield(form):
 
 
 @pytest.mark.parametrize("law", [tawami.drucker_prager, tawami.mohr_coulomb])
-def test_a_strength_that_depends_on_the_mean_stress_needs_a_form_that_gives_it(law):
+def test_a_strength_by_the_mean_stress_needs_a_form_that_gives_it(law):
     grid = grid_of()
     body = tawami.box(grid, grid.origin, grid.upper)
     with pytest.raises(

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import functools
 import subprocess
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +15,8 @@ import pytest
 from programs import on_ranks as start
 
 pytestmark = pytest.mark.mpi
-NUMBERS = (2, 3, pytest.param(4, marks=pytest.mark.slow))
+#: Three ranks share no number of cells evenly, and one of them has none of two cells.
+NUMBERS = (3, *(pytest.param(number, marks=pytest.mark.slow) for number in (2, 4)))
 
 
 @dataclass(frozen=True)
@@ -30,37 +29,34 @@ class Found:
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory) -> Callable[[int], Found]:
-    """Results on a number of ranks, computed once; one rank is this process."""
-
-    @functools.cache
-    def on(number: int) -> Found:
-        folder = tmp_path_factory.mktemp(f"ranks{number}")
-        if number == 1:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                return Found(1, folder, on_ranks.results(folder))
-        run = start(number, "tests/processes/on_ranks.py", folder / "results.npz")
-        assert run.returncode == 0, run.stderr
-        assert run.stdout.count("solved and written") == 1
-        return Found(number, folder, dict(np.load(folder / "results.npz")))
-
-    return on
+def alone(tmp_path_factory) -> Found:
+    """One rank: this process."""
+    folder = tmp_path_factory.mktemp("rank")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return Found(1, folder, on_ranks.results(folder))
 
 
-@pytest.mark.parametrize("number", NUMBERS)
+@pytest.fixture(scope="module", params=NUMBERS)
+def several(request, tmp_path_factory) -> Found:
+    number, folder = request.param, tmp_path_factory.mktemp("ranks")
+    run = start(number, "tests/processes/on_ranks.py", folder / "results.npz")
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.count("solved and written") == 1
+    return Found(number, folder, dict(np.load(folder / "results.npz")))
+
+
 @pytest.mark.parametrize(
     "subject",
     ["beam", "cloud", "nonlinear", "fem", "singular", "motion", "initial", "inverted", "few"],
 )
-def test_results_do_not_depend_on_the_number_of_ranks(found, number, subject):
-    alone, together = found(1).results, found(number).results
-    names = [name for name in alone if name.startswith(subject)]
+def test_results_do_not_depend_on_the_number_of_ranks(alone, several, subject):
+    names = [name for name in alone.results if name.startswith(subject)]
     assert names
     for name in names:
-        one, several = (np.asarray(results[name], dtype=float) for results in (alone, together))
+        one, more = (np.asarray(found.results[name], dtype=float) for found in (alone, several))
         size = 1.0 if name.endswith("error") else np.abs(one).max()  # errors are relative already
-        assert np.abs(several - one).max() <= tolerance(name) * size, name
+        assert np.abs(more - one).max() <= tolerance(name) * size, name
 
 
 def tolerance(name: str) -> float:
@@ -75,21 +71,19 @@ def tolerance(name: str) -> float:
     return 1e-9 if locking and "deflection" not in name else 1e-10
 
 
-@pytest.mark.parametrize("number", [1, *NUMBERS])
-def test_the_scenes_are_what_they_are_meant_to_be(found, number):
-    results = found(number).results
-    assert results["beam exact u_epsv fast deflection"] == pytest.approx(0.0111, rel=0.1)
-    assert results["singular"]
-    assert results["times inverted"] > 0
-    for path in ("fast", "reference"):
-        krylov = list(results[f"nonlinear {path} krylov"])
-        assert len(krylov) > 4
-        assert 0 < krylov.count(0) < len(krylov)
+def test_the_scenes_are_what_they_are_meant_to_be(alone, several):
+    for results in (alone.results, several.results):
+        assert results["beam exact u_epsv fast deflection"] == pytest.approx(0.0111, rel=0.1)
+        assert results["singular"]
+        assert results["times inverted"] > 0
+        for path in ("fast", "reference"):
+            krylov = list(results[f"nonlinear {path} krylov"])
+            assert len(krylov) > 4
+            assert 0 < krylov.count(0) < len(krylov)
 
 
-@pytest.mark.parametrize("number", NUMBERS)
-def test_an_error_on_one_rank_can_be_caught_on_all(found, number):
-    results = found(number).results
+def test_an_error_on_one_rank_can_be_caught_on_all(several):
+    number, results = several.number, several.results
     assert list(results["errors law"]) == ["BrokenError: of the law, on one rank"] * number
     assert list(results["errors iterations"]) == [1] * number  # they compute together again
     assert len(results["errors nan"]) == number
@@ -97,26 +91,24 @@ def test_an_error_on_one_rank_can_be_caught_on_all(found, number):
         assert "the first is NaN at particle 101" in said
 
 
-@pytest.mark.parametrize("number", [1, *NUMBERS])
-def test_files_hold_the_whole_body_once(found, number):
-    folder = found(number).folder
-    assert list(found(number).results["output counts"]) == [128] * 3
-    written = {path.name for path in folder.iterdir()} - {"results.npz"}
-    assert written == {"grid.vtu", "particles.vtu"}
-    mesh = meshio.read(folder / "particles.vtu")
-    assert len(mesh.points) == 128
-    assert len(np.unique(mesh.points, axis=0)) == 128
-    stress = mesh.point_data["mean stress [Pa]"]
-    assert np.isfinite(stress).all()
-    assert np.ptp(stress) > 0
+def test_files_hold_the_whole_body_once(alone, several):
+    for found in (alone, several):
+        assert list(found.results["output counts"]) == [128] * 3
+        written = {path.name for path in found.folder.iterdir()} - {"results.npz"}
+        assert written == {"grid.vtu", "particles.vtu"}
+        mesh = meshio.read(found.folder / "particles.vtu")
+        assert len(mesh.points) == 128
+        assert len(np.unique(mesh.points, axis=0)) == 128
+        stress = mesh.point_data["mean stress [Pa]"]
+        assert np.isfinite(stress).all()
+        assert np.ptp(stress) > 0
 
 
-@pytest.mark.parametrize("number", NUMBERS)
-def test_the_header_describes_the_whole_body_on_every_rank(found, number):
-    (alone,) = found(1).results["output header"]
-    assert "particles     128, 88 bytes each" in alone
-    expected = str(alone).replace("1 rank", f"{number} ranks")
-    assert list(found(number).results["output header"]) == [expected] * number
+def test_the_header_describes_the_whole_body_on_every_rank(alone, several):
+    (header,) = alone.results["output header"]
+    assert "particles     128, 88 bytes each" in header
+    expected = str(header).replace("1 rank", f"{several.number} ranks")
+    assert list(several.results["output header"]) == [expected] * several.number
 
 
 # -- programs that end by an error ------------------------------------------------

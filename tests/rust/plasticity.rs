@@ -192,7 +192,7 @@ fn tension_beyond_the_apex_leaves_its_stress() {
 }
 
 #[test]
-fn dilatancy_ends_where_it_is_told_to() {
+fn dilatancy_ends_at_its_limit() {
     let limited = Friction { eps_v_max: 0.005, ..friction(30.0, 0.0, 20.0) };
     for law in frictional(elastic(), limited) {
         let old = Stress { deviator: [0.0; 4], mean: -1.0 };

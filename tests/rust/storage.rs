@@ -32,7 +32,7 @@ fn with_all_roles() -> Particles {
 }
 
 #[test]
-fn columns_stand_in_the_order_of_their_roles() {
+fn columns_are_in_the_order_of_their_roles() {
     let particles = with_all_roles();
     let names: Vec<&str> = particles.arrays().iter().map(|(name, _)| *name).skip(4).collect();
     assert_eq!(names, ["stress", "displacement", "eps_v", "dilatancy", "velocity"]);

@@ -1,4 +1,4 @@
-"""Finite strain: derivatives, both paths, rigid rotation, closed forms, a column under its weight."""
+"""Finite strain: derivatives, both assemblies, rigid rotation, closed forms, a heavy column."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_the_tangent_is_the_difference_of_the_residual(random_scene, finite, bas
 
 
 @pytest.mark.parametrize("basis", BASES)
-def test_both_paths(random_scene, finite, basis):
+def test_both_assemblies_agree(random_scene, finite, basis):
     results = []
     for path in ("fast", "reference"):
         scene, c = pushed(random_scene, basis=basis, assembly=path, **finite)
@@ -58,7 +58,7 @@ def test_the_elastic_tangent_is_symmetric_without_stress(random_scene, finite, l
 
 
 @pytest.mark.parametrize("angle", [0.1, 1.0, 3.0])
-def test_a_rotation_of_the_body_makes_no_force(random_scene, finite, angle, law):
+def test_a_rotation_of_the_body_gives_no_force(random_scene, finite, angle, law):
     scene = random_scene(law=law, **finite)
     grid = scene.grid
     x, y = (grid.h * greville("quadratic_spline", n) for n in grid.cells)
@@ -83,13 +83,13 @@ def test_small_increments_give_the_small_strain(random_scene, finite, law):
 
 
 def hencky_stress(K, mu, stretches):
-    """Principal Kirchhoff stresses, written out once more here."""
+    """Principal Kirchhoff stresses, independent of the package."""
     e = np.log(stretches)
     return 2 * mu * (e - e.mean()) + K * e.sum()
 
 
 def neo_hookean_stress(K, mu, stretches):
-    """As `hencky_stress`."""
+    """Principal Kirchhoff stresses, independent of the package."""
     J = np.prod(stretches)
     b = J ** (-2 / 3) * np.square(stretches)
     return mu * (b - b.mean()) + K * np.log(J)
@@ -99,7 +99,7 @@ STRESSES = {tawami.linear_elastic: hencky_stress, tawami.neo_hookean: neo_hookea
 
 
 def block(law, form):
-    """2 m x 1 m on the whole of its grid, its particles at Gauss points."""
+    """2 m x 1 m, filling its grid, with particles at Gauss points."""
     grid = tawami.Grid(grid_of().comm, origin=(0, 0), h=0.5, cells=(4, 2))
     body = tawami.box(grid, (0, 0), (2, 1), per_axis=3, gauss=True)
     # quadratic B-bar misses the patch test (README, Limits)
@@ -108,7 +108,7 @@ def block(law, form):
 
 
 def check_step(scene, f):
-    """Equilibrium is the homogeneous f, to 1e-8; stored, with the particles left inside the grid."""
+    """Check that one step reaches the homogeneous f to 1e-8; the particles stay inside the grid."""
     step = scene.configuration.domain.newton.solve(
         scene.reduction(), scene.configuration.external()
     )
@@ -119,7 +119,7 @@ def check_step(scene, f):
 
 
 def move(scene, generator, steps=8):
-    """The motion exp(generator) along all edges, in equal steps; its deformation gradient."""
+    """Move all edges by exp(generator) in equal steps; the deformation gradient."""
     f = expm(np.array(generator) / steps)
     scene.configuration.supports.all.clear()
     for edge in ("left", "right", "bottom", "top"):
@@ -132,8 +132,8 @@ def move(scene, generator, steps=8):
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])
 @pytest.mark.parametrize("biaxial", [False, True])
-def test_plane_tension_against_the_closed_form(finite, law, nu, biaxial):
-    """One step, free at the sides or pulled there too: the nominal stress is P."""
+def test_plane_tension_agrees_with_the_closed_form(finite, law, nu, biaxial):
+    """In one step, with free or loaded sides: the nominal stress is P."""
     pull = np.array([0.25, 0.25 if biaxial else 0.0])
     made = law(E=1.0, nu=nu)
 
@@ -172,8 +172,8 @@ MOTIONS = {
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
-def test_the_stress_after_steps_is_that_of_the_whole_deformation(finite, law, motion):
-    """From step to step only the stress is carried: the elastic strain is found from it."""
+def test_the_stress_after_many_steps_is_that_of_the_total_deformation(finite, law, motion):
+    """Only the stress is carried from step to step: it gives the elastic strain."""
     K, mu = 5.0, 2.0
     scene = block(law(K=K, mu=mu), finite)
     F = np.eye(2)
@@ -186,7 +186,7 @@ def test_the_stress_after_steps_is_that_of_the_whole_deformation(finite, law, mo
     assert np.abs(scene.particles.stress - expected).max() < 1e-8
 
 
-def test_simple_shear_of_a_neo_hookean_block(finite):
+def test_simple_shear_of_a_neo_hookean_block_agrees_with_the_closed_form(finite):
     """be = F F^T: tau_xy = mu gamma, and the normal stress difference mu gamma^2."""
     gamma, mu = 0.8, 2.0
     scene = block(tawami.neo_hookean(K=1e3, mu=mu), finite)
@@ -196,7 +196,7 @@ def test_simple_shear_of_a_neo_hookean_block(finite):
     assert np.abs(scene.particles.stress - expected).max() < 1e-8
 
 
-def test_a_neo_hookean_law_is_one_of_finite_strain():
+def test_a_neo_hookean_law_needs_a_form_of_finite_strain():
     grid = grid_of()
     body = tawami.box(grid, grid.origin, grid.upper)
     law = tawami.neo_hookean(E=1.0, nu=0.3)
@@ -210,7 +210,7 @@ def test_a_neo_hookean_law_is_one_of_finite_strain():
         tawami.von_mises(law, yield_stress=1.0)
 
 
-def test_a_particle_turned_inside_out_is_no_iterate():
+def test_an_iterate_that_inverts_a_particle_is_rejected():
     grid = grid_of()
     body = tawami.box(grid, grid.origin, grid.upper)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3), form="u_finite")
@@ -227,7 +227,7 @@ def test_a_particle_turned_inside_out_is_no_iterate():
     ("form", "height", "stress"),
     [("u_finite", 3e-3, 0.025), ("u_epsv_finite", 3e-3, 0.025), ("u_bbar_finite", 6e-3, 0.025)],
 )
-def test_a_column_under_its_weight(form, height, stress):
+def test_a_column_under_its_weight_agrees_with_the_closed_form(form, height, stress):
     """Across many cells; the closed form is an integral of Lambert's W."""
     assert self_weight.final_height() == pytest.approx(24.05965, abs=5e-6)
     result = self_weight.solve(form)
@@ -236,7 +236,7 @@ def test_a_column_under_its_weight(form, height, stress):
     assert max(result.iterations) <= 5
 
 
-def test_what_is_not_there_yet_has_a_sentence(random_scene):
+def test_unsupported_combinations_are_rejected(random_scene):
     with pytest.raises(
         tawami.FormError, match="strain = 'huge': expected one of 'small', 'finite'"
     ):

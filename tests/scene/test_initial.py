@@ -1,4 +1,4 @@
-"""Fields that a scene begins with: where they come from, and what they mean to the laws."""
+"""Initial fields of a scene: their sources, and their meaning to the laws."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LAWS = {
 
 
 def k0(x, y, K0=K0):
-    """Stress of a column under its weight."""
+    """K0 stress of a column under its weight."""
     vertical = RHO * G * (y - HEIGHT)
     return K0 * vertical, vertical, K0 * vertical, 0.0
 
@@ -39,7 +39,7 @@ def column(law="elastic", form="u_epsv", per_axis=2, **options):
 
 @pytest.mark.parametrize("form", ["u", "u_epsv", "u_epsv_finite", "u_finite"])
 @pytest.mark.parametrize("law", LAWS)
-def test_a_column_in_its_k0_state_is_in_equilibrium_at_once(law, form):
+def test_a_column_in_its_k0_state_is_in_equilibrium(law, form):
     scene = column(law, form)
     scene.initial("stress", k0)
     before = scene.particles.stress.copy()
@@ -51,7 +51,7 @@ def test_a_column_in_its_k0_state_is_in_equilibrium_at_once(law, form):
     assert solution.reaction("left")[0] == pytest.approx(K0 * RHO * G * HEIGHT**2 / 2)
 
 
-def test_at_the_u_p_form_too():
+def test_a_k0_state_serves_the_u_p_form():
     scene = column(form="u_p")
     scene.initial("stress", k0)
     assert np.abs(scene.solve().displacement_of_particles).max() == 0
@@ -66,8 +66,8 @@ def test_a_motion_from_a_k0_state_stays_at_rest():
     assert motion.energies.kinetic < 1e-20
 
 
-def test_what_is_missing_to_equilibrium_moves_the_column():
-    """Half of the weight is borne: the other half compresses it by rho g H^2 / (4 M)."""
+def test_a_column_without_equilibrium_is_compressed():
+    """With half of the stress, the rest of the weight compresses it by rho g H^2 / (4 M)."""
     scene = column()
     scene.initial("stress", lambda x, y: [part * 0.5 for part in k0(x, y, 3 / 7)])
     M = SOIL.bulk_modulus + 4 / 3 * SOIL.shear_modulus
@@ -77,8 +77,8 @@ def test_what_is_missing_to_equilibrium_moves_the_column():
 
 @pytest.mark.parametrize("law", ["mohr_coulomb", "drucker_prager"])
 @pytest.mark.parametrize("form", ["u_epsv", "u_epsv_finite"])
-def test_earth_pressure_beyond_rankine_is_refused_or_returned(law, form):
-    """phi = 30 degrees: K between 1/3 and 3. Drucker-Prager matches that in plane strain only, where
+def test_a_stress_beyond_the_yield_surface_is_rejected_or_returned_to_it(law, form):
+    """phi = 30 degrees: K between 1/3 and 3 (Rankine). Drucker-Prager agrees in plane strain only, where
     sigma_zz is that of flow without volume change: the mean of the others.
     """
 
@@ -105,7 +105,7 @@ def test_earth_pressure_beyond_rankine_is_refused_or_returned(law, form):
         scene.initial("stress", np.array(scene.particles.stress))  # it is on the surface now
 
 
-def test_hardening_is_told_before_the_stress():
+def test_hardening_is_set_before_the_stress():
     scene = column(tawami.von_mises(SOIL, yield_stress=1e3, hardening=1e5))
     stress = np.array([1500.0, 0.0, 0.0, 0.0])
     with pytest.raises(tawami.InputError, match="beyond the yield surface"):
@@ -137,8 +137,8 @@ def test_eps_v_fits_the_stress_of_an_elastic_law():
     assert (plastic.particles.eps_v == 0.01).all()
 
 
-def test_loaded_and_given_are_one_state():
-    """The state that a scene was loaded to, given to another: the same answer to what follows."""
+def test_a_loaded_and_a_given_state_respond_alike():
+    """The state that a scene was loaded to, given to another scene: the next response is the same."""
     first, second = column(), column()
     first.solve()
     for name in ("stress", "eps_v", "displacement"):
@@ -150,7 +150,7 @@ def test_loaded_and_given_are_one_state():
     assert second.solve().stress == pytest.approx(first.solve().stress, rel=1e-9, abs=1.0)
 
 
-def test_numbers_and_functions_in_their_forms():
+def test_fields_are_given_as_numbers_arrays_and_functions():
     scene = column()
     x, y = scene.particles.x.T
     n = len(x)
@@ -187,7 +187,7 @@ def test_tables_are_linear_between_their_points(tmp_path):
     assert motion.velocity[:, 1] == pytest.approx(3 * x)
 
 
-def test_outside_of_a_table(tmp_path):
+def test_points_outside_a_table_are_rejected_or_take_the_nearest_value(tmp_path):
     path = tmp_path / "field.csv"
     write_table(
         path, [[0.2, 0], [2, 0], [2, 4], [0.2, 4]], [[1, 0], [2, 0], [3, 0], [4, 0]], "x,y,a,b"
@@ -199,8 +199,8 @@ def test_outside_of_a_table(tmp_path):
     assert scene.particles.displacement[0, 0] == 1.0
 
 
-def test_an_earlier_run(tmp_path):
-    """The same particles get what is in the file, others what is linear between them."""
+def test_an_earlier_run_gives_its_fields(tmp_path):
+    """The same particles take the values of the file, others interpolate linearly."""
     first = column("mohr_coulomb")
     first.initial("stress", lambda x, y: k0(x, y, 0.45))
     solution = first.solve()
@@ -248,14 +248,14 @@ def test_an_earlier_run(tmp_path):
     ],
 )  # fmt: skip
 @pytest.mark.filterwarnings("ignore:divide by zero")
-def test_a_wrong_field_gets_one_sentence(name, source, message):
+def test_a_wrong_field_is_rejected(name, source, message):
     scene = column()
     with pytest.raises(tawami.InputError, match=message):
         scene.initial(name, source)
     assert not scene.particles.stress.any()
 
 
-def test_it_comes_before_the_first_solve_and_before_a_motion():
+def test_initial_fields_are_set_before_the_first_solve_and_the_motion():
     solved, moving = column(), column()
     solved.solve()
     tawami.Dynamics(moving)
@@ -283,14 +283,14 @@ def test_it_comes_before_the_first_solve_and_before_a_motion():
         ("x,y,a,b\n0,0,1,1\n0,1,1,1\n9,2,2,2\n", r"has 2 columns besides x and y: expected 1 \(value\)"),
     ],
 )  # fmt: skip
-def test_a_wrong_table_gets_one_sentence(tmp_path, text, message):
+def test_a_wrong_table_is_rejected(tmp_path, text, message):
     path = tmp_path / "field.csv"
     path.write_text(text)
     with pytest.raises(tawami.InputError, match=message):
         column().initial("eps_v", tawami.table(path))
 
 
-def test_files_that_are_not_there(tmp_path):
+def test_missing_files_are_named(tmp_path):
     with pytest.raises(tawami.InputError, match=r"table\('.*none.csv'\) cannot be read"):
         tawami.table(tmp_path / "none.csv")
     with pytest.raises(tawami.InputError, match=r"earlier\('.*none.vtu'\) cannot be read"):
@@ -302,8 +302,8 @@ def test_files_that_are_not_there(tmp_path):
         tawami.table("any.csv", outside="far")
 
 
-def test_a_law_in_numpy_is_asked_too():
-    """One that bears no tension."""
+def test_a_law_in_numpy_rejects_a_stress_too():
+    """A law without tensile strength."""
 
     def respond(strain, stress):
         stress = np.minimum(stress, 0.0)

@@ -1,4 +1,4 @@
-"""Wrong input gets one clear sentence, and nothing is half done."""
+"""Wrong input raises one clear error message and changes nothing."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def body_of(grid: tawami.Grid) -> tawami.Body:
         ({}, r"got nothing: expected"),
     ],
 )
-def test_materials(parameters, message):
+def test_wrong_materials_are_rejected(parameters, message):
     with pytest.raises(tawami.InputError, match=message):
         tawami.linear_elastic(**parameters)
     law = message.replace("linear_elastic", "neo_hookean")
@@ -54,14 +54,14 @@ def test_a_neo_hookean_material_is_compressible():
 
 @pytest.mark.parametrize("form", ["u", "u_bbar", "u_epsv"])
 @pytest.mark.parametrize("incompressible", [{"nu": 0.5}, {"one_minus_2nu": 0.0}])
-def test_incompressible_material_with_any_form_but_u_p(form, incompressible):
+def test_only_u_p_takes_an_incompressible_material(form, incompressible):
     grid = grid_of()
     material = tawami.linear_elastic(E=1.0, **incompressible)
     with pytest.raises(tawami.InputError, match=r"particle 0 .*nu = 0.5.*Use form 'u_p'"):
         tawami.Scene(grid, body_of(grid), material, form=form)
 
 
-def test_a_form_of_k_with_an_incompressible_material():
+def test_a_form_that_names_k_rejects_an_incompressible_material():
     """Kinematics 'deviatoric' takes such a material, but K in a sum would be infinite."""
 
     def residual(u, p, w, q, sigma, K, sum_p):
@@ -93,7 +93,7 @@ def test_a_form_of_k_with_an_incompressible_material():
         ({"origin": (0.0,)}, r"origin = \(0.0,\): expected two"),
     ],
 )
-def test_grids(options, message):
+def test_wrong_grids_are_rejected(options, message):
     given = {"origin": (0.0, 0.0), "h": 1.0, "cells": (2, 2), **options}
     with pytest.raises(tawami.InputError, match=message):
         tawami.Grid(MPI.COMM_WORLD, **given)
@@ -141,12 +141,12 @@ def scene_of(x, volume=None, **options):
         ({"x": np.array([[0.0, 1.0]]), "material_of": [0.5]}, r"material_of\[0\] = 0.5"),
     ],
 )
-def test_bodies(arguments, message):
+def test_wrong_bodies_are_rejected(arguments, message):
     with pytest.raises(tawami.InputError, match=message):
         scene_of(**arguments)
 
 
-def test_boxes():
+def test_wrong_boxes_are_rejected():
     grid = grid_of()
     with pytest.raises(tawami.InputError, match="must lie on lines of the grid"):
         tawami.box(grid, (-1.0, 0.5), (0.3, 2.0))
@@ -180,7 +180,7 @@ def test_positions_and_materials_of_the_particles_cannot_be_written():
             array[0] = 1
 
 
-def test_what_is_not_a_grid_a_body_or_a_material():
+def test_other_objects_than_grid_body_and_material_are_rejected():
     grid = grid_of()
     with pytest.raises(tawami.InputError, match=r"Scene\(Grid, ndarray, ...\): expected"):
         tawami.Scene(grid, np.zeros((3, 2)), tawami.linear_elastic(**ELASTIC))
@@ -198,7 +198,7 @@ def test_numpy_numbers_are_numbers():
     assert tawami.linear_elastic(E=1, one_minus_2nu=-0.0).bulk_modulus == np.inf
 
 
-def test_supports_and_loads():
+def test_wrong_supports_and_loads_are_rejected():
     grid = grid_of()
     scene = tawami.Scene(grid, body_of(grid), tawami.linear_elastic(**ELASTIC))
     for call, message in [
@@ -235,7 +235,7 @@ def test_supports_and_loads():
         scene.solve()
 
 
-def test_traction_on_a_form_without_an_edge_term():
+def test_a_traction_on_a_form_without_an_edge_term_is_rejected():
     from ufl import grad
 
     form = tawami.Form(
@@ -249,7 +249,7 @@ def test_traction_on_a_form_without_an_edge_term():
         scene.traction("right", (0.0, -1.0))
 
 
-def test_newton_that_does_not_converge_tells_its_history_and_changes_nothing():
+def test_an_error_of_newton_holds_its_history_and_changes_nothing():
     from ufl import div, dot, grad
 
     def residual(u, w, sigma, mu, t, sum_p, ds):
@@ -307,7 +307,7 @@ def test_only_the_arrays_that_a_scene_needs_exist():
     nu=st.floats(allow_nan=True, allow_infinity=True),
     modulus=st.floats(allow_nan=True, allow_infinity=True),
 )
-def test_any_number_makes_a_material_or_a_sentence(nu, modulus):
+def test_any_number_makes_a_material_or_an_input_error(nu, modulus):
     try:
         material = tawami.linear_elastic(E=modulus, nu=nu)
     except tawami.InputError as error:
@@ -322,7 +322,7 @@ def test_any_number_makes_a_material_or_a_sentence(nu, modulus):
     h=st.floats(allow_nan=True, allow_infinity=True),
     cells=st.tuples(st.integers(-3, 40000), st.integers(-3, 40000)),
 )
-def test_any_numbers_make_a_grid_or_a_sentence(x, h, cells):
+def test_any_numbers_make_a_grid_or_an_input_error(x, h, cells):
     try:
         tawami.Grid(MPI.COMM_WORLD, origin=(x, x), h=h, cells=cells)
     except tawami.InputError as error:

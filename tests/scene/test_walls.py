@@ -1,4 +1,4 @@
-"""Walls with Coulomb friction: sliding, sticking, leaving, impact, and the states that contradict."""
+"""Walls with Coulomb friction: sliding, sticking, separation, impact, contradicting states."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ G = 10.0
 
 
 def block(*, slope=0.0, E=1e7, height=0.0, **wall):
-    """A block of 0.5 m on a wall, or above it, that gravity pulls along by a slope [degrees]."""
+    """A block of 0.5 m on a wall or above it, on a slope [degrees]."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(24, 10))
     body = tawami.box(grid, (0.5, height), (1.0, height + 0.5))
     material = tawami.linear_elastic(E=E, nu=0.3)
@@ -31,13 +31,13 @@ def speed(motion):
 
 @pytest.mark.parametrize("friction", [0.0, 0.2, 0.4])
 def test_a_block_slides_down_a_slope(friction):
-    """a = g (sin - mu cos), once the shear wave of the start has passed."""
+    """a = g (sin - mu cos), after the first shear wave."""
     motion = tawami.Dynamics(block(slope=30.0, friction=friction), gamma=0.7)
     motion.run(0.1, 1e-2)
     before = speed(motion)[0]
-    motion.run(0.5, 1e-2)
+    motion.run(0.3, 1e-2)
     expected = G * (np.sin(np.pi / 6) - friction * np.cos(np.pi / 6))
-    assert (speed(motion)[0] - before) / 0.4 == pytest.approx(expected, rel=0.02)
+    assert (speed(motion)[0] - before) / 0.2 == pytest.approx(expected, rel=0.02)
     assert abs(speed(motion)[1]) < 0.03
     lost = motion.energies.friction
     way = motion.scene.particles.displacement[:, 0].mean()
@@ -57,7 +57,7 @@ def test_a_block_below_its_angle_of_friction_stays():
 
 
 def test_friction_stops_a_sliding_block():
-    """From v after v / (mu g), on a way of v^2 / (2 mu g)."""
+    """After a time v / (mu g), over a distance v^2 / (2 mu g)."""
     v, mu = 1.0, 0.5
     scene = block(friction=mu)
     motion = tawami.Dynamics(scene, velocity=(v, 0.0), gamma=0.6)
@@ -67,7 +67,7 @@ def test_friction_stops_a_sliding_block():
     assert abs(speed(motion)[0]) < 0.02
 
 
-def test_a_block_may_leave_a_wall_that_lets_it():
+def test_a_block_leaves_a_wall_that_separates():
     found = {}
     for separates in (True, False):
         scene = block(friction=0.3, separates=separates)
@@ -79,7 +79,7 @@ def test_a_block_may_leave_a_wall_that_lets_it():
     assert found[False][0] < 0.4
 
 
-def test_a_falling_block_bounces_and_its_energy_is_accounted_for():
+def test_a_falling_block_bounces_with_a_balance_of_energy():
     scene = block(height=0.25, E=1e5, friction=0.0)
     motion = tawami.Dynamics(scene)
     heights = []
@@ -100,7 +100,7 @@ def test_the_reaction_of_a_wall_is_the_weight():
     assert solution.reaction("bottom") == pytest.approx([0.0, 250.0 * G], abs=1e-2)
 
 
-def test_states_that_contradict_are_changed():
+def test_contradicting_states_are_changed():
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=1.0, cells=(3, 2))
     wall = Wall(grid, "bilinear", "bottom", 0.5, True)
     contact = ActiveSet([wall], [np.zeros((4, 2), dtype=bool)])
@@ -126,7 +126,7 @@ def test_states_that_contradict_are_changed():
     assert wall.state.slip.tolist() == [0, 0, 0, 0]
 
 
-def test_wrong_walls_get_a_sentence():
+def test_wrong_walls_are_rejected():
     scene = block(friction=0.1)
     with pytest.raises(tawami.InputError, match="there is one already"):
         scene.wall("bottom")
@@ -160,7 +160,7 @@ def test_a_function_that_keeps_coming_back_is_released():
 
 @pytest.mark.parametrize("form", ["u_epsv", "u_epsv_finite"])
 def test_walls_in_a_corner_carry_the_load_once(form):
-    """A block pressed into a corner: what acts at the corner belongs to both walls."""
+    """A block pressed into a corner: forces at the corner belong to both walls."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(8, 8))
     body = tawami.box(grid, (0, 0), (0.5, 0.5))
     law = tawami.linear_elastic(E=1e6, nu=0.3)
@@ -177,7 +177,7 @@ def test_walls_in_a_corner_carry_the_load_once(form):
     np.testing.assert_array_equal(solution.reaction("bottom"), before)
 
 
-def test_a_wall_looks_at_the_gap_where_particles_do_not_move():
+def test_a_wall_knows_the_gap_in_small_strain():
     """Lifted by 1 mm and lowered by half of it, a block is still above the wall."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(8, 8))
     body = tawami.box(grid, (0, 0), (0.5, 0.5))
@@ -195,7 +195,7 @@ def test_a_wall_looks_at_the_gap_where_particles_do_not_move():
 
 
 def test_a_piston_slides_along_a_rough_floor():
-    """The edge that moves prescribes the corner; the floor gives friction beyond it."""
+    """The moving edge prescribes the corner; the floor gives friction elsewhere."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(8, 6))
     body = tawami.box(grid, (0, 0), (0.5, 0.5))
     law = tawami.linear_elastic(E=1e6, nu=0.3)

@@ -1,4 +1,4 @@
-"""How a step is solved may change how long it takes, not what comes out."""
+"""Numerical settings change the time of a step, not its result."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cases.verification.cantilever import mpm
 
 
 def pushed(**options) -> tawami.Scene:
-    """A block that yields: several Newton iterations."""
+    """A block that yields and needs several Newton iterations."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(6, 4))
     body = tawami.box(grid, (0.0, 0.0), (1.0, 1.0))
     clay = tawami.von_mises(tawami.linear_elastic(E=1e7, nu=0.49), yield_stress=1e5, hardening=1e5)
@@ -24,7 +24,7 @@ def pushed(**options) -> tawami.Scene:
 
 
 @pytest.mark.parametrize("form", ["u", "u_bbar", "u_epsv", "u_p"])
-def test_the_iterative_solver_finds_what_the_direct_one_finds(form):
+def test_the_iterative_solver_agrees_with_the_direct_one(form):
     rubber = tawami.linear_elastic(
         E=3e6, nu=0.45
     )  # near 0.5 multigrid fails without a field for volume
@@ -37,7 +37,7 @@ def test_the_iterative_solver_finds_what_the_direct_one_finds(form):
     assert direct.condition / 3 < iterative.condition < 3 * direct.condition
 
 
-def test_fgmres_iterations_of_the_mixed_form_depend_neither_on_nu_nor_on_the_grid():
+def test_fgmres_iterations_of_the_mixed_form_are_bounded():
     def most(n: int, nu: float) -> int:
         rubber = tawami.linear_elastic(E=3e6, nu=nu)
         options = {"alpha": 0.1, "material": rubber, "linear_solver": "iterative"}
@@ -47,7 +47,7 @@ def test_fgmres_iterations_of_the_mixed_form_depend_neither_on_nu_nor_on_the_gri
 
 
 @pytest.mark.parametrize("assembly", ["fast", "reference"])
-def test_a_reduced_tangent_takes_more_iterations_to_the_same_place(assembly):
+def test_a_reduced_tangent_takes_more_iterations_to_the_same_solution(assembly):
     full, reduced = (
         pushed(tangent_rule=rule, assembly=assembly, tolerance=1e-10).solve()
         for rule in ("full", "reduced")
@@ -68,14 +68,14 @@ def test_both_assemblies_have_the_same_reduced_tangent():
     assert np.abs(one - exact).max() > 1e-3 * np.abs(exact).max()
 
 
-def test_a_factorisation_for_every_iteration():
+def test_a_factorisation_in_every_iteration_gives_the_same_solution():
     seldom, always = (pushed(factorise=when).solve() for when in ("when_it_pays", "always"))
     assert always.krylov == (0,) * always.iterations
     assert max(seldom.krylov) > 0
     assert np.allclose(always.u, seldom.u, rtol=0, atol=1e-6 * np.abs(seldom.u).max())
 
 
-def test_what_fgmres_cannot_solve_is_said():
+def test_fgmres_reports_a_system_that_it_cannot_solve():
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.5, cells=(4, 2))
     body = tawami.box(grid, (0.0, 0.0), (2.0, 1.0), per_axis=1)
     scene = tawami.Scene(
@@ -99,6 +99,6 @@ def test_what_fgmres_cannot_solve_is_said():
         ({"tolerance": 0.5}, "tolerance = 0.5: expected a finite number"),
     ],
 )
-def test_other_settings_are_refused(options, message):
+def test_wrong_settings_are_rejected(options, message):
     with pytest.raises(tawami.InputError, match=message):
         pushed(**options)

@@ -1,4 +1,4 @@
-"""A free disc of nearly incompressible rubber spins ten times: what is conserved, and is it still round?
+"""A free disc of nearly incompressible rubber spins ten times: conservation and roundness.
 
                   R = 1 m, plane strain, E = 1 MPa, nu = 0.49, rho = 1000 kg/m3
       omega ( o ) rho omega^2 R^2 / E = 0.05

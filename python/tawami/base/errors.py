@@ -22,11 +22,9 @@ TawamiWarning             base of warnings about results that should not be trus
   InexactSumWarning       a `sum_p` that is not exactly the sum over the particles
   IncompleteWarning       a ramp or a path that ended before its end
   InstabilityWarning      an option that is not stable for this body
-  LargeStrainWarning      a form of small strain where displacement gradients are large
   LockingWarning          a form that locks
   ParameterWarning        a parameter beyond its usual range
   QuadratureWarning       particles with large integration errors
-  SofteningWarning        a softening law, whose results depend on the size of the cells
 ========================= ========================================================================
 
 When a step fails, the particles are as they were before it.
@@ -73,10 +71,6 @@ class InstabilityWarning(TawamiWarning):
     """An option of a form that is not stable for this body."""
 
 
-class LargeStrainWarning(TawamiWarning):
-    """A form of small strain in a body whose displacement gradients are large."""
-
-
 class LockingWarning(TawamiWarning):
     """A form without a field for the volume, in a case where its mean stress is useless."""
 
@@ -87,10 +81,6 @@ class ParameterWarning(TawamiWarning):
 
 class QuadratureWarning(TawamiWarning):
     """Particles whose volumes integrate badly over the cells that they fill."""
-
-
-class SofteningWarning(TawamiWarning):
-    """A softening law without an internal length: results depend on the size of the cells."""
 
 
 class SingularError(TawamiError):
@@ -140,7 +130,6 @@ __all__ = [
     "InexactSumWarning",
     "InputError",
     "InstabilityWarning",
-    "LargeStrainWarning",
     "LockingWarning",
     "MissingDependencyError",
     "NotModelledError",
@@ -148,7 +137,6 @@ __all__ = [
     "ParameterWarning",
     "QuadratureWarning",
     "SingularError",
-    "SofteningWarning",
     "SupportError",
     "TawamiError",
     "TawamiWarning",

@@ -80,3 +80,10 @@ def rows_of(matrix: Any) -> sp.csr_matrix:
     start, columns, values = matrix.getValuesCSR()
     shape = (len(start) - 1, matrix.getSize()[1])
     return sp.csr_matrix((np.array(values), columns, start), shape=shape)
+
+
+def add_rows(matrix: Any, rows: sp.csr_matrix) -> None:
+    """Add to a PETSc matrix whose pattern contains that of `rows`, the rows of this rank."""
+    start, columns = (part.astype(PETSc.IntType) for part in (rows.indptr, rows.indices))
+    matrix.setValuesCSR(start, columns, rows.data, addv=True)
+    matrix.assemble()

@@ -10,10 +10,10 @@ import numpy as np
 from tawami.base.arrays import Indices
 from tawami.base.checks import point
 from tawami.base.errors import InputError
+from tawami.base.space import lattice, tensor_product
 from tawami.body.body import Body
 from tawami.body.filling import Filling
 from tawami.grid.grid import Grid
-from tawami.grid.space import lattice, tensor_product
 
 
 def box(

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from tawami.base.arrays import Array, Indices
+from tawami.base.space import lattice
 from tawami.body.points import ROUND_OFF
 from tawami.grid.grid import ON_LINE, Grid
-from tawami.grid.space import lattice
 
 
 def on_lines(grid: Grid, x: Array) -> Array:

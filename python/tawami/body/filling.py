@@ -16,11 +16,11 @@ from tawami import _rust
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.checks import instance, room, shown, switch, whole_number
 from tawami.base.errors import InputError
+from tawami.base.space import lattice, tensor_product
 from tawami.body.body import Body
 from tawami.body.moment_fitting import fewer
 from tawami.body.points import ROUND_OFF, Points, joined
 from tawami.grid.grid import Grid
-from tawami.grid.space import lattice, tensor_product
 
 #: Largest Gauss rule along an axis.
 MOST_POINTS = 1000

@@ -10,12 +10,12 @@ import numpy.typing as npt
 from tawami.base.arrays import Array, Indices
 from tawami.base.checks import names, number, room, shown, whole_number
 from tawami.base.errors import InputError
+from tawami.base.space import lattice
 from tawami.body.body import Body
 from tawami.body.border_squares import Squares, triangulated
 from tawami.body.filling import Filling
 from tawami.body.points import ROUND_OFF, areas, halves, in_triangles
 from tawami.grid.grid import EDGES, Edge, Grid
-from tawami.grid.space import lattice
 
 #: Memory of a sample while the function is evaluated [bytes].
 BYTES_PER_SAMPLE = 64.0

@@ -12,8 +12,8 @@ from itertools import product
 import numpy as np
 
 from tawami.base.arrays import Array, Mask
+from tawami.base.space import PLANE
 from tawami.body.points import DEGREE
-from tawami.grid.space import PLANE
 
 #: Exponents of the monomials up to the degree of the rule, monomials x axes.
 EXPONENTS = np.array([e for e in product(range(DEGREE + 1), repeat=PLANE.dim) if sum(e) <= DEGREE])

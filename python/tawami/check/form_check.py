@@ -1,8 +1,8 @@
-"""Whether a weak form can be used: what every right form does, tried with this one and measured.
+"""Checks of a weak form: properties of every correct form, measured.
 
-A failure makes a form useless: it does not load, its Newton iteration cannot converge, a rigid motion
-strains it, or a uniform stress is not found. What costs or misleads only is a note: an unsymmetric
-tangent (LU in place of LDL^T), no term for tractions, a form that locks.
+A failed check makes a form unusable: it does not load, its Newton iteration cannot converge, a rigid
+motion strains it, or it does not find a uniform stress. Other shortcomings are notes: an unsymmetric
+tangent (LU instead of LDL^T), no term for tractions, locking.
 """
 
 from __future__ import annotations
@@ -20,24 +20,22 @@ from mpi4py import MPI
 from tawami.base.checks import shown
 from tawami.base.errors import FormError, InexactSumWarning, InputError, TawamiError
 from tawami.base.text import quoted
-from tawami.check import scenes as scenes
+from tawami.check import scenes
 from tawami.form.compilation import compile_form
 from tawami.form.form import Form
 from tawami.form.symbols import Symbols
 
 Verdict = Literal["ok", "note", "FAILED", "not tried"]
-#: Largest relative errors: of differences, of results that are exact except for round-off, and of
-#: uniform stresses that Newton's method finds.
+#: Bounds of relative errors: of finite differences, of round-off, of uniform stresses by Newton.
 DIFFERENCES, ROUND_OFF, UNIFORM = 1e-6, 1e-11, 1e-8
-#: Mean stress in a bent beam so far off is that of a form that locks (displacement only has
-#: 0.41, B-bar 0.12, u_epsv 0.007), and an inf-sup constant this small that of one whose pressures
-#: oscillate (Taylor and Hood's is 0.43).
+#: Error of the mean stress in a bent beam from which a form locks: displacement only has 0.41, B-bar
+#: 0.12, u_epsv 0.007. Inf-sup constant below which pressures oscillate: that of Taylor and Hood is 0.43.
 BEAM, STABLE = 0.25, 0.1
 
 
 @dataclass(frozen=True)
 class Line:
-    """One check: what was tried, how it ended, and the numbers or the reason."""
+    """One check: its subject, its verdict, and the numbers or the reason."""
 
     subject: str
     verdict: Verdict
@@ -49,10 +47,10 @@ class Line:
 
 @dataclass(frozen=True)
 class FormReport:
-    """What :func:`check_form` found; `print` shows it as a table.
+    """The results of :func:`check_form`; `print` shows them as a table.
 
     Attributes:
-        name: Of the form.
+        name: Name of the form.
         lines: The checks in order.
     """
 
@@ -61,12 +59,12 @@ class FormReport:
 
     @property
     def failed(self) -> tuple[Line, ...]:
-        """The lines that make the form useless."""
+        """The checks that failed."""
         return tuple(line for line in self.lines if line.verdict == "FAILED")
 
     @property
     def usable(self) -> bool:
-        """Whether nothing failed; there may be notes."""
+        """Whether no check failed; there may be notes."""
         return not self.failed
 
     def line(self, subject: str) -> Line:
@@ -89,14 +87,14 @@ class FormReport:
 
 
 def check_form(form: str | Path | ModuleType | Form, **parameters: Any) -> FormReport:
-    """Try a weak form and say what it does right and wrong; some seconds, longer when it is new.
+    """Check a weak form; this takes some seconds, and longer for a new form.
 
     Args:
-        form: As `Scene` takes it: a shipped name, the path of a file, a module or a `Form`.
-        parameters: Values of its parameters and options; its defaults by default.
+        form: Name of a shipped form, path of a file, module or `Form`.
+        parameters: Values of parameters and options, instead of their defaults.
 
     Raises:
-        InputError: A parameter that the form does not have, or out of its limits.
+        InputError: The form does not have a parameter, or its value is out of its limits.
     """
     try:
         loaded = Form.load(form)
@@ -106,13 +104,13 @@ def check_form(form: str | Path | ModuleType | Form, **parameters: Any) -> FormR
         loaded.settings(parameters)
     lines = list[Line]()
     with warnings.catch_warnings():
-        # particles at random, K/mu of the beam: that is what is tried here
+        # random particles and the K/mu of the beam cause warnings on purpose
         warnings.simplefilter("ignore")
         for subject, check, needs in CHECKS:
             failed = {line.subject for line in lines if line.verdict in ("FAILED", "not tried")}
             missing = next((need for need in needs if need in failed), None)
             if missing is not None:
-                lines.append(Line(subject, "not tried", f"it needs what failed above: {missing}"))
+                lines.append(Line(subject, "not tried", f"it needs a check that failed: {missing}"))
             else:
                 lines += _tried(subject, check, loaded, parameters)
     return FormReport(loaded.name, tuple(lines))
@@ -125,7 +123,7 @@ Found = Iterator[tuple[Verdict, str]]
 def _tried(
     subject: str, check: Callable[[Form, Settings], Found], form: Form, parameters: Settings
 ) -> list[Line]:
-    """Lines of a check; an error of tawami on the way is its failure."""
+    """Lines of a check; an error of tawami is a failure."""
     lines = list[Line]()
     try:
         for verdict, words in check(form, parameters):
@@ -136,8 +134,8 @@ def _tried(
 
 
 def _judged(error: float, bound: float, what: str) -> tuple[Verdict, str]:
-    """A relative error that must be below a bound."""
-    good = error < bound  # not a number is not
+    """Verdict on a relative error with a bound."""
+    good = error < bound  # NaN fails
     return (
         "ok" if good else "FAILED",
         f"{what}: {error:.1e} ({'<' if good else 'expected <'} {bound:g})",
@@ -219,7 +217,7 @@ def _has_edge_term(form: Form, given: Settings) -> bool:
 
 def _compressed(form: Form, given: Settings) -> Found:
     if not _has_edge_term(form, given):
-        yield "note", "no term - dot(t, w) * ds: traction(...) will be refused"
+        yield "note", "no term - dot(t, w) * ds: traction(...) will be rejected"
         return
     cell = form.kinematics.volume_at_centre
     error = scenes.compressed(form, given, "bilinear" if cell else "quadratic_spline")
@@ -227,13 +225,13 @@ def _compressed(form: Form, given: Settings) -> Found:
     yield _judged(error, UNIFORM, f"error of the stress under a traction{basis}")
     if cell:
         error = scenes.compressed(form, given, "quadratic_spline")
-        known = "known of B-bar: div w at the centre of a cell is not its mean (README, Limits)"
+        known = "a limit of B-bar: div w at the centre of a cell is not its mean (README, Limits)"
         yield "note" if error > UNIFORM else "ok", f"quadratic splines: {error:.1e}, {known}"
 
 
 def _paths(form: Form, given: Settings) -> Found:
     error = scenes.path_difference(form, given)
-    yield _judged(error, ROUND_OFF, "residual and tangent, kernels in Rust and dolfinx' assembly")
+    yield _judged(error, ROUND_OFF, "residual and tangent, fast and reference assembly")
 
 
 def _locking(form: Form, given: Settings) -> Found:
@@ -247,7 +245,7 @@ def _locking(form: Form, given: Settings) -> Found:
 
 def _stability(form: Form, given: Settings) -> Found:
     if len(form.fields) == 1:
-        yield "note", "no field for the volume: nothing to try; see locking"
+        yield "note", "no field for the volume: nothing to check; see locking"
         return
     constant = scenes.inf_sup(form, given)
     words = f"inf-sup constant of a filled block, K/mu = 1e4: {constant:.2g}"
@@ -260,7 +258,7 @@ def _stability(form: Form, given: Settings) -> Found:
 
 
 Check = Callable[[Form, Settings], Found]
-#: Subject, check, and what must not have failed before it.
+#: Subject, check, and earlier checks that must not have failed.
 CHECKS: tuple[tuple[str, Check, tuple[str, ...]], ...] = (
     ("declaration", _declaration, ()),
     ("parameters", _parameters, ()),

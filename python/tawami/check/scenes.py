@@ -1,7 +1,7 @@
-"""Small scenes that show whether a weak form is right; each gives a relative error.
+"""Small scenes with known results; each function returns a relative error of a weak form.
 
-Closed forms: the stress of a homogeneous deformation (Hencky's at finite strain), a bent beam in plane
-strain (Timoshenko and Goodier), the eigenvalues of the Schur complement of the volume equation.
+References are the stress of a homogeneous deformation (Hencky's at finite strain), a bent beam in plane
+strain (Timoshenko and Goodier), and eigenvalues of the Schur complement of the volume equation.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg as la
 from mpi4py import MPI
 
 from tawami import _rust
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError, SingularError
 from tawami.body.body import Body
 from tawami.body.box import box
@@ -25,35 +25,34 @@ from tawami.grid.grid import EDGES, Grid
 from tawami.particles.laws import drucker_prager, linear_elastic, von_mises
 from tawami.scene.scene import Scene
 
-Array = npt.NDArray[np.float64]
 Settings = dict[str, Any]
 Law = Callable[[_rust.Material], _rust.Material]
 
 COMPONENTS: tuple[Component, ...] = ("x", "y")
 K, MU = 5.0, 2.0
-#: Inwards, so that no particle leaves the grid.
+#: A displacement gradient that moves no particle out of the grid.
 GRADIENT = np.array([[-0.05, 0.02], [0.01, -0.03]])
 PRESSURE = 0.2
-#: Where volumetric locking shows.
+#: K/mu of the checks of volumetric locking.
 RATIO = 1e4
 
 
 def grid_of(
     cells: tuple[int, int], origin: tuple[float, float] = (0.0, 0.0), h: float = 0.5
 ) -> Grid:
-    """A grid of this rank alone."""
+    """A grid on this rank alone."""
     return Grid(MPI.COMM_SELF, origin=origin, h=h, cells=cells)
 
 
 def soil(form: Form) -> Law:
-    """A plastic law: one that couples mean stress and shear where the form can take it."""
+    """A plastic law that couples mean stress and shear, if the form allows it."""
     if form.kinematics.deviatoric:
         return lambda elastic: von_mises(elastic, yield_stress=0.1, hardening=0.1)
     return lambda elastic: drucker_prager(elastic, phi=20.0, c=0.05, psi=10.0)
 
 
 def cloud(form: Form, given: Settings, law: Law | None = None, **options: Any) -> Scene:
-    """Particles at random, of two materials."""
+    """A scene of random particles of two materials."""
     random = np.random.default_rng(0)
     grid = grid_of((4, 3))
     x = grid.h * np.array(grid.cells) * random.random((60, 2))
@@ -72,8 +71,10 @@ def cloud(form: Form, given: Settings, law: Law | None = None, **options: Any) -
 
 
 def tangent_error(scene: Scene) -> float:
-    """Tangent times a direction against central differences of the residual: the smaller error of two
-    steps, because a particle may change between elastic and plastic in one.
+    """Error of the tangent in a direction, compared with central differences of the residual.
+
+    It is the smaller error of two step sizes, because particles may change between elastic and plastic
+    within one of them.
     """
     random = np.random.default_rng(1)
     c, direction = 0.05 * scene.grid.h * random.standard_normal((2, scene.num_coefficients))
@@ -86,7 +87,7 @@ def tangent_error(scene: Scene) -> float:
 
 
 def path_difference(form: Form, given: Settings) -> float:
-    """Residual and tangent by kernels in Rust against those by dolfinx."""
+    """Difference of residual and tangent between the fast and the reference assembly."""
     parts = []
     for path in ("fast", "reference"):
         scene = cloud(form, given, assembly=path)
@@ -97,8 +98,9 @@ def path_difference(form: Form, given: Settings) -> float:
 
 
 def rigid_motion(form: Form, given: Settings) -> float:
-    """Largest force of a translation and of a rotation (at finite strain by 1 rad), over that of a
-    stretch of the same size.
+    """Largest force of a translation and of a rotation, divided by that of a stretch of the same size.
+
+    The rotation is infinitesimal at small strain, and 1 rad at finite strain.
     """
     scene = cloud(form, given)
     points = scene.configuration.domain.layout.greville - np.array(scene.grid.origin)
@@ -114,7 +116,7 @@ def rigid_motion(form: Form, given: Settings) -> float:
 
 
 def _filled(form: Form, given: Settings, basis: Basis = "quadratic_spline", rows: int = 3) -> Scene:
-    """Four columns and some rows of cells with particles at their Gauss points, three rows filled."""
+    """Four columns and some rows of cells, three rows filled with particles at Gauss points."""
     grid = grid_of((4, rows))
     body = box(grid, (0, 0), (grid.upper[0], 3 * grid.h), per_axis=3, gauss=True)
     law = linear_elastic(K=K, mu=MU)
@@ -133,7 +135,7 @@ def _linear(slope: Array) -> Callable[[Array, Array], Array]:
 
 
 def displaced(form: Form, given: Settings) -> float:
-    """A border displaced linearly gives one stress everywhere: largest error of it."""
+    """Largest error of the uniform stress under a linear displacement of the border."""
     scene = _filled(form, given)
     for edge in EDGES:
         for axis, component in enumerate(COMPONENTS):
@@ -143,13 +145,13 @@ def displaced(form: Form, given: Settings) -> float:
 
 
 def compressed(form: Form, given: Settings, basis: Basis) -> float:
-    """A traction on an edge gives one stress everywhere: largest error of it."""
+    """Largest error of the uniform stress under a traction on an edge."""
     scene = _filled(form, given, basis, rows=4)
     scene.fix("left", "x")
     scene.fix("bottom", "y")
     scene.traction("right", (-PRESSURE, 0.0))
     scene.solve()
-    # sigma_yy = 0; at finite strain sigma_xx / stretch_x, the force over the area at the start, is given
+    # sigma_yy = 0; at finite strain sigma_xx / stretch_x, force over initial area, is prescribed
     ratio = -(K - 2 * MU / 3) / (K + 4 * MU / 3)
     modulus = K + 4 * MU / 3 + ratio * (K - 2 * MU / 3)
     along, finite = -PRESSURE / modulus, form.strain.finite
@@ -163,9 +165,10 @@ def _error(scene: Scene, exact: Array) -> float:
 
 
 def bent_beam(form: Form, given: Settings) -> float:
-    """Mean stress in a cantilever of 16 x 8 cells of 2 x 2 particles at K/mu = 1e4, in the mean square.
+    """Error of the mean stress in a cantilever at K/mu = 1e4, in the mean square.
 
-    sigma_m = (1 + nu)/3 P (L - x) y / I with the tractions and root displacements of that solution.
+    16 x 8 cells of 2 x 2 particles, with tractions and root displacements of the exact solution, whose
+    mean stress is sigma_m = (1 + nu)/3 P (L - x) y / I.
     """
     n, length, force = 8, 2.0, 1e-5
     grid = grid_of((2 * n, n), origin=(0.0, -0.5), h=1 / n)
@@ -189,13 +192,14 @@ def bent_beam(form: Form, given: Settings) -> float:
 
 
 def inf_sup(form: Form, given: Settings) -> float:
-    """Inf-sup constant of a filled block, held all around: the root of the smallest eigenvalue, that of
-    constants apart, of S p = lambda M p / mu, S the Schur complement of the volume equation in p; with
-    the sign of the eigenvalue.
+    """Inf-sup constant of a filled block that is held all around.
+
+    This is the root of the smallest eigenvalue of S p = lambda M p / mu, except that of constants, with
+    the sign of the eigenvalue. S is the Schur complement of the volume equation in p.
 
     Raises:
-        InputError: A form without a field for the volume.
-        SingularError: One that does not resist a change of shape.
+        InputError: The form has no field for the volume.
+        SingularError: The form does not resist a change of shape.
     """
     if len(form.fields) == 1:
         raise InputError(f"form {form.name} has no field for the volume")
@@ -211,7 +215,7 @@ def inf_sup(form: Form, given: Settings) -> float:
     tangent = (selection.T @ scene.tangent(np.zeros(scene.num_coefficients)) @ selection).toarray()
     of_u = unknowns < scene.configuration.domain.layout.num_displacement
     A, B = tangent[of_u][:, of_u], tangent[~of_u][:, of_u]
-    # in p = K eps_v, and each equation of the volume without its K
+    # the unknown is p = K eps_v, and the equation of the volume is divided by K
     to_p = RATIO if form.kinematics.has_eps_v else 1.0
     try:
         lifted = np.linalg.solve(A, tangent[of_u][:, ~of_u])
@@ -226,7 +230,7 @@ def inf_sup(form: Form, given: Settings) -> float:
     line = grid.h / 6 * (np.diag([2.0, *[4.0] * (n - 1), 2.0]) + neighbours)
     mass = np.kron(line, line)
     values, vectors = la.eigh(schur, mass)
-    # the constant pressure is the one vector that no boundary lets work
+    # a constant pressure does no work in a block that is held all around
     constant = np.abs(vectors.T @ mass @ np.ones(len(mass)))
     least = float(np.delete(values, int(np.argmax(constant)))[0])
     return float(np.sign(least) * np.sqrt(abs(least)))

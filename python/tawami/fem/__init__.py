@@ -1,1 +1,7 @@
-"""The only importer of dolfinx, basix and FFCx: elements, rules, kernels, the mesh of a grid."""
+"""Elements, quadrature rules, compiled kernels, and the mesh of a grid: the only importer of dolfinx."""
+
+from tawami.fem.kernels import Kernel
+from tawami.fem.mesh import FunctionSpace, Rectangle
+from tawami.fem.rules import Rule, TangentRule
+
+__all__ = ["FunctionSpace", "Kernel", "Rectangle", "Rule", "TangentRule"]

@@ -16,6 +16,7 @@ import numpy as np
 
 from tawami.base.arrays import Array
 from tawami.base.dependencies import report_missing
+from tawami.base.space import PLANE
 
 __all__ = [
     "BILINEAR_DOFS", "DISPLACEMENT_DOFS", "OLD", "IntegralType", "at_points", "at_vertices",
@@ -38,8 +39,8 @@ if warnings.showwarning is not _showwarning:
     logging.captureWarnings(False)
 
 version: str = dolfinx.__version__
-#: Degrees of freedom of a cell: biquadratic displacement (9 nodes), bilinear field.
-DISPLACEMENT_DOFS, BILINEAR_DOFS = 18, 4
+#: Degrees of freedom of a cell: displacement, quadratic along each axis, and a field linear along each.
+DISPLACEMENT_DOFS, BILINEAR_DOFS = PLANE.dim * 3**PLANE.dim, PLANE.num_vertices
 #: Whether this is dolfinx 0.5, whose elements are those of UFL.
 OLD = not hasattr(dolfinx.fem, "functionspace")
 CELL = "quadrilateral"
@@ -108,7 +109,7 @@ else:
 
 def domain() -> Any:
     """A UFL mesh of squares, to write forms on without a grid."""
-    return ufl.Mesh(lagrange(1, 2))
+    return ufl.Mesh(lagrange(1, PLANE.dim))
 
 
 @functools.cache

@@ -1,4 +1,4 @@
-"""What a run depends on beyond its input: versions, the BLAS that is loaded, threads."""
+"""The environment of a run: versions, the loaded BLAS, threads, memory."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from petsc4py import PETSc
 
 from tawami.fem import dolfinx
 
-#: What this process has loaded (Linux).
+#: Libraries that this process has loaded (Linux).
 MAPS = Path("/proc/self/maps")
-#: What Linux says of this process.
+#: Status of this process (Linux).
 STATUS = Path("/proc/self/status")
 
 
 def blas() -> tuple[str, bool]:
-    """The BLAS library that PETSc's solvers use, and whether it is the slow reference one.
+    """Name of the BLAS library that PETSc uses, and whether it is the slow reference BLAS.
 
-    The loaded libraries are read from the process itself (Linux); 'unknown' elsewhere.
+    It is found among the loaded libraries (Linux), and 'unknown' elsewhere.
     """
     try:
         maps = MAPS.read_text().splitlines()
@@ -31,7 +31,7 @@ def blas() -> tuple[str, bool]:
     loaded = {Path(line.split()[-1]) for line in maps if ".so" in line}
     for path in sorted(loaded):
         if path.name.startswith("libblas.so"):
-            # Debian links libblas.so.3 to the chosen implementation, in a folder of its name.
+            # Debian links libblas.so.3 to the chosen implementation, in a folder with its name
             kind = path.resolve().parent.name
             return (f"reference BLAS ({path})", True) if kind == "blas" else (kind, False)
     for path in sorted(loaded):
@@ -41,9 +41,9 @@ def blas() -> tuple[str, bool]:
 
 
 def peak_memory() -> float:
-    """Most memory that this process has held [MB].
+    """Peak memory of this process [MB].
 
-    Linux' own figure: that of `getrusage` begins with what the parent held when it started the process.
+    On Linux this is VmHWM: the value of `getrusage` includes the memory of the parent at the start.
     """
     try:
         lines = STATUS.read_text().splitlines()
@@ -54,7 +54,7 @@ def peak_memory() -> float:
 
 
 def versions() -> dict[str, str]:
-    """Versions of what a result depends on."""
+    """Versions of the packages that a result depends on."""
     return {
         "tawami": version("tawami"),
         "dolfinx": dolfinx.version,
@@ -65,7 +65,7 @@ def versions() -> dict[str, str]:
 
 
 def header() -> str:
-    """A line for the start of a run, and a warning below it where the BLAS is slow."""
+    """A line for the start of a run, with a warning below it if the BLAS is slow."""
     name, slow = blas()
     line = ", ".join(f"{package} {number}" for package, number in versions().items())
     line += (

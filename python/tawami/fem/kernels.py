@@ -64,9 +64,18 @@ class Kernel:
     module: Any
 
 
+#: How long to wait for a kernel that another process compiles [s]. FFCx would raise an error after 10 s,
+#: which is too short on a busy machine.
+PATIENCE = 60
+
+
 def compile_kernel(comm: Any, form: Any, kind: Kind = "cell") -> Kernel:
     """Compile a UFL form with one kind of integral; the result is cached on disk."""
-    settings = {"cffi_extra_compile_args": list(COMPILER_FLAGS), "cache_dir": cache_directory()}
+    settings = {
+        "cffi_extra_compile_args": list(COMPILER_FLAGS),
+        "cache_dir": cache_directory(),
+        "timeout": PATIENCE,
+    }
     with quiet():
         compiled, module, _ = jit.ffcx_jit(comm, form, {}, settings)
     place = KINDS.index(kind)

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from tawami.base.arrays import Array
+from tawami.base.space import PLANE
 from tawami.fem.dolfinx import basix, reference_nodes
 
 #: Rules of particle densities: the full rule, a smaller one for tangents, the centre of the cell, its
@@ -38,7 +39,7 @@ def triangle_rule(degree: int) -> tuple[Array, Array]:
 
 
 def rule_points(rule: Rule) -> Array:
-    """Points of a rule of densities, points x 2; none for means over cells."""
+    """Points of a rule of densities, points x dim; none for means over cells."""
     if rule == "mean":
-        return np.empty((0, 2))
+        return np.empty((0, PLANE.dim))
     return reference_nodes(1) if rule == "vertex" else reference_points(DEGREE[rule])

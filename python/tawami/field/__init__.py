@@ -1,1 +1,19 @@
-"""Assembly and constraints: (form, particle densities, P) -> reduced residual and tangent."""
+"""The field problem: (form, particle densities, reduction) -> residual and reduced tangent."""
+
+from tawami.field.assembly import Assembly
+from tawami.field.attachment import Attachment
+from tawami.field.fast import FastAssembly
+from tawami.field.layout import Layout
+from tawami.field.reduction import Reduction
+from tawami.field.reference import ReferenceAssembly
+from tawami.field.tractions import Tractions
+
+__all__ = [
+    "Assembly",
+    "Attachment",
+    "FastAssembly",
+    "Layout",
+    "Reduction",
+    "ReferenceAssembly",
+    "Tractions",
+]

@@ -72,22 +72,22 @@ class Attachment:
             once = np.ones(len(volume))
             sums = _rust.nodal_sums(location, once, once[:, None], basis)
             self.layout.tie(self.summed(sums)[:, 0], UNRESOLVED)
-        self.points: dict[Rule, list[tuple[int, int]]] = {
+        self.points: dict[Rule, list[tuple[int, ...]]] = {
             rule: self._point_indices(rule) for rule in compiled.densities
         }
 
-    def _point_indices(self, rule: Rule) -> list[tuple[int, int]]:
-        """Indices along x and y, in the rule of one axis, of each point of a rule of dolfinx."""
+    def _point_indices(self, rule: Rule) -> list[tuple[int, ...]]:
+        """Indices along each axis, in the rule of one axis, of each point of a rule of dolfinx."""
         if rule == "mean":
             return []
         points = self.grid.rectangle.to_grid_axes(rule_points(rule))
         along = np.array([0.0, 1.0])
         if rule != "vertex":
-            along, _ = _rust.gauss(round(len(points) ** 0.5))
+            along, _ = _rust.gauss(round(len(points) ** (1 / self.grid.space.dim)))
         distance = np.abs(points[:, :, None] - along[None, None, :])
         if distance.min(axis=2).max() > 1e-12:
             raise RuntimeError("internal: dolfinx' quadrature is not the tensor Gauss rule")
-        return [(int(a), int(b)) for a, b in distance.argmin(axis=2)]
+        return [tuple(map(int, index)) for index in distance.argmin(axis=2)]
 
     def constants(self, integral: Integral) -> Array:
         """Values of the constants that an integral names."""

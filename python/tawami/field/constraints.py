@@ -13,7 +13,8 @@ from scipy.sparse.linalg import spsolve
 from tawami import _rust
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import SupportError
-from tawami.grid.basis import Basis, values_1d
+from tawami.base.space import Position, lattice, tensor_product
+from tawami.grid.basis import Basis, functions_on, values_1d
 from tawami.grid.edges import (
     Interval,
     Profile,
@@ -23,7 +24,6 @@ from tawami.grid.edges import (
     locate_point,
 )
 from tawami.grid.grid import Edge, Grid
-from tawami.grid.space import Position, lattice, tensor_product
 
 #: Points of the Gauss rule along a cell of an edge, for the projection of profiles.
 POINTS = 5
@@ -101,18 +101,17 @@ def held_edge(
             f"fix(edge='{edge}'): no cell along that edge of the grid holds particles: the support "
             "would not touch the body. Let the grid end where the body is held"
         )
+    used = functions_on(basis, grid.cells[along], touched)
+    indices = grid.space.dim * edge_functions(grid, basis, edge)[used] + component
+    if not callable(value) and np.ndim(value) == 0:
+        return Held(indices, np.full(len(used), float(value)))  # the functions add up to 1
     points, weights = _rust.gauss(POINTS)
     cell, t = np.repeat(touched, POINTS), np.tile(points, len(touched))
     position = grid.axis_positions(along, cell, t)
     fixed = np.full_like(position, grid.upper[axis] if end else grid.origin[axis])
     x, y = (fixed, position) if axis == 0 else (position, fixed)
     prescribed = evaluate(value, x, y, f"fix(edge='{edge}')")
-    values = values_1d(basis, grid.cells[along], cell, t)
-    used = np.unique(values.indices)
-    indices = grid.space.dim * edge_functions(grid, basis, edge)[used] + component
-    if not callable(value) and np.ndim(value) == 0:
-        return Held(indices, np.full(len(used), prescribed[0]))  # the functions add up to 1
-    values = values[:, used]
+    values = values_1d(basis, grid.cells[along], cell, t)[:, used]
     weighted = sp.diags(np.tile(weights, len(touched))) @ values
     coefficients = spsolve((weighted.T @ values).tocsc(), weighted.T @ prescribed)
     return Held(indices, coefficients)

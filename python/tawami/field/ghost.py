@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 from petsc4py import PETSc
 
@@ -23,10 +22,8 @@ from tawami.fem import dolfinx
 from tawami.fem.kernels import Kernel
 from tawami.fem.rules import Rule
 from tawami.field.attachment import Attachment
-from tawami.field.layout import Layout
 from tawami.field.reduction import Reduction
 from tawami.form.integral import Integral
-from tawami.grid.grid import Grid
 
 Side = tuple[tuple[int, int], tuple[int, int], tuple[str, str]]
 
@@ -120,7 +117,7 @@ class GhostPenalty:
             x = np.concatenate([vertices, vertices + shift]).ravel()
             facets = np.array([grid.rectangle.facet_of_edge(n) for n in names], dtype=np.int32)
             packed = means[grid.cell_numbers(np.array([here, there]))][:, columns].ravel()
-            (c0, t0), (c1, t1) = (_extraction(grid, layout, cell) for cell in (here, there))
+            (c0, t0), (c1, t1) = (layout.on_cell(np.array(cell)) for cell in (here, there))
             element = np.zeros((2 * len(t0), 2 * len(t0)))
             kernel(element, packed, constants, x, facets)
             coefficients = np.concatenate([c0, c1])
@@ -137,38 +134,10 @@ class GhostPenalty:
     def _means(self, data: Array) -> Array:
         """Volume-weighted means over the particles of each cell, on any rank, cells x columns."""
         attached = self._attachment
-        columns = [attached.volume, *(attached.volume[:, None] * data).T]
-        cell, cells = attached.location.cell, attached.grid.num_cells
-        sums = [np.bincount(cell, weights=column, minlength=cells) for column in columns]
-        total = attached.summed(np.stack(sums, axis=1))
-        volume = total[:, :1]
-        return np.asarray(total[:, 1:] / np.where(volume > 0, volume, 1.0))
-
-
-def _extraction(
-    grid: Grid, layout: Layout, cell: tuple[int, int]
-) -> tuple[npt.NDArray[Any], Array]:
-    """Coefficients on a cell, and T: degrees of freedom of the kernel there = T coefficients."""
-    nodes = grid.rectangle.to_grid_axes(dolfinx.reference_nodes(2))
-    functions, values = [], []
-    for axis in range(2):
-        n, number = grid.cells[axis], np.full(len(nodes), cell[axis])
-        first, at_nodes = _rust.basis_1d(layout.basis, n, number, nodes[:, axis].copy())
-        used = at_nodes.any(axis=0)
-        functions.append(first[0] + np.flatnonzero(used))
-        values.append(at_nodes[:, used])
-    width = _rust.basis_len(layout.basis, grid.cells[0])
-    function = (functions[0] + width * functions[1][:, None]).ravel()
-    scalar = (values[1][:, :, None] * values[0][:, None, :]).reshape(len(nodes), -1)
-    coefficients = (2 * function[:, None] + np.arange(2)).ravel()
-    t = np.kron(scalar, np.eye(2))
-    if layout.size > layout.num_displacement:
-        vertices = np.rint(grid.rectangle.to_grid_axes(dolfinx.reference_nodes(1))).astype(int)
-        i, j = (np.array(cell) + vertices).T
-        more = layout.num_displacement + i + (grid.cells[0] + 1) * j
-        coefficients = np.concatenate([coefficients, more])
-        t = sp.block_diag([t, np.eye(4)]).toarray()
-    return coefficients, t
+        columns = np.column_stack([np.ones(len(data)), data])
+        sums = attached.summed(_rust.cell_sums(attached.location, attached.volume, columns))
+        volume = sums[:, :1]
+        return np.asarray(sums[:, 1:] / np.where(volume > 0, volume, 1.0))
 
 
 def _call(kernel: Kernel) -> Callable[..., None]:

@@ -15,11 +15,11 @@ import scipy.sparse as sp
 
 from tawami import _rust
 from tawami.base.arrays import Array, Indices, Mask
+from tawami.base.space import lattice
 from tawami.fem import dolfinx
 from tawami.fem.mesh import FunctionSpace
 from tawami.grid.basis import Basis, greville_1d
 from tawami.grid.grid import Grid
-from tawami.grid.space import lattice
 
 
 class Layout:
@@ -97,20 +97,23 @@ class Layout:
 
     def extraction_on(self, cells: Any) -> sp.csr_matrix:
         """The rows of E of the degrees of freedom of some dolfinx cells; the others are empty."""
-        of_u, of_bilinear = dolfinx.DISPLACEMENT_DOFS, dolfinx.BILINEAR_DOFS
-        dofs, dim = self._space.dofs[cells], self.grid.space.dim
+        grid, of_u, of_bilinear = self.grid, dolfinx.DISPLACEMENT_DOFS, dolfinx.BILINEAR_DOFS
+        dofs, dim = self._space.dofs[cells], grid.space.dim
+        number = grid.cell_numbers(grid.rectangle.ij[cells])
         fields: list[tuple[Basis, int, Any]] = [(self.basis, 2, dofs[:, :of_u].reshape(-1, dim))]
         if self._bilinear:
             fields.append(("bilinear", 1, dofs[:, of_u : of_u + of_bilinear].reshape(-1, 1)))
         rows, columns, values, first = [], [], [], 0
         for basis, degree, of_nodes in fields:
-            functions, weights = self._at_nodes(basis, degree, cells)
-            once = np.unique(of_nodes[:, 0], return_index=True)[1]
+            functions, at_nodes = self._at_nodes(basis, degree, number)
+            once = np.unique(of_nodes[:, 0], return_index=True)[1]  # (cell, node) of each row
+            functions = functions[once // at_nodes.shape[1]]
+            at_nodes = at_nodes.reshape(-1, at_nodes.shape[2])[once]
             components = np.arange(of_nodes.shape[1])
-            shape = (len(once), functions.shape[1], len(components))
-            columns.append(first + len(components) * functions[once][..., None] + components)
+            shape = (*functions.shape, len(components))
+            columns.append(first + len(components) * functions[..., None] + components)
             rows.append(np.broadcast_to(of_nodes[once][:, None], shape))
-            values.append(np.broadcast_to(weights[once][..., None], shape))
+            values.append(np.broadcast_to(at_nodes[..., None], shape))
             first += len(components) * int(np.prod(self._shape(basis)))
         flat = [
             np.concatenate([part.ravel() for part in parts]) for parts in (values, rows, columns)
@@ -119,21 +122,25 @@ class Layout:
         matrix.eliminate_zeros()
         return matrix
 
-    def _at_nodes(self, basis: Basis, degree: int, cells: Any) -> tuple[Indices, Array]:
-        """Functions at the Lagrange nodes of cells and their values, (cells x nodes) x functions."""
-        grid = self.grid
-        nodes = grid.rectangle.to_grid_axes(dolfinx.reference_nodes(degree))
-        along = []
-        for axis, n in enumerate(grid.cells):
-            cell = np.repeat(grid.rectangle.ij[cells, axis], len(nodes))
-            first, values = _rust.basis_1d(basis, n, cell, np.tile(nodes[:, axis], len(cells)))
-            along.append((first[:, None] + np.arange(3), values))
-        (fx, vx), (fy, vy) = along
-        functions = fx[:, None, :] + self._shape(basis)[0] * fy[:, :, None]
-        weights = vx[:, None, :] * vy[:, :, None]
-        # a function beyond the last has the value 0 (a bilinear cell has two along each axis)
-        functions = np.where(weights == 0, 0, functions)
-        return functions.reshape(-1, 9), weights.reshape(-1, 9)
+    def on_cell(self, cell: Indices) -> tuple[Indices, Array]:
+        """Coefficients on a cell (i, j), and T: degrees of freedom of a kernel = T coefficients."""
+        number, dim = np.array([self.grid.cell_numbers(cell)]), self.grid.space.dim
+        functions, at_nodes = self._at_nodes(self.basis, 2, number)
+        coefficients = (dim * functions[0][:, None] + np.arange(dim)).ravel()
+        blocks = [np.kron(at_nodes[0], np.eye(dim))]
+        if self._bilinear:  # each function is 1 at one vertex
+            functions, at_nodes = self._at_nodes("bilinear", 1, number)
+            of_vertices = self.num_displacement + functions[0][at_nodes[0].argmax(axis=1)]
+            coefficients = np.concatenate([coefficients, of_vertices])
+            blocks.append(np.eye(len(of_vertices)))
+        return coefficients, sp.block_diag(blocks).toarray()
+
+    def _at_nodes(self, basis: Basis, degree: int, cells: Indices) -> tuple[Indices, Array]:
+        """Functions on cells (cells x functions), and their values at Lagrange nodes of a degree
+        (cells x nodes x functions).
+        """
+        nodes = self.grid.rectangle.to_grid_axes(dolfinx.reference_nodes(degree))
+        return _rust.extraction(basis, self.grid.cells, cells, np.ascontiguousarray(nodes))
 
     @functools.cached_property
     def greville(self) -> Array:

@@ -6,6 +6,7 @@ matrix S contains supports, point constraints and inactive functions.
 
 from __future__ import annotations
 
+import functools
 import hashlib
 from collections.abc import Sequence
 
@@ -105,6 +106,21 @@ class Reduction:
         reduction.offset = np.zeros(layout.size)
         return reduction
 
+    def restricted(self, forces: Array) -> Array:
+        """S^T f: forces on the unknowns, from those on all coefficients."""
+        return np.asarray(self._transposed @ forces)
+
+    @functools.cached_property
+    def _transposed(self) -> sp.csc_matrix:
+        return self.selection.T
+
+    @functools.cached_property
+    def _displacement(self) -> tuple[sp.csr_matrix, Indices]:
+        """The part of S for the displacement, and the coefficients of its unknowns."""
+        n = self.layout.num_displacement
+        free = self.unknowns < n
+        return self.selection[:n][:, free], self.unknowns[free]
+
     def imposed(self, values: Array, mass: Array, offset: Array) -> Array:
         """Velocities after an impulse of the supports.
 
@@ -115,11 +131,9 @@ class Reduction:
             mass: Mass of each [kg per metre depth].
             offset: As `offset`, for the rate.
         """
-        n = len(values)
-        free = self.unknowns < n
-        s, g = self.selection[:n][:, free], offset[:n]
+        (s, unknowns), g = self._displacement, offset[: len(values)]
         if not self.points and not len(self.layout.tied):
-            return np.asarray(s @ (values - g)[self.unknowns[free]] + g)
+            return np.asarray(s @ (values - g)[unknowns] + g)
         weighted = s.T @ sp.diags(mass)
         return np.asarray(s @ spsolve((weighted @ s).tocsc(), weighted @ (values - g)) + g)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -15,6 +16,22 @@ from tawami.field.layout import Layout
 FREE, ZERO = 1e-10, 1e-8
 
 
+def rigid_motions(points: Array) -> Array:
+    """Displacements at points (points x dim) of translations and of rotations about the origin.
+
+    Returns:
+        Components x motions, where the components are those of one point after the other.
+    """
+    dim = points.shape[1]
+    planes = list(combinations(range(dim), 2))
+    motions = np.zeros((*points.shape, dim + len(planes)))
+    for axis in range(dim):
+        motions[:, axis, axis] = 1.0
+    for number, (i, j) in enumerate(planes, start=dim):
+        motions[:, i, number], motions[:, j, number] = -points[:, j], points[:, i]
+    return motions.reshape(points.size, -1)
+
+
 def rigid_modes(layout: Layout, part: Mask) -> tuple[Array, Array, float]:
     """Rigid motions of a part of the body.
 
@@ -23,17 +40,15 @@ def rigid_modes(layout: Layout, part: Mask) -> tuple[Array, Array, float]:
         part: Whether each displacement coefficient belongs to the part.
 
     Returns:
-        Coefficients of the translations in x and y and of the rotation (coefficients x 3), the centre
-        of the part [m], and the length that divides the rotation [m].
+        Coefficients of the translations and rotations (coefficients x motions), the centre of the part
+        [m], and the length that divides the rotations [m].
     """
-    points = layout.greville
-    mine = points[part[::2]]
+    dim = layout.grid.space.dim
+    mine = layout.greville[part[::dim]]
     centre = mine.mean(axis=0)
     length = float(np.ptp(mine, axis=0).max())
-    modes = np.zeros((layout.num_displacement, 3))
-    modes[0::2, 0] = modes[1::2, 1] = 1.0
-    modes[0::2, 2] = -(points[:, 1] - centre[1]) / length
-    modes[1::2, 2] = (points[:, 0] - centre[0]) / length
+    modes = rigid_motions(layout.greville - centre)
+    modes[:, dim:] /= length
     return modes, centre, length
 
 
@@ -53,7 +68,7 @@ def check_rigid_motions(layout: Layout, fixed: Mask, points: Sequence[PointHeld]
         modes, centre, length = rigid_modes(layout, mine)
         held = modes[mine & fixed[: layout.num_displacement]]
         rows = [p.weights @ modes[p.indices] for p in points if mine[p.indices].any()]
-        matrix = np.vstack([held.T @ held, *rows, np.zeros((3, 3))])
+        matrix = np.vstack([held.T @ held, *rows, np.zeros((modes.shape[1],) * 2)])
         _, singular, vectors = np.linalg.svd(matrix)
         free = vectors[singular < FREE * max(singular[0], 1e-300)]
         if not len(free):
@@ -71,7 +86,7 @@ def check_rigid_motions(layout: Layout, fixed: Mask, points: Sequence[PointHeld]
 
 
 def _names(free: Array, centre: Array, length: float) -> list[str]:
-    """Names of the rigid motions spanned by the rows (translation x, y, rotation)."""
+    """Names of the rigid motions of the plane spanned by the rows (translation x, y, rotation)."""
     names, rest = [], free
     for axis, name in enumerate("xy"):
         unit = np.eye(3)[axis]

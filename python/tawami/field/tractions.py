@@ -28,10 +28,10 @@ class Tractions:
         return np.flatnonzero(np.take(self._attachment.active, end, axis=1 - axis))
 
     def nodes(self, edge: Edge) -> Array:
-        """Positions [m] of the biquadratic nodes of an edge, cells x nodes x 2, on every rank."""
+        """Positions [m] of the biquadratic nodes of an edge, cells x nodes x dim, on every rank."""
         axis, end = self._grid.edge(edge)
         along = self.cells(edge)
-        ij = np.full((len(along), 2), self._grid.cells[axis] - 1 if end else 0)
+        ij = np.full((len(along), self._grid.space.dim), self._grid.cells[axis] - 1 if end else 0)
         ij[:, 1 - axis] = along
         nodes = self._grid.rectangle.to_grid_axes(dolfinx.reference_nodes(2))
         positions = ij[:, None, :] + nodes[self._on(edge)]
@@ -42,7 +42,7 @@ class Tractions:
 
         Args:
             edge: Name of the edge.
-            values: Traction [Pa] at :meth:`nodes`, cells x nodes x 2.
+            values: Traction [Pa] at :meth:`nodes`, cells x nodes x dim.
         """
         attached, rectangle = self._attachment, self._grid.rectangle
         integral = attached.compiled.traction
@@ -52,7 +52,8 @@ class Tractions:
         on_edge = ij[attached.cells, axis] == (self._grid.cells[axis] - 1 if end else 0)
         cells = attached.cells[on_edge]
         cells = cells[rectangle.facet_order(cells, local)]
-        packed = np.zeros((len(cells), dolfinx.DISPLACEMENT_DOFS // 2, 2))
+        dim = self._grid.space.dim
+        packed = np.zeros((len(cells), dolfinx.DISPLACEMENT_DOFS // dim, dim))
         packed[:, self._on(edge)] = values[np.searchsorted(self.cells(edge), ij[cells, 1 - axis])]
         packed = packed.reshape(len(cells), dolfinx.DISPLACEMENT_DOFS)
         form = attached.space.form(integral.kernel, 1, rectangle.entities(cells, local))

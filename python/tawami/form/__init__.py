@@ -1,1 +1,7 @@
-"""A weak form: what it declares, what its residual may name, its derived tangent and its kernels."""
+"""A weak form: its contract, the names in its residual, its derived tangent and its kernels."""
+
+from tawami.form.compilation import CompiledForm, compile_form
+from tawami.form.form import Form
+from tawami.form.kinematics import Kinematics, StrainMeasure
+
+__all__ = ["CompiledForm", "Form", "Kinematics", "StrainMeasure", "compile_form"]

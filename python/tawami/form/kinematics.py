@@ -7,17 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg as la
 import ufl
 
+from tawami.base.arrays import Array
+from tawami.base.space import PLANE
 from tawami.form.quantities import Part
 
-Array = npt.NDArray[np.float64]
-
+AXES = range(PLANE.dim)
 #: Kinds of the fields of a form, with their units.
 FIELD_UNITS: Mapping[str, str] = {"displacement": "m", "volumetric_strain": "-", "pressure": "Pa"}
 
@@ -58,9 +59,9 @@ class StrainMeasure:
         stress_xx_yy_xy: Places of xx, yy and xy among its components.
         deviator: Name of its deviator.
         mean: Name of the mean stress.
-        gradient_part: What the tangent of a quantity is taken with respect to.
+        gradient_part: Derivative that the tangent of a quantity contains: by strain or by gradient.
         mixed_form: The shipped form with a field for the volumetric strain.
-        description: For the header of a run.
+        description: Text for the header of a run.
     """
 
     name: str
@@ -81,31 +82,34 @@ class StrainMeasure:
         """Components of a change of displacement (UFL) that :attr:`gradient_part` multiplies."""
         if self.finite:
             g = ufl.grad(du)
-            return g[0, 0], g[0, 1], g[1, 0], g[1, 1]
+            return tuple(g[i, j] for i, j in product(AXES, repeat=2))
         e = ufl.sym(ufl.grad(du))
-        return e[0, 0], e[1, 1], 2 * e[0, 1]
+        shear = (2 * e[i, j] for i, j in combinations(AXES, 2))
+        return (*(e[i, i] for i in AXES), *shear)
 
     def volume_change(self, u: Any, du: Any) -> Any:
         """Change of div u (small strain) or ln det f (finite strain) with du, in UFL."""
         if self.finite:
-            return ufl.inner(ufl.inv(ufl.Identity(2) + ufl.grad(u)).T, ufl.grad(du))
+            return ufl.inner(ufl.inv(ufl.Identity(PLANE.dim) + ufl.grad(u)).T, ufl.grad(du))
         return ufl.div(du)
 
     def metric_change(self, gradient: Array) -> Array:
-        """Twice the strain that vanishes for rigid motions; `gradient` is (n x 2 x 2)."""
+        """Twice the strain that vanishes for rigid motions; `gradient` is (n x dim x dim)."""
         transposed = gradient.transpose(0, 2, 1)
         change = gradient + transposed
         return change + transposed @ gradient if self.finite else change
 
     def rotation(self, angle: float) -> Array:
-        """Displacement gradient of a rotation (2 x 2), linearised and of size 1 at small strain."""
+        """Displacement gradient of a rotation in the plane (2 x 2); of an infinitesimal one at small
+        strain, divided by the angle.
+        """
         c, s = np.cos(angle), np.sin(angle)
         return np.array([[c - 1, -s], [s, c - 1]] if self.finite else [[0.0, -1.0], [1.0, 0.0]])
 
     def of_gradient(self, gradient: Array) -> Array:
-        """Strain tensor of a displacement gradient (2 x 2 each), logarithmic at finite strain."""
+        """Strain tensor of a displacement gradient (dim x dim each), logarithmic at finite strain."""
         if self.finite:
-            f = np.eye(2) + gradient
+            f = np.eye(len(gradient)) + gradient
             return np.asarray(np.real(la.logm(f @ f.T)) / 2)
         return np.asarray((gradient + gradient.T) / 2)
 

@@ -13,17 +13,20 @@ from typing import Any, Literal
 import numpy as np
 
 from tawami.base.errors import FormError
+from tawami.base.space import PLANE
 from tawami.fem.rules import Rule
 
 Part = Literal["value", "strain", "gradient", "volume"]
 
-#: Components of the quantities that the material law gives: (xx, yy, xy) or (xx, xy, yx, yy).
+#: Components of a strain or a stress, (xx, yy, xy), and of a gradient, (xx, xy, yx, yy).
+STRAIN, GRADIENT = PLANE.num_strains, len(PLANE.gradient)
+#: Components of the quantities that the material law gives.
 COMPONENTS: Mapping[str, int] = {
-    "sigma": 3, "s": 3, "sigma_m": 1, "P": 4, "P_s": 4, "tau_m": 1, "ln_J": 1
+    "sigma": STRAIN, "s": STRAIN, "sigma_m": 1, "P": GRADIENT, "P_s": GRADIENT, "tau_m": 1, "ln_J": 1
 }  # fmt: skip
 #: Numbers per component of the parts of a law quantity: its value, and its derivatives with respect to
 #: the strain (xx, yy, gamma_xy), grad u (xx, xy, yx, yy) and the volumetric strain.
-WIDTH: Mapping[Part, int] = {"value": 1, "strain": 3, "gradient": 4, "volume": 1}
+WIDTH: Mapping[Part, int] = {"value": 1, "strain": STRAIN, "gradient": GRADIENT, "volume": 1}
 
 OPERATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
     "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power

@@ -11,6 +11,7 @@ from typing import Any
 import ufl
 
 from tawami.base.errors import FormError, InexactSumWarning
+from tawami.base.space import PLANE
 from tawami.base.text import quoted
 from tawami.fem import dolfinx
 from tawami.fem.rules import DEGREE, FAMILY, Rule
@@ -49,7 +50,7 @@ class Symbols:
     def __init__(self, form: Form, options: Mapping[str, str]) -> None:
         self.form = form
         domain = dolfinx.domain()
-        elements = [dolfinx.lagrange(2, 2)] + [dolfinx.lagrange(1)] * (len(form.fields) - 1)
+        elements = [dolfinx.lagrange(2, PLANE.dim)] + [dolfinx.lagrange(1)] * (len(form.fields) - 1)
         self.element = elements[0] if len(elements) == 1 else dolfinx.mixed(elements)
         space = ufl.FunctionSpace(domain, self.element)
         self.domain = domain
@@ -60,7 +61,9 @@ class Symbols:
         self.trials = self._split(self.trial)
         tests = self._split(test)
         self.tests = {form.fields[name][1]: tests[name] for name in form.fields}
-        self.traction = ufl.Coefficient(ufl.FunctionSpace(domain, dolfinx.lagrange(2, 2)), count=1)
+        self.traction = ufl.Coefficient(
+            ufl.FunctionSpace(domain, dolfinx.lagrange(2, PLANE.dim)), count=1
+        )
         self.constants = {
             name: ufl.Constant(domain, count=k) for k, name in enumerate(("h", *form.parameters))
         }

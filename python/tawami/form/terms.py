@@ -34,7 +34,7 @@ def terms_of(symbols: Symbols, residual: Any) -> Terms:
     """The terms of a residual.
 
     Raises:
-        FormError: A term contains what it cannot contain; the message says what is expected.
+        FormError: A term is of a kind that is not supported; the message says what is expected.
     """
     name = symbols.form.name
     for part in residual.integrals():

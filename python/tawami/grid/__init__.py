@@ -1,1 +1,5 @@
-"""The background grid before there are particles: `Grid`, `Space`, edges and one-dimensional bases."""
+"""The background grid before there are particles: cells, edges and one-dimensional bases."""
+
+from tawami.grid.grid import Grid
+
+__all__ = ["Grid"]

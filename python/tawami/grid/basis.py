@@ -2,13 +2,11 @@
 
 Quadratic splines, bilinear and biquadratic Lagrange functions are all biquadratic on a cell. The field
 problem is therefore assembled on the nodes of a continuous Lagrange element: nodal values = E
-coefficients. The extraction matrix E is the Kronecker product of one-dimensional matrices, whose rows
-sum to 1.
+coefficients. The rows of the extraction matrix E sum to 1.
 """
 
 from __future__ import annotations
 
-from functools import reduce
 from typing import Literal, get_args
 
 import numpy as np
@@ -16,8 +14,8 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from tawami import _rust
-from tawami.base.arrays import Array
-from tawami.grid.space import Counts
+from tawami.base.arrays import Array, Indices
+from tawami.base.space import Counts, lattice
 
 Basis = Literal["quadratic_spline", "bilinear", "biquadratic"]
 BASES: tuple[Basis, ...] = get_args(Basis)
@@ -34,7 +32,7 @@ def values_1d(basis: Basis, n: int, cell: npt.ArrayLike, t: npt.ArrayLike) -> sp
     """
     cells = np.atleast_1d(np.asarray(cell, dtype=np.int64))
     first, values = _rust.basis_1d(basis, n, cells, np.atleast_1d(np.asarray(t, dtype=float)))
-    width = 2 if basis == "bilinear" else 3
+    width = _per_cell(basis)
     rows = np.repeat(np.arange(len(cells)), width)
     columns = (first[:, None] + np.arange(width)).ravel()
     shape = (len(cells), _rust.basis_len(basis, n))
@@ -43,17 +41,37 @@ def values_1d(basis: Basis, n: int, cell: npt.ArrayLike, t: npt.ArrayLike) -> sp
     return matrix
 
 
-def extraction_1d(basis: Basis, n: int, degree: int) -> sp.csr_matrix:
-    """Values at the Lagrange nodes (`degree` per cell) of a row of `n` cells, nodes x functions."""
-    node = np.arange(degree * n + 1)
-    cell = np.minimum(node // degree, n - 1)
-    return values_1d(basis, n, cell, (node - degree * cell) / degree)
+def _per_cell(basis: Basis) -> int:
+    """Functions that do not vanish on a cell of a row."""
+    return 2 if basis == "bilinear" else 3
+
+
+def functions_on(basis: Basis, n: int, cells: npt.ArrayLike) -> Indices:
+    """Functions on a row of `n` cells that do not vanish on all of these cells, ascending."""
+    chosen = np.atleast_1d(np.asarray(cells, dtype=np.int64))
+    first, _ = _rust.basis_1d(basis, n, chosen, np.full(len(chosen), 0.5))
+    return np.unique(first[:, None] + np.arange(_per_cell(basis)))
 
 
 def extraction(basis: Basis, cells: Counts, degree: int) -> sp.csr_matrix:
-    """The extraction matrix E of a scalar field, nodes x functions; x fastest in both."""
-    along = [extraction_1d(basis, n, degree) for n in cells]
-    return reduce(lambda inner, outer: sp.kron(outer, inner, format="csr"), along)
+    """The extraction matrix E of a scalar field on Lagrange nodes (`degree` per cell along each axis).
+
+    Its shape is nodes x functions, x fastest in both.
+    """
+    nodes = lattice([np.arange(degree + 1)] * len(cells))
+    number = np.arange(int(np.prod(cells)))
+    functions, values = _rust.extraction(basis, cells, number, nodes / degree)
+    first = degree * lattice([np.arange(n) for n in cells])
+    shape = [degree * n + 1 for n in cells]
+    row = (first[:, None] + nodes) @ np.cumprod((1, *shape[:-1]))
+    rows, once = np.unique(row, return_index=True)  # a node belongs to several cells
+    columns = functions[once // len(nodes)]
+    entries = values.reshape(-1, values.shape[2])[once]
+    index = (np.repeat(rows, columns.shape[1]), columns.ravel())
+    count = [_rust.basis_len(basis, n) for n in cells]
+    matrix = sp.csr_matrix((entries.ravel(), index), shape=(len(rows), int(np.prod(count))))
+    matrix.eliminate_zeros()
+    return matrix
 
 
 def greville_1d(basis: Basis, n: int) -> Array:

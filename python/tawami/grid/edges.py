@@ -13,22 +13,12 @@ from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import InputError
 from tawami.grid.basis import Basis
 from tawami.grid.grid import Edge, Grid
-from tawami.grid.space import PLANE
 
 Component = Literal["x", "y"]
 #: A part of an edge: from one line of the grid to another [m].
 Interval = tuple[float, float]
 #: A number, or a function of position f(x, y) on arrays.
 Profile = float | Callable[[Array, Array], Any]
-
-
-def component_index(component: str) -> int:
-    """Number of a component of a vector: 0 for 'x', 1 for 'y'.
-
-    Raises:
-        InputError: Anything else.
-    """
-    return PLANE.axis(component)
 
 
 def evaluate(profile: Profile, x: Array, y: Array, what: str) -> Array:

@@ -16,8 +16,8 @@ from tawami.base.arrays import Array, Indices
 from tawami.base.checks import number, one_of, pair, point, room, shown, whole_number
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
+from tawami.base.space import PLANE, Counts, Position
 from tawami.fem import mesh
-from tawami.grid.space import PLANE, Counts, Position
 
 Edge = Literal["left", "right", "bottom", "top"]
 EDGES: tuple[Edge, ...] = get_args(Edge)
@@ -89,6 +89,13 @@ class Grid(Unique):
         """Its range along each axis [m], as text."""
         ends = zip(self.origin, self.upper, strict=True)
         return " x ".join(f"[{low:g}, {high:g}]" for low, high in ends)
+
+    @property
+    def line(self) -> str:
+        """The grid in words, for the header of a run."""
+        cells = " x ".join(map(str, self.cells))
+        corners = (", ".join(f"{x:g}" for x in corner) for corner in (self.origin, self.upper))
+        return f"{cells} cells of {self.h:g} m from ({next(corners)}) to ({next(corners)})"
 
     def __repr__(self) -> str:
         cells = " x ".join(map(str, self.cells))

@@ -147,7 +147,7 @@ class PathStep:
             return product(at_particles(a), at_particles(b))
 
         def ahead(u: Array) -> float:
-            """The first step goes on with the load; later ones do not turn back."""
+            """The first step continues with the load; later ones do not turn back."""
             return product(at_particles(u), last) if following.loads else 1.0
 
         return controls.ArcLength(inner, ahead, self.size)
@@ -278,4 +278,4 @@ def _checked(scene: Scene, control: Any) -> tuple[tuple[float, float] | None, in
         raise InputError(f"follow(...): control = {checks.shown(control)}: {EXPECTED}")
     place = checks.point("follow(...): control", control[0])
     edges.locate_point(scene.grid, place, "follow(...): control")
-    return place, edges.component_index(control[1])
+    return place, scene.grid.space.axis(control[1])

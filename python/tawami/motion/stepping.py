@@ -100,8 +100,7 @@ def ramp(
     """Apply the new loads and prescribed displacements of a scene in steps, without inertia.
 
     New loads grow in proportion from 0 to their values; loads that are in equilibrium already stay.
-    Where the body carries no more, the scene stays in its last equilibrium, and later ramps go on from
-    there.
+    Where the body carries no more, the scene stays in its last equilibrium; later ramps start there.
 
     Args:
         scene: The scene.
@@ -137,13 +136,7 @@ def ramp(
                 pace, 1.0, least, lambda part, _size: scene.solve_part(part), observer, each, steps
             )
     except ConvergenceError as error:
-        end_early(
-            steps,
-            error,
-            stop,
-            f"ramp stopped at {pace.at:g} of the load, which `reached` holds",
-            scene,
-        )
+        end_early(steps, error, stop, "ramp", scene)
     finally:
         steps.loads = [step.end for step in steps]
         if pace.at < 1.0:

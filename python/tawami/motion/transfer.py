@@ -67,7 +67,7 @@ def to_grid(domain: Domain, mass: Array, values: Array, gradient: Array) -> Arra
     points, at = _positions(domain)
     at_origin = values - np.einsum("pij,pj->pi", gradient, at)
     space = domain.model.space
-    sums = domain.sums(mass, np.column_stack([at_origin, gradient.reshape(len(mass), -1)]))
+    sums = domain.sums(mass, np.column_stack([at_origin, gradient.reshape(-1, space.dim**2)]))
     values, gradients = sums[:, : space.dim], space.tensors(sums[:, space.dim :])
     return np.asarray(values + np.einsum("ikl,il->ik", gradients, points))
 

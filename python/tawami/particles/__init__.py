@@ -1,1 +1,21 @@
-"""Material laws, which particle has which, and the cell and rank each particle belongs to."""
+"""Particles: their material laws, their cells and ranks, and their responses to an increment."""
+
+from tawami.particles.laws import (
+    drucker_prager,
+    linear_elastic,
+    mohr_coulomb,
+    neo_hookean,
+    von_mises,
+)
+from tawami.particles.numpy_law import NumpyLaw
+from tawami.particles.responses import Responses
+
+__all__ = [
+    "NumpyLaw",
+    "Responses",
+    "drucker_prager",
+    "linear_elastic",
+    "mohr_coulomb",
+    "neo_hookean",
+    "von_mises",
+]

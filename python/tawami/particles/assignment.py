@@ -1,4 +1,4 @@
-"""Which material and density each particle has, from what a driver script passes."""
+"""Material and density of each particle, from the arguments of a driver script."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.body.body import Body
 from tawami.particles.numpy_law import NumpyLaw
 
-Array = npt.NDArray[np.float64]
 #: A material for all particles, one for each number, or one for each name of the body.
 Given = _rust.Material | Sequence[_rust.Material] | Mapping[str, _rust.Material] | NumpyLaw
 
@@ -26,8 +26,8 @@ class Assignment:
 
     Attributes:
         materials: The laws.
-        law: The one in NumPy, if there is one; `materials` has what stands for it.
-        number: Which of them each particle has.
+        law: The law in NumPy, if there is one; `materials` then contains its elastic law.
+        number: Number of the law of each particle.
     """
 
     materials: list[_rust.Material]
@@ -36,19 +36,24 @@ class Assignment:
 
 
 def assigned(material: Given, material_of: npt.ArrayLike | None, body: Body, n: int) -> Assignment:
-    """The materials of n particles.
+    """Assign materials to n particles.
+
+    Args:
+        material: Material, list or dictionary of materials, or a `NumpyLaw`.
+        material_of: Number of the material of each particle.
+        body: The body, with names and numbers of its own.
+        n: Number of particles.
 
     Raises:
-        InputError: No material, a name of the body without one or the reverse, or numbers that do not
-            fit.
+        InputError: There is no material, names of body and materials differ, or numbers do not fit.
     """
     law = material if isinstance(material, NumpyLaw) else None
     numbers = body.material_of if material_of is None else material_of
     if isinstance(material, Mapping):
         if material_of is not None:
             raise InputError(
-                "material is a dictionary and material_of is given too: expected names, which the body "
-                "has, or a list of materials with material_of"
+                "material is a dictionary and material_of is given too: expected a dictionary with the "
+                "names of the body, or a list of materials with material_of"
             )
         materials = _by_name("material", material, body.names)
     elif law is not None:
@@ -76,10 +81,10 @@ def densities(
     materials: int,
     names: Sequence[str],
 ) -> Array | None:
-    """Density of each material [kg/m3], if there is one.
+    """Density of each material [kg/m3]; None if no density is given.
 
     Raises:
-        InputError: Another number of them, another name, or a number below 0.
+        InputError: Number or names do not fit the materials, or a density is below 0.
     """
     if density is None:
         return None
@@ -96,7 +101,7 @@ def densities(
 
 
 def _by_name(what: str, given: Mapping[str, Any], names: Sequence[str]) -> list[Any]:
-    """The values in the order of the names of a body."""
+    """The values in the order of the names of the body."""
     if not names:
         raise InputError(
             f"{what} is a dictionary and the body has no names: expected a body of tawami.mesh(...) "

@@ -1,4 +1,4 @@
-"""Material laws: what a driver script passes to a scene."""
+"""Material laws for driver scripts."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ def linear_elastic(
 ) -> _rust.Material:
     """Isotropic linear elasticity: `s = 2 mu dev(eps)`, `sigma_m = K eps_v`.
 
-    Give (E, nu), (K, mu), or (E, one_minus_2nu); the last keeps its digits near nu = 0.5.
+    Give (E, nu), (K, mu), or (E, one_minus_2nu). The last keeps all digits near nu = 0.5.
 
     Args:
         E: Young's modulus [Pa].
-        nu: Poisson's ratio, -1 < nu <= 0.5; 0.5 with form 'u_p' only.
+        nu: Poisson's ratio, -1 < nu <= 0.5; 0.5 only with form 'u_p'.
         K: Bulk modulus [Pa].
         mu: Shear modulus [Pa].
-        one_minus_2nu: 1 - 2 nu, from 0 (with form 'u_p' only) to below 3.
+        one_minus_2nu: 1 - 2 nu, from 0 (only with form 'u_p') to below 3.
 
     Raises:
-        InputError: A parameter out of its range, or another combination.
+        InputError: A parameter is out of its range, or the combination is another one.
     """
     return _elastic("linear_elastic", E=E, nu=nu, K=K, mu=mu, one_minus_2nu=one_minus_2nu)
 
@@ -46,8 +46,8 @@ def neo_hookean(
 ) -> _rust.Material:
     """Neo-Hookean elasticity: `tau = mu dev(be_bar) + K ln J I`, be_bar = J^(-2/3) F F^T.
 
-    At finite strain only. Give its constants at small strain as (E, nu), (K, mu), or
-    (E, one_minus_2nu); the last keeps its digits near nu = 0.5.
+    This law exists at finite strain only. Give its constants at small strain as (E, nu), (K, mu), or
+    (E, one_minus_2nu). The last keeps all digits near nu = 0.5.
 
     Args:
         E: Young's modulus [Pa].
@@ -57,7 +57,7 @@ def neo_hookean(
         one_minus_2nu: 1 - 2 nu, above 0 and below 3.
 
     Raises:
-        InputError: A parameter out of its range, or another combination.
+        InputError: A parameter is out of its range, or the combination is another one.
     """
     name = "neo_hookean"
     elastic = _elastic(name, E=E, nu=nu, K=K, mu=mu, one_minus_2nu=one_minus_2nu)
@@ -70,14 +70,14 @@ def von_mises(
     """Von Mises plasticity: `q = sqrt(3 J2) <= yield_stress + hardening * plastic_strain`.
 
     Args:
-        elastic: Elastic part, as linear_elastic(...) makes it; nu < 0.5.
-        yield_stress: In uniaxial tension [Pa].
+        elastic: Elastic part, a material of linear_elastic(...) with nu < 0.5.
+        yield_stress: Yield stress in uniaxial tension [Pa].
         hardening: Hardening modulus [Pa].
 
     History: `plastic_strain`, the equivalent plastic strain.
 
     Raises:
-        InputError: A parameter out of its range.
+        InputError: A parameter is out of its range.
     """
     K, mu = _moduli("von_mises", elastic)
     yield_stress = checks.real("von_mises: yield_stress", yield_stress)
@@ -97,17 +97,18 @@ def drucker_prager(
     """Drucker-Prager plasticity whose limit states in plane strain are those of Mohr-Coulomb.
 
     Args:
-        elastic: Elastic part, as linear_elastic(...) makes it; nu < 0.5.
+        elastic: Elastic part, a material of linear_elastic(...) with nu < 0.5.
         phi: Friction angle [degrees].
         c: Cohesion [Pa].
         psi: Dilatancy angle [degrees], at most phi.
-        eps_v_max: Plastic volumetric strain at which dilatancy ends; the strength stays that of psi.
-        tiny_angle: Take a friction angle between 0 and 1.6 degrees as it is: it is not in radians.
+        eps_v_max: Plastic volumetric strain at which dilatancy ends; the strength remains that of psi.
+        tiny_angle: Accept a friction angle between 0 and 1.6 degrees. It is rejected otherwise, because
+            it may be in radians.
 
     History: `plastic_strain`, the multiplier of sqrt(J2); `dilatancy`, the plastic volumetric strain.
 
     Raises:
-        InputError: A parameter out of its range.
+        InputError: A parameter is out of its range.
     """
     make = _rust.Material.drucker_prager
     return _frictional("drucker_prager", make, elastic, tiny_angle, phi, c, psi, eps_v_max)
@@ -122,30 +123,32 @@ def mohr_coulomb(
     eps_v_max: float = math.inf,
     tiny_angle: bool = False,
 ) -> _rust.Material:
-    """Mohr-Coulomb plasticity: `s1 - s3 + (s1 + s3) sin phi <= 2 c cos phi`, s1 >= s2 >= s3 the
-    principal stresses, tension positive; Tresca where phi = 0.
+    """Mohr-Coulomb plasticity: `s1 - s3 + (s1 + s3) sin phi <= 2 c cos phi`.
+
+    s1 >= s2 >= s3 are the principal stresses, tension positive. With phi = 0 this is Tresca plasticity.
 
     Args:
-        elastic: Elastic part, as linear_elastic(...) makes it; nu < 0.5.
+        elastic: Elastic part, a material of linear_elastic(...) with nu < 0.5.
         phi: Friction angle [degrees].
         c: Cohesion [Pa]; with phi = 0 the undrained strength s_u.
         psi: Dilatancy angle [degrees], at most phi.
-        eps_v_max: Plastic volumetric strain at which dilatancy ends; the strength stays.
-        tiny_angle: Take a friction angle between 0 and 1.6 degrees as it is: it is not in radians.
+        eps_v_max: Plastic volumetric strain at which dilatancy ends; the strength does not change.
+        tiny_angle: Accept a friction angle between 0 and 1.6 degrees. It is rejected otherwise, because
+            it may be in radians.
 
-    History: `plastic_strain`, the sum over the steps of the greatest plastic shear (gamma: largest less
-    smallest principal value of the step's plastic strain); `dilatancy`, the plastic volumetric strain
-    but for what opens at the apex.
+    History: `plastic_strain`, the sum over the steps of the greatest plastic shear (gamma: largest minus
+    smallest principal value of the plastic strain of the step); `dilatancy`, the plastic volumetric
+    strain without the part that opens at the apex.
 
     Raises:
-        InputError: A parameter out of its range.
+        InputError: A parameter is out of its range.
     """
     make = _rust.Material.mohr_coulomb
     return _frictional("mohr_coulomb", make, elastic, tiny_angle, phi, c, psi, eps_v_max)
 
 
 def _elastic(law: str, **given: float | None) -> _rust.Material:
-    """The linear law of two constants, for what `law` got."""
+    """The linear elastic law of two constants that `law` received."""
     values = {name: value for name, value in given.items() if value is not None}
     makers: dict[tuple[str, ...], Callable[[float, float], _rust.Material]] = {
         ("E", "nu"): _rust.Material.linear_elastic_e_nu,

@@ -1,4 +1,4 @@
-"""A material law written in NumPy: to try one out before it is written in Rust."""
+"""Material laws in NumPy, to try one out before it is written in Rust."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.source import source_of
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class NumpyLaw:
     """A law for all particles of a scene at once.
 
-    Components are those of the stress of the particles: xx, yy, zz, xy, tension positive; a strain
-    holds gamma_xy = 2 eps_xy, so that tangent[:, i, j] = d stress_i / d strain_j.
+    Components are xx, yy, zz, xy, as in the stress of the particles, tension positive. A strain contains
+    gamma_xy = 2 eps_xy, so that tangent[:, i, j] = d stress_i / d strain_j.
 
     Args:
-        respond: From strain increment (n x 4) and old stress (n x 4) [Pa] to new stress (n x 4) [Pa]
-            and consistent tangent (n x 4 x 4) [Pa]. Must not change what it is given.
-        K: Bulk modulus [Pa] that forms and scaling name; finite.
-        mu: Shear modulus [Pa] that forms and scaling name.
+        respond: Function of the strain increment (n x 4) and the old stress (n x 4) [Pa]. It returns
+            the new stress (n x 4) [Pa] and the consistent tangent (n x 4 x 4) [Pa], and must not change
+            its arguments.
+        K: Bulk modulus in forms and in the scaling [Pa]; finite.
+        mu: Shear modulus in forms and in the scaling [Pa].
 
     Raises:
         InputError: K or mu is not a positive, finite number.
@@ -47,11 +47,11 @@ class NumpyLaw:
 
     @property
     def source(self) -> str:
-        """Text of its function."""
+        """Source text of the function."""
         return source_of(self.respond)
 
     def elastic(self) -> _rust.Material:
-        """The elastic law of K and mu, which stands for this one where only these matter."""
+        """The elastic law of K and mu, for uses that need only these."""
         try:
             K, mu = checks.real("K", self.K), checks.real("mu", self.mu)
             return _rust.Material.linear_elastic_k_mu(K, mu)
@@ -60,11 +60,11 @@ class NumpyLaw:
 
 
 class NumpyStage:
-    """`_rust.Stage` with the law in NumPy: same calls, same results.
+    """`_rust.Stage` with a law in NumPy.
 
     Args:
-        stage: The particle side of the scene.
-        particles: Its particles, which hold the old stress.
+        stage: The stage in Rust, which gives the strains.
+        particles: The particles, with the old stress.
         law: The law.
     """
 
@@ -74,7 +74,7 @@ class NumpyStage:
         self._latest: tuple[tuple[Array, ...], tuple[Array, Array]] | None = None
 
     def _given(self, u: Array, volumetric: Array | None) -> tuple[Array, Array]:
-        """Stress and tangent, flat; the last ones are kept: a step is accepted as it was computed."""
+        """Stress and tangent, flat; those of the last call are reused, as when a step is accepted."""
         state = (u, np.empty(0) if volumetric is None else volumetric, self._particles.stress)
         if self._latest is not None and all(map(np.array_equal, state, self._latest[0])):
             return self._latest[1]
@@ -118,11 +118,11 @@ class NumpyStage:
         requests: _rust.Requests,
         data: Sequence[Array],
     ) -> None:
-        """As `_rust.Stage.evaluate`."""
+        """See `_rust.Stage.evaluate`."""
         self._stage.evaluate(u, volumetric, requests, data, self._given(u, volumetric))
 
     def commit(self, u: Array, volumetric: Array | None) -> float:
-        """As `_rust.Stage.commit`."""
+        """See `_rust.Stage.commit`."""
         dissipated = self._stage.commit(u, volumetric, self._given(u, volumetric))
         self._latest = None
         return dissipated

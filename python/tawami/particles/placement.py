@@ -1,4 +1,4 @@
-"""Which cell and rank each particle belongs to, and which ones left the grid."""
+"""Cell and rank of each particle, and the particles that left the grid."""
 
 from __future__ import annotations
 
@@ -11,24 +11,23 @@ import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import ranks
+from tawami.base.arrays import Array, Mask
 from tawami.base.errors import CheckpointError, InputError
 from tawami.grid.grid import Grid
 
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
-#: Distance, in cells, to which moving particles approach a side of their cell: one that is alone leaves
-#: functions beyond it without strength and mass. It is as well as on the side, to this distance.
+#: Least distance of moving particles from the sides of their cell [cells]. A single particle on a side
+#: would leave functions beyond it without stiffness and mass.
 MARGIN = 1e-5
 
 
 def located(grid: Grid, x: Array, *, moving: bool) -> _rust.Location:
-    """Cells of particles; those that move are kept off the sides of their cells."""
+    """Cells of particles; moving particles are placed away from the sides of their cells."""
     location = grid.rust.locate(x)
     return location.away_from_sides(MARGIN) if moving else location
 
 
 def outside(grid: Grid, x: Array) -> Mask:
-    """Whether each position is outside the grid, by more than Rust takes for round-off."""
+    """Whether each position is outside the grid, by more than the round-off that Rust accepts."""
     margin = 1e-9 * grid.h
     inside = (x >= np.subtract(grid.origin, margin)) & (x <= np.add(grid.upper, margin))
     return np.asarray(~inside.all(axis=1))
@@ -37,10 +36,10 @@ def outside(grid: Grid, x: Array) -> Mask:
 def distributed(
     grid: Grid, body: _rust.Particles, *, moving: bool
 ) -> tuple[_rust.Particles, _rust.Location]:
-    """Of a body that every rank has, the particles in this rank's cells.
+    """The particles in this rank's cells, from a body that every rank has.
 
     Raises:
-        InputError: Particles outside the grid, or a body that is not the same on all ranks.
+        InputError: Particles are outside the grid, or the body is not the same on all ranks.
     """
     location = located(grid, body.x, moving=moving)
     if grid.comm.size == 1:
@@ -57,21 +56,22 @@ def distributed(
 
 
 def columns(particles: _rust.Particles) -> list[tuple[str, int]]:
-    """Name and width of the arrays of particles, in the order of their rows."""
+    """Names and widths of the arrays of particles, in the order of their rows."""
     double = np.dtype(float).itemsize
     return [(name, max(1, size // double)) for name, size in particles.arrays]
 
 
 def in_order(comm: Any, number: npt.NDArray[Any]) -> Callable[[npt.ArrayLike], Any]:
-    """What makes of an array of each rank's particles that of all of them, in the order of their
-    numbers; on every rank, as a call for all.
+    """A function that gathers arrays of particles on every rank, in the order of their numbers.
+
+    This and the function are collective calls.
     """
     order = np.argsort(ranks.allgathered(comm, np.asarray(number)), kind="stable")
     return lambda values: ranks.allgathered(comm, np.asarray(values))[order]
 
 
 def gathered(grid: Grid, particles: _rust.Particles) -> dict[str, Array]:
-    """The arrays of all ranks' particles by name, in the order of their numbers; on every rank."""
+    """Arrays of the particles of all ranks by name, in the order of their numbers, on every rank."""
     rows = in_order(grid.comm, particles.number)(particles.rows())
     names, widths = zip(*columns(particles), strict=True)
     parts = np.split(rows, np.cumsum(widths)[:-1], axis=1)
@@ -81,11 +81,12 @@ def gathered(grid: Grid, particles: _rust.Particles) -> dict[str, Array]:
 def scattered(
     grid: Grid, particles: _rust.Particles, arrays: Mapping[str, Array], *, moving: bool
 ) -> tuple[_rust.Particles, _rust.Location]:
-    """The reverse of :func:`gathered`: this rank's particles, `particles` themselves if they are the
-    same ones, with these values.
+    """The particles of this rank from gathered arrays, the reverse of :func:`gathered`.
+
+    The result is `particles` itself, with these values, if the particles of this rank are the same.
 
     Raises:
-        CheckpointError: Other arrays than those of the particles.
+        CheckpointError: The arrays are not those of the particles.
     """
     wanted = dict(columns(particles))
     found = {name: array.shape[1] for name, array in arrays.items()}
@@ -95,13 +96,13 @@ def scattered(
             f"its particles have other arrays than those of the scene: {differ[0][0]} is in one of them "
             "only, or has another width. Expected the same form, laws and motion"
         )
-    whole = particles.of_rows(np.hstack([arrays[name] for name in wanted]))
-    mine, location = distributed(grid, whole, moving=moving)
+    everything = particles.of_rows(np.hstack([arrays[name] for name in wanted]))
+    mine, location = distributed(grid, everything, moving=moving)
     return (particles if particles.assign(mine) else mine), location
 
 
 def migrated(grid: Grid, particles: _rust.Particles) -> tuple[_rust.Particles, _rust.Location]:
-    """Moving particles on the rank of their cell, in the order of their numbers."""
+    """Move particles to the rank of their cell, in the order of their numbers."""
     comm = grid.comm
     while True:
         location = located(grid, particles.x, moving=True)
@@ -117,17 +118,17 @@ def migrated(grid: Grid, particles: _rust.Particles) -> tuple[_rust.Particles, _
 def check_staying(
     grid: Grid, particles: _rust.Particles, x: Array, time: float, *, stop: bool
 ) -> None:
-    """Whether a step may move the particles to x.
+    """Check that a step may move the particles to x.
 
     Args:
         grid: The grid.
-        particles: Those of this rank.
-        x: Where they would be [m].
-        time: When [s]; not a number in a static scene.
-        stop: Whether a single one that leaves is an error.
+        particles: The particles of this rank.
+        x: Their new positions [m].
+        time: Time at the end of the step [s]; NaN in a static scene.
+        stop: Whether it is an error if any particle leaves the grid.
 
     Raises:
-        InputError: One leaves, or the last one does.
+        InputError: A particle leaves the grid, or the last one does.
     """
     gone = outside(grid, x)
     with ranks.raise_together(grid.comm):
@@ -147,7 +148,7 @@ def check_staying(
 def removed(
     grid: Grid, particles: _rust.Particles
 ) -> tuple[_rust.Particles, list[tuple[int, tuple[float, float]]]]:
-    """The particles inside the grid; number and position [m] of those outside, of all ranks."""
+    """The particles inside the grid; number and position [m] of those outside, on all ranks."""
     gone = outside(grid, particles.x)
     mine = [
         (int(particles.number[p]), (float(particles.x[p, 0]), float(particles.x[p, 1])))

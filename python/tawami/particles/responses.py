@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from tawami import _rust
 from tawami.base import ranks
-from tawami.base.arrays import Array
+from tawami.base.arrays import Array, Indices
 from tawami.base.errors import InputError
 from tawami.base.timing import Stopwatch
 from tawami.fem.rules import Rule
@@ -134,3 +134,19 @@ class Responses:
         volume = self.particles.volume
         sums = _rust.nodal_sums(self.location, volume, columns, "bilinear")
         return ranks.sum_of(self._comm, sums)
+
+    def cell_sums(self, columns: Array) -> Array:
+        """Sums over all particles of the body in each cell of the grid, cells x columns.
+
+        A collective call.
+
+        Args:
+            columns: Values of this rank's particles, particles x columns.
+        """
+        once = np.ones(len(self.particles))
+        return ranks.sum_of(self._comm, _rust.cell_sums(self.location, once, columns))
+
+    @property
+    def particles_per_cell(self) -> Indices:
+        """Number of particles in each cell, x fastest; a collective call."""
+        return self.cell_sums(np.ones((len(self.particles), 1)))[:, 0].astype(np.int64)

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from tawami.base.arrays import Array
 from tawami.base.errors import OutputError
 from tawami.base.files import atomic_file
+from tawami.base.space import PLANE
 from tawami.results.figure import new_figure, save
 from tawami.results.frame import Frame
 
@@ -51,9 +52,9 @@ def scalars(frame: Frame) -> dict[str, tuple[str, Array]]:
         tensor = re.fullmatch(r"(.*) xx yy zz xy", name)
         if values.ndim == 2 and values.shape[1] == 3:
             found[name] = (unit, np.linalg.norm(values, axis=1))
-            found |= {f"{name} {axis}": (unit, values[:, k]) for k, axis in enumerate("xy")}
+            found |= {f"{name} {axis}": (unit, values[:, k]) for k, axis in enumerate(PLANE.axes)}
         elif tensor is not None:
-            for k, component in enumerate(("xx", "yy", "zz", "xy")):
+            for k, component in enumerate(PLANE.tensor):
                 found[f"{tensor[1]} {component}"] = (unit, values[:, k])
         else:
             found[name] = (unit, values)

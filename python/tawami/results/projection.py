@@ -13,6 +13,7 @@ errors.
 
 from __future__ import annotations
 
+import math
 from typing import Literal, get_args
 
 import numpy as np
@@ -20,6 +21,7 @@ import numpy as np
 from tawami import _rust
 from tawami.base import checks
 from tawami.base.arrays import Array
+from tawami.base.space import lattice
 from tawami.scene.scene import Scene
 
 Projection = Literal["lumped", "consistent"]
@@ -37,13 +39,14 @@ def check_projection(method: str) -> Projection:
 
 
 def vertices(scene: Scene) -> Array:
-    """Corners of the cells, x fastest [m]: vertices x 2."""
+    """Corners of the cells, x fastest [m]: vertices x dim."""
     grid = scene.grid
-    x, y = (
-        grid.axis_positions(axis, np.arange(number + 1), 0.0)
-        for axis, number in enumerate(grid.cells)
+    return lattice(
+        [
+            grid.axis_positions(axis, np.arange(number + 1), 0.0)
+            for axis, number in enumerate(grid.cells)
+        ]
     )
-    return np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
 
 
 def nodal(scene: Scene, values: Array, method: Projection = "lumped") -> Array:
@@ -61,7 +64,9 @@ def nodal(scene: Scene, values: Array, method: Projection = "lumped") -> Array:
         InputError: An unknown method.
     """
     method = check_projection(method)
-    columns = np.asarray(values, dtype=float).reshape(len(scene.particles), -1)
+    values = np.asarray(values, dtype=float)
+    # a rank may be without particles: its number of columns is that of the shape
+    columns = values.reshape(len(values), math.prod(values.shape[1:]))
     sums = _sums(scene, np.column_stack([np.ones(len(columns)), columns]))
     weight, right = sums[:, :1], sums[:, 1:]
     near = weight > 0

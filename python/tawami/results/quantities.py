@@ -22,7 +22,7 @@ from tawami.grid.basis import extraction, greville_1d, values_1d
 from tawami.motion.observer import Snapshot, Subject
 from tawami.motion.transfer import to_grid
 from tawami.particles import placement
-from tawami.results.projection import Projection, nodal
+from tawami.results.projection import Projection, nodal, vertices
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
 
@@ -231,7 +231,7 @@ def _projected(quantity: Quantity, projection: Projection) -> GridQuantity:
 
 def _at_vertices(scene: Scene, coefficients: Array) -> Array:
     matrix = extraction(scene.basis, scene.grid.cells, 1)
-    return np.asarray(matrix @ coefficients.reshape(-1, 2))
+    return np.asarray(matrix @ scene.grid.space.vectors(coefficients))
 
 
 def _displacement(now: Snapshot) -> Array:
@@ -266,9 +266,8 @@ def _reaction(now: Snapshot) -> Array:
     the same sum and moment; NaN before the first solution.
     """
     scene, grid = now.scene, now.scene.grid
-    nx, ny = grid.cells
     if now.solution is None:
-        return np.full(((nx + 1) * (ny + 1), 2), np.nan)
+        return np.full((len(vertices(scene)), grid.space.dim), np.nan)
     along = []
     for n in grid.cells:
         place = greville_1d(scene.basis, n)

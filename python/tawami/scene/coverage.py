@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from tawami.base import ranks
 from tawami.base.errors import QuadratureWarning
 from tawami.base.warn import warn
 from tawami.scene.domain import Domain
@@ -48,9 +47,8 @@ def _moments(domain: Domain) -> tuple[Array, Array, Array]:
     off = np.asarray(location.xi) - 0.5
     columns = np.column_stack([np.ones(len(off)), off, off**2])
     columns *= np.asarray(domain.particles.volume)[:, None]
-    sums = np.zeros((grid.cells[0] * grid.cells[1], 5))
-    np.add.at(sums, np.asarray(location.cell), columns / grid.space.measure(grid.h))
-    sums = ranks.sum_of(grid.comm, sums).reshape(*grid.cells[::-1], 5)
+    sums = domain.responses.cell_sums(columns / grid.space.measure(grid.h))
+    sums = sums.reshape(*grid.cells[::-1], columns.shape[1])
     area = sums[..., 0]
     with np.errstate(invalid="ignore", divide="ignore"):
         return area, sums[..., 1:3] / area[..., None], sums[..., 3:] / area[..., None]

@@ -28,20 +28,15 @@ def header(now: Configuration, motion: str = "") -> str:
         "supports": now.supports.line,
         "loads": now.loads.line,
         "motion": motion,
-        "solver": _solver(now),
+        "solver": now.numerics.line(now.model.grid.comm.size),
         "not modelled": "; ".join(_not_modelled(now, motion)),
     }
     return "\n".join(labelled(label, text) for label, text in lines.items() if text)
 
 
 def _grid(now: Configuration) -> str:
-    grid = now.model.grid
-    (nx, ny), (x0, y0), (x1, y1) = grid.cells, grid.origin, grid.upper
     filled = int(np.count_nonzero(now.domain.active))
-    return (
-        f"{nx} x {ny} cells of {grid.h:g} m from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}), {filled} with "
-        f"particles; basis {now.model.basis}"
-    )
+    return f"{now.model.grid.line}, {filled} with particles; basis {now.model.basis}"
 
 
 def _particles(now: Configuration) -> str:
@@ -72,18 +67,6 @@ def _models(now: Configuration, motion: str) -> Iterator[str]:
     yield "inertia" if motion else statics
     yield now.model.form.strain.description
     yield f"laws {', '.join(dict.fromkeys(now.model.laws))}"
-
-
-def _solver(now: Configuration) -> str:
-    numerics, ranks_used = now.numerics, now.model.grid.comm.size
-    solver: str = numerics.linear_solver
-    if solver == "direct":
-        solver += f", factorised {numerics.factorise.replace('_', ' ')}"
-    return (
-        f"Newton to {numerics.tolerance:g} in at most {numerics.max_iterations} iterations, "
-        f"{numerics.tangent_rule} tangent, {solver}, assembly {numerics.assembly}, "
-        f"{ranks_used} rank{'s' if ranks_used > 1 else ''}"
-    )
 
 
 def _not_modelled(now: Configuration, motion: str) -> Iterator[str]:

@@ -164,9 +164,7 @@ class Domain:
     @property
     def particles_per_cell(self) -> npt.NDArray[np.int64]:
         """Number of particles in each cell, x fastest; a call for all ranks."""
-        nx, ny = self.model.grid.cells
-        counts = np.bincount(self.location.cell, minlength=nx * ny)
-        return ranks.sum_of(self.model.grid.comm, counts)
+        return self.responses.particles_per_cell
 
     def warn_of_partial_cells(self) -> None:
         """Warn of partially filled cells if an option of the form needs whole ones.
@@ -180,10 +178,7 @@ class Domain:
 
     def _warn_of_partial_cells(self, option: str) -> None:
         grid = self.model.grid
-        areas = np.bincount(
-            self.location.cell, self.particles.volume, minlength=grid.cells[0] * grid.cells[1]
-        )
-        areas = ranks.sum_of(grid.comm, areas)
+        areas = self.responses.cell_sums(self.particles.volume[:, None])[:, 0]
         shares = np.where(areas > 0, areas / self.model.space.measure(grid.h), 1.0)
         c = int(shares.argmin())
         if shares[c] < WHOLE and not grid.comm.rank:

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from tawami import _rust
 from tawami.base import checks, ranks
 from tawami.base.errors import InputError
+from tawami.base.space import PLANE
 from tawami.form import quantities
 from tawami.scene import sources
 from tawami.scene.configuration import Configuration
@@ -28,7 +29,10 @@ Beyond = Literal["stop", "return"]
 ON_SURFACE, LOST = 1e-9, 1e-13
 #: Share by which sigma_m / K may differ from eps_v.
 FITS = 1e-6
-COMPONENTS = {"stress": ("xx yy zz xy", "Pa"), "displacement": ("x y", "m")}
+COMPONENTS = {
+    "stress": (" ".join(PLANE.tensor), "Pa"),
+    "displacement": (" ".join(PLANE.axes), "m"),
+}
 
 
 def set_field(now: Configuration, name: str, given: Source, beyond: Beyond) -> None:

@@ -15,6 +15,7 @@ from tawami import _rust
 from tawami.base import checks
 from tawami.base.errors import InputError, LockingWarning, ParameterWarning
 from tawami.base.sealed import Settings
+from tawami.base.space import Space
 from tawami.base.warn import warn
 from tawami.body.body import Body
 from tawami.fem.rules import TangentRule
@@ -22,7 +23,6 @@ from tawami.form.compilation import CompiledForm, check_used, compile_form
 from tawami.form.form import Form
 from tawami.grid.basis import BASES, Basis
 from tawami.grid.grid import Grid
-from tawami.grid.space import Space
 from tawami.particles import assignment
 from tawami.particles.numpy_law import NumpyLaw
 

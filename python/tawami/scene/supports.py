@@ -114,7 +114,7 @@ class Supports:
         """Prescribe a component along an edge."""
         edges.cells_between(self.grid, edge, between)
         value = checks.profile(f"fix(edge='{edge}'): value", value)
-        self._add(Support(edge, edges.component_index(component), value, velocity, between))
+        self._add(Support(edge, self.grid.space.axis(component), value, velocity, between))
 
     def hold(
         self,
@@ -128,7 +128,7 @@ class Supports:
         edges.locate_point(self.grid, point, what)
         place = checks.point(what, point)
         held = checks.number(f"{what}: value", value)
-        self._add(Support(place, edges.component_index(component), held, velocity))
+        self._add(Support(place, self.grid.space.axis(component), held, velocity))
 
     def _add(self, support: Support) -> None:
         if support.velocity is not None:
@@ -153,7 +153,7 @@ class Supports:
     def release(self, place: Edge | Sequence[float], component: Component | None) -> None:
         """Take supports away."""
         at = place if isinstance(place, str) else checks.point("release(...)", place)
-        axis = None if component is None else edges.component_index(component)
+        axis = None if component is None else self.grid.space.axis(component)
         gone = [s for s in self.all if at in (s.place, s.given) and axis in (None, s.component)]
         walls = [w for w in self.walls if w.edge == at and axis is None]
         if not gone and not walls:

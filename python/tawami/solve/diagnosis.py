@@ -11,6 +11,7 @@ from mpi4py import MPI
 from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import ConvergenceError, SingularError
+from tawami.base.petsc import add_rows
 from tawami.base.timing import Stopwatch
 from tawami.field.assembly import Assembly
 from tawami.field.reduction import Reduction
@@ -119,7 +120,7 @@ class Diagnosis:
         data = self._elastic().evaluate(*self._layout.split(zero))
         tangent = self._assembly.tangent(zero, data, reduction)
         if equations.inertia is not None:
-            equations.inertia.add_to(tangent, reduction)
+            add_rows(tangent, equations.inertia.reduced(reduction))
         solver = DirectSolver(self._comm, Stopwatch(), always=True)
         try:
             solver.solve(
@@ -187,8 +188,7 @@ class Diagnosis:
         own = np.argsort(-np.abs(direction))[:ENTRIES]
         entries = ranks.allgathered(self._comm, np.abs(direction[own]))
         unknowns = ranks.allgathered(self._comm, reduction.own.start + own)
-        cell = self._responses.location.cell
-        counts = ranks.sum_of(self._comm, np.bincount(cell, minlength=grid.num_cells))
+        counts = self._responses.particles_per_cell
         found: list[str] = []
         for unknown in unknowns[np.argsort(-entries, kind="stable")][:ENTRIES]:
             cells = self._layout.cells_of(reduction.unknowns[unknown])

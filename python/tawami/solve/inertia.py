@@ -9,7 +9,6 @@ has all digits by itself: Newton's method updates both.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -60,11 +59,8 @@ class Inertia:
         forces[: len(acceleration)] = self.mass * acceleration
         return forces
 
-    def add_to(self, tangent: Any, reduction: Reduction) -> None:
-        """Add S^T (slope M) S to a reduced tangent: it is diagonal without point constraints."""
+    def reduced(self, reduction: Reduction) -> sp.csr_matrix:
+        """This rank's rows of S^T (slope M) S, which is diagonal without point constraints."""
         padding = len(reduction.offset) - len(self.mass)
         mass = sp.diags(np.pad(self.slope * self.mass, (0, padding)))
-        reduced = (reduction.selection.T @ mass @ reduction.selection).tocsr()[reduction.own]
-        rows, columns = (part.astype(np.int32) for part in (reduced.indptr, reduced.indices))
-        tangent.setValuesCSR(rows, columns, reduced.data, addv=True)
-        tangent.assemble()
+        return (reduction.selection.T @ mass @ reduction.selection).tocsr()[reduction.own]

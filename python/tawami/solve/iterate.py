@@ -11,7 +11,7 @@ from tawami.base.arrays import Array
 from tawami.field.reduction import Reduction
 from tawami.solve.inertia import Inertia
 
-#: Gives the friction on the body from the forces of supports and walls, functions x 2 each.
+#: Gives the friction on the body from the forces of supports and walls, functions x dim each.
 Friction = Callable[[Array], Array]
 
 
@@ -59,7 +59,7 @@ class Iterate:
     ) -> None:
         self.factor = factor
         unknowns = np.zeros(reduction.size) if guess is None else guess[reduction.unknowns]
-        self._inertia, self._num_displacement = inertia, reduction.layout.num_displacement
+        self._inertia, self._layout = inertia, reduction.layout
         self.coefficients: Array = reduction.selection @ unknowns + reduction.offset
         #: u - dt v, which is updated by itself to keep its digits.
         self._deviation = None if inertia is None else inertia.deviation(self.coefficients)
@@ -67,7 +67,7 @@ class Iterate:
     @property
     def u(self) -> Array:
         """Coefficients of the displacement."""
-        return self.coefficients[: self._num_displacement]
+        return self.coefficients[: self._layout.num_displacement]
 
     def add(self, change: Array, of_factor: float = 0.0) -> None:
         """Go to the next iterate."""
@@ -98,6 +98,7 @@ class Iterate:
             reactions = residual.copy()
             reactions[: len(self._inertia.impulse)] += self._inertia.impulse
         if friction is not None:
-            n, residual = self._num_displacement, residual.copy()
-            residual[:n] -= friction(reactions[:n].reshape(-1, 2)).ravel()
+            n, space = self._layout.num_displacement, self._layout.grid.space
+            residual = residual.copy()
+            residual[:n] -= friction(space.vectors(reactions[:n])).ravel()
         return Forces(internal, external, inertial, acceleration, reactions, residual)

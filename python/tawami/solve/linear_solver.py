@@ -25,7 +25,7 @@ class Blocks:
 
     Attributes:
         displacement: Whether each unknown belongs to the displacement.
-        rigid: Values of the three rigid motions at those that do, n x 3.
+        rigid: Values of the rigid motions at those that do, n x motions.
     """
 
     displacement: Mask

@@ -89,7 +89,7 @@ class Measures:
             inertia: Inertia of a dynamic step.
         """
         n = self._layout.num_displacement
-        free = reduction.selection.T @ forces.residual
+        free = reduction.restricted(forces.residual)
         of_u = reduction.unknowns < n
         parts = [forces.internal, forces.external]
         parts += [] if forces.inertia is None else [forces.inertia]
@@ -129,7 +129,9 @@ class Measures:
         """
         location, basis = self._responses.location, self._layout.basis
         gradient = np.asarray(_rust.gradients(location, basis, np.ascontiguousarray(u)))
-        strain = self._responses.form.strain.metric_change(gradient.reshape(-1, 2, 2))
+        strain = self._responses.form.strain.metric_change(
+            self._layout.grid.space.tensors(gradient)
+        )
         largest = self._comm.allreduce(float(np.abs(strain).max(initial=0.0)), op=MPI.MAX)
         return bool(prescribed == 0 or largest <= NO_STRAIN * prescribed / self._layout.grid.h)
 

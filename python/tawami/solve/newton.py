@@ -13,7 +13,7 @@ from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import SingularError
-from tawami.base.petsc import clean_up
+from tawami.base.petsc import add_rows, clean_up
 from tawami.base.timing import Stopwatch, tally
 from tawami.field.assembly import Assembly
 from tawami.field.reduction import Reduction
@@ -162,6 +162,7 @@ class Newton:
         self._measures.begin(self.internal if inertia is None else None)
         equations = Equations(reduction, external, inertia, friction, path)
         iterate, history, krylov = equations.first(guess), History(), list[int]()
+        mass = None if inertia is None else inertia.reduced(reduction)
         search: LineSearch | None = None
         while True:
             try:
@@ -187,7 +188,7 @@ class Newton:
             if len(history) > self.numerics.max_iterations:
                 advice = self._diagnosis.material()
                 self._fail(history, advice or equations.advice)
-            change, of_factor = self._change(iterate, forces, equations, history)
+            change, of_factor = self._change(iterate, forces, equations, mass, history)
             if equations.at_rest and not self._responses.form.strain.finite:
                 n = reduction.layout.num_displacement
                 search = LineSearch(self._comm, change, forces.residual, n)
@@ -228,13 +229,18 @@ class Newton:
         return found[-1]
 
     def _change(
-        self, iterate: Iterate, forces: Forces, equations: Equations, history: History
+        self,
+        iterate: Iterate,
+        forces: Forces,
+        equations: Equations,
+        mass: Any,
+        history: History,
     ) -> tuple[Array, float]:
         """Change of all increments and of the load factor by one tangent."""
         solver, data, reduction = self._solver, self._responses.data, equations.reduction
         tangent = self._assembly.tangent(iterate.coefficients, data, reduction)
-        if equations.inertia is not None:
-            equations.inertia.add_to(tangent, reduction)
+        if mass is not None:
+            add_rows(tangent, mass)
         if self._stored is not None:
             self._restore(tangent, reduction)
         tolerance = ON_PATH
@@ -245,7 +251,7 @@ class Newton:
             found = solver.solve(
                 tangent,
                 functools.partial(self._scaling.factors, tangent, reduction),
-                -(reduction.selection.T @ forces.residual)[reduction.own],
+                -reduction.restricted(forces.residual)[reduction.own],
                 tolerance,
                 functools.partial(self._scaling.blocks, reduction),
             )
@@ -261,7 +267,7 @@ class Newton:
         change = self._on_all(reduction, found)
         if equations.path is None:
             return change, 0.0
-        loads = (reduction.selection.T @ equations.path.rate)[reduction.own]
+        loads = reduction.restricted(equations.path.rate)[reduction.own]
         rate = self._on_all(reduction, solver.again(loads, tolerance))
         n = reduction.layout.num_displacement
         of_factor = equations.path.control.change(iterate.u, change[:n], rate[:n])

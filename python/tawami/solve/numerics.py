@@ -54,3 +54,14 @@ class Numerics:
         }
         for name, possible in choices.items():
             checks.choice(name, getattr(self, name), get_args(possible))
+
+    def line(self, ranks: int) -> str:
+        """The settings in words, for the header of a run on so many ranks."""
+        solver: str = self.linear_solver
+        if solver == "direct":
+            solver += f", factorised {self.factorise.replace('_', ' ')}"
+        return (
+            f"Newton to {self.tolerance:g} in at most {self.max_iterations} iterations, "
+            f"{self.tangent_rule} tangent, {solver}, assembly {self.assembly}, "
+            f"{ranks} rank{'s' if ranks > 1 else ''}"
+        )

@@ -17,7 +17,7 @@ import numpy as np
 
 from tawami.base.arrays import Array, Indices
 
-#: Displacement of a control point per load factor, relative to the largest, that counts as none.
+#: Displacement of a control point per load factor, relative to the largest, that is ignored.
 NO_MOTION = 1e-12
 #: Error of the length of a step, relative to it, below which a step is accepted.
 LENGTH_TOLERANCE = 1e-3
@@ -73,7 +73,7 @@ class ArcLength:
 
     Attributes:
         inner: Scalar product of two displacement fields [m2].
-        ahead: Product of a field with the direction in which the path goes on; its sign counts.
+        ahead: Product of a field with the direction in which the path continues; its sign counts.
         size: Length of the step [m].
     """
 

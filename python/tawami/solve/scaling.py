@@ -9,6 +9,7 @@ import numpy as np
 from tawami.base.arrays import Array, Indices
 from tawami.field.layout import Layout
 from tawami.field.reduction import Reduction
+from tawami.field.rigid import rigid_motions
 from tawami.particles.responses import Responses
 from tawami.solve.linear_solver import Blocks
 
@@ -53,7 +54,8 @@ class Scaling:
         bulk, mu = (self._responses.constants[name] for name in ("K", "mu"))
         sums = self._responses.sums(np.column_stack([np.ones_like(mu), 1 / bulk, 1 / mu]))
         volume, over_bulk, over_mu = sums[functions].T
-        least = LEAST * self._layout.grid.h**2
+        grid = self._layout.grid
+        least = LEAST * grid.space.measure(grid.h)
         volume = np.maximum(volume, least)
         mu_i = volume / np.maximum(over_mu, least / self._responses.largest_mu)
         has_eps_v = self._responses.form.kinematics.has_eps_v
@@ -67,7 +69,5 @@ class Scaling:
         """Fields of this rank's unknowns, with the rigid motions at the Greville points."""
         own = reduction.unknowns[reduction.own]
         of_u = own < self._layout.num_displacement
-        function, along_y = np.divmod(own[of_u], 2)
-        x, y = (self._layout.greville[function] - self._layout.grid.origin).T
-        rigid = [1.0 - along_y, along_y, np.where(along_y == 1, x, -y)]
-        return Blocks(of_u, np.column_stack(rigid))
+        points = self._layout.greville - self._layout.grid.origin
+        return Blocks(of_u, rigid_motions(points)[own[of_u]])

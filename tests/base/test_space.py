@@ -7,7 +7,7 @@ import pytest
 from scenes import grid_of
 
 import tawami
-from tawami.grid.space import PLANE, Space, lattice, tensor_product
+from tawami.base.space import PLANE, Space, lattice, tensor_product
 
 #: No grid is three-dimensional yet; the names of its space are known already.
 SOLID = Space(axes=("x", "y", "z"), volume="m3", depth="")

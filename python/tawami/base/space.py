@@ -59,6 +59,11 @@ class Space:
         return tuple("".join(pair) for pair in product(self.axes, repeat=2))
 
     @property
+    def num_strains(self) -> int:
+        """Strain components that a displacement gradient has: xx, yy, gamma_xy in the plane."""
+        return self.dim * (self.dim + 1) // 2
+
+    @property
     def num_vertices(self) -> int:
         """Vertices of a cell."""
         return 1 << self.dim

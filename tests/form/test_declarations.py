@@ -1,0 +1,112 @@
+"""Wrong declarations and residuals of weak forms raise an error that names the mistake."""
+
+from __future__ import annotations
+
+import textwrap
+
+import pytest
+from declared import BOTH, form_of
+from ufl import SpatialCoordinate, div, dot, grad
+
+import tawami
+from tawami.form.form import Form
+
+WRONG = [
+    (lambda: Form.load("u_eps"), r"'u_eps' is not shipped: expected one of 'u', 'u_bbar'"),
+    (lambda: Form.load("nowhere.py"), "'nowhere.py' cannot be read"),
+    (lambda: Form.load(textwrap), "'textwrap' declares no 'fields', 'kinematics', 'residual'"),
+    (lambda: form_of(None, {"u": ("velocity", "w")}), "kind 'velocity': expected one of"),
+    (lambda: form_of(None, {"u": "displacement"}), r"expected \(kind, test function\)"),
+    (lambda: form_of(None, parameters={"a": {}}), "parameter 'a' has no \"default\""),
+    (lambda: form_of(None, parameters={"h": {"default": 1}}), "'h' has two meanings"),
+    (lambda: form_of(None, {"u": ("displacement", "K")}), "'K' has two meanings"),
+    (lambda: Form.load(3), "form = 3: expected the name of a shipped form"),
+    (lambda: form_of(None, kinematics="large"), "kinematics = 'large': expected one of"),
+    (lambda: form_of(None, kinematics="mixed"), "'mixed' needs fields of the kinds"),
+    (lambda: form_of(None, BOTH), "'displacement' needs fields of the kinds 'displacement'"),
+    (
+        lambda: form_of(None, parameters={"a": {"default": 1, "min": 0}}),
+        "'a' declares 'min': expected among 'default', 'minimum', 'maximum', 'usual'",
+    ),
+]
+
+
+@pytest.mark.parametrize(("make", "message"), WRONG)
+def test_wrong_declarations_are_rejected(make, message):
+    with pytest.raises(tawami.FormError, match=message):
+        make()
+
+
+@pytest.mark.filterwarnings("ignore::tawami.base.errors.InexactSumWarning")
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (lambda w, sigma, porosity: 0, r"asks for 'porosity', which is not defined: .* 'K'"),
+        (lambda w, sigma: 3.0, "residual returned float: expected a UFL form"),
+        (lambda u, sum_p, K: sum_p(K, div(u)), "test function 'w' of field 'u' does not appear"),
+        (lambda u, w, sum_p, K: sum_p(K, div(u)), "test function 'w' of field 'u' does not appear"),
+        (
+            lambda w, sum_p, sigma: sum_p(sigma, w),
+            r"shape \(2, 2\) and an expression of shape \(2,\)",
+        ),
+        (lambda w, sum_p: sum_p(1, 2, 3), "not 3 arguments"),
+        (lambda w, sum_p: sum_p(w, div(w)), "takes a particle quantity"),
+        (lambda w, sum_p, t, ds: sum_p(div(w)) - dot(t, t) * w[0] * ds, "linear in the traction t"),
+        (
+            lambda w, sum_p, t, dx: sum_p(div(w)) - dot(t, w) * dx,
+            "expected it in terms with ds only",
+        ),
+        (
+            lambda w, sum_p, dx: sum_p(SpatialCoordinate(dx.ufl_domain())[0] * w[0]),
+            "the position x",
+        ),
+        (lambda w, sum_p, ds: sum_p(div(w)) - w[1] * ds, "linear in the traction t"),
+        (lambda w, sum_p, dx: sum_p(div(w)) + w[1] * dx(1), r"as dx\(1\): expected dx"),
+        (lambda w, sum_c, sigma_m: sum_c(sigma_m, div(w)), "needs kinematics 'cell'"),
+        (lambda w, sum_p, sigma: sum_p(sigma + 2, grad(w)), "its residual raised"),
+        (lambda w, sum_v, sigma: sum_v(sigma, grad(w)), r"sum_v\(sigma, ...\): expected constants"),
+        (
+            lambda w, sum_p, sigma: sum_p(sigma * w[0], grad(w)),
+            "a quantity of the law combines with particle constants only",
+        ),
+        (
+            lambda w, sum_p, K: sum_p(K * div(w), div(w)),
+            "a particle constant combines with numbers",
+        ),
+        (
+            lambda w, cell_mean, sigma, dx: cell_mean(sigma) * div(w) * dx,
+            "cell_mean takes constants",
+        ),
+        (lambda u, w, sum_p: sum_p(div(w) ** 2 * div(u)), "linear in one test function"),
+        (
+            lambda u, w, sigma, sum_p, ds: sum_p(sigma, grad(w)) + dot(u, w) * ds,
+            "contain nothing else",
+        ),
+        (lambda t, w, ds: dot(t, w) * ds, "expected integrals over particles or cells"),
+    ],
+)
+def test_wrong_residuals_are_rejected(random_scene, function, message):
+    with pytest.raises(tawami.FormError, match=message):
+        random_scene(form=form_of(function))
+
+
+def test_b_bar_takes_deviators_at_particles_and_means_at_centres(random_scene):
+    for function, message in [
+        (lambda w, sigma, sum_p: sum_p(sigma, grad(w)), r"sum_p\(sigma"),
+        (lambda w, s, sum_c: sum_c(s, grad(w)), r"sum_c\(s,"),
+    ]:
+        with pytest.raises(tawami.FormError, match=message + r".* 'cell': expected sum_p\(s"):
+            random_scene(form=form_of(function, kinematics="cell"))
+
+
+def test_a_missing_test_function_is_named(random_scene):
+    form = form_of(lambda w, q, sigma, sum_p: sum_p(sigma, grad(w)), BOTH, "mixed")
+    with pytest.raises(tawami.FormError, match="'q' of field 'eps_v' does not appear"):
+        random_scene(form=form)
+
+
+def test_a_file_with_a_mistake_is_named(tmp_path):
+    path = tmp_path / "broken.py"
+    path.write_text("fields = {")
+    with pytest.raises(tawami.FormError, match=r"'broken.py' cannot be read: SyntaxError"):
+        Form.load(path)
