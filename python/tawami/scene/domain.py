@@ -91,7 +91,10 @@ class Domain:
 
         def elastic() -> Responses:
             """The same particles with the elastic parts of their laws."""
-            laws = [_rust.Material.linear_elastic_k_mu(*map(float, m)) for m in model.moduli]
+            laws = [  # an incompressible law is elastic already
+                _rust.Material.linear_elastic_k_mu(float(K), float(mu)) if np.isfinite(K) else given
+                for given, (K, mu) in zip(model.materials, model.moduli, strict=True)
+            ]
             stage = _rust.Stage(
                 particles, location, laws, form.kinematics.name, model.moves, model.basis
             )
