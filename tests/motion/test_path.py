@@ -1,4 +1,4 @@
-"""Paths of equilibria beyond limit points: a column that softens, and an arch that snaps through."""
+"""Paths of equilibria beyond limit points: a column that softens."""
 
 from __future__ import annotations
 
