@@ -53,7 +53,7 @@ def biaxial(name: str, phi: float) -> float:
     scene.fix("bottom", "y")
     scene.fix("right", "x", strain)
     scene.fix("top", "y", -strain)
-    tawami.ramp(scene, 0.005)
+    tawami.ramp(scene, 0.005, stop="raise")
     found = np.array(scene.particles.stress)
     return float(np.abs(found[:, 1] / found[:, 0] / ratio - 1).max())
 

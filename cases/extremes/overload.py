@@ -89,7 +89,7 @@ def by_ramp(form: str, factor: float) -> tuple[float, str]:
     load = factor * 1e-2 * M
     scene = bar(form, load)
     try:
-        tawami.ramp(scene, 0.005)
+        tawami.ramp(scene, 0.005, stop="raise")
     except tawami.TawamiError as error:
         sentence = " ".join([str(error), *getattr(error, "__notes__", [])])
         reached = re.search(r"at ([\d.e+-]+) of the load", sentence)
@@ -103,7 +103,7 @@ def by_ramp(form: str, factor: float) -> tuple[float, str]:
 def ramped(form: str, load: float) -> tuple[float, str]:
     """A load on Hencky's bar by a ramp: mean error of the stress in the half that is not loaded."""
     scene = bar(form, load)
-    steps = tawami.ramp(scene, 0.05)
+    steps = tawami.ramp(scene, 0.05, stop="raise")
     stretch = closed_form(load)
     inner = np.array(scene.particles.x)[:, 0] < 2.0 * stretch
     error = np.abs(scene.particles.stress[inner, 0] / (load * stretch) - 1).mean()

@@ -86,7 +86,7 @@ def hanging(form: str, law: str, nu: float, most: float) -> float:
         )
     height = float(stretch.mean())
     scene = column(made, form, height, weight)
-    tawami.ramp(scene, 0.05)
+    tawami.ramp(scene, 0.05, stop="raise")
     start = np.array(scene.particles.x - scene.particles.displacement)[:, 1]
     exact = np.interp(start, y, stretch) * weight * (1 - start)
     found = scene.particles.stress[:, 1]
@@ -116,7 +116,7 @@ def without_equilibrium(form: str) -> float:
     """A weight of 1.1 times the largest that a Hencky column carries."""
     made = tawami.linear_elastic(E=1.0, nu=0.3)
     most = (made.bulk_modulus + 4 / 3 * made.shear_modulus) / np.e
-    tawami.ramp(column(made, form, 3.0, 1.1 * most), 0.1)
+    tawami.ramp(column(made, form, 3.0, 1.1 * most), 0.1, stop="raise")
     return np.inf
 
 

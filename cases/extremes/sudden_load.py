@@ -64,7 +64,10 @@ def ramped(form: str, factor: float) -> float:
 
     try:
         tawami.ramp(
-            scene, 0.1, each=lambda solution: reactions.append(solution.reaction("left")[0])
+            scene,
+            0.1,
+            each=lambda solution: reactions.append(solution.reaction("left")[0]),
+            stop="raise",
         )
     except tawami.TawamiError:
         if not wrong() < 1e-5:

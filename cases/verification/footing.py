@@ -218,7 +218,7 @@ def solve(
         run.uneven = float(np.ptp(under) / np.abs(under).max())
 
     try:
-        tawami.ramp(scene, step, each=record)
+        tawami.ramp(scene, step, each=record, stop="raise")
     except (tawami.ConvergenceError, tawami.SingularError) as error:
         run.stopped = error.__notes__[0]
     run.x = np.array(scene.particles.x)

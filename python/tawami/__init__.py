@@ -8,6 +8,7 @@ from tawami.base.errors import (
     EnergyWarning,
     FormError,
     GeometryWarning,
+    IncompleteWarning,
     InexactSumWarning,
     InputError,
     InstabilityWarning,
@@ -33,6 +34,7 @@ from tawami.check.form_check import FormReport, check_form
 from tawami.form.form import Form
 from tawami.grid.grid import Grid
 from tawami.motion.dynamics import Dynamics
+from tawami.motion.path import follow
 from tawami.motion.stepping import ramp, settle
 from tawami.particles.laws import (
     drucker_prager,
@@ -63,6 +65,7 @@ __all__ = [
     "GeometryWarning",
     "Grid",
     "GridOutput",
+    "IncompleteWarning",
     "InexactSumWarning",
     "InputError",
     "InstabilityWarning",
@@ -90,6 +93,7 @@ __all__ = [
     "disc",
     "drucker_prager",
     "earlier",
+    "follow",
     "level_set",
     "linear_elastic",
     "mesh",

@@ -104,10 +104,17 @@ def test_a_ramp_stops_at_the_limit_load():
     scene.fix("left", "x")
     scene.fix("bottom", "y")
     scene.traction("right", (-2.0, 0.0))
-    with pytest.raises((tawami.ConvergenceError, tawami.SingularError)) as error:
-        tawami.ramp(scene, 0.1, smallest=1e-3)
+    with pytest.warns(
+        tawami.IncompleteWarning, match="ramp stopped at .* of the load, with the small"
+    ):
+        steps = tawami.ramp(scene, 0.1, smallest=1e-3)
     reached = scene.particles.stress[:, 0].mean() / -2.0
     assert reached == pytest.approx(1 / np.sqrt(3), rel=0.01)
+    assert steps.reached == pytest.approx(reached)
+    assert not steps.complete
+    assert steps.loads == [step.end for step in steps]
+    with pytest.raises(tawami.ConvergenceError) as error:
+        tawami.ramp(scene, 0.1, smallest=1e-2, stop="raise")
     assert "of the load, with the smallest step" in error.value.__notes__[0]
     scene.configuration.loads.tractions.clear()
     assert scene.solve().reaction("left") == pytest.approx([0.0, 0.0], abs=1e-6)
@@ -177,6 +184,8 @@ def test_a_held_point_moves_with_the_body():
     scene.hold((0.5, 0.5), "y")
     steps = tawami.ramp(scene, 0.1)
     assert len(steps) == 10
+    assert steps.complete
+    assert steps.reached == 1.0
     assert scene.particles.displacement[:, 0] == pytest.approx(np.full(64, 0.2), abs=1e-8)
     solution = scene.solve()
     x, y = scene.configuration.supports.all[0].place

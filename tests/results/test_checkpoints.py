@@ -115,7 +115,7 @@ def test_a_failed_step_leaves_a_checkpoint_of_the_state_before_it(tmp_path):
     scene.fix("bottom", "x")
     scene.load([0], (0.0, -1e9))
     with pytest.raises(tawami.TawamiError):
-        tawami.ramp(scene, 0.01, smallest=0.004, results=results_of(tmp_path / "b"))
+        tawami.ramp(scene, 0.01, smallest=0.004, results=results_of(tmp_path / "b"), stop="raise")
     log = (tmp_path / "b" / "log.txt").read_text()
     assert "failed, now 0.005" in log
     assert "ramp ended by" in log

@@ -204,8 +204,8 @@ def test_a_phase_after_a_failed_one_resumes(tmp_path):
         scene.fix("bottom", "x")
         scene.load([0], (0.0, -4e4))
         results = results_of(tmp_path / "run")
-        with pytest.raises(tawami.ConvergenceError):
-            tawami.ramp(scene, 0.1, smallest=0.03, results=results)
+        with pytest.warns(tawami.IncompleteWarning):
+            assert not tawami.ramp(scene, 0.1, smallest=0.03, results=results).complete
         motion = tawami.Dynamics(scene)
         motion.run(0.005, 0.0005, results=results, each=each)
 

@@ -15,7 +15,7 @@ SCENE = {
     "grid", "form", "basis", "parameters", "options", "numerics", "particles", "num_particles",
     "laws", "mass", "particles_per_cell", "left", "stopwatch", "configuration",
     "initial", "fix", "hold", "wall", "release", "traction", "load", "gravity",
-    "solve", "solve_part", "residual", "tangent", "reduction", "split", "num_coefficients",
+    "solve", "solve_part", "advanced", "residual", "tangent", "reduction", "split", "num_coefficients",
 }  # fmt: skip
 DYNAMICS = {
     "transfer", "damping", "gamma", "beta", "time", "steps", "step", "run",
@@ -23,7 +23,7 @@ DYNAMICS = {
     "energies", "kinetic_energy", "elastic_energy", "linear_momentum", "angular_momentum",
 }  # fmt: skip
 SOLUTION = {
-    "scene", "u", "volumetric", "unknowns", "iterations", "history", "krylov", "condition",
+    "scene", "u", "volumetric", "unknowns", "load", "iterations", "history", "krylov", "condition",
     "symmetric", "number", "x", "volume", "stress", "mean_stress", "displacement_of_particles",
     "eps_v", "displacement", "reaction", "on_edges", "on_points",
 }  # fmt: skip

@@ -122,7 +122,7 @@ def solve(
     scene, loaded, L = build(run)
     start = np.array(scene.particles.x)
     try:
-        accepted = tawami.ramp(scene, 1 / steps, smallest=1 / (64 * steps))
+        accepted = tawami.ramp(scene, 1 / steps, smallest=1 / (64 * steps), stop="raise")
     except (tawami.ConvergenceError, tawami.SingularError) as error:
         run.stopped = error.__notes__[0]
         return run

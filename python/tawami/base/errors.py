@@ -20,6 +20,7 @@ TawamiWarning             base of warnings about results that should not be trus
   EnergyWarning           spurious energy
   GeometryWarning         a body whose shape differs from the given one
   InexactSumWarning       a `sum_p` that is not exactly the sum over the particles
+  IncompleteWarning       a ramp or a path that ended before its end
   InstabilityWarning      an option that is not stable for this body
   LockingWarning          a form that locks
   ParameterWarning        a parameter beyond its usual range
@@ -60,6 +61,10 @@ class GeometryWarning(TawamiWarning):
 
 class InexactSumWarning(TawamiWarning):
     """A `sum_p` of an expression whose degree is too high for the exact sum over the particles."""
+
+
+class IncompleteWarning(TawamiWarning):
+    """A ramp or a path that ended before its end; the scene is in its last equilibrium."""
 
 
 class InstabilityWarning(TawamiWarning):
@@ -121,6 +126,7 @@ __all__ = [
     "EnergyWarning",
     "FormError",
     "GeometryWarning",
+    "IncompleteWarning",
     "InexactSumWarning",
     "InputError",
     "InstabilityWarning",

@@ -48,6 +48,7 @@ class Tally:
     Attributes:
         steps: Converged steps.
         newton_iterations: Linear solves, with those of failed steps.
+        line_searches: Newton iterations that a line search shortened.
         unknowns: Largest number of reduced unknowns.
         compiling_s: Wall time of compiling forms [s]; later runs find the kernels on disk.
         compiling_cpu_s: Processor time of the same [s].
@@ -55,6 +56,7 @@ class Tally:
 
     steps: int = 0
     newton_iterations: int = 0
+    line_searches: int = 0
     unknowns: int = 0
     compiling_s: float = 0.0
     compiling_cpu_s: float = 0.0

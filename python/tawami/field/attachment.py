@@ -44,6 +44,7 @@ class Attachment:
         rows: Position of each of them in `location.active`.
         layout: Places of the coefficients.
         points: Indices along the axes of the points of each rule; none for means over cells.
+        values: Values of h and of the parameters of the form.
     """
 
     def __init__(
@@ -58,7 +59,7 @@ class Attachment:
     ) -> None:
         self.grid, self.compiled, self.stopwatch = grid, compiled, stopwatch
         self.location, self.volume = location, volume
-        self._values = {"h": grid.h, **parameters}
+        self.values = {"h": grid.h, **parameters}
         self.space = grid.function_space(len(compiled.form.fields), compiled.element)
         number = grid.cell_numbers(grid.rectangle.ij)
         active: Mask = np.zeros(grid.cells[::-1], dtype=bool)
@@ -90,7 +91,7 @@ class Attachment:
 
     def constants(self, integral: Integral) -> Array:
         """Values of the constants that an integral names."""
-        return np.array([self._values[name] for name in integral.constants], dtype=float)
+        return np.array([self.values[name] for name in integral.constants], dtype=float)
 
     def summed(self, of_cells: Any) -> Array:
         """The sum over all ranks of arrays from their cells."""

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tawami.base.errors import ConvergenceError
 from tawami.solve.measures import History
 
 
@@ -46,6 +47,27 @@ class Step:
     def iterations(self) -> int:
         """Number of Newton iterations."""
         return len(self.history) - 1
+
+
+class Steps(list[Step]):
+    """The accepted steps of a ramp or a path, and how it ended.
+
+    Attributes:
+        loads: Share of the new loads that is in equilibrium after each step.
+        complete: Whether the end was reached.
+        error: Why the next step failed; None if none did.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.loads: list[float] = []
+        self.complete = False
+        self.error: ConvergenceError | None = None
+
+    @property
+    def reached(self) -> float:
+        """Share of the new loads that the scene is in equilibrium with."""
+        return self.loads[-1] if self.loads else 0.0
 
 
 def pack(steps: Sequence[Step]) -> dict[str, Any]:

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Literal, get_args
 
 from tawami.base import checks
-from tawami.base.errors import ConvergenceError, InputError, SingularError
+from tawami.base.errors import ConvergenceError, IncompleteWarning, InputError, SingularError
+from tawami.base.warn import warn
 from tawami.motion.observer import Observer, Recorder, observed
-from tawami.motion.pace import Pace, Step
+from tawami.motion.pace import Pace, Step, Steps
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
+
+#: What to do if the smallest step does not converge.
+Stop = Literal["return", "raise"]
 
 
 def march(
@@ -19,6 +24,7 @@ def march(
     attempt: Callable[[float, float], Solution],
     observer: Observer,
     each: Callable[[Solution], None] | None = None,
+    steps: list[Step] | None = None,
 ) -> list[Step]:
     """Take steps until an end. A step that fails is halved; after three accepted steps the size doubles.
 
@@ -30,11 +36,12 @@ def march(
             leave everything as it was.
         observer: Observer of the steps.
         each: Called with the solution of each accepted step.
+        steps: List to which the accepted steps are added, and that is returned; a new one by default.
 
     Raises:
         ConvergenceError, SingularError: At the smallest size.
     """
-    largest, steps = pace.size, list[Step]()
+    largest, steps = pace.size, list[Step]() if steps is None else steps
     observer.begin(pace, steps)
     while end - pace.at > 1e-9 * largest:
         now = min(pace.size, end - pace.at)
@@ -62,6 +69,25 @@ def march(
     return steps
 
 
+def end_early(steps: Steps, error: ConvergenceError, stop: Stop, what: str, scene: Scene) -> None:
+    """End a ramp or a path whose smallest step did not converge.
+
+    Raises:
+        ConvergenceError: With stop='raise'.
+    """
+    if stop == "raise":
+        raise error
+    steps.error = error
+    if scene.grid.comm.rank:
+        return
+    warn(
+        f"{what} stopped {error.__notes__[0]}: Newton did not converge. The scene is in its last "
+        "equilibrium; `reached` holds its load. If the body carries more, allow a smaller `smallest`; "
+        "follow(scene, ...) passes a limit load; stop='raise' raises the error instead",
+        IncompleteWarning,
+    )
+
+
 def ramp(
     scene: Scene,
     size: float = 0.05,
@@ -69,10 +95,12 @@ def ramp(
     smallest: float | None = None,
     each: Callable[[Solution], None] | None = None,
     results: Recorder | None = None,
-) -> list[Step]:
+    stop: Stop = "return",
+) -> Steps:
     """Apply the new loads and prescribed displacements of a scene in steps, without inertia.
 
     New loads grow in proportion from 0 to their values; loads that are in equilibrium already stay.
+    Where the body carries no more, the scene stays in its last equilibrium; later ramps start there.
 
     Args:
         scene: The scene.
@@ -80,28 +108,41 @@ def ramp(
         smallest: Share below which a step is not halved any more; size/1024 by default.
         each: Called with the solution of each accepted step.
         results: `tawami.Results` of the run, with outputs and checkpoints.
+        stop: What to do if the smallest step does not converge: 'return' the steps with a warning, or
+            'raise' the error.
 
     Returns:
-        The accepted steps; those before a resumed run are included.
+        The accepted steps as a list; those before a resumed run are included. `reached` is the share of
+        the load that was reached, `complete` whether that is all of it, `error` why it is not.
 
     Raises:
-        ConvergenceError, SingularError: The smallest step failed; the scene is in its last equilibrium.
+        ConvergenceError: The smallest step did not converge, with stop='raise'.
+        SingularError: The tangent is singular, and not because the load is too large.
         InputError: A size out of its range, or as `Scene.solve`.
+
+    Warns:
+        IncompleteWarning: The ramp stopped before the whole load, with stop='return'.
     """
     checks.instance("ramp: scene", scene, Scene, "a tawami.Scene")
     size = checks.number("size", size, low=checks.LEAST, high=1.0)
     checks.number("size", size, low=1e-9)  # with smaller steps it would not end
     least = size / 1024 if smallest is None else checks.number("smallest", smallest, low=0.0)
     each = checks.function("each", each, "of a solution")
-    pace = Pace(0.0, size)
+    checks.choice("stop", stop, get_args(Stop))
+    pace, steps = Pace(0.0, size), Steps()
     try:
         with observed(results, "ramp", scene, 1.0, "of the load") as observer:
-            return march(
-                pace, 1.0, least, lambda part, _size: scene.solve_part(part), observer, each
+            march(
+                pace, 1.0, least, lambda part, _size: scene.solve_part(part), observer, each, steps
             )
+    except ConvergenceError as error:
+        end_early(steps, error, stop, "ramp", scene)
     finally:
+        steps.loads = [step.end for step in steps]
         if pace.at < 1.0:
             scene.configuration.accept(pace.at)
+    steps.complete = steps.error is None
+    return steps
 
 
 def settle(

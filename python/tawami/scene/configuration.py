@@ -177,10 +177,13 @@ class Configuration:
 
     def _newton(self, problem: Problem, last: Converged | None) -> Converged:
         """Solve a problem, from the solution for the last states of the walls if there is one."""
-        guess = problem.guess if last is None else last.coefficients
+        guess, path = problem.guess, problem.path
+        if last is not None:
+            guess = last.coefficients
+            path = None if path is None else replace(path, guess=last.factor)
         friction = problem.contact.friction if problem.contact.walls else None
         found = self.domain.newton.solve(
-            problem.reduction, problem.external, problem.inertia, guess, friction
+            problem.reduction, problem.external, problem.inertia, guess, friction, path
         )
         if last is None:
             return found

@@ -81,7 +81,22 @@ class Domain:
             model.compiled, particles, location, stage, _constants(model, particles),
             model.grid.comm, stopwatch,
         )  # fmt: skip
-        newton = Newton(assembly, responses, numerics, stopwatch)
+
+        def elastic() -> Responses:
+            """The same particles with the elastic parts of their laws."""
+            laws = [  # an incompressible law is elastic already
+                _rust.Material.linear_elastic_k_mu(float(K), float(mu)) if np.isfinite(K) else given
+                for given, (K, mu) in zip(model.materials, model.moduli, strict=True)
+            ]
+            stage = _rust.Stage(
+                particles, location, laws, form.kinematics.name, model.moves, model.basis
+            )
+            return Responses(
+                model.compiled, particles, location, stage, _constants(model, particles),
+                model.grid.comm, stopwatch,
+            )  # fmt: skip
+
+        newton = Newton(assembly, responses, numerics, stopwatch, elastic)
         return cls(
             model, particles, location, assembly, Tractions(attachment), stage, responses, newton
         )

@@ -32,6 +32,7 @@ from tawami.scene.model import build
 from tawami.scene.solution import Solution
 from tawami.scene.sources import Source
 from tawami.scene.statics import StaticStep
+from tawami.scene.step import StepKind
 from tawami.scene.supports import Velocity
 from tawami.solve.numerics import Assembly, Factorise, Numerics, SolverName
 
@@ -351,6 +352,10 @@ class Scene(Elsewhere, Sealed, Unique):
         """Find equilibrium under a part, from 0 to 1, of the loads and prescribed displacements that
         are new since the last full solve, as :meth:`solve` does; `ramp` takes it from 0 to 1.
         """
+        return self.advanced(StaticStep(self.configuration, part))
+
+    def advanced(self, kind: StepKind) -> Solution:
+        """Take a static step, as :meth:`solve` does."""
         for support in self.configuration.supports.all:
             if support.velocity is not None:
                 raise InputError(
@@ -358,8 +363,7 @@ class Scene(Elsewhere, Sealed, Unique):
                     "Dynamics(scene)"
                 )
         self.configuration.check_coverage()
-        outcome = self.configuration.advance(StaticStep(self.configuration, part))
-        return Solution(self, outcome)
+        return Solution(self, self.configuration.advance(kind))
 
     def header(self) -> str:
         """Lines for the start of a run: what the scene models and what it does not, with the switches

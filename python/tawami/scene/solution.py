@@ -16,7 +16,6 @@ from tawami.form.kinematics import KINEMATICS
 from tawami.grid import edges
 from tawami.scene.absent import Elsewhere
 from tawami.scene.configuration import Configuration, Outcome
-from tawami.solve.measures import History
 
 Array = npt.NDArray[np.float64]
 
@@ -39,6 +38,7 @@ class Solution(Elsewhere, Sealed, Unique):
         u: Coefficients of the displacement [m], two per function, x fastest: since the start, and of
             the last step where strains are finite.
         unknowns: Number of reduced unknowns.
+        load: Share of the new loads and displacements that it is in equilibrium with; NaN in dynamics.
         iterations: Newton iterations of the last step.
         history: (momentum, volume) measures of every residual of the last step.
         krylov: FGMRES iterations of every linear solve of the last step; 0 where the tangent was
@@ -62,7 +62,7 @@ class Solution(Elsewhere, Sealed, Unique):
         layout, step = outcome.accepted.problem.reduction.layout, outcome.accepted.step
         self.u, self._volumetric = layout.split(outcome.coefficients)
         self.unknowns, self.iterations = outcome.accepted.problem.reduction.size, step.iterations
-        self.history: History = step.history
+        self.load, self.history = outcome.accepted.load, step.history
         self.krylov = tuple(step.krylov)
         self.condition, self.symmetric = step.condition, step.symmetric
         self._reactions = outcome.reactions

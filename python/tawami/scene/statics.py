@@ -43,7 +43,7 @@ class StaticStep:
                 now.domain, amount, now.before, now.before, moving=False
             )
             external = now.external(self.part)
-        return Problem(reduction, contact, external, crossings=crossings)
+        return Problem(reduction, contact, external, crossings=crossings, load=self.part)
 
     def accept(self, accepted: Accepted) -> StaticStep:
         """Nothing is to be prepared."""

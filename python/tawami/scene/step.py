@@ -13,6 +13,7 @@ from tawami.field.reduction import Reduction
 from tawami.scene.contact import ActiveSet
 from tawami.solve.inertia import Inertia
 from tawami.solve.newton import Converged
+from tawami.solve.path import Path
 
 Array = npt.NDArray[np.float64]
 
@@ -29,6 +30,8 @@ class Problem:
         guess: Increments of all fields to start from.
         crossings: How far supports will have moved the body across their edges [m], by the number of
             the support.
+        path: What makes the load factor an unknown; `external` is at its start.
+        load: Share of the new loads; NaN in dynamics.
     """
 
     reduction: Reduction
@@ -37,6 +40,8 @@ class Problem:
     inertia: Inertia | None = None
     guess: Array | None = None
     crossings: Mapping[int, float] = field(default_factory=dict)
+    path: Path | None = None
+    load: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -54,6 +59,11 @@ class Accepted:
     step: Converged
     u: Array
     acceleration: Array | None
+
+    @property
+    def load(self) -> float:
+        """Share of the new loads at its end; NaN in dynamics."""
+        return self.problem.load if self.problem.path is None else self.step.factor
 
     @property
     def forces(self) -> Array:

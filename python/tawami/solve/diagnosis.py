@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NoReturn
 
 import numpy as np
@@ -10,27 +11,21 @@ from mpi4py import MPI
 from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import ConvergenceError, SingularError
-from tawami.field.layout import Layout
+from tawami.base.petsc import add_rows
+from tawami.base.timing import Stopwatch
+from tawami.field.assembly import Assembly
 from tawami.field.reduction import Reduction
 from tawami.particles.responses import Responses
+from tawami.solve.direct import DirectSolver
+from tawami.solve.equations import Equations
 from tawami.solve.linear_solver import LinearSolver
 from tawami.solve.measures import History
+from tawami.solve.scaling import Scaling
 
 #: K/mu from which forms without a field for the volume lose all digits.
 NO_DIGITS = 1e9
 #: Ratio of shear moduli from which the round-off of stiff parts may exceed Newton's tolerance.
 FEW_DIGITS = 1e8
-#: Advice if the tangent was regular at the beginning of the step.
-BEYOND = (
-    "the load, because the tangent was regular when the step began: it exceeds the strength of the "
-    "material, or the size of one step. Nothing was changed in the particles. Take a smaller load, or "
-    "ramp(...)"
-)
-#: Advice if nothing else is known.
-TOO_FEW_PARTICLES = (
-    "some functions of the grid get no stiffness from the particles. Use more particles per cell, the "
-    "basis 'quadratic_spline', or alpha > 0"
-)
 #: Entries of the weak direction that are traced to cells, and cells that the message lists.
 ENTRIES, CELLS = 20, 4
 
@@ -39,13 +34,23 @@ class Diagnosis:
     """Errors of the steps of one scene.
 
     Args:
-        layout: Places of the coefficients.
+        assembly: Residual and tangent of the form.
         responses: The particles.
+        scaling: Scaling of the unknowns.
+        elastic: Makes the responses of the same particles with elastic laws.
     """
 
-    def __init__(self, layout: Layout, responses: Responses) -> None:
-        self._layout, self._responses = layout, responses
-        self._comm = layout.grid.comm
+    def __init__(
+        self,
+        assembly: Assembly,
+        responses: Responses,
+        scaling: Scaling,
+        elastic: Callable[[], Responses],
+    ) -> None:
+        self._assembly, self._responses = assembly, responses
+        self._scaling, self._elastic = scaling, elastic
+        self._layout = assembly.layout
+        self._comm = self._layout.grid.comm
 
     def report_divergence(self, history: History, tolerance: float, advice: str) -> NoReturn:
         """Raise the error of an iteration that did not converge.
@@ -67,23 +72,83 @@ class Diagnosis:
         )
 
     def report_singular(
-        self, solver: LinearSolver, reduction: Reduction, *, first: bool
+        self,
+        solver: LinearSolver,
+        equations: Equations,
+        history: History,
+        error: SingularError | None,
     ) -> NoReturn:
         """Raise the error of a singular tangent; a collective call.
 
+        If the tangent of the same body with elastic laws is regular, the material has lost its
+        stiffness: the step did not converge. Otherwise particles, supports or the grid are at fault.
+
         Args:
             solver: The solver, which knows the condition number and the weak direction.
-            reduction: The unknowns.
-            first: Whether it is the first tangent of the step.
+            equations: The equations.
+            history: Measures of all residuals.
+            error: Of the solver, if it raised one.
+
+        Raises:
+            ConvergenceError: The load exceeds the strength of the material.
+            SingularError: Any other singular tangent.
         """
-        condition = solver.condition
+        reduction, condition = equations.reduction, solver.condition
         size = "infinite" if np.isinf(condition) else f"about {condition:.1e}"
-        advice = self.material() or (TOO_FEW_PARTICLES if first else BEYOND)
-        cells = ", ".join(self._weakest_cells(reduction, solver.weak))
-        raise SingularError(
+        weak = solver.weak if len(solver.weak) == reduction.num_own else np.empty(0)
+        cells = ", ".join(self._weakest_cells(reduction, weak)) if error is None else ""
+        what = str(error) if error is not None else (
             f"the tangent is singular (condition number of the scaled matrix: {size}; from its "
             f"factorisation and random vectors). The displacement basis is '{self._layout.basis}'; "
-            f"weakest at the cells (i, j): {cells}. Likely cause: {advice}"
+            f"weakest at the cells (i, j): {cells}"
+        )  # fmt: skip
+        material = self.material()
+        if not material and self._elastic_is_regular(equations):
+            raise ConvergenceError(
+                f"{what}. An elastic body would not be, so the likely cause is the load, which exceeds "
+                "the strength of the material or the size of one step. Nothing was changed in the "
+                f"particles. {equations.advice}",
+                history,
+            ) from error
+        if error is not None:
+            raise error
+        raise SingularError(f"{what}. Likely cause: {material or self._too_few_particles()}")
+
+    def _elastic_is_regular(self, equations: Equations) -> bool:
+        """Whether the tangent of the body with elastic laws is regular at the start of the step."""
+        reduction, zero = equations.reduction, np.zeros(self._layout.size)
+        data = self._elastic().evaluate(*self._layout.split(zero))
+        tangent = self._assembly.tangent(zero, data, reduction)
+        if equations.inertia is not None:
+            add_rows(tangent, equations.inertia.reduced(reduction))
+        solver = DirectSolver(self._comm, Stopwatch(), always=True)
+        try:
+            solver.solve(
+                tangent,
+                lambda: self._scaling.factors(tangent, reduction),
+                np.zeros(reduction.num_own),
+                1e-3,
+                lambda: self._scaling.blocks(reduction),
+            )
+        except SingularError:
+            return False
+        regular = not solver.singular
+        solver.forget()
+        return regular
+
+    def _too_few_particles(self) -> str:
+        """Advice on functions without stiffness: what is not set already."""
+        form, values = self._responses.form, self._assembly.attachment.values
+        advice = ["use more particles per cell (per_axis=3)"]
+        if self._layout.basis != "quadratic_spline":
+            advice.append("use the basis 'quadratic_spline'")
+        if values.get("alpha") == 0:
+            advice.append("use alpha > 0")
+        if self._assembly.attachment.compiled.ghost is None and "ghost_penalty" in form.options:
+            advice.append("use ghost_penalty='on', which ties partial cells to their neighbours")
+        return (
+            "some functions of the grid get no stiffness from the particles. Support every part of the "
+            f"body; {'; '.join(advice)}"
         )
 
     def material(self) -> str:

@@ -146,6 +146,7 @@ class DirectSolver(LinearSolver):
             if failed:
                 matrix.shift(1e-12)
                 if not self._factorise(matrix):
+                    self.condition = np.inf
                     raise SingularError(
                         "the tangent is singular, and so is its neighbour (shift 1e-12)"
                     )

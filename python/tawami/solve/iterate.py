@@ -43,23 +43,43 @@ class Iterate:
         reduction: Unknowns of the step.
         guess: Increments to start from; zero by default.
         inertia: Inertia of a dynamic step.
+        factor: Load factor to start from; NaN where it is no unknown.
 
     Attributes:
         coefficients: The increments.
+        factor: The load factor.
     """
 
-    def __init__(self, reduction: Reduction, guess: Array | None, inertia: Inertia | None) -> None:
+    def __init__(
+        self,
+        reduction: Reduction,
+        guess: Array | None,
+        inertia: Inertia | None,
+        factor: float = np.nan,
+    ) -> None:
+        self.factor = factor
         unknowns = np.zeros(reduction.size) if guess is None else guess[reduction.unknowns]
         self._inertia, self._layout = inertia, reduction.layout
         self.coefficients: Array = reduction.selection @ unknowns + reduction.offset
         #: u - dt v, which is updated by itself to keep its digits.
         self._deviation = None if inertia is None else inertia.deviation(self.coefficients)
 
-    def add(self, change: Array) -> None:
+    @property
+    def u(self) -> Array:
+        """Coefficients of the displacement."""
+        return self.coefficients[: self._layout.num_displacement]
+
+    def add(self, change: Array, of_factor: float = 0.0) -> None:
         """Go to the next iterate."""
+        self._before, self._change = self.coefficients, change
         self.coefficients = self.coefficients + change
+        self.factor += of_factor
         if self._deviation is not None:
             self._deviation = self._deviation + change[: len(self._deviation)]
+
+    def shorten(self, share: float) -> None:
+        """Take a share of the last change, in a static step at a given load."""
+        self.coefficients = self._before + share * self._change
 
     def forces(self, internal: Array, external: Array, friction: Friction | None) -> Forces:
         """All forces at this iterate.

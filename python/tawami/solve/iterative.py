@@ -83,6 +83,7 @@ class IterativeSolver(LinearSolver):
 
     def _converge(self, right: Array, tolerance: float) -> None:
         if not self._fgmres(right, tolerance, LIMIT):
+            self.condition = np.inf
             reached = self._handles["ksp"].getResidualNorm() / self._handles["b"].norm()
             raise SingularError(
                 f"FGMRES reached {reached:.1e} of the right-hand side in {self.iterations} iterations: "

@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 
 from tawami.base.arrays import Array, Mask
+from tawami.base.errors import SingularError
 from tawami.base.petsc import Handles
 from tawami.base.timing import Stopwatch
 
 #: Condition number from which the solution of a scaled system has no correct digit.
 SINGULAR = 1e14
+#: FGMRES iterations for a second right-hand side.
+MOST = 500
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,24 @@ class LinearSolver:
                 :attr:`singular` as well.
         """
         raise NotImplementedError
+
+    def again(self, right: Array, tolerance: float) -> Array:
+        """Solve the last system of :meth:`solve` for another right-hand side.
+
+        Raises:
+            SingularError: FGMRES did not converge.
+        """
+        iterations = self.iterations
+        with self._stopwatch("solve"):
+            converged = self._fgmres(self._scale * right, tolerance, MOST)
+            solution = np.asarray(self._scale * self._handles["x"].array)
+        if not converged:
+            raise SingularError(
+                f"FGMRES did not converge in {self.iterations} iterations for a second right-hand side "
+                "of the same tangent; use factorise='always'"
+            )
+        self.iterations = iterations
+        return solution
 
     def _begin(self, matrix: Any, scale: Callable[[], Array]) -> None:
         """Make vectors and factors for another tangent, and scale it."""

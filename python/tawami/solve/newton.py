@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -12,6 +12,7 @@ import numpy as np
 from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array
+from tawami.base.errors import SingularError
 from tawami.base.petsc import add_rows, clean_up
 from tawami.base.timing import Stopwatch, tally
 from tawami.field.assembly import Assembly
@@ -19,13 +20,19 @@ from tawami.field.reduction import Reduction
 from tawami.particles.responses import Responses
 from tawami.solve.diagnosis import Diagnosis
 from tawami.solve.direct import DirectSolver
+from tawami.solve.equations import Equations
 from tawami.solve.inertia import Inertia
 from tawami.solve.iterate import Forces, Friction, Iterate
 from tawami.solve.iterative import IterativeSolver
+from tawami.solve.line_search import LineSearch
 from tawami.solve.linear_solver import LinearSolver
-from tawami.solve.measures import History, Measures, forcing, worst
+from tawami.solve.measures import History, Measured, Measures, forcing, worst
 from tawami.solve.numerics import Numerics
+from tawami.solve.path import Path
 from tawami.solve.scaling import Scaling
+
+#: Tolerance of linear solves along a path, whose first residual may be zero.
+ON_PATH = 1e-8
 
 
 @dataclass(frozen=True)
@@ -40,6 +47,7 @@ class Converged:
         krylov: FGMRES iterations of every solve; 0 if the tangent was factorised.
         condition: Estimated condition number of the last factorised tangent, scaled; 1 if none was.
         symmetric: Whether that tangent was symmetric, and LDL^T was used.
+        factor: Load factor of a step along a path; NaN for other steps.
     """
 
     coefficients: Array
@@ -49,6 +57,7 @@ class Converged:
     krylov: list[int]
     condition: float
     symmetric: bool
+    factor: float = np.nan
 
     @property
     def iterations(self) -> int:
@@ -64,6 +73,7 @@ class Newton:
         responses: The particles.
         numerics: Numerical settings.
         stopwatch: Measures the time of each stage.
+        elastic: Makes the responses of the same particles with elastic laws, for a diagnosis.
 
     Attributes:
         numerics: Numerical settings; its tolerance may change between steps.
@@ -75,13 +85,14 @@ class Newton:
         responses: Responses,
         numerics: Numerics,
         stopwatch: Stopwatch,
+        elastic: Callable[[], Responses],
     ) -> None:
         self._assembly, self._responses = assembly, responses
         self.numerics, self._stopwatch = numerics, stopwatch
         self._comm = assembly.layout.grid.comm
         self._measures = Measures(assembly.layout, responses)
         self._scaling = Scaling(assembly.layout, responses)
-        self._diagnosis = Diagnosis(assembly.layout, responses)
+        self._diagnosis = Diagnosis(assembly, responses, self._scaling, elastic)
         self._solver: LinearSolver
         if numerics.linear_solver == "iterative":
             self._solver = IterativeSolver(self._comm, stopwatch)
@@ -129,6 +140,7 @@ class Newton:
         inertia: Inertia | None = None,
         guess: Array | None = None,
         friction: Friction | None = None,
+        path: Path | None = None,
     ) -> Converged:
         """Solve for the increments that balance the external forces.
 
@@ -138,72 +150,134 @@ class Newton:
             inertia: Inertia of a dynamic step.
             guess: Increments of all fields to start from; zero by default.
             friction: Friction of the walls; the tangent neglects its change.
+            path: What makes the load factor an unknown.
 
         Raises:
-            ConvergenceError: Newton did not reach the tolerance within `max_iterations`.
+            ConvergenceError: Newton did not reach the tolerance within `max_iterations`, or the
+                tangent became singular where that of an elastic body is not.
             SingularError: The tangent cannot be solved; the message names the cells.
         """
         clean_up(self._comm)
         self._stopwatch.start()
         self._measures.begin(self.internal if inertia is None else None)
-        iterate, history, krylov = Iterate(reduction, guess, inertia), History(), list[int]()
+        equations = Equations(reduction, external, inertia, friction, path)
+        iterate, history, krylov = equations.first(guess), History(), list[int]()
         mass = None if inertia is None else inertia.reduced(reduction)
+        search: LineSearch | None = None
         while True:
             try:
-                internal = self.internal(iterate.coefficients)
+                forces, measured = self._evaluate(iterate, equations)
+                if search is not None and worst(measured) > worst(history[-1]):
+                    forces, measured = self._shortened(search, iterate, equations, forces, measured)
             except _rust.InvertedError as error:
                 if guess is None:
                     self._fail(history, f"Then {error}")
-                guess = None
-                iterate = Iterate(reduction, guess, inertia)
+                guess = search = None
+                iterate = equations.first(guess)
                 continue
-            forces = iterate.forces(internal, external, friction)
-            with self._stopwatch("measures"):
-                measured = self._measures.of(forces, iterate.coefficients, reduction, inertia)
             history.append(measured)
             if not np.isfinite(worst(measured)):
                 self._fail(history, "An infinite or undefined number came up")
-            if worst(measured) < self.numerics.tolerance:
+            met = path is None or path.control.is_met(iterate.u)
+            if worst(measured) < self.numerics.tolerance and met:
                 tally.steps += 1
                 return Converged(
                     iterate.coefficients, forces.acceleration, forces.reactions, history, krylov,
-                    self._solver.condition, self._solver.symmetric,
+                    self._solver.condition, self._solver.symmetric, iterate.factor,
                 )  # fmt: skip
             if len(history) > self.numerics.max_iterations:
                 advice = self._diagnosis.material()
-                self._fail(history, advice or "Take a smaller load, or check material and supports")
-            iterate.add(self._change(iterate, forces, reduction, mass, history))
+                self._fail(history, advice or equations.advice)
+            change, of_factor = self._change(iterate, forces, equations, mass, history)
+            if equations.at_rest and not self._responses.form.strain.finite:
+                n = reduction.layout.num_displacement
+                search = LineSearch(self._comm, change, forces.residual, n)
+            iterate.add(change, of_factor)
             krylov.append(self._solver.iterations)
             self._stopwatch.lap()
+
+    def _evaluate(self, iterate: Iterate, equations: Equations) -> tuple[Forces, Measured]:
+        """Forces at an iterate, and their measures."""
+        internal = self.internal(iterate.coefficients)
+        forces = equations.forces(iterate, internal)
+        with self._stopwatch("measures"):
+            measured = self._measures.of(
+                forces, iterate.coefficients, equations.reduction, equations.inertia
+            )
+        return forces, measured
+
+    def _shortened(
+        self,
+        search: LineSearch,
+        iterate: Iterate,
+        equations: Equations,
+        forces: Forces,
+        measured: Measured,
+    ) -> tuple[Forces, Measured]:
+        """Shorten the last change if it overshoots; forces and measures at the iterate then."""
+        if not search.overshoots(forces.residual):
+            return forces, measured
+        found = [(forces, measured)]
+
+        def residual_at(share: float) -> Array:
+            iterate.shorten(share)
+            found.append(self._evaluate(iterate, equations))
+            return found[-1][0].residual
+
+        search.length(residual_at, forces.residual)
+        tally.line_searches += 1
+        return found[-1]
 
     def _change(
         self,
         iterate: Iterate,
         forces: Forces,
-        reduction: Reduction,
+        equations: Equations,
         mass: Any,
         history: History,
-    ) -> Array:
-        """Change of all increments by one linear solve."""
-        solver, data = self._solver, self._responses.data
+    ) -> tuple[Array, float]:
+        """Change of all increments and of the load factor by one tangent."""
+        solver, data, reduction = self._solver, self._responses.data, equations.reduction
         tangent = self._assembly.tangent(iterate.coefficients, data, reduction)
         if mass is not None:
             add_rows(tangent, mass)
         if self._stored is not None:
             self._restore(tangent, reduction)
-        found = solver.solve(
-            tangent,
-            functools.partial(self._scaling.factors, tangent, reduction),
-            -reduction.restricted(forces.residual)[reduction.own],
-            forcing(history, self.numerics.tolerance),
-            functools.partial(self._scaling.blocks, reduction),
-        )
+        tolerance = ON_PATH
+        if equations.path is None:
+            tolerance = forcing(history, self.numerics.tolerance)
+        singular: SingularError | None = None
+        try:
+            found = solver.solve(
+                tangent,
+                functools.partial(self._scaling.factors, tangent, reduction),
+                -reduction.restricted(forces.residual)[reduction.own],
+                tolerance,
+                functools.partial(self._scaling.blocks, reduction),
+            )
+        except SingularError as error:
+            if not solver.singular:
+                raise
+            singular = error
         tally.newton_iterations += 1
         tally.unknowns = max(tally.unknowns, reduction.size)
         if solver.singular:
             solver.forget()
-            self._diagnosis.report_singular(solver, reduction, first=len(history) == 1)
-        return np.asarray(reduction.selection @ ranks.allgathered(self._comm, found))
+            self._diagnosis.report_singular(solver, equations, history, singular)
+        change = self._on_all(reduction, found)
+        if equations.path is None:
+            return change, 0.0
+        loads = reduction.restricted(equations.path.rate)[reduction.own]
+        rate = self._on_all(reduction, solver.again(loads, tolerance))
+        n = reduction.layout.num_displacement
+        of_factor = equations.path.control.change(iterate.u, change[:n], rate[:n])
+        if not np.isfinite(of_factor):
+            self._fail(history, "The loads do not move the control: choose another control")
+        return change + of_factor * rate, of_factor
+
+    def _on_all(self, reduction: Reduction, unknowns: Array) -> Array:
+        """All coefficients from this rank's unknowns."""
+        return np.asarray(reduction.selection @ ranks.allgathered(self._comm, unknowns))
 
     def _fail(self, history: History, advice: str) -> NoReturn:
         self._diagnosis.report_divergence(history, self.numerics.tolerance, advice)

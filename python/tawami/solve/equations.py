@@ -1,0 +1,66 @@
+"""The equations of one step: what the increments have to balance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tawami.base.arrays import Array
+from tawami.field.reduction import Reduction
+from tawami.solve.inertia import Inertia
+from tawami.solve.iterate import Forces, Friction, Iterate
+from tawami.solve.path import Path
+
+#: Advice if a step does not converge.
+STATIC = (
+    "The load may exceed what the body carries, or what one step can reach. ramp(scene) applies it in "
+    "steps and returns the share that it reached; follow(scene, ...) passes a limit load"
+)
+DYNAMIC = "Take a smaller dt; run(...) does this by itself"
+ALONG_PATH = "Take shorter steps along the path"
+
+
+@dataclass(frozen=True)
+class Equations:
+    """What `Newton.solve` is given.
+
+    Attributes:
+        reduction: Unknowns that the supports leave free.
+        external: External forces on all coefficients [N per metre depth]; on a path, at its start.
+        inertia: Inertia of a dynamic step.
+        friction: Friction of the walls.
+        path: What makes the load factor an unknown.
+    """
+
+    reduction: Reduction
+    external: Array
+    inertia: Inertia | None
+    friction: Friction | None
+    path: Path | None
+
+    def first(self, guess: Array | None) -> Iterate:
+        """The first iterate, at increments of all fields or at zero."""
+        factor = np.nan
+        if self.path is not None:
+            factor = self.path.start if guess is None else self.path.guess
+        return Iterate(self.reduction, guess, self.inertia, factor)
+
+    def forces(self, iterate: Iterate, internal: Array) -> Forces:
+        """All forces at an iterate with these internal forces."""
+        external = self.external
+        if self.path is not None:
+            external = self.path.external(external, iterate.factor)
+        return iterate.forces(internal, external, self.friction)
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether it is a static step at a given load without friction, which a line search serves."""
+        return self.inertia is None and self.friction is None and self.path is None
+
+    @property
+    def advice(self) -> str:
+        """What to do if the step does not converge."""
+        if self.inertia is not None:
+            return DYNAMIC
+        return STATIC if self.path is None else ALONG_PATH

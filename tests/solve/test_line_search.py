@@ -1,0 +1,95 @@
+"""The line search: where it makes Newton converge, and that it does nothing elsewhere."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import tawami
+from tawami.base.timing import tally
+from tawami.solve.line_search import LineSearch
+
+
+def pulled(nu: float, up: float) -> tawami.Scene:
+    """A block of 4 x 4 cells on a rough base, which a rough plate pulls up on half its top."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(4, 4))
+    body = tawami.box(grid, (0, 0), (1, 1), per_axis=3)
+    elastic = tawami.linear_elastic(E=1e3, nu=nu)
+    scene = tawami.Scene(grid, body, tawami.mohr_coulomb(elastic, phi=20.0, c=1.0))
+    for component in ("x", "y"):
+        scene.fix("bottom", component)
+    scene.fix("top", "x", between=(0.0, 0.5))
+    scene.fix("top", "y", up, between=(0.0, 0.5))
+    return scene
+
+
+def solves(nu: float, up: float) -> tuple[int, int, int]:
+    """Steps, linear solves and shortened iterations of a ramp in steps of at most 1/20."""
+    scene = pulled(nu, up)
+    tally.reset()
+    steps = tawami.ramp(scene, 0.05)
+    assert steps[-1].end == 1.0
+    return len(steps), tally.newton_iterations, tally.line_searches
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.49])
+def test_a_block_in_tension_needs_a_fifth_of_the_solves(nu, monkeypatch):
+    steps, count, searched = solves(nu, 0.05)
+    assert steps == 20  # no step failed
+    assert count < 180
+    assert searched > 20
+    monkeypatch.setattr(LineSearch, "overshoots", lambda _self, _residual: False)
+    steps, without, _ = solves(nu, 0.05)
+    assert steps > 60
+    assert without > 780
+    print(f"nu = {nu}: {count} solves in 20 steps; without line search {without} in {steps}")
+
+
+def test_a_run_that_converges_without_it_is_the_same_to_the_bit(monkeypatch):
+    scene = pulled(0.49, 0.01)
+    tally.reset()
+    tawami.ramp(scene, 0.05)
+    assert tally.line_searches == 0
+    stress = np.array(scene.particles.stress)
+    monkeypatch.setattr(LineSearch, "overshoots", lambda _self, _residual: False)
+    scene = pulled(0.49, 0.01)
+    tawami.ramp(scene, 0.05)
+    assert np.array_equal(scene.particles.stress, stress)
+
+
+def test_the_secant_method_ends_where_the_work_is_half_as_large():
+    """g(t) = -1 + 3 t^3 along one coefficient: g(1) = 2, and the search stops at |g| <= 1/2."""
+    tried = []
+
+    def residual_at(t):
+        tried.append(t)
+        return np.array([-1 + 3 * t**3])
+
+    search = LineSearch(MPI.COMM_WORLD, np.array([1.0]), np.array([-1.0]), 1)
+    assert search.overshoots(np.array([2.0]))
+    assert not search.overshoots(np.array([0.7]))
+    assert not search.overshoots(np.array([-2.0]))
+    t = search.length(residual_at, np.array([2.0]))
+    assert t == tried[-1]
+    assert abs(-1 + 3 * t**3) <= 0.5
+    assert len(tried) <= 4
+
+
+def test_the_search_ends_after_eight_evaluations_and_takes_no_tiny_step():
+    """A work that never falls: the step is shortened to 1/20 at most."""
+    tried = []
+
+    def residual_at(t):
+        tried.append(t)
+        return np.array([2.0])
+
+    search = LineSearch(MPI.COMM_WORLD, np.array([1.0]), np.array([-1.0]), 1)
+    assert search.length(residual_at, np.array([2.0])) >= 0.05
+    assert len(tried) <= 8
+
+
+def test_the_volume_counts_with_the_other_sign():
+    """At a saddle point, a change of eps_v that lowers the energy is one in the wrong direction."""
+    search = LineSearch(MPI.COMM_WORLD, np.array([1.0, 1.0]), np.array([-2.0, 1.0]), 1)
+    assert search.overshoots(np.array([0.0, -3.0]))  # g(0) = -3, g(1) = 3
