@@ -186,7 +186,7 @@ def test_parameters_and_inexact_sums_are_reported():
 def test_the_plastic_law_yields_in_the_check():
     """The tangent of at least half of the particles is not the elastic one."""
     form = tawami.Form.load("u_epsv_finite")
-    elastic, plastic = (scenes.cloud(form, {}, law) for law in (None, scenes.soil(form)))
+    elastic, plastic = (scenes.cloud(form, {}, law) for law in (None, scenes.soil(form, {})))
     c = (
         0.05
         * elastic.grid.h

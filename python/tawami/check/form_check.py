@@ -198,9 +198,12 @@ def _symmetry(form: Form, given: Settings) -> Found:
 
 
 def _differences(form: Form, given: Settings) -> Found:
-    for law, name in ((None, "elastic"), (scenes.soil(form), "plastic")):
+    plastic = "plastic law"
+    if form.kinematics.has_mean_stress and not scenes.has_plastic_volume(form, given):
+        plastic += " that preserves the volume (the form has no eps_p)"
+    for law, name in ((None, "elastic law"), (scenes.soil(form, given), plastic)):
         scene = scenes.cloud(form, given, law)
-        yield _judged(scenes.tangent_error(scene), DIFFERENCES, f"{name} law, random particles")
+        yield _judged(scenes.tangent_error(scene), DIFFERENCES, f"{name}, random particles")
 
 
 def _rigid(form: Form, given: Settings) -> Found:

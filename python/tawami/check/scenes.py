@@ -18,6 +18,7 @@ from tawami.base.arrays import Array
 from tawami.base.errors import InputError, SingularError
 from tawami.body.body import Body
 from tawami.body.box import box
+from tawami.form.compilation import compile_form
 from tawami.form.form import Form
 from tawami.grid.basis import Basis
 from tawami.grid.edges import Component
@@ -44,11 +45,16 @@ def grid_of(
     return Grid(MPI.COMM_SELF, origin=origin, h=h, cells=cells)
 
 
-def soil(form: Form) -> Law:
-    """A plastic law that couples mean stress and shear, if the form allows it."""
-    if form.kinematics.deviatoric:
+def soil(form: Form, given: Settings) -> Law:
+    """A plastic law whose flow changes the volume, if the form has a term for that."""
+    if form.kinematics.has_mean_stress and not has_plastic_volume(form, given):
         return lambda elastic: von_mises(elastic, yield_stress=0.1, hardening=0.1)
     return lambda elastic: drucker_prager(elastic, phi=20.0, c=0.05, psi=10.0)
+
+
+def has_plastic_volume(form: Form, given: Settings) -> bool:
+    """Whether the residual names the plastic volumetric strain."""
+    return compile_form(MPI.COMM_SELF, form, form.settings(given)[1]).names("eps_p")
 
 
 def cloud(form: Form, given: Settings, law: Law | None = None, **options: Any) -> Scene:
