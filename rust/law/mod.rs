@@ -28,7 +28,7 @@ pub(crate) const ROUND_OFF: f64 = 1e-13;
 /// A mean stress m beyond that of the apex is not clipped, since its tangent would be zero. The material
 /// opens by `(m - m_apex) / (SOFT mu)` in the step instead, so that the excess is SOFT mu times the
 /// volumetric strain of the step.
-pub(crate) const SOFT: f64 = 0.01;
+pub(crate) const SOFT: f64 = 0.1;
 
 /// Most history variables that a law may have.
 pub const MAX_HISTORY: usize = 8;

@@ -51,7 +51,7 @@ class Sample:
         self.rows = np.arange(len(self.location.active), dtype=np.uint32)
         self.packed = np.zeros((len(self.rows), 12))
         self.few = np.array([0, 2], dtype=np.uint32)
-        self.given = (np.zeros(4 * N), np.zeros(16 * N))
+        self.given = (np.zeros(4 * N), np.zeros(16 * N), np.zeros(N))
         self.wanted = [[("sigma", "value", 0, None), ("sigma_m", "value", 3, np.ones(N))]]
         self.requests = _rust.Requests(self.wanted)
         self.none = [_rust.Kernels(self.assembler, rank, []) for rank in (1, 2)]

@@ -122,7 +122,7 @@ proptest! {
             let (a, _) = answer(&*law, &e, apex + beyond);
             prop_assert!(a.deviator == [0.0; 4] && a.dev_dev == [[0.0; 4]; 4]);
             let opened = a.plastic_volume - at.plastic_volume;
-            prop_assert!((opened - beyond / (0.01 * mu)).abs() < 1e-12 * opened.max(1.0));
+            prop_assert!((opened - beyond / (0.1 * mu)).abs() < 1e-12 * opened.max(1.0));
             // continuous there
             prop_assert!(apart(&below.deviator, &at.deviator) < 1e-7);
             prop_assert!((below.plastic_volume - at.plastic_volume).abs() < 1e-6);
@@ -146,7 +146,7 @@ proptest! {
 }
 
 #[test]
-fn dilation_at_a_mean_stress_ends_where_it_is_told_to() {
+fn dilation_at_a_mean_stress_ends_at_its_limit() {
     let limited = Friction { eps_v_max: 0.012, ..friction(30.0, 0.1, 20.0) };
     for (law, _) in with_apex(limited) {
         let (a, new) = answer(&*law, &[0.3, -0.3, 0.0, 0.0], -1.0);

@@ -66,11 +66,16 @@ class CompiledForm:
         )
 
 
-_compiled: dict[tuple[Form, TangentRule, tuple[tuple[str, str], ...]], CompiledForm] = {}
+_compiled: dict[tuple[Form, TangentRule, bool, tuple[tuple[str, str], ...]], CompiledForm] = {}
 
 
 def compile_form(
-    comm: Any, form: Form, options: Mapping[str, str], tangent_rule: TangentRule = "full"
+    comm: Any,
+    form: Form,
+    options: Mapping[str, str],
+    tangent_rule: TangentRule = "full",
+    *,
+    plastic_volume: bool = True,
 ) -> CompiledForm:
     """Compile a form with its options; a collective call.
 
@@ -79,22 +84,22 @@ def compile_form(
         form: The form.
         options: One value for each of the form's options.
         tangent_rule: Points of the sums over particles in the tangent: 'full', or 'reduced'.
+        plastic_volume: Whether plastic flow may change the volume. Otherwise eps_p is zero, and its
+            terms are left out.
 
     Raises:
         FormError: A name is unknown, a test function is missing, or UFL or FFCx rejects the form.
     """
-    key = (form, tangent_rule, tuple(sorted(options.items())))
+    key = (form, tangent_rule, plastic_volume, tuple(sorted(options.items())))
     if key not in _compiled:
+        symbols = Symbols(form, options, plastic_volume=plastic_volume)
         with tally.compiling():
-            _compiled[key] = _compile(comm, form, options, tangent_rule)
+            _compiled[key] = _compile(comm, symbols, tangent_rule)
     return _compiled[key]
 
 
-def _compile(
-    comm: Any, form: Form, options: Mapping[str, str], tangent_rule: TangentRule
-) -> CompiledForm:
-    symbols = Symbols(form, options)
-    residual = symbols.residual()
+def _compile(comm: Any, symbols: Symbols, tangent_rule: TangentRule) -> CompiledForm:
+    form, residual = symbols.form, symbols.residual()
     terms = terms_of(symbols, residual)
     with ufl_errors(form):
         linearisation = Linearisation(symbols, terms.cells)

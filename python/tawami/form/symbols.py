@@ -39,6 +39,7 @@ class Symbols:
     Args:
         form: The form.
         options: The value of each of its options.
+        plastic_volume: Whether plastic flow may change the volume; otherwise sums of eps_p are empty.
 
     Attributes:
         names: Symbols by name.
@@ -47,8 +48,11 @@ class Symbols:
         fields, tests, trials: The parts of these for each field; test functions by their own name.
     """
 
-    def __init__(self, form: Form, options: Mapping[str, str]) -> None:
+    def __init__(
+        self, form: Form, options: Mapping[str, str], *, plastic_volume: bool = True
+    ) -> None:
         self.form = form
+        self._plastic_volume = plastic_volume
         domain = dolfinx.domain()
         elements = [dolfinx.lagrange(2, PLANE.dim)] + [dolfinx.lagrange(1)] * (len(form.fields) - 1)
         self.element = elements[0] if len(elements) == 1 else dolfinx.mixed(elements)
@@ -145,6 +149,8 @@ class Symbols:
             self._check_place(rule, quantity, caller)
         if rule == "particle":
             self._check_degree(expression)
+        if _is_plastic_volume(quantity) and not self._plastic_volume:
+            return ufl.Form([])
         c = self.density(Density(rule, quantity))
         weight = c[0]
         if len(c) == 3:
@@ -168,7 +174,7 @@ class Symbols:
                 f"form {self.form.name}: sum_v({quantity.name}, ...): expected constants of the "
                 "particle (K, mu): the stress depends on the strain at the particle"
             )
-        if quantity.name == "eps_p" and not self.form.kinematics.has_mean_stress:
+        if _is_plastic_volume(quantity) and not self.form.kinematics.has_mean_stress:
             raise FormError(
                 f"form {self.form.name}: {caller}(eps_p, ...) with kinematics "
                 f"'{self.form.kinematics}', whose law receives the total strain: expected kinematics "
@@ -264,3 +270,7 @@ class Symbols:
                     "appear in its residual: every field needs its equation"
                 )
         return residual
+
+
+def _is_plastic_volume(quantity: Quantity) -> bool:
+    return isinstance(quantity, LawQuantity) and quantity.name == "eps_p"

@@ -160,7 +160,8 @@ def build(
             "only"
         )
     _warn_of_locking(grid, loaded, materials, particles)
-    compiled = compile_form(grid.comm, loaded, options, tangent_rule)
+    dilates = law is not None or any(one.pressure_dependent for one in materials)
+    compiled = compile_form(grid.comm, loaded, options, tangent_rule, plastic_volume=dilates)
     check_used(compiled, options, parameters)
     _check_plastic_volume(compiled, materials, law, particles)
     instead = "the form's parameters are fixed when a scene is made: Scene(..., {}=...)"
