@@ -36,7 +36,11 @@ MINUTES = 60
 #: Cases that only print.
 WITHOUT_FILES = ("self_weight", "projection", "writing")
 #: Options of cases that would run for more than three minutes.
-SHORTER = {"elastica": ("--steps", "40"), "footing": ("--cells", "8")}
+SHORTER = {
+    "elastica": ("--steps", "40"),
+    "footing": ("--cells", "8"),
+    "bearing_capacity": ("--cells", "2"),
+}
 
 
 class RunError(Exception):

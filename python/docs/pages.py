@@ -31,6 +31,7 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "self_weight": ("Self-weight", "verification", ()),
     "elastica": ("Elastica", "verification", ("strip",)),
     "footing": ("Footing", "verification", ()),
+    "bearing_capacity": ("Bearing capacity", "verification", ()),
     "vibrating_beam": ("Vibrating beam", "verification", ("beam",)),
     "spinning_disc": ("Spinning disc", "verification", ("disc",)),
     "collapse": ("Collapse", "showcase", ("pile",)),
