@@ -21,7 +21,7 @@ from tawami.base.identity import fingerprint
 from tawami.base.process import check_process
 from tawami.base.timing import Stopwatch
 from tawami.particles import placement
-from tawami.scene import coverage
+from tawami.scene import coverage, strain_limit
 from tawami.scene.domain import Domain
 from tawami.scene.loads import Loads
 from tawami.scene.model import Model
@@ -84,6 +84,7 @@ class Configuration:
         self.total = np.zeros(self.domain.layout.size)
         self.left = list[tuple[int, tuple[float, float], float]]()
         self.begun = self._coverage_checked = False
+        self._small_strain = not model.moves
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
         self.domain = Domain.attach(self.model, particles, location, self.numerics, self.stopwatch)
@@ -138,6 +139,7 @@ class Configuration:
         try:
             accepted = self._solve(kind)
             moved = self._moved(accepted, kind.end)
+            self._check_strain(accepted)
             update = kind.accept(accepted)
             with signals.deferred():
                 with self.stopwatch("commit"), ranks.raise_together(self.model.grid.comm):
@@ -203,6 +205,16 @@ class Configuration:
         stop = self.model.leaving == "stop"
         placement.check_staying(self.model.grid, particles, moved, time, stop=stop)
         return moved
+
+    def _check_strain(self, accepted: Accepted) -> None:
+        """Warn, once, of displacement gradients beyond small strain."""
+        if self._small_strain:
+            n = self.domain.layout.num_displacement
+            total = self.total[:n] + accepted.step.coefficients[:n]
+            exceeded = strain_limit.exceeded(self.domain, total)
+            if exceeded is not None:
+                self._small_strain = False
+                strain_limit.warn_of(self.domain, *exceeded)
 
     def _store(self, accepted: Accepted, moved: Array | None, time: float) -> Outcome:
         """Store a step that the laws have committed, and move the particles."""
