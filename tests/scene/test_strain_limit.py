@@ -37,8 +37,9 @@ def warnings_of(run) -> list[str]:
 
 def test_a_solve_warns_once_and_names_the_particle():
     scene = sheared(SHEAR)
-    with pytest.warns(tawami.SmallStrainWarning, match=MESSAGE):
+    with pytest.warns(tawami.SmallStrainWarning, match=MESSAGE) as caught:
         scene.solve()
+    assert caught[0].filename == __file__
     assert warnings_of(scene.solve) == []
 
 
