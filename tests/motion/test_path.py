@@ -113,7 +113,9 @@ def test_a_law_in_rust_that_softens_is_rejected():
 
 def test_a_ramp_stops_at_the_peak_and_says_how_to_continue():
     scene = column(20.0)
-    with pytest.warns(tawami.IncompleteWarning, match=r"at 0\.\d+ of the load.*follow\(scene") as caught:
+    with pytest.warns(
+        tawami.IncompleteWarning, match=r"at 0\.\d+ of the load.*follow\(scene"
+    ) as caught:
         steps = tawami.ramp(scene, 0.1, smallest=1e-3)
     assert caught[0].filename == __file__
     assert not steps.complete
