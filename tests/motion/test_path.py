@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -9,6 +11,7 @@ from scenes import grid_of
 
 import tawami
 
+pytestmark = pytest.mark.filterwarnings("ignore:the material softens:UserWarning")
 MU, TAU = 100.0, 1.0  # [Pa]
 LAYERS = 4  # of 1 m
 
@@ -89,10 +92,32 @@ def test_a_softening_column_beyond_its_peak(control, softening):
     assert scene.particles.stress[:, 3] == pytest.approx(2 * TAU * steps.reached, rel=1e-6)
 
 
+def test_a_law_that_softens_warns_once_where_it_does():
+    number = int(np.flatnonzero(column(20.0).particles.x[:, 1] < 1.0)[0])
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        steps, _ = followed(column(20.0), ((0.5, 1.0), "x"), 0.002, 0.014)
+        scene = column(0.0)  # ideal plasticity
+        scene.fix("top", "x", 0.05)
+        tawami.ramp(scene, 0.25)
+    assert len(steps) > 5
+    assert [w.category for w in caught] == [tawami.SofteningWarning]
+    assert f"of particle {number} has the eigenvalue -25 Pa" in str(caught[0].message)
+
+
+def test_a_law_in_rust_that_softens_is_rejected():
+    elastic = tawami.linear_elastic(E=1e3, nu=0.3)
+    with pytest.raises(tawami.InputError, match="hardening = -1: .*softening needs a length"):
+        tawami.von_mises(elastic, yield_stress=1.0, hardening=-1.0)
+
+
 def test_a_ramp_stops_at_the_peak_and_says_how_to_continue():
     scene = column(20.0)
-    with pytest.warns(tawami.IncompleteWarning, match=r"at 0\.\d+ of the load.*follow\(scene"):
+    with pytest.warns(
+        tawami.IncompleteWarning, match=r"at 0\.\d+ of the load.*follow\(scene"
+    ) as caught:
         steps = tawami.ramp(scene, 0.1, smallest=1e-3)
+    assert caught[0].filename == __file__
     assert not steps.complete
     assert steps.reached == pytest.approx(0.5, abs=1e-3)
     assert isinstance(steps.error, tawami.ConvergenceError)

@@ -46,14 +46,64 @@ def test_a_block_in_tension_needs_a_fifth_of_the_solves(nu, monkeypatch):
     print(f"nu = {nu}: {count} solves in 20 steps; without line search {without} in {steps}")
 
 
-def test_a_run_that_converges_without_it_is_the_same_to_the_bit(monkeypatch):
-    scene = pulled(0.49, 0.01)
+def pressed(nu: float, psi: float) -> tawami.Scene:
+    """A smooth strip footing of 1 m on 4 m x 2 m, under about 1.05 times its limit load."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.5, cells=(8, 4))
+    body = tawami.box(grid, (0, 0), (4, 2), per_axis=3)
+    phi = 20.0 if psi else 0.0
+    elastic = tawami.linear_elastic(E=1e3, nu=nu)
+    scene = tawami.Scene(grid, body, tawami.mohr_coulomb(elastic, phi=phi, c=1.0, psi=psi))
+    for edge in ("left", "right", "bottom"):
+        scene.fix(edge, "x")
+    scene.fix("bottom", "y")
+    scene.traction("top", (0.0, -16.0 if phi else -5.6), between=(0.0, 1.0))
+    return scene
+
+
+def iterations(scene: tawami.Scene, smallest: float) -> dict[float, int]:
+    """Linear solves of each accepted step of a ramp, by the share of the load at its end."""
+    steps = tawami.ramp(scene, 0.05, smallest=smallest)
+    return {round(step.end, 9): len(step.history) - 1 for step in steps}
+
+
+@pytest.mark.filterwarnings("ignore::tawami.base.errors.IncompleteWarning")
+@pytest.mark.parametrize(("nu", "psi"), [(0.3, 0.0), (0.3, 20.0), (0.49, 10.0), (0.49, 20.0)])
+def test_at_a_limit_load_it_costs_no_iteration(nu, psi, monkeypatch):
+    """Every step that converges without the search converges with it, as fast."""
+    tally.reset()
+    found = iterations(pressed(nu, psi), 0.01)
+    assert tally.line_searches > 0  # of the steps beyond the limit load
+    monkeypatch.setattr(LineSearch, "overshoots", lambda _self, _residual: False)
+    without = iterations(pressed(nu, psi), 0.01)
+    assert max(without) < 1.0
+    assert max(found) >= max(without)
+    assert all(found[end] <= count for end, count in without.items())
+    with_search = sum(found[end] for end in without)
+    print(f"nu = {nu}, psi = {psi}: {with_search} iterations, without {sum(without.values())};")
+    print(f"{max(found):g} of the load, without {max(without):g}")
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.49])
+def test_where_a_block_in_tension_converges_without_it_it_saves_iterations(nu, monkeypatch):
+    found = iterations(pulled(nu, 0.01), 0.01)
+    monkeypatch.setattr(LineSearch, "overshoots", lambda _self, _residual: False)
+    without = iterations(pulled(nu, 0.01), 0.01)
+    assert list(found) == list(without)
+    assert sum(found.values()) < sum(without.values())
+    print(
+        f"nu = {nu}: {sum(found.values())} iterations with the search, {sum(without.values())} without"
+    )
+
+
+def test_a_run_that_does_not_overshoot_is_the_same_to_the_bit(monkeypatch):
+    scene = pulled(0.49, 0.005)
     tally.reset()
     tawami.ramp(scene, 0.05)
+    assert tally.newton_iterations > 60  # it yields
     assert tally.line_searches == 0
     stress = np.array(scene.particles.stress)
     monkeypatch.setattr(LineSearch, "overshoots", lambda _self, _residual: False)
-    scene = pulled(0.49, 0.01)
+    scene = pulled(0.49, 0.005)
     tawami.ramp(scene, 0.05)
     assert np.array_equal(scene.particles.stress, stress)
 

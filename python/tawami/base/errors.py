@@ -25,6 +25,8 @@ TawamiWarning             base of warnings about results that should not be trus
   LockingWarning          a form that locks
   ParameterWarning        a parameter beyond its usual range
   QuadratureWarning       particles with large integration errors
+  SmallStrainWarning      displacement gradients too large for a form of small strain
+  SofteningWarning        a material that softens: results depend on the grid
 ========================= ========================================================================
 
 When a step fails, the particles are as they were before it.
@@ -83,6 +85,14 @@ class QuadratureWarning(TawamiWarning):
     """Particles whose volumes integrate badly over the cells that they fill."""
 
 
+class SmallStrainWarning(TawamiWarning):
+    """Displacement gradients that are too large for a form of small strain."""
+
+
+class SofteningWarning(TawamiWarning):
+    """A material that softens, without a length: results depend on the grid."""
+
+
 class SingularError(TawamiError):
     """A singular tangent; the message names the cells."""
 
@@ -137,6 +147,8 @@ __all__ = [
     "ParameterWarning",
     "QuadratureWarning",
     "SingularError",
+    "SmallStrainWarning",
+    "SofteningWarning",
     "SupportError",
     "TawamiError",
     "TawamiWarning",

@@ -195,6 +195,10 @@ class NumpyStage:
         """See `_rust.Stage.evaluate`."""
         self._stage.evaluate(u, volumetric, requests, data, self._given(u, volumetric))
 
+    def tangent(self, u: Array, volumetric: Array | None) -> Array:
+        """Tangent of the law (n x 4 x 4) [Pa] at increments of the fields."""
+        return self._given(u, volumetric)[1].reshape(-1, 4, 4).copy()
+
     def commit(self, u: Array, volumetric: Array | None) -> float:
         """See `_rust.Stage.commit`."""
         dissipated = self._stage.commit(u, volumetric, self._given(u, volumetric))

@@ -21,7 +21,7 @@ from tawami.base.identity import fingerprint
 from tawami.base.process import check_process
 from tawami.base.timing import Stopwatch
 from tawami.particles import placement
-from tawami.scene import coverage
+from tawami.scene import coverage, softening, strain_limit
 from tawami.scene.domain import Domain
 from tawami.scene.loads import Loads
 from tawami.scene.model import Model
@@ -84,6 +84,7 @@ class Configuration:
         self.total = np.zeros(self.domain.layout.size)
         self.left = list[tuple[int, tuple[float, float], float]]()
         self.begun = self._coverage_checked = False
+        self._small_strain, self._softens = not model.moves, False
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
         self.domain = Domain.attach(self.model, particles, location, self.numerics, self.stopwatch)
@@ -138,6 +139,7 @@ class Configuration:
         try:
             accepted = self._solve(kind)
             moved = self._moved(accepted, kind.end)
+            self._warn_of_strain(accepted)
             update = kind.accept(accepted)
             with signals.deferred():
                 with self.stopwatch("commit"), ranks.raise_together(self.model.grid.comm):
@@ -203,6 +205,20 @@ class Configuration:
         stop = self.model.leaving == "stop"
         placement.check_staying(self.model.grid, particles, moved, time, stop=stop)
         return moved
+
+    def _warn_of_strain(self, accepted: Accepted) -> None:
+        """Warn, once each, of displacement gradients beyond small strain and of softening."""
+        coefficients, n = accepted.step.coefficients, self.domain.layout.num_displacement
+        if self._small_strain:
+            large = strain_limit.exceeded(self.domain, self.total[:n] + coefficients[:n])
+            if large is not None:
+                self._small_strain = False
+                strain_limit.warn_of(self.domain, *large)
+        if not self._softens:
+            soft = softening.found(self.domain, coefficients)
+            if soft is not None:
+                self._softens = True
+                softening.warn_of(self.domain, *soft)
 
     def _store(self, accepted: Accepted, moved: Array | None, time: float) -> Outcome:
         """Store a step that the laws have committed, and move the particles."""

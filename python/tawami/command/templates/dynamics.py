@@ -49,7 +49,7 @@ def main() -> None:
     gate = [(0.4, 0.025 * k) for k in range(9)]
     for point in gate:
         scene.hold(point, "x")
-    tawami.ramp(scene, 0.1, results=results)
+    tawami.ramp(scene, 0.1, results=results, stop="raise")
     for point in gate:
         scene.release(point)
 

@@ -1,0 +1,54 @@
+"""Whether the law in NumPy of a scene softens, so that results depend on the grid."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tawami.base import ranks
+from tawami.base.arrays import Array
+from tawami.base.errors import SofteningWarning
+from tawami.base.warn import warn
+from tawami.particles.numpy_law import NumpyStage
+from tawami.scene.domain import Domain
+
+#: Eigenvalue, and asymmetry, of a tangent that are ignored, relative to the shear modulus.
+IGNORED = 1e-6
+
+
+def found(domain: Domain, coefficients: Array) -> tuple[int, float] | None:
+    """Number of the particle that softens most, and the least eigenvalue of its tangent [Pa].
+
+    A tangent without symmetry is ignored: the law may be non-associated. A call for all ranks.
+
+    Args:
+        domain: The particles.
+        coefficients: Increments of all fields at the end of a step.
+    """
+    stage, comm = domain.stage, domain.model.grid.comm
+    if not isinstance(stage, NumpyStage):
+        return None
+    with ranks.raise_together(comm):
+        tangent = stage.tangent(*domain.layout.split(coefficients))
+    limit = IGNORED * domain.responses.largest_mu
+    odd = np.abs(tangent - tangent.transpose(0, 2, 1)).max(axis=(1, 2), initial=0.0)
+    tangent[odd > limit] = 0.0
+    least = np.linalg.eigvalsh(tangent)[:, 0]
+    worst = least.argsort()[:1]  # empty on a rank without particles
+    numbers = ranks.allgathered(comm, domain.particles.number[worst])
+    least = ranks.allgathered(comm, least[worst])
+    if least.min(initial=0.0) >= -limit:
+        return None
+    return int(numbers[least.argmin()]), float(least.min())
+
+
+def warn_of(domain: Domain, number: int, least: float) -> None:
+    """Warn of a particle and the eigenvalue of its tangent."""
+    if domain.model.grid.comm.rank:
+        return
+    warn(
+        f"the material softens: the tangent of particle {number} has the eigenvalue {least:.3g} Pa, "
+        "expected none below 0. Strain will localise in bands as wide as a cell, so the load and the "
+        "energy beyond the peak depend on the grid: scale the slope of softening with h, or compare "
+        "several h",
+        SofteningWarning,
+    )
