@@ -25,6 +25,7 @@ TawamiWarning             base of warnings about results that should not be trus
   LockingWarning          a form that locks
   ParameterWarning        a parameter beyond its usual range
   QuadratureWarning       particles with large integration errors
+  RotationWarning         a nearly incompressible body that turns too far in a step
   SmallStrainWarning      displacement gradients too large for a form of small strain
   SofteningWarning        a material that softens: results depend on the grid
 ========================= ========================================================================
@@ -83,6 +84,10 @@ class ParameterWarning(TawamiWarning):
 
 class QuadratureWarning(TawamiWarning):
     """Particles whose volumes integrate badly over the cells that they fill."""
+
+
+class RotationWarning(TawamiWarning):
+    """A nearly incompressible body that turns too far in a step of a motion."""
 
 
 class SmallStrainWarning(TawamiWarning):
@@ -146,6 +151,7 @@ __all__ = [
     "OutputError",
     "ParameterWarning",
     "QuadratureWarning",
+    "RotationWarning",
     "SingularError",
     "SmallStrainWarning",
     "SofteningWarning",

@@ -18,6 +18,7 @@ from tawami.motion.energy import Balance, Energies
 from tawami.motion.newmark import Clock, NewmarkStep, signature
 from tawami.motion.observer import Recorder, observed
 from tawami.motion.pace import Pace, Step
+from tawami.motion.rotation import Rotation
 from tawami.motion.stepping import march
 from tawami.motion.transfer import TRANSFERS, Transfer, TransferName
 from tawami.scene import description, sources
@@ -53,6 +54,7 @@ class Dynamics(Sealed, Unique):
 
     Warns:
         EnergyWarning: Once, where spurious energy appears.
+        RotationWarning: Once, where a nearly incompressible body turns too far in a step.
     """
 
     def __init__(
@@ -83,6 +85,7 @@ class Dynamics(Sealed, Unique):
         self.velocity[:] = given
         self._clock = Clock()
         self._balance = Balance(self._now, self._carried)
+        self._rotation = Rotation(self._now)
         self._seal()
 
     def _how_to_set(self, name: str) -> str:
@@ -156,7 +159,14 @@ class Dynamics(Sealed, Unique):
                 )
         self._balance.begin()
         kind = NewmarkStep(
-            now, self._carried, self._balance, self._clock, self.gamma, self.beta, dt
+            now,
+            self._carried,
+            self._balance,
+            self._rotation,
+            self._clock,
+            self.gamma,
+            self.beta,
+            dt,
         )
         return Solution(self.scene, now.advance(kind))
 
@@ -231,6 +241,7 @@ class Dynamics(Sealed, Unique):
             "loads_changed": signature(self._now) != self._clock.loads,
             "carried": self._carried.state(),
             "balance": self._balance.state(),
+            "rotation_warned": self._rotation.warned,
         }
         return self.scene.state() | {"motion": own}
 
@@ -242,6 +253,7 @@ class Dynamics(Sealed, Unique):
         vars(self._clock).update(time=own["time"], steps=own["steps"], loads=loads)
         self._carried.restore(own["carried"])
         self._balance.restore(own["balance"])
+        self._rotation.warned = own["rotation_warned"]
 
     # -- conserved quantities ------------------------------------------------
 

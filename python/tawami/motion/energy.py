@@ -38,7 +38,8 @@ class Energies:
         dissipated: Work of the stress on plastic strains.
         friction: Lost to the friction of walls.
         external: Work of loads and of supports that move.
-        transfer: Kinetic energy lost on the way from the particles to the grid and back.
+        transfer: Energy lost on the way from the particles to the grid and back: kinetic, and elastic
+            where the mean stress of a mixed form is projected on the present grid.
         impact: Kinetic energy lost where supports stop the grid.
         left: Kinetic and elastic energy of the particles that left the grid.
         integration: What closes the balance.
@@ -186,6 +187,15 @@ class Balance:
         self.energies = Energies(**sums | {"kinetic": kinetic, "elastic": elastic})
         if self._now.model.grid.comm.rank == 0:
             self._growth.check(self.energies, steps, time)
+
+    def project(self, taken: float) -> None:
+        """Count what the projection of the mean stress took from the particles of this rank.
+
+        Args:
+            taken: Elastic energy [J per metre depth].
+        """
+        lost, e = self.sum(taken), self.energies
+        self.energies = replace(e, elastic=e.elastic - lost, transfer=e.transfer + lost)
 
     def remove_left(self) -> None:
         """Move the energy of particles that have left the grid to its own term."""

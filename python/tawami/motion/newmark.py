@@ -17,6 +17,7 @@ import numpy.typing as npt
 from tawami.field.reduction import Reduction
 from tawami.motion.carried import Carried, divided
 from tawami.motion.energy import Balance, Energies
+from tawami.motion.rotation import Rotation
 from tawami.scene.configuration import Configuration
 from tawami.scene.contact import ActiveSet
 from tawami.scene.step import Accepted, Problem
@@ -64,6 +65,7 @@ class NewmarkStep:
         configuration: The body.
         carried: Velocities and accelerations of its particles.
         balance: Its energy balance.
+        rotation: Warns of rotations that are too large for a step.
         clock: Its time.
         gamma, beta: Newmark's parameters.
         dt: [s]
@@ -74,13 +76,14 @@ class NewmarkStep:
         configuration: Configuration,
         carried: Carried,
         balance: Balance,
+        rotation: Rotation,
         clock: Clock,
         gamma: float,
         beta: float,
         dt: float,
     ) -> None:
-        self._now, self._carried, self._balance, self._clock = (
-            configuration, carried, balance, clock
+        self._now, self._carried, self._balance, self._rotation, self._clock = (
+            configuration, carried, balance, rotation, clock
         )  # fmt: skip
         self._gamma, self._beta, self._dt, self.end = gamma, beta, dt, clock.time + dt
         domain = configuration.domain
@@ -153,6 +156,7 @@ class NewmarkStep:
         """Velocities, accelerations and energies at the end of the step."""
         assert accepted.acceleration is not None
         start, dt, a1 = self._start, self._dt, accepted.acceleration
+        self._rotation.check(accepted.u, dt)
         v1 = start.v + dt * ((1 - self._gamma) * start.a + self._gamma * a1)
         v1 = start.reduction.imposed(v1.ravel(), self._masses, self._speed1).reshape(v1.shape)
         a1 = start.reduction.imposed(a1.ravel(), self._masses, self._speed_rate).reshape(a1.shape)
@@ -201,6 +205,7 @@ class NewmarkUpdate:
     def finish(self) -> None:
         """After the particles have moved."""
         self.configuration.accept(1.0)
+        self.balance.project(self.configuration.projected)
         if len(self.configuration.left) > self.left:
             self.balance.remove_left()
 

@@ -21,7 +21,7 @@ from tawami.base.identity import fingerprint
 from tawami.base.process import check_process
 from tawami.base.timing import Stopwatch
 from tawami.particles import placement
-from tawami.scene import coverage, softening, strain_limit
+from tawami.scene import coverage, mean_stress, softening, strain_limit
 from tawami.scene.domain import Domain
 from tawami.scene.loads import Loads
 from tawami.scene.model import Model
@@ -70,6 +70,8 @@ class Configuration:
         total: Coefficients of all fields since the start, where particles do not move.
         left: Number, position [m] and time [s] of the particles that left the grid.
         begun: Whether a step was stored.
+        projected: Elastic energy that the projection of the mean stress took from the particles of this
+            rank at the end of the last step [J per metre depth].
         stopwatch: Where the time goes.
     """
 
@@ -84,6 +86,7 @@ class Configuration:
         self.total = np.zeros(self.domain.layout.size)
         self.left = list[tuple[int, tuple[float, float], float]]()
         self.begun = self._coverage_checked = False
+        self.projected = 0.0
         self._small_strain, self._softens = not model.moves, False
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
@@ -234,6 +237,9 @@ class Configuration:
         particles, gone = placement.removed(grid, self.domain.particles)
         self.left += [(number, x, time) for number, x in gone]
         self._attach(*placement.migrated(grid, particles))
+        if self.model.form.kinematics.has_eps_v:
+            with self.stopwatch("commit"):
+                self.projected = mean_stress.project(self.domain)
         return outcome
 
     def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:
