@@ -76,7 +76,8 @@ def test_the_path_is_that_of_two_bars(by_arc_length):
 
 
 def test_a_point_follows_the_same_path(by_arc_length):
-    deflection, load = followed(((SPAN, RISE), "y"), 0.06, -0.9)
+    # the seventh step ends where the bars are flat, and supports do not hold them to first order
+    deflection, load = followed(((SPAN, RISE), "y"), 0.05, -0.9)
     fitted = np.polynomial.Polynomial.fit(*by_arc_length, 7)
     apart = np.abs(load - fitted(deflection))
     largest = apart[deflection < 1.9 * RISE].max() / load[deflection < RISE].max()

@@ -111,7 +111,8 @@ class PathStep:
     def problem(self) -> Problem:
         """The problem in the present states of the walls."""
         now, factor = self.configuration, self.following.factor
-        static = StaticStep(now, factor).problem()
+        stressed = now.model.moves and bool(self.following.loads)
+        static = StaticStep(now, factor, stressed).problem()
         rate = now.external(1.0) - now.external(0.0)
         if not rate.any():
             raise InputError(

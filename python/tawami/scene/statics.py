@@ -18,10 +18,12 @@ class StaticStep:
     Attributes:
         configuration: What it starts from.
         part: From 0 to 1.
+        stressed: Whether stress may hold what supports leave free, as in a truss that snaps through.
     """
 
     configuration: Configuration
     part: float = 1.0
+    stressed: bool = False
 
     @property
     def end(self) -> float:
@@ -40,7 +42,7 @@ class StaticStep:
         with now.stopwatch("set-up"):
             crossings = now.supports.crossings(amount) if moves else {}
             reduction, contact = now.supports.constraints(
-                now.domain, amount, now.before, now.before, moving=False
+                now.domain, amount, now.before, now.before, moving=self.stressed
             )
             external = now.external(self.part)
         return Problem(reduction, contact, external, crossings=crossings, load=self.part)

@@ -184,8 +184,8 @@ class Supports:
             start: Coefficients at the start of the step, which the amounts include.
             before: Displacement coefficients since the start of the scene where particles do not move,
                 0 where they do: what walls measure distances from.
-            moving: Inertia holds the body: rigid motions may be free, and edges that are held at rest
-                and that the body has left are skipped.
+            moving: Inertia or stress holds the body: rigid motions may be free, and edges that are
+                held at rest and that the body has left are skipped.
 
         Raises:
             SupportError: The body has left an edge with a prescribed motion, or a point.

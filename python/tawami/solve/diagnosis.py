@@ -138,13 +138,13 @@ class Diagnosis:
 
     def _too_few_particles(self) -> str:
         """Advice on functions without stiffness: what is not set already."""
-        form, values = self._responses.form, self._assembly.attachment.values
+        form, lagrange = self._responses.form, self._layout.basis == "biquadratic"
         advice = ["use more particles per cell (per_axis=3)"]
-        if self._layout.basis != "quadratic_spline":
-            advice.append("use the basis 'quadratic_spline'")
-        if values.get("alpha") == 0:
-            advice.append("use alpha > 0")
-        if self._assembly.attachment.compiled.ghost is None and "ghost_penalty" in form.options:
+        if lagrange:
+            advice.append("use the basis 'quadratic_spline' with per_axis=2 or more")
+        attachment = self._assembly.attachment
+        off = attachment.compiled.ghost is None and "ghost_penalty" in form.options
+        if off and not lagrange and not attachment.active.all():
             advice.append("use ghost_penalty='on', which ties partial cells to their neighbours")
         return (
             "some functions of the grid get no stiffness from the particles. Support every part of the "
@@ -173,8 +173,8 @@ class Diagnosis:
             return ""
         return (
             f"shear moduli differ by a factor of {largest / least:.1e}, and round-off of the stiff "
-            "material is as large as the forces of the soft one; make the stiff one softer, or hold it "
-            "by supports"
+            "material is as large as the forces of the soft one; make the stiff one softer, or hold "
+            "all of it by supports"
         )
 
     def _weakest_cells(self, reduction: Reduction, direction: Array) -> list[str]:

@@ -171,13 +171,13 @@ class Newton:
                     forces, measured = self._shortened(search, iterate, equations, forces, measured)
             except _rust.InvertedError as error:
                 if guess is None:
-                    self._fail(history, f"Then {error}")
+                    self._fail(history, f"Then {error}. {equations.advice}")
                 guess = search = None
                 iterate = equations.first(guess)
                 continue
             history.append(measured)
             if not np.isfinite(worst(measured)):
-                self._fail(history, "An infinite or undefined number came up")
+                self._fail(history, f"A number is infinite or undefined. {equations.advice}")
             met = path is None or path.control.is_met(iterate.u)
             if worst(measured) < self.numerics.tolerance and met:
                 tally.steps += 1
