@@ -86,7 +86,7 @@ class Configuration:
         self.total = np.zeros(self.domain.layout.size)
         self.left = list[tuple[int, tuple[float, float], float]]()
         self.begun = self._coverage_checked = False
-        self.projected = 0.0
+        self.projected = self._travel = 0.0
         self._small_strain, self._softens = not model.moves, False
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
@@ -232,15 +232,27 @@ class Configuration:
             return self._outcome(accepted, coefficients)
         problem, grid = accepted.problem, self.model.grid
         self.supports.follow(accepted.u, problem.reduction.points, problem.crossings)
+        travel = mean_stress.travel(self.domain, moved)
         self.domain.particles.move_to(moved)
         outcome = self._outcome(accepted, coefficients)
         particles, gone = placement.removed(grid, self.domain.particles)
         self.left += [(number, x, time) for number, x in gone]
         self._attach(*placement.migrated(grid, particles))
-        if self.model.form.kinematics.has_eps_v:
+        self._project(travel)
+        return outcome
+
+    def _project(self, travel: float) -> None:
+        """Project the mean stress on the present grid once the particles have travelled far enough.
+
+        Args:
+            travel: In the last step, in cells.
+        """
+        self.projected = 0.0
+        self._travel += travel
+        if self.model.form.kinematics.has_eps_v and self._travel > mean_stress.TRAVEL:
+            self._travel = 0.0
             with self.stopwatch("commit"):
                 self.projected = mean_stress.project(self.domain)
-        return outcome
 
     def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:
         particles, comm = self.domain.particles, self.model.grid.comm
@@ -275,6 +287,7 @@ class Configuration:
             "particles": placement.gathered(self.model.grid, self.domain.particles),
             "total": self.total,
             "left": self.left,
+            "travel": self._travel,
             "coverage_checked": self._coverage_checked,
             "supports": self.supports.state(),
             "loads": self.loads.state(),
@@ -293,6 +306,7 @@ class Configuration:
         self.total = state["total"]
         self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
         self._coverage_checked, self.begun = state["coverage_checked"], True
+        self._travel = state["travel"]
         self.supports.restore(state["supports"])
         self.loads.restore(state["loads"])
         self._attach(particles, location)
