@@ -83,3 +83,10 @@ def test_a_higher_pile_runs_out_farther():
     assert 0.8 < slope < 1.8
     low, high = runout.exponents([runout.Runout(a, 2 * a**0.9) for a in (0.5, 1.5, 4.0)])
     assert (low, high) == pytest.approx((0.9, 0.9))
+
+
+@pytest.mark.parametrize("end", [0.01, pytest.param(0.1, marks=pytest.mark.slow)])
+def test_a_dilatant_and_nearly_incompressible_pile_collapses(end):
+    run = pile.solve("u_epsv_finite", end=end, nu=0.4999, psi=5.0)
+    assert run.time[-1] == pytest.approx(end)
+    assert np.mean(run.iterations) < 12

@@ -65,6 +65,7 @@ def build(
     *,
     h: float = 0.01,
     nu: float = NU,
+    psi: float = 0.0,
     per_axis: int = 2,
     size: tuple[float, float] = (LENGTH, HEIGHT),
     transfer: str = "affine_flip",
@@ -76,6 +77,7 @@ def build(
         form: Weak form.
         h: Cell size [m].
         nu: Poisson's ratio.
+        psi: Angle of dilation [degrees].
         per_axis: Particles per cell and axis.
         size: Length and height of the pile [m].
         transfer: Transfer between particles and grid.
@@ -86,7 +88,7 @@ def build(
     cells = (round((2 * length + 4 * height) / h), round(1.4 * height / h))
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=h, cells=cells)
     body = tawami.box(grid, (0.0, 0.0), size, per_axis=per_axis)
-    rods = tawami.drucker_prager(tawami.linear_elastic(E=E, nu=nu), phi=PHI)
+    rods = tawami.drucker_prager(tawami.linear_elastic(E=E, nu=nu), phi=PHI, psi=psi)
     parameters = {"alpha": 0.01} if form == "u_epsv_finite" else {}
     scene = tawami.Scene(grid, body, rods, form=form, density=RHO, **(parameters | options))
     scene.gravity((0.0, -G))

@@ -1,0 +1,1 @@
+"""Dilatant plasticity: a pressed block, and all active sets of the rate problem of a patch."""
