@@ -64,7 +64,7 @@ def block(**options: Any) -> tawami.Scene:
     grid = tawami.Grid(
         MPI.COMM_WORLD, origin=(0, 0), h=options["h"], cells=(int(2 / options["h"]), 6)
     )
-    body = tawami.box(grid, (0.5, 0), (1.0, 0.5))
+    body = tawami.box(grid, (0.5, 0), (1.0, 0.5), per_axis=2)
     body.x[:, 0] += options["shift"]
     law = tawami.linear_elastic(E=options["E"], nu=0.4)
     if options["phi"] is not None:
@@ -80,7 +80,7 @@ def block(**options: Any) -> tawami.Scene:
 def plastic_block(**options: Any) -> tawami.Dynamics:
     """A plastic block that strikes a floor; its particles are in a random order."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(-1.0, 0.5), h=0.25, cells=(6, 5))
-    body = tawami.box(grid, (-0.75, 0.5), (0.0, 1.25))
+    body = tawami.box(grid, (-0.75, 0.5), (0.0, 1.25), per_axis=2)
     order = np.random.default_rng(0).permutation(len(body.x))
     body = tawami.Body(body.x[order], body.volume[order])
     steel = tawami.von_mises(
@@ -146,7 +146,7 @@ def look(output, scene, motion, solution, time, step, *, last):
 def static_scene(form="u_epsv", **options) -> tawami.Scene:
     """A beam held on the left and at a point, under a traction on the right."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(8, 5))
-    body = tawami.box(grid, (0.0, 0.0), (2.0, 1.0))
+    body = tawami.box(grid, (0.0, 0.0), (2.0, 1.0), per_axis=2)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1e3, nu=0.3), form=form, **options)
     scene.fix("left", "x")
     scene.hold((0.0, 0.5), "y")

@@ -66,7 +66,7 @@ def scene_of(particles: str, n: int) -> tawami.Scene:
     """The beam with 2 x 2 particles per cell as a lattice, moved by a part of a cell, or at random."""
     h = D / n
     grid = tawami.Grid(MPI.COMM_SELF, origin=(-h, -D / 2 - h), h=h, cells=(2 * n + 3, n + 3))
-    body = tawami.box(grid, (0.0, -D / 2), (L, D / 2))
+    body = tawami.box(grid, (0.0, -D / 2), (L, D / 2), per_axis=2)
     x, shift = body.x, {"lattice": 0.0, "moved": 0.37 * h, "random": 0.0}[particles]
     if particles == "random":
         x = np.random.default_rng(0).uniform((0.0, -D / 2), (L, D / 2), x.shape)

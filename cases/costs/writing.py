@@ -49,7 +49,7 @@ class Row:
 def motion_of(cells: int) -> tawami.Dynamics:
     """A square block with random stresses and velocities in the middle of a grid."""
     grid = tawami.Grid(MPI.COMM_SELF, origin=(0.0, 0.0), h=1.0, cells=(cells + 2, cells + 2))
-    body = tawami.box(grid, (1.0, 1.0), (cells + 1.0, cells + 1.0))
+    body = tawami.box(grid, (1.0, 1.0), (cells + 1.0, cells + 1.0), per_axis=2)
     law = tawami.linear_elastic(E=1e6, nu=0.3)
     scene = tawami.Scene(grid, body, law, form="u_epsv_finite", density=1.0)
     random = np.random.default_rng(0)

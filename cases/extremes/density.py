@@ -76,7 +76,7 @@ def mode(omega: float, held: float, free: float, x: Array) -> Array:
 def vibration(form: str, held: float, free: float) -> float:
     """Error of the period, from the velocity in the mode after a quarter of a period."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=L / CELLS, cells=(CELLS + 2, 2))
-    body = tawami.box(grid, (0, 0), (L, 2 * L / CELLS))
+    body = tawami.box(grid, (0, 0), (L, 2 * L / CELLS), per_axis=2)
     x = body.x[:, 0]
     options: dict[str, Any] = {"alpha": 0.0} if "epsv" in form else {}
     made = tawami.linear_elastic(E=E, nu=0.0)

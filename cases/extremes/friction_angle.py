@@ -43,7 +43,7 @@ def biaxial(name: str, phi: float) -> float:
     homogeneous strain is unstable at large angles (Rudnicki and Rice 1975).
     """
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=1.0, cells=(1, 1))
-    body = tawami.box(grid, (0, 0), (1, 1))
+    body = tawami.box(grid, (0, 0), (1, 1), per_axis=2)
     scene = tawami.Scene(grid, body, law(name, phi), form="u_epsv", basis="bilinear")
     scene.particles.stress[:, :3] = -P
     ratio = (1 + np.sin(np.radians(phi))) / (1 - np.sin(np.radians(phi)))
@@ -90,7 +90,7 @@ def dust(name: str, phi: float, form: str) -> float:
 def pile(name: str, phi: float, form: str) -> float:
     """The larger of yield function and spurious energy of a pile, over its bound; the limit is 1."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=block.H, cells=(40, 8))
-    body = tawami.box(grid, (0, 0), (8 * block.H, 4 * block.H))
+    body = tawami.box(grid, (0, 0), (8 * block.H, 4 * block.H), per_axis=2)
     options: dict[str, Any] = {"alpha": 0.01} if form == "u_epsv_finite" else {}
     scene = tawami.Scene(grid, body, law(name, phi), form=form, density=block.RHO, **options)
     scene.gravity((0.0, -G))

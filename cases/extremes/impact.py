@@ -32,7 +32,7 @@ BALANCE, EXACT = 0.05, 1e-6
 def hit(form: str, speed: float, friction: float) -> float:
     """The largest error over its bound; the limit is 1."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=block.H, cells=(40, 16))
-    body = tawami.box(grid, (0.5, 0.0), (0.5 + block.SIDE, block.SIDE))
+    body = tawami.box(grid, (0.5, 0.0), (0.5 + block.SIDE, block.SIDE), per_axis=2)
     options: dict[str, Any] = {"alpha": 0.01} if form == "u_epsv_finite" else {}
     scene = tawami.Scene(grid, body, LAW, form=form, density=block.RHO, **options)
     scene.wall("bottom", friction)

@@ -93,7 +93,7 @@ def scene_of(
     square = tawami.box(grid, (0.0, 0.0), (1.0, 1.0), per_axis=3, gauss=True)
     if body == "cut":
         end = 1 + 0.3 / n
-        square = tawami.polygon(grid, [(0, 0), (end, 0), (end, end), (0, 1)])
+        square = tawami.polygon(grid, [(0, 0), (end, 0), (end, end), (0, 1)], per_axis=2)
     if body == "random":
         x = np.random.default_rng(n).random((9 * n * n, 2))
         square = tawami.Body(x, np.full(len(x), 1 / len(x)))

@@ -28,7 +28,7 @@ HISTORY = ("plastic_strain", "dilatancy")
 def scene_of(form: str = "u_epsv", **options: Any) -> tawami.Scene:
     """A strip of Drucker-Prager material that yields slightly under its weight."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(8, 4))
-    body = tawami.box(grid, grid.origin, grid.upper)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     law = tawami.drucker_prager(tawami.linear_elastic(E=1e6, nu=0.3), phi=30.0, c=1e3, psi=5.0)
     scene = tawami.Scene(grid, body, law, form=form, density=1e3, **options)
     for component in "xy":
@@ -87,7 +87,7 @@ def mended(name: str, value: float) -> float:
 def passed(value: float) -> dict[str, Callable[[], object]]:
     """Calls of a driver script that pass the value, by name."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(8, 4))
-    body, law = tawami.box(grid, (0, 0), (2, 1)), tawami.linear_elastic(E=1.0, nu=0.3)
+    body, law = tawami.box(grid, (0, 0), (2, 1), per_axis=2), tawami.linear_elastic(E=1.0, nu=0.3)
     bad = np.array(body.volume)
     bad[PARTICLE] = value
     far = np.array(body.x)

@@ -41,7 +41,7 @@ def linear(form: str, factor: float) -> float:
 def plastic(law: tawami.Material, factor: float) -> float:
     """A cantilever that yields: the load must be rejected, with the particles unchanged."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(8, 4))
-    scene = tawami.Scene(grid, tawami.box(grid, grid.origin, grid.upper), law)
+    scene = tawami.Scene(grid, tawami.box(grid, grid.origin, grid.upper, per_axis=2), law)
     scene.fix("left", "x")
     scene.fix("left", "y")
     scene.traction("right", (0.0, -20.0))

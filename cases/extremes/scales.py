@@ -54,7 +54,9 @@ ELASTIC = {"u": 0.3, "u_bbar": 0.3, "u_epsv": 0.4999, "u_p": 0.4999}
 def strip(units: Units, law: tawami.Material, form: str, **options: Any) -> tawami.Scene:
     """A strip of 2 m x 1 m, 8 x 4 cells, held on the left."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25 * units.metre, cells=(8, 4))
-    scene = tawami.Scene(grid, tawami.box(grid, grid.origin, grid.upper), law, form=form, **options)
+    scene = tawami.Scene(
+        grid, tawami.box(grid, grid.origin, grid.upper, per_axis=2), law, form=form, **options
+    )
     scene.fix("left", "x")
     scene.fix("left", "y")
     return scene

@@ -47,7 +47,7 @@ def pushed(form: str, factor: float) -> float:
 def ramped(form: str, factor: float) -> float:
     """Pull the right column of the held block in 10 increments: error of the reaction, over the load."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=block.H, cells=(12, 4))
-    body = tawami.box(grid, (0, 0), (block.SIDE, block.SIDE))
+    body = tawami.box(grid, (0, 0), (block.SIDE, block.SIDE), per_axis=2)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=block.E, nu=0.3), form=form)
     scene.fix("left", "x")
     scene.fix("bottom", "y")

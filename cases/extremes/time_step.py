@@ -42,7 +42,7 @@ def bar(form: str, amplitude: float, gamma: float = 0.5) -> tawami.Dynamics:
         gamma: Of Newmark's method.
     """
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=L / CELLS, cells=(CELLS + 2, 2))
-    body = tawami.box(grid, (0, 0), (L, 2 * L / CELLS))
+    body = tawami.box(grid, (0, 0), (L, 2 * L / CELLS), per_axis=2)
     options: dict[str, Any] = {"alpha": 0.0} if "epsv" in form else {}
     law = tawami.linear_elastic(E=E, nu=0.0)
     scene = tawami.Scene(grid, body, law, form=form, density=RHO, **options)

@@ -74,7 +74,7 @@ COLUMNS = ("method", "where", "stretch", "change_percent", "condition", "unscale
 def build(method: str, offset: float) -> tawami.Scene:
     """The block, shifted by an offset in cells."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=H, cells=(N + 3, N + 3))
-    body = tawami.box(grid, (H, H), ((N + 1) * H, (N + 1) * H))
+    body = tawami.box(grid, (H, H), ((N + 1) * H, (N + 1) * H), per_axis=2)
     body = tawami.Body(body.x + offset * H, body.volume)
     material = tawami.linear_elastic(E=E, nu=NU)
     scene = tawami.Scene(grid, body, material, density=RHO, **METHODS[method])

@@ -77,7 +77,7 @@ def build(form: str, h: float = 1.0, **options: object) -> tawami.Scene:
     """The column, one cell wide, with cells of side h [m]. With two cells B-bar bulges sideways."""
     cells = round(H / h)
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=h, cells=(1, cells))
-    body = tawami.box(grid, (0.0, 0.0), (h, H))
+    body = tawami.box(grid, (0.0, 0.0), (h, H), per_axis=2)
     material = tawami.linear_elastic(E=E, nu=0.0)
     scene = tawami.Scene(grid, body, material, form=form, density=WEIGHT / G, **options)
     scene.fix("left", "x")

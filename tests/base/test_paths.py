@@ -28,7 +28,10 @@ GRID = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=1.0, cells=(2, 1))
 
 def scene() -> tawami.Scene:
     made = tawami.Scene(
-        GRID, tawami.box(GRID, (0, 0), (2, 1)), tawami.linear_elastic(E=1.0, nu=0.3), form="u"
+        GRID,
+        tawami.box(GRID, (0, 0), (2, 1), per_axis=2),
+        tawami.linear_elastic(E=1.0, nu=0.3),
+        form="u",
     )
     made.fix("left", "x")
     made.fix("left", "y")
@@ -77,7 +80,7 @@ READ: dict[str, tuple[str, Use]] = {
     "table": (".csv", lambda path, _: tawami.table(path)),
     "earlier, file": (".vtu", lambda path, _: tawami.earlier(path)),
     "earlier, checkpoint": (".npz", lambda path, _: tawami.earlier(path)),
-    "mesh": (".msh", lambda path, _: tawami.mesh(GRID, path)),
+    "mesh": (".msh", lambda path, _: tawami.mesh(GRID, path, per_axis=2)),
     "Form.load": (".py", lambda path, _: tawami.Form.load(path)),
     "recommend": (".csv", lambda path, _: tawami.recommend(path, 0.1)),
     "Table.read": (".csv", lambda path, _: Table.read(path)),

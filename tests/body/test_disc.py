@@ -51,7 +51,7 @@ def test_area_centroid_and_second_moments(place, size, hole, per_axis):
 @pytest.mark.parametrize(("inner", "cells"), [(0.0, 8), (0.25, 8), (0.5, 8), (0.5, 24), (0.999, 8)])
 def test_circles_that_touch_lines_and_edges_of_the_grid(inner, cells):
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(-1, -1), h=2 / cells, cells=(cells, cells))
-    body = tawami.disc(grid, (0, 0), 1.0, inner=inner, gauss=True)
+    body = tawami.disc(grid, (0, 0), 1.0, inner=inner, gauss=True, per_axis=2)
     exact = moments.of_ring((0, 0), 1.0, inner)
     assert moments.of_particles(body) == pytest.approx(exact, abs=1e-12)
     assert (np.abs(body.x) < 1).all()
@@ -76,7 +76,7 @@ def test_error_of_second_moments_with_evenly_spaced_particles(per_axis):
 def test_forces_of_a_constant_stress_act_on_the_circle_only():
     """sum_p V_p grad N_i = int over the circle of N_i n."""
     grid, centre, radius = grid_of((8, 7), h=0.25), np.array([-0.05, 1.3]), 0.6
-    body = tawami.disc(grid, centre, radius, gauss=True)
+    body = tawami.disc(grid, centre, radius, gauss=True, per_axis=2)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=3.0, nu=0.0), form="u")
     gradient = np.array([[1.0, 0.3], [0.3, -0.5]])  # nu = 0: sigma = 3 gradient
     forces = scene.residual(linear_field(grid, "quadratic_spline", np.zeros(2), gradient))

@@ -47,7 +47,7 @@ def square(side, angle):
 )
 def test_area_and_centroid_of_ellipses(centre, axes, turn, tolerance):
     grid = square_grid()
-    body = tawami.level_set(grid, ellipse(centre, axes, turn), tolerance=tolerance)
+    body = tawami.level_set(grid, ellipse(centre, axes, turn), tolerance=tolerance, per_axis=2)
     area = np.pi * axes[0] * axes[1]
     assert body.volume.sum() == pytest.approx(area, rel=tolerance)
     assert body.volume @ body.x / area == pytest.approx(centre, abs=tolerance * max(axes))
@@ -70,6 +70,7 @@ def test_area_of_curved_borders(sign):
         samples=4,
         tolerance=0.1,
         ends=() if sign > 0 else ("left", "right", "bottom", "top"),
+        per_axis=2,
     )
     area = np.pi * R**2
     chords = area * (grid.h / 4) ** 2 / (12 * R**2)
@@ -81,7 +82,9 @@ def test_area_of_curved_borders(sign):
 @pytest.mark.parametrize("angle", [0.0, 0.1, np.pi / 4])
 def test_corners(angle):
     for tolerance in (1e-4, 1e-6, 1e-7):
-        body = tawami.level_set(square_grid(), square(1.03, angle), tolerance=tolerance, gauss=True)
+        body = tawami.level_set(
+            square_grid(), square(1.03, angle), tolerance=tolerance, gauss=True, per_axis=2
+        )
         area = 1.03**2
         assert body.volume.sum() == pytest.approx(area, rel=tolerance)
         second = (body.volume[:, None] * body.x**2).sum(axis=0)
@@ -100,7 +103,8 @@ def test_sides_on_lines_of_the_grid_make_a_box():
 def test_only_the_sign_of_the_function_is_used():
     f = ellipse((0.0, 0.1), (0.6, 0.3), 0.5)
     one, other = (
-        tawami.level_set(square_grid(), g) for g in (f, lambda x, y: np.where(f(x, y) < 0, -3e9, 0))
+        tawami.level_set(square_grid(), g, per_axis=2)
+        for g in (f, lambda x, y: np.where(f(x, y) < 0, -3e9, 0))
     )
     assert np.array_equal(one.x, other.x)
     assert np.array_equal(one.volume, other.volume)
@@ -112,19 +116,23 @@ def test_thin_parts_need_more_samples():
 
     grid = square_grid()
     with pytest.raises(tawami.InputError, match="not negative at any of the 16641 samples"):
-        tawami.level_set(grid, strip)
-    body = tawami.level_set(grid, strip, samples=32)
+        tawami.level_set(grid, strip, per_axis=2)
+    body = tawami.level_set(grid, strip, samples=32, per_axis=2)
     assert body.volume.sum() == pytest.approx(0.004, rel=1e-6)
 
 
 def test_bodies_that_end_at_edges_of_the_grid():
     grid = grid_of()
-    slope = tawami.level_set(grid, lambda x, y: y - 1.2 - 0.1 * x, ends=("bottom", "left", "right"))
+    slope = tawami.level_set(
+        grid, lambda x, y: y - 1.2 - 0.1 * x, ends=("bottom", "left", "right"), per_axis=2
+    )
     assert slope.volume.sum() == pytest.approx(2 * 0.7, rel=1e-12)
     with pytest.raises(tawami.InputError, match=r"negative on the edge 'left'.*ends=\('left',\)"):
-        tawami.level_set(grid, lambda x, y: y - 1.2 - 0.1 * x, ends=("bottom", "right"))
-    full = tawami.level_set(grid, lambda x, y: -1.0, ends=("bottom", "left", "right", "top"))
-    box = tawami.box(grid, grid.origin, grid.upper)
+        tawami.level_set(grid, lambda x, y: y - 1.2 - 0.1 * x, ends=("bottom", "right"), per_axis=2)
+    full = tawami.level_set(
+        grid, lambda x, y: -1.0, ends=("bottom", "left", "right", "top"), per_axis=2
+    )
+    box = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     assert set(map(tuple, full.x)) == set(map(tuple, box.x))
 
 

@@ -62,9 +62,11 @@ def test_moments_of_each_group(kind):
     points, cells, tag = triangles() if kind.startswith("tri") else quads()
     if kind[-1].isdigit():
         nodes, elements = second_order(points, cells)
-        body = tawami.mesh(grid_of(), made(nodes, kind, elements, tag, z=3.0), gauss=True)
+        body = tawami.mesh(
+            grid_of(), made(nodes, kind, elements, tag, z=3.0), gauss=True, per_axis=2
+        )
     else:
-        body = tawami.mesh(grid_of(), made(points, kind, cells, tag), gauss=True)
+        body = tawami.mesh(grid_of(), made(points, kind, cells, tag), gauss=True, per_axis=2)
     check(body, points, cells, tag)
 
 
@@ -97,7 +99,7 @@ def test_files(tmp_path, format):
         meshio.write(path, mesh, file_format=format, binary=False)
     else:
         meshio.write(path, mesh)
-    body = tawami.mesh(grid_of(), path, gauss=True)
+    body = tawami.mesh(grid_of(), path, gauss=True, per_axis=2)
     if not format.startswith("gmsh"):  # these formats have numbers only
         assert body.names == ("3", "7")
         body = tawami.Body(body.x, body.volume, body.material_of, ("sand", "clay"))
@@ -107,9 +109,11 @@ def test_files(tmp_path, format):
 def test_cell_sets_and_meshes_without_groups():
     points, cells, tag = quads()
     sets = {"sand": [np.flatnonzero(tag == SAND)], "clay": [np.flatnonzero(tag == CLAY)]}
-    body = tawami.mesh(grid_of(), made(points, "quad", cells, cell_sets=sets), gauss=True)
+    body = tawami.mesh(
+        grid_of(), made(points, "quad", cells, cell_sets=sets), gauss=True, per_axis=2
+    )
     check(body, points, cells, tag)
-    plain = tawami.mesh(grid_of(), made(points, "quad", cells), gauss=True)
+    plain = tawami.mesh(grid_of(), made(points, "quad", cells), gauss=True, per_axis=2)
     assert plain.names == ()
     assert moments.of_particles(plain) == pytest.approx(
         moments.of_polygons(points[cells]), rel=1e-12
@@ -120,8 +124,8 @@ def test_a_mesh_has_the_moments_of_the_polygon_around_it():
     points, cells, _ = quads(nx=11, ny=7)
     corners = points[[0, 11, 12 * 8 - 1, 12 * 7]]
     grid = grid_of((8, 6), h=0.25)
-    body = tawami.mesh(grid, made(points, "quad", cells))
-    polygon = tawami.polygon(grid, corners)
+    body = tawami.mesh(grid, made(points, "quad", cells), per_axis=2)
+    polygon = tawami.polygon(grid, corners, per_axis=2)
     assert moments.of_particles(body) == pytest.approx(moments.of_particles(polygon), rel=1e-12)
 
 
@@ -129,7 +133,9 @@ def test_concave_quadrilaterals_and_clockwise_ones():
     points = np.array(
         [[-0.9, 0.6], [0.2, 0.7], [-0.5, 0.9], [-0.6, 1.9]]
     )  # node 2 is inside the triangle of the others
-    body = tawami.mesh(grid_of(), made(points, "quad", np.array([[3, 2, 1, 0]])), gauss=True)
+    body = tawami.mesh(
+        grid_of(), made(points, "quad", np.array([[3, 2, 1, 0]])), gauss=True, per_axis=2
+    )
     exact = moments.of_polygons(points[[[0, 1, 2, 3]]])
     assert moments.of_particles(body) == pytest.approx(exact, rel=1e-12)
 
@@ -137,7 +143,7 @@ def test_concave_quadrilaterals_and_clockwise_ones():
 def test_materials_by_name_or_in_the_order_of_the_numbers():
     points, cells, tag = triangles()
     grid = grid_of()
-    body = tawami.mesh(grid, made(points, "triangle", cells, tag))
+    body = tawami.mesh(grid, made(points, "triangle", cells, tag), per_axis=2)
     clay, sand = tawami.linear_elastic(E=1e5, nu=0.4), tawami.linear_elastic(E=4e5, nu=0.2)
     named = tawami.Scene(
         grid, body, {"clay": clay, "sand": sand}, density={"sand": 2e3, "clay": 1e3}
@@ -172,14 +178,14 @@ def test_error_messages_of_materials_by_name(material, options, message):
     else:
         material = [law] * len(material) if isinstance(material, list) else law
     points, cells, tag = triangles()
-    body = tawami.mesh(grid_of(), made(points, "triangle", cells, tag))
+    body = tawami.mesh(grid_of(), made(points, "triangle", cells, tag), per_axis=2)
     with pytest.raises(tawami.InputError, match=message):
         tawami.Scene(grid_of(), body, material, **options)
 
 
 def test_a_dictionary_for_a_body_without_names():
     grid = grid_of()
-    box = tawami.box(grid, grid.origin, grid.upper)
+    box = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     law = tawami.linear_elastic(E=1e5, nu=0.4)
     with pytest.raises(tawami.InputError, match="dictionary and the body has no names"):
         tawami.Scene(grid, box, {"clay": law})
@@ -190,7 +196,7 @@ def test_warning_of_curved_sides():
     nodes, elements = second_order(points, cells)
     nodes[len(points)] += 0.01
     with pytest.warns(tawami.GeometryWarning, match=r"curved sides, by up to 0.04\d* of a side"):
-        body = tawami.mesh(grid_of(), made(nodes, "triangle6", elements), gauss=True)
+        body = tawami.mesh(grid_of(), made(nodes, "triangle6", elements), gauss=True, per_axis=2)
     assert body.volume.sum() == pytest.approx(1.7 * 1.1, rel=1e-12)
 
 
@@ -249,22 +255,22 @@ def wrong(what):
 )  # fmt: skip
 def test_error_messages(what, message):
     with pytest.raises(tawami.InputError, match=message):
-        tawami.mesh(grid_of(), wrong(what))
+        tawami.mesh(grid_of(), wrong(what), per_axis=2)
 
 
 def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(tawami.InputError, match=r"'.*none.msh' cannot be read .*: expected a mesh"):
-        tawami.mesh(grid_of(), tmp_path / "none.msh")
+        tawami.mesh(grid_of(), tmp_path / "none.msh", per_axis=2)
     for name in ("text.msh", "text.vtu", "text.unknown"):
         (tmp_path / name).write_text("no mesh")
         with pytest.raises(tawami.InputError, match=rf"meshio cannot read '.*{name}'"):
-            tawami.mesh(grid_of(), tmp_path / name)
+            tawami.mesh(grid_of(), tmp_path / name, per_axis=2)
     with pytest.raises(tawami.InputError, match="source = 3: expected the path of a mesh file"):
-        tawami.mesh(grid_of(), 3)
+        tawami.mesh(grid_of(), 3, per_axis=2)
     points, cells, tag = triangles()
     mesh = made(points, "triangle", cells, tag)
     with pytest.raises(tawami.InputError, match="no such cell data: .*'gmsh:physical'"):
-        tawami.mesh(grid_of(), mesh, tags="layer")
+        tawami.mesh(grid_of(), mesh, tags="layer", per_axis=2)
 
 
 @pytest.mark.slow
@@ -278,7 +284,7 @@ def test_time_for_many_elements():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         begin = perf_counter()
-        body = tawami.mesh(grid, made(points, "triangle", cells, tag))
+        body = tawami.mesh(grid, made(points, "triangle", cells, tag), per_axis=2)
         seconds = perf_counter() - begin
     print(f"{len(cells)} triangles: {len(body.x)} particles in {seconds:.1f} s")
     exact = moments.of_polygons(points[cells])[:3]

@@ -41,9 +41,9 @@ def on_grid(corners):
 
 def check(corners):
     exact = moments.of_polygons(corners)
-    gauss = tawami.polygon(grid_of(), corners, gauss=True)
+    gauss = tawami.polygon(grid_of(), corners, gauss=True, per_axis=2)
     assert moments.of_particles(gauss) == pytest.approx(exact, abs=1e-14, rel=1e-12)
-    even = tawami.polygon(grid_of(), corners)
+    even = tawami.polygon(grid_of(), corners, per_axis=2)
     assert moments.of_particles(even)[:3] == pytest.approx(exact[:3], abs=1e-14, rel=1e-12)
     for body in (gauss, even):
         assert (body.volume > 0).all()
@@ -63,7 +63,7 @@ def test_area_centroid_and_second_moments_of_others(corners):
 def test_a_cut_cell_is_integrated_up_to_degree_six():
     """int x^a y^b over the triangle (0, 0), (1, 0), (0, 1) is a! b! / (a + b + 2)!."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=1, cells=(1, 1))
-    body = tawami.polygon(grid, [(0, 0), (1, 0), (0, 1)])
+    body = tawami.polygon(grid, [(0, 0), (1, 0), (0, 1)], per_axis=2)
     x, y = body.x.T
     for a in range(7):
         for b in range(7 - a):
@@ -113,7 +113,7 @@ def test_patch_test_of_a_slanted_bar(name):
 def shelf(name, width):
     """A shelf of length 8 under its weight; its uppermost row of cells is filled to `width`."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=1.0, cells=(8, 8))
-    body = tawami.polygon(grid, [(0, 0), (8, 0), (8, 4 + width), (0, 4 + width)])
+    body = tawami.polygon(grid, [(0, 0), (8, 0), (8, 4 + width), (0, 4 + width)], per_axis=2)
     rubber = tawami.linear_elastic(E=70.0, nu=0.4999)
     scene = tawami.Scene(grid, body, rubber, density=1.0, **FORMS[name])
     scene.fix("left", "x")
@@ -161,7 +161,7 @@ def test_error_messages(corners, message):
     if not isinstance(corners, str) and len(corners[0]) == 2:
         corners = on_grid(corners)
     with pytest.raises(tawami.InputError, match=message):
-        tawami.polygon(grid_of(), corners)
+        tawami.polygon(grid_of(), corners, per_axis=2)
 
 
 def test_error_message_of_particles_per_axis():

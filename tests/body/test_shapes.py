@@ -58,14 +58,18 @@ def hanging(body, grid):
 
 def test_all_functions_give_the_same_solution():
     grid = grid_of_two()
-    polygon = hanging(tawami.polygon(grid, corners()), grid)
+    polygon = hanging(tawami.polygon(grid, corners(), per_axis=2), grid)
     assert polygon[1] < -1e-2
-    mesh = hanging(tawami.mesh(grid, mesh_of_square()), grid)
+    mesh = hanging(tawami.mesh(grid, mesh_of_square(), per_axis=2), grid)
     assert mesh == pytest.approx(polygon, rel=1e-9, abs=1e-12)
-    geometry = tawami.polygon(grid, shapely.Polygon(corners()).union(shapely.Point(MIDDLE)))
+    geometry = tawami.polygon(
+        grid, shapely.Polygon(corners()).union(shapely.Point(MIDDLE)), per_axis=2
+    )
     assert hanging(geometry, grid) == pytest.approx(polygon, rel=1e-9, abs=1e-12)
     for tolerance in (1e-3, 1e-5, 1e-7):
-        level_set = hanging(tawami.level_set(grid, in_square, tolerance=tolerance), grid)
+        level_set = hanging(
+            tawami.level_set(grid, in_square, tolerance=tolerance, per_axis=2), grid
+        )
         assert level_set == pytest.approx(polygon, rel=10 * tolerance)
 
 
@@ -83,15 +87,16 @@ def embedded(grid, kind):
     ends = ("left", "right", "bottom", "top")
     around = [(0, 0), (2, 0), (2, 2), (0, 2)]
     if kind == "square":
-        hole = tawami.polygon(grid, around, holes=[corners()], gauss=True)
-        return joined(tawami.polygon(grid, corners(), gauss=True), hole), 1e-11
-    disc = tawami.disc(grid, MIDDLE, 0.6, gauss=True)
+        hole = tawami.polygon(grid, around, holes=[corners()], gauss=True, per_axis=2)
+        return joined(tawami.polygon(grid, corners(), gauss=True, per_axis=2), hole), 1e-11
+    disc = tawami.disc(grid, MIDDLE, 0.6, gauss=True, per_axis=2)
     if kind == "ring":  # a disc, a ring around it, and the rest of the square
-        inside = tawami.disc(grid, MIDDLE, 0.3, gauss=True)
-        ring = tawami.disc(grid, MIDDLE, 0.6, inner=0.3, gauss=True)
+        inside = tawami.disc(grid, MIDDLE, 0.3, gauss=True, per_axis=2)
+        ring = tawami.disc(grid, MIDDLE, 0.6, inner=0.3, gauss=True, per_axis=2)
     hole = tawami.level_set(
         grid, lambda x, y: 0.6 - np.hypot(*(np.stack([x, y], axis=-1) - MIDDLE).T), ends=ends,
         tolerance=1e-8, gauss=True,
+        per_axis=2,
     )  # fmt: skip
     return joined(inside, ring, hole) if kind == "ring" else joined(disc, hole), 1e-6
 
@@ -121,14 +126,16 @@ def test_patch_test_of_embedded_shapes(kind, form):
 
 def particles_of(kind, grid, move):
     if kind == "disc":
-        return tawami.disc(grid, MIDDLE + move, 0.5, inner=0.2)
+        return tawami.disc(grid, MIDDLE + move, 0.5, inner=0.2, per_axis=2)
     if kind == "polygon":
-        return tawami.polygon(grid, corners() + move, holes=[corners(0.3, 0.8) + move])
+        return tawami.polygon(grid, corners() + move, holes=[corners(0.3, 0.8) + move], per_axis=2)
     if kind == "mesh":
         mesh = mesh_of_square()
         mesh.points[:, :2] += move
-        return tawami.mesh(grid, mesh)
-    return tawami.level_set(grid, lambda x, y: in_square(x - move[0], y - move[1]), tolerance=1e-4)
+        return tawami.mesh(grid, mesh, per_axis=2)
+    return tawami.level_set(
+        grid, lambda x, y: in_square(x - move[0], y - move[1]), tolerance=1e-4, per_axis=2
+    )
 
 
 AREAS = {"disc": np.pi * 0.21, "polygon": SIDE**2 - 0.09, "mesh": SIDE**2, "level set": SIDE**2}
@@ -151,10 +158,10 @@ def test_geometries_of_shapely():
     two = shapely.MultiPolygon(
         [shapely.Polygon(corners(0.3)), shapely.box(1.5, 1.5, 1.93, 2.0, ccw=False)]
     )
-    body = tawami.polygon(grid, two)
+    body = tawami.polygon(grid, two, per_axis=2)
     assert body.volume.sum() == pytest.approx(0.09 + 0.43 * 0.5)
     ring = shapely.Point(*MIDDLE).buffer(0.6) - shapely.Point(*MIDDLE).buffer(0.4)
-    assert tawami.polygon(grid, ring).volume.sum() == pytest.approx(ring.area)
+    assert tawami.polygon(grid, ring, per_axis=2).volume.sum() == pytest.approx(ring.area)
 
 
 @pytest.mark.parametrize(
@@ -177,7 +184,7 @@ def test_error_messages_of_geometries(shape, options, message):
 
 def test_the_body_has_the_numbers_of_materials():
     grid = grid_of()
-    box = tawami.box(grid, grid.origin, grid.upper)
+    box = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     soft, stiff = (tawami.linear_elastic(E=E, nu=0.3) for E in (1.0, 2.0))
     body = tawami.Body(box.x, box.volume, (box.x[:, 0] > 0).astype(np.uint32))
     scene = tawami.Scene(grid, body, [soft, stiff])
@@ -189,12 +196,16 @@ def test_the_body_has_the_numbers_of_materials():
 def test_parts_that_are_round_off_have_no_particles():
     """A side that is 1e-13 cells beyond a line of the grid does not reach the next cell."""
     grid = grid_of_two(8)
-    box = tawami.box(grid, (0.5, 0.5), (1.5, 1.5))
+    box = tawami.box(grid, (0.5, 0.5), (1.5, 1.5), per_axis=2)
     beyond = 1.5 + 1e-14
     level_set = tawami.level_set(
         grid,
         lambda x, y: np.maximum(np.maximum(0.5 - x, x - beyond), np.maximum(0.5 - y, y - beyond)),
+        per_axis=2,
     )
-    for body in (level_set, tawami.polygon(grid, shapely.box(0.5, 0.5, beyond, beyond))):
+    for body in (
+        level_set,
+        tawami.polygon(grid, shapely.box(0.5, 0.5, beyond, beyond), per_axis=2),
+    ):
         assert len(body.x) == len(box.x)
         assert body.volume.sum() == pytest.approx(1.0, rel=1e-12)

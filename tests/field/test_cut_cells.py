@@ -147,7 +147,7 @@ def test_a_sliver_of_1e_8_of_a_cell_changes_little():
 def test_a_particle_alone_in_its_cell_does_not_stop_a_motion(penalty):
     """It moves as a point mass does, and so does the block beside it."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(16, 16))
-    block = tawami.box(grid, (0.25, 1.0), (0.75, 1.5))
+    block = tawami.box(grid, (0.25, 1.0), (0.75, 1.5), per_axis=2)
     x = np.vstack([block.x, [1.31, 1.27]])
     body = tawami.Body(x, np.append(block.volume, block.volume[0]))
     law = tawami.linear_elastic(E=1e5, nu=0.49)

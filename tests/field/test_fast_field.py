@@ -199,7 +199,7 @@ def test_one_field_serves_several_reductions_in_turn(random_scene):
 def test_the_solutions_after_a_change_of_supports_agree():
     def run(path):
         grid = grid_of()
-        body = tawami.box(grid, grid.origin, grid.upper)
+        body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
         material = tawami.linear_elastic(E=1e3, nu=0.4999)
         scene = tawami.Scene(grid, body, material, assembly=path)
         scene.fix("left", "x")

@@ -174,7 +174,7 @@ def test_results_do_not_depend_on_units_or_place(name):
     def solve(length, stress, shift):
         h = 0.25 * length
         grid = tawami.Grid(MPI.COMM_WORLD, origin=(shift, -shift), h=h, cells=(8, 4))
-        body = tawami.box(grid, grid.origin, grid.upper)
+        body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
         material = tawami.linear_elastic(E=3e6 * stress, nu=0.4999)
         scene = tawami.Scene(grid, body, material, **options)
         scene.fix("left", "x")

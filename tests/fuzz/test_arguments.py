@@ -83,7 +83,7 @@ def enough(_: tawami.Solution) -> None:
 
 def scene_of(form: str = "u_epsv", **options: Any) -> tawami.Scene:
     grid = grid_of((2, 2))
-    body = tawami.box(grid, grid.origin, grid.upper)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     material = tawami.linear_elastic(E=1e3, nu=0.3)
     scene = tawami.Scene(grid, body, material, form=form, **{"density": 1.0} | options)
     scene.hold((-1.0, 0.5), "x")

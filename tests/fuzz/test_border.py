@@ -282,7 +282,7 @@ print(len(found), len({array.tobytes() for array in found}))
 def test_a_view_stays_readable_when_the_storage_is_replaced():
     """Particles that leave the grid make a new storage; a view holds the old one."""
     grid = grid_of((6, 2))
-    body = tawami.box(grid, (1.0, 0.5), (2.0, 1.5))
+    body = tawami.box(grid, (1.0, 0.5), (2.0, 1.5), per_axis=2)
     scene = tawami.Scene(
         grid, body, tawami.linear_elastic(E=1e3, nu=0.3), form="u_finite", density=1.0,
         leaving="remove",

@@ -51,7 +51,7 @@ def test_a_bar_vibrates_with_its_period():
     """A bar held at one end, nu = 0: after half a period 2 L / c the velocity is reversed."""
     L, E, rho, v0 = 1.0, 1e6, 1000.0, 0.1
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=1 / 16, cells=(18, 2))
-    body = tawami.box(grid, (0, 0), (L, 1 / 8))
+    body = tawami.box(grid, (0, 0), (L, 1 / 8), per_axis=2)
     scene = tawami.Scene(
         grid, body, tawami.linear_elastic(E=E, nu=0.0), form="u_epsv_finite", density=rho, alpha=0.0
     )
@@ -73,7 +73,7 @@ def test_a_bar_vibrates_with_its_period():
 def test_a_body_at_rest_stays_at_rest(count):
     """After a ramp and a static equilibrium on its floor; then a support is released, and it moves."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(12, 8))
-    body = tawami.box(grid, (0, 0), (1, 0.75))
+    body = tawami.box(grid, (0, 0), (1, 0.75), per_axis=2)
     material = tawami.linear_elastic(E=1e5, nu=0.45)
     scene = tawami.Scene(grid, body, material, form="u_epsv_finite", density=1000.0)
     for edge, component in (("left", "x"), ("bottom", "y"), ("bottom", "x")):
@@ -188,7 +188,7 @@ def test_particles_that_leave_the_grid_can_be_removed():
 def test_a_pendulum_has_the_period_of_a_rigid_body():
     """Held at a point. The lumped mass adds about M h^2/2 to its moment of inertia."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(-1, -1.5), h=0.125, cells=(16, 16))
-    body = tawami.box(grid, (-0.125, -1.0), (0.125, 0.0))
+    body = tawami.box(grid, (-0.125, -1.0), (0.125, 0.0), per_axis=2)
     material = tawami.linear_elastic(E=1e7, nu=0.3)
     scene = tawami.Scene(grid, body, material, form="u_epsv_finite", density=1000.0)
     scene.gravity((0, -G))
@@ -213,7 +213,7 @@ def test_a_pendulum_has_the_period_of_a_rigid_body():
 def test_the_impulse_of_a_moving_support_is_the_momentum():
     """Sum of its reactions over the steps, compared with the momentum of the body."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(16, 6))
-    body = tawami.box(grid, (0, 0.125), (0.5, 0.5))
+    body = tawami.box(grid, (0, 0.125), (0.5, 0.5), per_axis=2)
     material = tawami.linear_elastic(E=1e6, nu=0.3)
     scene = tawami.Scene(grid, body, material, form="u_epsv_finite", density=1000.0)
     scene.fix("left", "x", velocity=lambda t: 0.1 * np.sin(20 * t))

@@ -27,7 +27,7 @@ def test_gamma_above_one_half_dissipates_energy():
 def test_a_form_of_small_strain_conserves_energy(form):
     """The trapezoidal rule conserves it, and nothing is transferred; alpha takes a little."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(8, 4))
-    body = tawami.box(grid, (0, 0), (1, 0.5))
+    body = tawami.box(grid, (0, 0), (1, 0.5), per_axis=2)
     material = tawami.linear_elastic(E=1e6, nu=0.3)
     scene = tawami.Scene(grid, body, material, form=form, density=1000.0, tolerance=1e-10)
     scene.fix("left", "x")
@@ -76,7 +76,7 @@ def test_the_dissipation_is_the_work_on_plastic_strains():
 def test_the_impact_of_a_support_that_starts_suddenly_is_known():
     """An edge that moves at once: 1/2 m (v - v0)^2 of its functions."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(8, 4))
-    body = tawami.box(grid, (0, 0), (1, 0.5))
+    body = tawami.box(grid, (0, 0), (1, 0.5), per_axis=2)
     law = tawami.linear_elastic(E=1e6, nu=0.3)
     scene = tawami.Scene(grid, body, law, form="u", density=1000.0, tolerance=1e-10)
     scene.fix("left", "x", velocity=0.1)

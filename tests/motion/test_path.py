@@ -23,7 +23,7 @@ def column(softening: float) -> tawami.Scene:
     `zz` carries the plastic shear strain times mu: it enters no equation of plane strain.
     """
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=1.0, cells=(1, LAYERS))
-    body = tawami.box(grid, (0, 0), (1, LAYERS))
+    body = tawami.box(grid, (0, 0), (1, LAYERS), per_axis=2)
     weak = body.x[:, 1] < 1.0
 
     def respond(strain, stress):
@@ -144,7 +144,9 @@ def test_wrong_input_of_a_path_raises_an_error():
         tawami.follow(scene, "arc length", size=0.1, to=1.0)
     grid = grid_of()
     scene = tawami.Scene(
-        grid, tawami.box(grid, grid.origin, grid.upper), tawami.linear_elastic(E=1.0, nu=0.3)
+        grid,
+        tawami.box(grid, grid.origin, grid.upper, per_axis=2),
+        tawami.linear_elastic(E=1.0, nu=0.3),
     )
     scene.fix("bottom", "x")
     scene.fix("bottom", "y")

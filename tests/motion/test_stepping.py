@@ -63,7 +63,7 @@ def test_the_end_is_met_exactly_without_a_tiny_step(size, count):
 
 def block(form="u_epsv_finite", **options):
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(6, 4))
-    body = tawami.box(grid, (0, 0), (1, 1))
+    body = tawami.box(grid, (0, 0), (1, 1), per_axis=2)
     scene = tawami.Scene(grid, body, ELASTIC, form=form, density=1.0, **options)
     scene.fix("bottom", "y")
     scene.fix("left", "x")
@@ -153,7 +153,7 @@ def test_reactions_balance_the_weight():
 def test_an_edge_and_a_point_near_it_share_the_load():
     """The functions of the edge reach the point, and its reaction is not counted twice."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(8, 4))
-    body = tawami.box(grid, (0, 0), (2, 1))
+    body = tawami.box(grid, (0, 0), (2, 1), per_axis=2)
     scene = tawami.Scene(grid, body, ELASTIC, form="u")
     scene.fix("left", "x")
     scene.hold((0, 0.5), "y")

@@ -96,7 +96,7 @@ def test_a_block_in_plane_compression_yields_at_its_limit(form):
 @pytest.mark.parametrize("law", [tawami.drucker_prager, tawami.mohr_coulomb])
 def test_flow_that_changes_the_volume_needs_a_term_in_the_form(law):
     grid = grid_of()
-    body = tawami.box(grid, grid.origin, grid.upper)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     fields = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
 
     def paper(u, eps_v, w, q, sigma, K, sum_p):

@@ -100,7 +100,7 @@ def nonlinear() -> dict[str, np.ndarray]:
 def singular() -> dict[str, np.ndarray]:
     """The error of a singular tangent names cells."""
     grid = grid_of((6, 5))
-    body = tawami.box(grid, grid.origin, grid.upper)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     material = tawami.linear_elastic(E=1.0, nu=0.3)
     scene = tawami.Scene(grid, body, material, basis="biquadratic")
     scene.fix("left", "x")
@@ -123,7 +123,7 @@ def motion() -> dict[str, np.ndarray]:
     found["motion pile energy"] = np.array(pile.energies.dissipated)
     found |= {f"motion pile {k}": v for k, v in whole(pile).items()}
     grid = tawami.Grid(COMM, origin=(0, 0), h=0.25, cells=(8, 4))
-    body = tawami.box(grid, (1.0, 0), (1.5, 0.5))
+    body = tawami.box(grid, (1.0, 0), (1.5, 0.5), per_axis=2)
     law = tawami.linear_elastic(E=1e5, nu=0.4)
     for leaving, speed in (("stop", 5.0), ("remove", 9.0)):
         scene = tawami.Scene(grid, body, law, form="u_epsv_finite", density=1e3, leaving=leaving)
@@ -141,7 +141,7 @@ def motion() -> dict[str, np.ndarray]:
 def initial() -> dict[str, np.ndarray]:
     """A ring with an initial stress, beyond the yield surface in part; some ranks have no particle."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(16, 16))
-    ring = tawami.disc(grid, (0.6, 0.7), 0.5, inner=0.2)
+    ring = tawami.disc(grid, (0.6, 0.7), 0.5, inner=0.2, per_axis=2)
     elastic = tawami.linear_elastic(E=1e6, nu=0.3)
     steel = tawami.von_mises(elastic, yield_stress=1e3)
     stress = np.column_stack([4e3 * (ring.x[:, 0] - 0.6), *(3 * [0 * ring.x[:, 0]])])
@@ -177,7 +177,7 @@ def beam(**options: Any) -> tawami.Scene:
     """A clamped beam of 128 particles, of a law that may be given."""
     grid = tawami.Grid(COMM, origin=(0, 0), h=0.25, cells=(8, 4))
     law = options.pop("law", tawami.linear_elastic(E=1.0, nu=0.3))
-    scene = tawami.Scene(grid, tawami.box(grid, (0, 0), (2, 1)), law, **options)
+    scene = tawami.Scene(grid, tawami.box(grid, (0, 0), (2, 1), per_axis=2), law, **options)
     scene.fix("left", "x")
     scene.fix("left", "y")
     return scene
@@ -248,7 +248,7 @@ def few_cells() -> dict[str, np.ndarray]:
     """Two cells, of which some ranks have none; a load that is a function of the whole edge."""
     grid = tawami.Grid(COMM, origin=(0, 0), h=1.0, cells=(2, 1))
     law = tawami.linear_elastic(E=1.0, nu=0.3)
-    scene = tawami.Scene(grid, tawami.box(grid, (0, 0), (2, 1)), law)
+    scene = tawami.Scene(grid, tawami.box(grid, (0, 0), (2, 1), per_axis=2), law)
     scene.fix("left", "x")
     scene.fix("left", "y")
     for _ in range(2):

@@ -23,7 +23,7 @@ PACKAGE = os.path.dirname(tawami.__file__)
 def falling(form: str) -> tawami.Dynamics:
     """A block that spins and falls on a wall, yields, and loses particles at an edge of the grid."""
     grid = grid_of((6, 4))
-    body = tawami.box(grid, (0.5, 0.5), (2.0, 1.5))
+    body = tawami.box(grid, (0.5, 0.5), (2.0, 1.5), per_axis=2)
     law = tawami.von_mises(tawami.linear_elastic(E=1e4, nu=0.3), yield_stress=50.0)
     scene = tawami.Scene(grid, body, law, form=form, density=1000.0, leaving="remove")
     scene.gravity((0.0, -9.81))

@@ -16,7 +16,7 @@ import tawami
 
 def scene_of(material: tawami.Material | None = None) -> tawami.Scene:
     grid = grid_of((8, 6), 0.25)
-    body = tawami.box(grid, grid.origin, grid.upper)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     law = material or tawami.linear_elastic(E=1e4, nu=0.3)
     scene = tawami.Scene(grid, body, law, density=1000.0)
     scene.fix("left", "x")

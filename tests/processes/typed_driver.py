@@ -42,7 +42,7 @@ def statics(comm: MPI.Comm) -> float:
     """A scene, its supports and loads."""
     grid = tawami.Grid(comm, origin=(0, -0.5), h=1 / 16, cells=(32, 16))
     body = tawami.box(grid, (0, -0.5), [2.0, 0.5], per_axis=3, gauss=True)
-    tawami.polygon(grid, [(0, 0), (1, 0), (0, 0.4)])
+    tawami.polygon(grid, [(0, 0), (1, 0), (0, 0.4)], per_axis=2)
     mine = tawami.Body(np.zeros((1, 2)), np.ones(1))
     scene = tawami.Scene(
         grid, body, materials()[:2], material_of=np.zeros(4), form="u_epsv", alpha=0.1
@@ -68,7 +68,7 @@ def statics(comm: MPI.Comm) -> float:
 def dynamics(comm: MPI.Comm) -> None:
     """Ramp, settle, motion and results."""
     grid = tawami.Grid(comm, origin=(0.0, 0.0), h=0.1, cells=[10, 10])
-    block = tawami.box(grid, (0, 0), (0.5, 0.5))
+    block = tawami.box(grid, (0, 0), (0.5, 0.5), per_axis=2)
     law = tawami.NumpyLaw(respond, K=1e6, mu=1e6)
     small = tawami.Scene(grid, block, law, form="u", density=[1000.0], leaving="remove")
     small.fix("left", "x", velocity=lambda time: 0.1 * np.sin(time))
@@ -91,10 +91,10 @@ def dynamics(comm: MPI.Comm) -> None:
     tawami.Results("results", "stress")  # wrong: arg-type
     tawami.Results("results", existing="append")  # wrong: arg-type
     tawami.ParticleOutput("stress", every="often")  # wrong: arg-type
-    ring: tawami.Body = tawami.disc(grid, (0.5, 0.5), 0.4, inner=0.1, gauss=True)
-    tawami.level_set(grid, lambda x, y: np.hypot(x, y) - 0.4, ends=["left", "bottom"])
-    tawami.level_set(grid, lambda x, y: x, ends=["north"])  # wrong: list-item
-    layers = tawami.mesh(grid, "pile.msh", tags="gmsh:physical")
+    ring: tawami.Body = tawami.disc(grid, (0.5, 0.5), 0.4, inner=0.1, gauss=True, per_axis=2)
+    tawami.level_set(grid, lambda x, y: np.hypot(x, y) - 0.4, ends=["left", "bottom"], per_axis=2)
+    tawami.level_set(grid, lambda x, y: x, ends=["north"], per_axis=2)  # wrong: list-item
+    layers = tawami.mesh(grid, "pile.msh", tags="gmsh:physical", per_axis=2)
     whole = tawami.Scene(grid, layers, {"clay": materials()[0]}, density={"clay": 1800.0})
     whole.initial("stress", lambda x, y: (0 * x, y, 0 * x, 0 * x))
     whole.initial("stress", tawami.earlier("results/block"), beyond="return")

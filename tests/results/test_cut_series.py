@@ -144,7 +144,7 @@ def test_several_ranks_write_the_same_files_once(tmp_path):
 
 def test_particles_that_left_are_not_written(tmp_path):
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(4, 4))
-    body = tawami.box(grid, (0.5, 0.25), (1.0, 0.75))
+    body = tawami.box(grid, (0.5, 0.25), (1.0, 0.75), per_axis=2)
     law = tawami.linear_elastic(E=1e2, nu=0.3)
     options = {"form": "u_finite", "density": 1.0, "leaving": "remove"}
     scene = tawami.Scene(grid, body, law, **options)

@@ -24,7 +24,7 @@ def fall(results, *, form, law, transfer, each):
     Two ramps and two motions, with supports that are added and released between them.
     """
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(-1, -1), h=0.125, cells=(16, 10))
-    body = tawami.box(grid, (-0.25, -1.0), (0.25, -0.5))
+    body = tawami.box(grid, (-0.25, -1.0), (0.25, -0.5), per_axis=2)
     scene = tawami.Scene(grid, body, LAWS[law], form=form, density=1000.0, alpha=0.01)
     finite = form.endswith("finite")
     scene.fix("bottom", "y")

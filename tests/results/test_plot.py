@@ -21,7 +21,7 @@ from tawami.results.plot import plot
 @pytest.fixture(scope="module")
 def scene():
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(12, 4))
-    body = tawami.box(grid, (0.0, 0.0), (1.0, 1.0))
+    body = tawami.box(grid, (0.0, 0.0), (1.0, 1.0), per_axis=2)
     return tawami.Scene(grid, body, tawami.linear_elastic(E=1e3, nu=0.3), form="u_finite")
 
 

@@ -60,7 +60,7 @@ def test_the_volume_integral_is_conserved(seed, method):
 
 def test_bilinear_fields_are_exact():
     grid = grid_of((5, 4))
-    lattice = tawami.box(grid, (-1.0, 0.5), (1.0, 2.0))
+    lattice = tawami.box(grid, (-1.0, 0.5), (1.0, 2.0), per_axis=2)
     for body in (lattice, tawami.Body(lattice.x + 0.1, lattice.volume)):
         scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3))
 

@@ -116,7 +116,7 @@ def plain(u, w, sigma, sum_p, mu):
 
 def test_a_form_of_a_script_can_be_loaded_again(tmp_path):
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.5, cells=(4, 2))
-    body = tawami.box(grid, (0, 0), (2, 1))
+    body = tawami.box(grid, (0, 0), (2, 1), per_axis=2)
     law = tawami.linear_elastic(E=1e3, nu=0.3)
     form = Form({"u": ("displacement", "w")}, "displacement", plain)
     scene = tawami.Scene(grid, body, law, form=form)
@@ -134,7 +134,7 @@ def test_a_form_without_source_is_recorded_as_such(tmp_path):
     form = Form({"u": ("displacement", "w")}, "displacement", names["residual"])
     assert provenance.source_of(form) is None
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.5, cells=(4, 2))
-    body = tawami.box(grid, (0, 0), (2, 1))
+    body = tawami.box(grid, (0, 0), (2, 1), per_axis=2)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1e3, nu=0.3), form=form)
     provenance.write(tmp_path, scene)
     assert json.loads((tmp_path / "run.json").read_text())["form"]["source"] is None
@@ -144,7 +144,7 @@ def test_a_form_without_source_is_recorded_as_such(tmp_path):
 def test_a_folder_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").touch()
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.5, cells=(4, 2))
-    body = tawami.box(grid, (0, 0), (2, 1))
+    body = tawami.box(grid, (0, 0), (2, 1), per_axis=2)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1e3, nu=0.3), form="u")
     with pytest.raises(tawami.OutputError, match="result folder .* cannot be written"):
         provenance.write(tmp_path / "file" / "below", scene)

@@ -101,7 +101,7 @@ def test_a_table_has_a_row_for_each_step(written):
 def test_the_displacement_of_a_point_follows_the_body(tmp_path):
     """The upper right corner, without a particle, of a block that flies and spins."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(-1.0, -1.0), h=0.25, cells=(8, 8))
-    body = tawami.box(grid, (-0.5, -0.5), (0.5, 0.5))
+    body = tawami.box(grid, (-0.5, -0.5), (0.5, 0.5), per_axis=2)
     law = tawami.linear_elastic(E=1e4, nu=0.3)
     scene = tawami.Scene(grid, body, law, form="u_finite", density=1.0)
     spin, velocity = 2.0, np.array([0.2, -0.1])

@@ -34,7 +34,7 @@ BEFORE = "before"
 @pytest.fixture(scope="module")
 def solution() -> tawami.Solution:
     grid = grid_of((20, 10), 0.25)
-    body = tawami.box(grid, grid.origin, grid.upper)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1e6, nu=0.3))
     scene.fix("left", "x")
     scene.fix("left", "y")

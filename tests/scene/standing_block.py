@@ -15,7 +15,7 @@ STATIC = ["x", "volume", "material", "number", "stress", "displacement"]
 def scene_of(law=None, **options):
     """A block that stands on the bottom."""
     grid = grid_of()
-    body = tawami.box(grid, grid.origin, grid.upper)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     scene = tawami.Scene(grid, body, law or tawami.linear_elastic(**ELASTIC), **options)
     scene.fix("bottom", "x")
     scene.fix("bottom", "y")

@@ -198,7 +198,7 @@ def test_simple_shear_of_a_neo_hookean_block_agrees_with_the_closed_form(finite)
 
 def test_a_neo_hookean_law_needs_a_form_of_finite_strain():
     grid = grid_of()
-    body = tawami.box(grid, grid.origin, grid.upper)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     law = tawami.neo_hookean(E=1.0, nu=0.3)
     for form in ("u_epsv", "u_p", "u"):
         with pytest.raises(
@@ -212,7 +212,7 @@ def test_a_neo_hookean_law_needs_a_form_of_finite_strain():
 
 def test_an_iterate_that_inverts_a_particle_is_rejected():
     grid = grid_of()
-    body = tawami.box(grid, grid.origin, grid.upper)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3), form="u_finite")
     scene.fix("left", "x")
     scene.fix("left", "y")
@@ -247,7 +247,7 @@ def test_unsupported_combinations_are_rejected(random_scene):
         Form({"u": ("displacement", "w")}, "deviatoric", lambda w: w, strain="finite")
     law = tawami.NumpyLaw(lambda e, s: (s, np.zeros((len(e), 4, 4))), K=1.0, mu=1.0)
     grid = grid_of()
-    body = tawami.box(grid, grid.origin, grid.upper)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     with pytest.raises(tawami.InputError, match="expected a law in Rust"):
         tawami.Scene(grid, body, law, form="u_finite")
     with pytest.raises(tawami.InputError, match=r"gravity\(...\) needs Scene\(..., density=...\)"):

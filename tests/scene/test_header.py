@@ -40,7 +40,7 @@ def test_the_header_counts_particles_bytes_and_unknowns(assembly):
 
 def test_only_cells_with_particles_have_unknowns():
     grid = grid_of()
-    body = tawami.box(grid, grid.origin, (0.0, 1.5))
+    body = tawami.box(grid, grid.origin, (0.0, 1.5), per_axis=2)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(**ELASTIC), form="u")
     assert line(scene.header(), "grid").startswith(
         "4 x 3 cells of 0.5 m from (-1, 0.5) to (1, 2), 4 "

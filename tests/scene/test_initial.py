@@ -310,7 +310,7 @@ def test_a_law_in_numpy_rejects_a_stress_too():
         return stress, np.broadcast_to(np.eye(4), (len(strain), 4, 4))
 
     grid = grid_of()
-    body = tawami.box(grid, grid.origin, grid.upper)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     scene = tawami.Scene(grid, body, tawami.NumpyLaw(respond, K=1.0, mu=1.0))
     scene.initial("stress", [-1.0, -2.0, -1.0, 0.0])
     with pytest.raises(tawami.InputError, match=r"returns it, \(-1, 0, -1, 0\) Pa"):

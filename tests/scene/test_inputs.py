@@ -19,7 +19,7 @@ ELASTIC = {"E": 1e6, "nu": 0.3}
 
 
 def body_of(grid: tawami.Grid) -> tawami.Body:
-    return tawami.box(grid, grid.origin, grid.upper)
+    return tawami.box(grid, grid.origin, grid.upper, per_axis=2)
 
 
 @pytest.mark.parametrize(
@@ -149,11 +149,11 @@ def test_wrong_bodies_are_rejected(arguments, message):
 def test_wrong_boxes_are_rejected():
     grid = grid_of()
     with pytest.raises(tawami.InputError, match="must lie on lines of the grid"):
-        tawami.box(grid, (-1.0, 0.5), (0.3, 2.0))
+        tawami.box(grid, (-1.0, 0.5), (0.3, 2.0), per_axis=2)
     with pytest.raises(tawami.InputError, match="must lie on lines of the grid"):
-        tawami.box(grid, (-1.0, 0.5), (2.0, 2.0))
+        tawami.box(grid, (-1.0, 0.5), (2.0, 2.0), per_axis=2)
     with pytest.raises(tawami.InputError, match="so the body has no particles"):
-        tawami.box(grid, (0.0, 0.5), (0.0, 2.0))
+        tawami.box(grid, (0.0, 0.5), (0.0, 2.0), per_axis=2)
     with pytest.raises(tawami.InputError, match="per_axis = 0"):
         tawami.box(grid, (-1.0, 0.5), (0.0, 2.0), per_axis=0)
 
@@ -259,7 +259,10 @@ def test_an_error_of_newton_holds_its_history_and_changes_nothing():
         fields={"u": ("displacement", "w")}, kinematics="displacement", residual=residual
     )
     grid = grid_of()
-    body, material = tawami.box(grid, grid.origin, grid.upper), tawami.linear_elastic(**ELASTIC)
+    body, material = (
+        tawami.box(grid, grid.origin, grid.upper, per_axis=2),
+        tawami.linear_elastic(**ELASTIC),
+    )
     with pytest.warns(InexactSumWarning):
         scene = tawami.Scene(grid, body, material, form=form, max_iterations=3)
     scene.fix("left", "x")

@@ -65,7 +65,7 @@ def test_loading_in_two_steps_equals_loading_in_one():
 def test_a_part_of_an_edge_is_loaded_and_held():
     """The load of two of four cells, and only the functions of the held ones."""
     grid = grid_of((4, 3))
-    body = tawami.box(grid, grid.origin, grid.upper)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=10.0, nu=0.3), basis="bilinear")
     scene.fix("bottom", "x", between=(-1.0, 0.0))
     scene.fix("bottom", "y", between=(-1.0, 0.0))

@@ -32,7 +32,7 @@ SOLUTION = {
 @pytest.fixture(scope="module")
 def scene():
     grid = grid_of()
-    body = tawami.box(grid, grid.origin, grid.upper)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3), density=1.0)
     scene.fix("bottom", "x")
     scene.fix("bottom", "y")

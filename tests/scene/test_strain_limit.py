@@ -19,7 +19,7 @@ MESSAGE = r"displacement gradient of particle \d+ is 0\.25.*form='u_epsv_finite'
 def sheared(shear: float, **options) -> tawami.Scene:
     """A block whose edges all move in simple shear."""
     grid = grid_of()
-    body = tawami.box(grid, grid.origin, grid.upper)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     law = tawami.linear_elastic(E=1e3, nu=0.3)
     scene = tawami.Scene(grid, body, law, density=1.0, **options)
     for edge in ("left", "right", "bottom", "top"):
@@ -55,7 +55,7 @@ def test_a_path_warns():
     grid = grid_of((1, 4), 1.0)
     scene = tawami.Scene(
         grid,
-        tawami.box(grid, grid.origin, grid.upper, gauss=True),
+        tawami.box(grid, grid.origin, grid.upper, gauss=True, per_axis=2),
         tawami.linear_elastic(E=1.0, nu=0.0),
     )
     for edge in ("left", "right", "bottom"):
@@ -71,7 +71,7 @@ def test_a_motion_warns():
     grid = grid_of()
     scene = tawami.Scene(
         grid,
-        tawami.box(grid, grid.origin, grid.upper),
+        tawami.box(grid, grid.origin, grid.upper, per_axis=2),
         tawami.linear_elastic(E=1e3, nu=0.3),
         density=1.0,
     )
@@ -90,7 +90,7 @@ def test_smaller_gradients_give_no_warning(shear):
 def pulled(form: str, traction: float) -> tawami.Scene:
     """A block of 1 m x 1 m that hangs by a load on its upper particles."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(4, 8))
-    body = tawami.box(grid, (0, 0), (1, 1))
+    body = tawami.box(grid, (0, 0), (1, 1), per_axis=2)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=10.0, nu=0.3), form=form)
     for edge in ("left", "right"):
         scene.fix(edge, "x")

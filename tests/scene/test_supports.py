@@ -139,7 +139,10 @@ def test_supports_that_agree_where_they_meet_are_accepted():
 
 def test_each_separate_part_of_the_body_needs_its_supports():
     grid = grid_of((12, 3))
-    parts = [tawami.box(grid, (-1, 0.5), (0.5, 2)), tawami.box(grid, (3.0, 0.5), (5, 2))]
+    parts = [
+        tawami.box(grid, (-1, 0.5), (0.5, 2), per_axis=2),
+        tawami.box(grid, (3.0, 0.5), (5, 2), per_axis=2),
+    ]
     body = tawami.Body(
         *(np.concatenate(a) for a in zip(*[(b.x, b.volume) for b in parts], strict=True))
     )
@@ -174,7 +177,7 @@ def test_a_prescribed_rigid_motion_gives_no_stress_and_converges(form):
 def test_a_point_on_the_border_of_the_body_is_held_despite_round_off():
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(-0.3, -0.3), h=0.1, cells=(10, 10))
     for shift in (0.0, 4e-16, -4e-16, 1e-12):
-        body = tawami.box(grid, (0.0, 0.0), (0.5, 0.5))
+        body = tawami.box(grid, (0.0, 0.0), (0.5, 0.5), per_axis=2)
         scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3))
         for y in (0.0, 0.25, 0.5):
             scene.hold((shift, y), "x")
@@ -254,7 +257,7 @@ def test_a_support_may_be_given_twice():
 
 def test_a_support_that_misses_the_body_is_rejected():
     grid = grid_of()
-    body = tawami.box(grid, grid.origin, (0.0, grid.upper[1]))
+    body = tawami.box(grid, grid.origin, (0.0, grid.upper[1]), per_axis=2)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3))
     scene.fix("right", "x")
     with pytest.raises(SupportError, match=r"fix\(edge='right'\): no cell"):

@@ -16,7 +16,7 @@ G = 10.0
 def block(*, slope=0.0, E=1e7, height=0.0, **wall):
     """A block of 0.5 m on a wall or above it, on a slope [degrees]."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(24, 10))
-    body = tawami.box(grid, (0.5, height), (1.0, height + 0.5))
+    body = tawami.box(grid, (0.5, height), (1.0, height + 0.5), per_axis=2)
     material = tawami.linear_elastic(E=E, nu=0.3)
     scene = tawami.Scene(grid, body, material, form="u_epsv_finite", density=1000.0)
     angle = np.radians(slope)
@@ -162,7 +162,7 @@ def test_a_function_that_keeps_coming_back_is_released():
 def test_walls_in_a_corner_carry_the_load_once(form):
     """A block pressed into a corner: forces at the corner belong to both walls."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(8, 8))
-    body = tawami.box(grid, (0, 0), (0.5, 0.5))
+    body = tawami.box(grid, (0, 0), (0.5, 0.5), per_axis=2)
     law = tawami.linear_elastic(E=1e6, nu=0.3)
     scene = tawami.Scene(grid, body, law, form=form, density=1000.0)
     scene.gravity((-6.0, -G))
@@ -180,7 +180,7 @@ def test_walls_in_a_corner_carry_the_load_once(form):
 def test_a_wall_knows_the_gap_in_small_strain():
     """Lifted by 1 mm and lowered by half of it, a block is still above the wall."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(8, 8))
-    body = tawami.box(grid, (0, 0), (0.5, 0.5))
+    body = tawami.box(grid, (0, 0), (0.5, 0.5), per_axis=2)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1e6, nu=0.3), form="u_epsv")
     scene.wall("bottom", 0.3)
     points = [(x, 0.45) for x in (0.05, 0.45)]
@@ -197,7 +197,7 @@ def test_a_wall_knows_the_gap_in_small_strain():
 def test_a_piston_slides_along_a_rough_floor():
     """The moving edge prescribes the corner; the floor gives friction elsewhere."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(8, 6))
-    body = tawami.box(grid, (0, 0), (0.5, 0.5))
+    body = tawami.box(grid, (0, 0), (0.5, 0.5), per_axis=2)
     law = tawami.linear_elastic(E=1e6, nu=0.3)
     scene = tawami.Scene(grid, body, law, form="u_epsv_finite", density=1000.0)
     scene.gravity((0.0, -G))

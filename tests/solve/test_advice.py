@@ -103,7 +103,7 @@ def test_another_control():
 def test_a_smaller_time_step():
     def spinning():
         grid = tawami.Grid(MPI.COMM_WORLD, origin=(-1, -1), h=0.125, cells=(16, 16))
-        body = tawami.box(grid, (-0.25, -0.25), (0.25, 0.25))
+        body = tawami.box(grid, (-0.25, -0.25), (0.25, 0.25), per_axis=2)
         law = tawami.linear_elastic(E=1e5, nu=0.4)
         scene = tawami.Scene(grid, body, law, form="u_epsv_finite", density=1000.0)
         return tawami.Dynamics(

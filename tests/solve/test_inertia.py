@@ -19,7 +19,7 @@ def test_the_acceleration_of_a_vibrating_bar(form, angle):
     of any size; the acceleration is -omega^2 times the displacement.
     """
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=1 / 16, cells=(18, 2))
-    body = tawami.box(grid, (0, 0), (L, 1 / 8))
+    body = tawami.box(grid, (0, 0), (L, 1 / 8), per_axis=2)
     options = {} if form == "u" else {"alpha": 0.0}
     law = tawami.linear_elastic(E=E, nu=0.0)
     scene = tawami.Scene(grid, body, law, form=form, density=RHO, **options)
@@ -43,7 +43,7 @@ def test_the_acceleration_of_a_vibrating_bar(form, angle):
 def test_gravity_acts_on_a_fast_body_in_a_short_step(dt):
     """A step of 1e-13 s at 1 km/s changes the velocity in its last digit only."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(-1, -1), h=0.125, cells=(16, 16))
-    body = tawami.box(grid, (-0.25, -0.25), (0.25, 0.25))
+    body = tawami.box(grid, (-0.25, -0.25), (0.25, 0.25), per_axis=2)
     law = tawami.linear_elastic(E=1e5, nu=0.3)
     scene = tawami.Scene(grid, body, law, form="u_epsv_finite", density=1000.0)
     scene.gravity((0.0, -10.0))
@@ -55,7 +55,7 @@ def test_gravity_acts_on_a_fast_body_in_a_short_step(dt):
 @pytest.mark.parametrize("dt", [1e-300, 1e-101, 1e101, 1e300])
 def test_a_step_whose_square_overflows_is_rejected(dt):
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(-1, -1), h=0.125, cells=(16, 16))
-    body = tawami.box(grid, (-0.25, -0.25), (0.25, 0.25))
+    body = tawami.box(grid, (-0.25, -0.25), (0.25, 0.25), per_axis=2)
     law = tawami.linear_elastic(E=1e5, nu=0.3)
     scene = tawami.Scene(grid, body, law, form="u_epsv_finite", density=1000.0)
     motion = tawami.Dynamics(scene)

@@ -96,7 +96,7 @@ def test_a_load_beyond_the_strength_raises_an_error(form, load):
         return stress + s + K * volume[:, None] * unit, tangent
 
     grid = grid_of((8, 4), h=0.25)
-    body = tawami.box(grid, grid.origin, grid.upper)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     scene = tawami.Scene(grid, body, tawami.NumpyLaw(respond, K=K, mu=mu), form=form)
     scene.fix("left", "x")
     scene.fix("left", "y")

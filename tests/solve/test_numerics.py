@@ -13,7 +13,7 @@ from cases.verification.cantilever import mpm
 def pushed(**options) -> tawami.Scene:
     """A block that yields and needs several Newton iterations."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(6, 4))
-    body = tawami.box(grid, (0.0, 0.0), (1.0, 1.0))
+    body = tawami.box(grid, (0.0, 0.0), (1.0, 1.0), per_axis=2)
     clay = tawami.von_mises(tawami.linear_elastic(E=1e7, nu=0.49), yield_stress=1e5, hardening=1e5)
     scene = tawami.Scene(grid, body, clay, form="u_epsv", alpha=0.1, **options)
     scene.fix("bottom", "x")

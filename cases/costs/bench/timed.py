@@ -28,7 +28,7 @@ WARM_UP = 5  # steps of the pile before the first that is measured
 def beam(n: int) -> Any:
     """The cantilever of the paper as a scene, 2n x n cells with 2 x 2 particles each."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, -0.5), h=1 / n, cells=(2 * n, n))
-    body = tawami.box(grid, (0.0, -0.5), (2.0, 0.5))
+    body = tawami.box(grid, (0.0, -0.5), (2.0, 0.5), per_axis=2)
     law = tawami.linear_elastic(E=3e6, nu=0.4999)
     scene = tawami.Scene(grid, body, law, form="u_epsv", alpha=0.1)
     scene.fix("left", "x")
@@ -40,7 +40,7 @@ def beam(n: int) -> Any:
 def pile() -> Any:
     """The pile of `cases.showcase.collapse` in motion, 800 particles."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.01, cells=(80, 14))
-    body = tawami.box(grid, (0.0, 0.0), (0.2, 0.1))
+    body = tawami.box(grid, (0.0, 0.0), (0.2, 0.1), per_axis=2)
     rods = tawami.drucker_prager(tawami.linear_elastic(E=0.84e6, nu=0.3), phi=21.9)
     scene = tawami.Scene(grid, body, rods, form="u_epsv_finite", density=RHO, alpha=0.01)
     scene.gravity((0.0, -G))

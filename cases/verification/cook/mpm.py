@@ -42,11 +42,11 @@ def body_of(grid: tawami.Grid, kind: str) -> tawami.Body:
     lattice   2 x 2 in every cell, those outside the membrane left out
     """
     if kind == "even":
-        return tawami.polygon(grid, CORNERS)
+        return tawami.polygon(grid, CORNERS, per_axis=2)
     if kind == "gauss":
         return tawami.polygon(grid, CORNERS, per_axis=3, gauss=True)
     if kind == "lattice":
-        body = tawami.box(grid, grid.origin, grid.upper)
+        body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
         inside = shapely.contains_xy(shapely.Polygon(CORNERS), *body.x.T)
         return tawami.Body(body.x[inside], body.volume[inside])
     raise tawami.InputError(f"body '{kind}': expected one of {', '.join(map(repr, BODIES))}")

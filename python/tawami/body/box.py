@@ -12,7 +12,7 @@ from tawami.base.checks import point
 from tawami.base.errors import InputError
 from tawami.base.space import lattice, tensor_product
 from tawami.body.body import Body
-from tawami.body.filling import Filling
+from tawami.body.filling import PER_AXIS, Filling
 from tawami.grid.grid import Grid
 
 
@@ -21,7 +21,7 @@ def box(
     lower: Sequence[float],
     upper: Sequence[float],
     *,
-    per_axis: int = 2,
+    per_axis: int = PER_AXIS,
     gauss: bool = False,
 ) -> Body:
     """A rectangle filled with `per_axis` x `per_axis` particles in every cell of the grid.

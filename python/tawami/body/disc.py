@@ -12,7 +12,7 @@ from tawami.base.checks import LEAST, number, point
 from tawami.base.errors import InputError
 from tawami.body import clipping
 from tawami.body.body import Body
-from tawami.body.filling import Filling
+from tawami.body.filling import PER_AXIS, Filling
 from tawami.body.points import ROUND_OFF, Points, halves, in_triangles, joined
 from tawami.grid.grid import ON_LINE, Grid
 
@@ -30,7 +30,7 @@ def disc(
     radius: float,
     *,
     inner: float = 0.0,
-    per_axis: int = 2,
+    per_axis: int = PER_AXIS,
     gauss: bool = False,
 ) -> Body:
     """A disc, or a ring, filled with particles.

@@ -13,7 +13,7 @@ from tawami.base.errors import InputError
 from tawami.base.space import lattice
 from tawami.body.body import Body
 from tawami.body.border_squares import Squares, triangulated
-from tawami.body.filling import Filling
+from tawami.body.filling import PER_AXIS, Filling
 from tawami.body.points import ROUND_OFF, areas, halves, in_triangles
 from tawami.grid.grid import EDGES, Edge, Grid
 
@@ -62,7 +62,7 @@ def level_set(
     ends: Sequence[Edge] = (),
     tolerance: float = 1e-6,
     samples: int = 8,
-    per_axis: int = 2,
+    per_axis: int = PER_AXIS,
     gauss: bool = False,
 ) -> Body:
     """The body where f(x, y) < 0, filled with particles; only the sign of f is used.

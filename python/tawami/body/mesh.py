@@ -14,7 +14,7 @@ from tawami.base.files import unreadable
 from tawami.base.warn import warn
 from tawami.body import elements
 from tawami.body.body import Body
-from tawami.body.filling import Filling
+from tawami.body.filling import PER_AXIS, Filling
 from tawami.grid.grid import Grid
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def mesh(
     source: str | Path | meshio.Mesh,
     *,
     tags: str | None = None,
-    per_axis: int = 2,
+    per_axis: int = PER_AXIS,
     gauss: bool = False,
 ) -> Body:
     """The elements of a mesh filled with particles; each group of elements has its own material.

@@ -13,7 +13,7 @@ from tawami.base.checks import array, shown
 from tawami.base.errors import InputError
 from tawami.body import clipping
 from tawami.body.body import Body
-from tawami.body.filling import Filling
+from tawami.body.filling import PER_AXIS, Filling
 from tawami.body.points import ROUND_OFF, in_triangles
 from tawami.grid.grid import Grid
 
@@ -26,7 +26,7 @@ def polygon(
     shape: npt.ArrayLike | shapely.Polygon | shapely.MultiPolygon,
     *,
     holes: Sequence[npt.ArrayLike] = (),
-    per_axis: int = 2,
+    per_axis: int = PER_AXIS,
     gauss: bool = False,
 ) -> Body:
     """A polygon filled with particles; its sides may cut cells of the grid.

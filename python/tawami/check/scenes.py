@@ -181,7 +181,7 @@ def bent_beam(form: Form, given: Settings) -> float:
     nu = (3 * RATIO - 2) / (2 * (3 * RATIO + 1))
     law = linear_elastic(K=RATIO, mu=1.0)
     modulus, nubar, inertia = (9 * RATIO / (3 * RATIO + 1)) / (1 - nu**2), nu / (1 - nu), 1 / 12
-    scene = Scene(grid, box(grid, (0, -0.5), (2, 0.5)), law, form=form, **given)
+    scene = Scene(grid, box(grid, (0, -0.5), (2, 0.5), per_axis=2), law, form=form, **given)
     shear = 1.5 * force
 
     def root(x: Array, y: Array) -> Array:
