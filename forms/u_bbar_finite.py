@@ -11,6 +11,7 @@ kinematics = "cell"
 strain = "finite"
 parameters = {"k": {"default": 0.01, "minimum": 0.0}}
 options = {"ghost_penalty": ("off", "on")}
+static_options = {"ghost_penalty": "on"}
 
 
 def residual(

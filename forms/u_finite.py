@@ -10,6 +10,7 @@ kinematics = "displacement"
 strain = "finite"
 parameters = {"k": {"default": 0.01, "minimum": 0.0}}
 options = {"ghost_penalty": ("off", "on")}
+static_options = {"ghost_penalty": "on"}
 
 
 def residual(u, w, P, mu, t, h, sum_p, ds, dG, facet_mean, jump_nn, k, ghost_penalty):

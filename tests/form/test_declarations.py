@@ -110,3 +110,19 @@ def test_a_file_with_a_mistake_is_named(tmp_path):
     path.write_text("fields = {")
     with pytest.raises(tawami.FormError, match=r"'broken.py' cannot be read: SyntaxError"):
         Form.load(path)
+
+
+def test_static_options_are_the_defaults_of_scenes_without_a_density():
+    form = tawami.Form.load("u_epsv_finite")
+    assert form.settings({})[1] == {"ghost_penalty": "off"}
+    assert form.settings({}, static=True)[1] == {"ghost_penalty": "on"}
+    assert form.settings({"ghost_penalty": "off"}, static=True)[1] == {"ghost_penalty": "off"}
+    for static_options in ({"ghost": "on"}, {"ghost_penalty": "perhaps"}):
+        with pytest.raises(tawami.FormError, match="expected one of the option's values"):
+            tawami.Form(
+                {"u": ("displacement", "w")},
+                "displacement",
+                lambda w, sigma, sum_p: sum_p(sigma, w),
+                options={"ghost_penalty": ("off", "on")},
+                static_options=static_options,
+            )

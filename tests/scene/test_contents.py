@@ -98,8 +98,9 @@ def compiled(monkeypatch):
         ({"form": "u_p"}, 2),
         ({"form": "u_epsv", "stabilisation": "projection"}, 4),  # each by two rules
         ({"form": "u_bbar"}, 8),  # as well, and two products of two integrals
-        ({"form": "u_finite"}, 2),
-        ({"form": "u_epsv_finite"}, 4),  # the lumped term has a rule of its own
+        ({"form": "u_finite", "ghost_penalty": "off"}, 2),
+        # the lumped term has a rule of its own
+        ({"form": "u_epsv_finite", "ghost_penalty": "off"}, 4),
     ],
 )
 def test_only_the_kernels_that_a_scene_needs_are_compiled(compiled, options, integrals):
@@ -117,6 +118,13 @@ def test_only_the_kernels_that_a_scene_needs_are_compiled(compiled, options, int
 def test_the_ghost_penalty_is_compiled_only_if_it_is_on(compiled):
     scene_of(form="u_epsv", ghost_penalty="on").solve()
     assert sorted(compiled) == ["cell", "cell", "interior_facet"]
+
+
+@pytest.mark.parametrize(("density", "penalty"), [(None, "on"), (1e3, "off")])
+def test_the_ghost_penalty_is_the_default_of_static_finite_strain(density, penalty):
+    for form in ("u_epsv_finite", "u_finite", "u_bbar_finite"):
+        model = scene_of(form=form, density=density).configuration.model
+        assert model.options["ghost_penalty"] == penalty
 
 
 def test_a_static_scene_assembles_no_mass(monkeypatch):

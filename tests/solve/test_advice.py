@@ -118,8 +118,14 @@ def test_a_smaller_time_step():
 
 def test_more_resets_or_a_larger_tolerance():
     def settled(**options):
-        scene, _ = block(0.05, form="u_epsv_finite")
+        scene, _ = block(0.05, form="u_epsv_finite", ghost_penalty=penalty)
         return tawami.settle(scene, **options)
+
+    penalty = "on"
+    with pytest.raises(tawami.ConvergenceError, match="or take ghost_penalty='off'"):
+        settled(max_resets=10)
+    assert settled(max_resets=10, tolerance=0.1)
+    penalty = "off"
 
     with pytest.raises(tawami.ConvergenceError, match="allow more resets, or a larger tolerance"):
         settled(max_resets=3)

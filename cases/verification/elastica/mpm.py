@@ -92,7 +92,8 @@ def build(run: Run) -> tuple[tawami.Scene, npt.NDArray[np.bool_], float]:
     )  # fmt: skip
     body = tawami.box(grid, (0.0, -D / 2), (length, D / 2), per_axis=run.per_axis)
     material = tawami.linear_elastic(E=E, nu=run.nu)
-    options: dict[str, Any] = {"ghost_penalty": "on", "k": run.k} if run.k else {}
+    penalty = {"ghost_penalty": "on", "k": run.k}
+    options: dict[str, Any] = penalty if run.k else {"ghost_penalty": "off"}
     if run.form == "u_epsv_finite":
         options["alpha"] = run.alpha
     scene = tawami.Scene(grid, body, material, form=run.form, **options)

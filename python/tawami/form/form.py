@@ -87,6 +87,7 @@ class Form:
         strain: 'small', or 'finite' for logarithmic elastic strains, with a reset of the grid after each
             step. The attribute is a `StrainMeasure`.
         whole_cells: Values of options that are not stable in partially filled cells.
+        static_options: Defaults of options, in place of the first value, for scenes without a density.
         name: Name in messages.
 
     Raises:
@@ -100,6 +101,7 @@ class Form:
     options: Mapping[str, tuple[str, ...]]
     strain: StrainMeasure
     whole_cells: tuple[str, ...]
+    static_options: Mapping[str, str]
     name: str
 
     def __init__(
@@ -111,11 +113,12 @@ class Form:
         options: Mapping[str, tuple[str, ...]] = NOTHING,
         strain: str | StrainMeasure = "small",
         whole_cells: tuple[str, ...] = (),
+        static_options: Mapping[str, str] = NOTHING,
         name: str = "of the driver script",
     ) -> None:
         declared = {
             "fields": fields, "residual": residual, "parameters": parameters, "options": options,
-            "whole_cells": whole_cells, "name": name,
+            "whole_cells": whole_cells, "static_options": static_options, "name": name,
         }  # fmt: skip
         for attribute, value in declared.items():
             object.__setattr__(self, attribute, value)
@@ -158,7 +161,7 @@ class Form:
 
     def _check_declarations(self) -> None:
         """Check the types of all declarations."""
-        for what in ("fields", "parameters", "options"):
+        for what in ("fields", "parameters", "options", "static_options"):
             declared = getattr(self, what)
             if not isinstance(declared, Mapping) or not all(isinstance(n, str) for n in declared):
                 self._fail(f"{what} = {shown(declared)}: expected a mapping from names")
@@ -178,6 +181,11 @@ class Form:
             if not _are_names(choices) or not choices:
                 self._fail(
                     f"option '{name}' is {shown(choices)}: expected its values, default first"
+                )
+        for name, value in self.static_options.items():
+            if not one_of(value, self.options.get(name, ())):
+                self._fail(
+                    f"static_options: '{name}': {shown(value)}: expected one of the option's values"
                 )
         if not _are_names(self.whole_cells):
             self._fail(f"whole_cells = {shown(self.whole_cells)}: expected names of options")
@@ -226,14 +234,21 @@ class Form:
             "form source": hashlib.sha256(self.source.encode()).hexdigest(),
         }
 
-    def settings(self, given: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, str]]:
+    def settings(
+        self, given: Mapping[str, Any], *, static: bool = False
+    ) -> tuple[dict[str, float], dict[str, str]]:
         """Parameters and options of this form, with the defaults of those that are not given.
+
+        Args:
+            given: By name.
+            static: Whether the scene has no density, so that its options default to `static_options`.
 
         Raises:
             InputError: A name is unknown, or a value is out of its limits.
         """
         parameters = {name: declared["default"] for name, declared in self.parameters.items()}
         options = {name: choices[0] for name, choices in self.options.items()}
+        options |= self.static_options if static else {}
         for name, value in given.items():
             if name in parameters:
                 parameters[name] = value
@@ -302,5 +317,6 @@ def _from_module(module: ModuleType, _residual: Any, name: str | None = None) ->
         options=getattr(module, "options", {}),
         strain=getattr(module, "strain", "small"),
         whole_cells=getattr(module, "whole_cells", ()),
+        static_options=getattr(module, "static_options", {}),
         name=name,
     )

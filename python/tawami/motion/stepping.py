@@ -193,9 +193,11 @@ def settle(
                 return steps
         if observer.finished:
             return steps
+        ghost = scene.configuration.model.options.get("ghost_penalty") == "on"
+        penalty = ", or take ghost_penalty='off', which settles faster" if ghost else ""
         raise ConvergenceError(
             f"settle: {steps[-1].history[0][0]:.1e} of the forces are out of balance after {max_resets} "
             f"resets of the grid: expected less than {tolerance:g}; allow more resets, or a larger "
-            "tolerance",
+            f"tolerance{penalty}",
             steps[-1].history,
         )

@@ -133,7 +133,15 @@ def source_of(form: Form) -> bytes | None:
     name = getattr(form.residual, "__name__", "residual")
     lines = [f"# Form {form.name}: defined in {file}"]
     lines += [f"from ufl import {', '.join(names)}"] if names else []
-    for key in ("fields", "kinematics", "parameters", "options", "strain", "whole_cells"):
+    for key in (
+        "fields",
+        "kinematics",
+        "parameters",
+        "options",
+        "static_options",
+        "strain",
+        "whole_cells",
+    ):
         value = getattr(form, key)
         text = str(value) if isinstance(value, Kinematics | StrainMeasure) else value
         lines.append(f"{key} = {text!r}")

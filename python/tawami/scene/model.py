@@ -149,7 +149,7 @@ def build(
             "a tawami.Body"
         )
     loaded = Form.load(form)
-    values, options = loaded.settings(parameters)
+    values, options = loaded.settings(parameters, static=density is None)
     for message in [] if grid.comm.rank else loaded.unusual(values):
         warn(message, ParameterWarning)
     particles, materials, law = _particles(body, material, material_of, loaded)

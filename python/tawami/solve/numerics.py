@@ -59,7 +59,9 @@ class Numerics:
         """The settings in words, for the header of a run on so many ranks."""
         solver: str = self.linear_solver
         if solver == "direct":
-            solver += f", factorised {self.factorise.replace('_', ' ')}"
+            solver += (
+                f" (LDL^T of symmetric tangents), factorised {self.factorise.replace('_', ' ')}"
+            )
         return (
             f"Newton to {self.tolerance:g} in at most {self.max_iterations} iterations, "
             f"{self.tangent_rule} tangent, {solver}, assembly {self.assembly}, "
