@@ -32,6 +32,7 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "elastica": ("Elastica", "verification", ("strip",)),
     "footing": ("Footing", "verification", ()),
     "bearing_capacity": ("Bearing capacity", "verification", ()),
+    "dilatancy": ("Dilatancy", "verification", ("block", "enumeration")),
     "vibrating_beam": ("Vibrating beam", "verification", ("beam",)),
     "spinning_disc": ("Spinning disc", "verification", ("disc",)),
     "collapse": ("Collapse", "showcase", ("pile",)),

@@ -221,9 +221,8 @@ def tried():
 
 def test_combinations_that_are_rejected(tried):
     rejected = {(cell.form, cell.law): cell.says for cell in tried if cell.error}
-    assert set(rejected) == {("u_p", "mohr_coulomb"), ("u_epsv_finite", "NumpyLaw")}
+    assert set(rejected) == {("u_epsv_finite", "NumpyLaw")}
     assert {cell.error for cell in tried if cell.error} == {"InputError"}
-    assert "depends on the mean stress" in rejected["u_p", "mohr_coulomb"]
     assert "expected a law in Rust" in rejected["u_epsv_finite", "NumpyLaw"]
 
 
@@ -238,9 +237,10 @@ def test_stress_of_a_compressed_block_of_a_linear_law(tried):
 def test_the_table_shows_the_results(tried):
     text = compatibility.page(tried, {1: 1.0})
     assert text.count("| works |") + text.count("| works ") >= 6
-    assert text.count("rejected 1") == text.count("rejected 2") == 2
+    assert text.count("rejected 1") == 2
+    assert text.count("rejected 2") == 0
     assert re.search(
-        r"^12 combinations were run, 0 of them on 2 ranks .*: 8 work, 4 are rejected",
+        r"^12 combinations were run, 0 of them on 2 ranks .*: 10 work, 2 are rejected",
         text,
         re.MULTILINE,
     )

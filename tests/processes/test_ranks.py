@@ -137,7 +137,7 @@ def respond(strain, stress):
 scene(tawami.NumpyLaw(respond, K=1.0, mu=1.0)).solve()
 """
 PERMUTED = """
-body.x[:] = body.x[np.random.default_rng(rank).permutation(128)]
+body.x[:] = body.x[np.random.default_rng(rank).permutation(len(body.x))]
 scene()
 """
 EXIT = """

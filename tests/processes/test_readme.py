@@ -59,9 +59,10 @@ def test_the_block_in_motion_keeps_its_angular_momentum_and_writes_results(tmp_p
     }  # fmt: skip
     assert len(list((folder / "motion" / "particles").glob("*.vtu"))) == 11
     (printed,) = re.findall(r"^angular momentum.*?(\S+)$", run.stdout, flags=re.MULTILINE)
-    x = (np.arange(8) + 0.5) / 16 - 0.25
-    size = 1000.0 / 16**2  # kg per metre depth of a particle
-    assert float(printed) == pytest.approx(3.0 * size * 2 * 8 * (x**2).sum(), rel=5e-3)
+    n = 12  # particles along a side
+    x = (np.arange(n) + 0.5) / (2 * n) - 0.25
+    size = 1000.0 / (2 * n) ** 2  # kg per metre depth of a particle
+    assert float(printed) == pytest.approx(3.0 * size * 2 * n * (x**2).sum(), rel=5e-3)
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ from tawami.scene.domain import Domain
 
 #: Size of the residual of the projection over that of its right-hand side, and most iterations. What is
 #: not reached stays as it was.
-TOLERANCE, MOST_ITERATIONS = 1e-6, 60
+TOLERANCE, MOST_ITERATIONS = 1e-11, 200
 
 
 #: Cells that the particles travel between two projections. A body at rest is left alone.
