@@ -77,3 +77,9 @@ def test_the_loss_of_the_trapezoidal_rule_is_known(coarse_steps):
 
 def test_the_mean_stress_averaged_over_a_turn_is_accurate(coarse_steps):
     assert coarse_steps.stress_error[0] < 0.08
+
+
+@pytest.mark.slow
+def test_the_mean_stress_stays_accurate_for_ten_turns():
+    """Measured: 2.4 to 2.8 %; without the projection of the mean stress 11 % in the tenth turn."""
+    assert max(disc.solve(turns=10).stress_error) < 0.035
