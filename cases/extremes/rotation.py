@@ -30,15 +30,21 @@ ENERGY = 0.0015
 SHAPE = 5e-4
 
 
+def turning(form: str, nu: float, per_axis: int = 3) -> tawami.Dynamics:
+    """The block, which spins about its middle."""
+    law = tawami.linear_elastic(E=block.E, nu=nu)
+    scene = block.scene(form, law=law, cells=(8, 8), per_axis=per_axis, shift=(0.13, 0.07))
+    motion = block.spinning(scene, SPIN)
+    motion.velocity[:] -= motion.linear_momentum / block.MASS  # its middle is not the origin
+    return motion
+
+
 def spinning(form: str, turns: int, nu: float = 0.3, steps: int = STEPS) -> Measured:
     """The largest error over its bound with `steps` per turn; the limit is 1."""
-    law = tawami.linear_elastic(E=block.E, nu=nu)
-    scene = block.scene(form, law=law, cells=(8, 8), per_axis=3, shift=(0.13, 0.07))
-    motion = block.spinning(scene, SPIN)
+    motion = turning(form, nu)
+    scene = motion.scene
     begin, dt = np.array(scene.particles.x), 2 * np.pi / SPIN / steps
     about = begin.mean(axis=0)
-    # the block spins about its middle, which is not the origin
-    motion.velocity[:] -= motion.linear_momentum / block.MASS
     angular, energy = motion.angular_momentum(about), motion.kinetic_energy
     highest = 0.0
     for _ in range(turns * steps):

@@ -67,6 +67,11 @@ def davis(phi: float, psi: float) -> float:
     return prandtl(float(np.degrees(np.arctan(r * np.tan(of_phi)))), float(r) * C)
 
 
+def dilatancies(phi: float) -> list[float]:
+    """Angles of dilatancy of the study for a friction angle [deg]."""
+    return sorted({0.0, phi / 2, float(phi)})
+
+
 @dataclass
 class Run:
     """A loading to collapse.
@@ -150,12 +155,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     work = [
         (law, phi, psi, nu, 2)
         for law, phi, nu in product(LAWS, GROUND, (0.3, 0.45, 0.49, 0.4999))
-        for psi in sorted({0.0, phi / 2, float(phi)})
+        for psi in dilatancies(phi)
     ]
     work += [
-        (law, phi, psi, 0.49, 4)
-        for law, phi in product(LAWS, GROUND)
-        for psi in sorted({0.0, phi / 2, float(phi)})
+        (law, phi, psi, 0.49, 4) for law, phi in product(LAWS, GROUND) for psi in dilatancies(phi)
     ]
     work += [("mohr_coulomb", 20, 20.0, 0.49, 8)]
     work = [one for one in work if one[-1] <= options.cells]

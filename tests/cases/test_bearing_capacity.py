@@ -17,7 +17,7 @@ ALL = [
     (law, phi, psi, nu)
     for law in case.LAWS
     for phi in case.GROUND
-    for psi in sorted({0.0, phi / 2, float(phi)})
+    for psi in case.dilatancies(phi)
     for nu in (0.3, 0.45, 0.49, 0.4999)
     if (law, phi, psi, nu) not in FAST
 ]

@@ -115,10 +115,8 @@ def test_an_attempt_beyond_its_bound_or_without_a_message_is_wrong():
 
 def test_a_rejection_that_changes_particles_is_found():
     grid = grid_of()
-    body, law = (
-        tawami.box(grid, grid.origin, grid.upper, per_axis=2),
-        tawami.linear_elastic(E=1.0, nu=0.3),
-    )
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
+    law = tawami.linear_elastic(E=1.0, nu=0.3)
     scene = tawami.Scene(grid, body, law)
 
     def change_and_refuse():
@@ -210,10 +208,8 @@ def test_points_of_a_tiny_body_are_distinguished():
     """Two points held 4e-9 m apart, on cells of 4e-9 m, each with its own reaction."""
     h = 4e-9
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=h, cells=(4, 4))
-    body, law = (
-        tawami.box(grid, grid.origin, grid.upper, per_axis=2),
-        tawami.linear_elastic(E=1e6, nu=0.3),
-    )
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
+    law = tawami.linear_elastic(E=1e6, nu=0.3)
     scene = tawami.Scene(grid, body, law, form="u")
     left, right = (1.5 * h, 0.0), (2.5 * h, 0.0)
     scene.hold(left, "x")
@@ -232,10 +228,8 @@ def test_a_soft_part_beside_a_stiff_one_is_no_rigid_motion():
     rows_of = outcomes("contrast", r"^series, u, bilinear: 1e\+13")
     assert {row.outcome for row in rows_of.values()} == {"refused"}
     grid = grid_of()
-    body, law = (
-        tawami.box(grid, grid.origin, grid.upper, per_axis=2),
-        tawami.linear_elastic(E=1e6, nu=0.3),
-    )
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
+    law = tawami.linear_elastic(E=1e6, nu=0.3)
     scene = tawami.Scene(grid, body, law)
     scene.fix("left", "x", 0.3)  # rigidly: nothing to balance
     scene.fix("left", "y", 0.1)
@@ -246,10 +240,8 @@ def test_a_soft_part_beside_a_stiff_one_is_no_rigid_motion():
 def test_a_tiny_prescribed_displacement_strains_the_body(size):
     """In proportion: no displacement is taken for round-off."""
     grid = grid_of()
-    body, law = (
-        tawami.box(grid, grid.origin, grid.upper, per_axis=2),
-        tawami.linear_elastic(E=1e6, nu=0.0),
-    )
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
+    law = tawami.linear_elastic(E=1e6, nu=0.0)
     scene = tawami.Scene(grid, body, law, form="u")
     for edge, value in (("left", 0.0), ("right", size)):
         scene.fix(edge, "x", value)

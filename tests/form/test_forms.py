@@ -234,10 +234,8 @@ def test_constants_of_particles_have_arithmetic():
 
 def test_alpha_of_the_residual_based_stabilisation_is_limited():
     grid = grid_of()
-    body, law = (
-        tawami.box(grid, grid.origin, grid.upper, per_axis=2),
-        tawami.linear_elastic(E=1.0, nu=0.3),
-    )
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
+    law = tawami.linear_elastic(E=1.0, nu=0.3)
     options = {"form": "u_epsv", "stabilisation": "residual_based"}
     message = "alpha = 0.3 with 'residual_based': expected at most 0.14, .* use a smaller alpha"
     with pytest.raises(tawami.InputError, match=message):
@@ -251,10 +249,8 @@ def test_alpha_of_the_residual_based_stabilisation_is_limited():
 @pytest.mark.parametrize("form", ["u_epsv", "u_p", "u_epsv_finite"])
 def test_an_unusual_alpha_gets_a_warning(form):
     grid = grid_of()
-    body, law = (
-        tawami.box(grid, grid.origin, grid.upper, per_axis=2),
-        tawami.linear_elastic(E=1.0, nu=0.3),
-    )
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
+    law = tawami.linear_elastic(E=1.0, nu=0.3)
     tawami.Scene(grid, body, law, form=form, alpha=1.0)
     with pytest.warns(tawami.ParameterWarning, match="alpha = 2: expected at most 1, beyond which"):
         tawami.Scene(grid, body, law, form=form, alpha=2.0)
@@ -265,10 +261,8 @@ def test_an_unusual_alpha_gets_a_warning(form):
 ])  # fmt: skip
 def test_a_form_that_locks_warns(form, nu, locks):
     grid = grid_of()
-    body, law = (
-        tawami.box(grid, grid.origin, grid.upper, per_axis=2),
-        tawami.linear_elastic(E=1.0, nu=nu),
-    )
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
+    law = tawami.linear_elastic(E=1.0, nu=nu)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         tawami.Scene(grid, body, law, form=form)

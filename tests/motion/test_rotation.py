@@ -8,18 +8,9 @@ import numpy as np
 import pytest
 
 import tawami
-from cases.extremes import block
-from cases.extremes.rotation import SPIN
+from cases.extremes.rotation import SPIN, turning
 
-
-def spinning(nu, per_axis=3):
-    law = tawami.linear_elastic(E=block.E, nu=nu)
-    scene = block.scene(
-        "u_epsv_finite", law=law, cells=(8, 8), per_axis=per_axis, shift=(0.13, 0.07)
-    )
-    motion = block.spinning(scene, SPIN)
-    motion.velocity[:] -= motion.linear_momentum / block.MASS
-    return motion
+FORM = "u_epsv_finite"
 
 
 def turned(motion, turns, steps):
@@ -30,7 +21,7 @@ def turned(motion, turns, steps):
 
 @pytest.mark.parametrize(("nu", "steps"), [(0.3, 40), (0.45, 40), (0.49, 80), (0.4999, 80)])
 def test_a_turning_block_gains_no_energy(nu, steps):
-    motion = spinning(nu)
+    motion = turning(FORM, nu)
     start = motion.kinetic_energy
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -42,13 +33,13 @@ def test_a_turning_block_gains_no_energy(nu, steps):
 
 
 def test_a_stiff_block_warns_once_of_long_steps_and_the_advice_works():
-    motion = spinning(0.49)
+    motion = turning(FORM, 0.49)
     with pytest.warns(tawami.RotationWarning, match=r"turns by 0\.16 rad in a step") as caught:
         turned(motion, 0.1, 40)
     assert len([w for w in caught if w.category is tawami.RotationWarning]) == 1
     message = str(caught[0].message)
     dt = float(message.split("dt = ")[1].split(" s")[0])
-    motion = spinning(0.49)
+    motion = turning(FORM, 0.49)
     start = motion.kinetic_energy
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -57,7 +48,7 @@ def test_a_stiff_block_warns_once_of_long_steps_and_the_advice_works():
 
 
 def test_without_the_advice_the_block_gains_energy():
-    motion = spinning(0.49)
+    motion = turning(FORM, 0.49)
     start = motion.kinetic_energy
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -70,7 +61,7 @@ def test_without_the_advice_the_block_gains_energy():
 @pytest.mark.parametrize(("per_axis", "bound"), [(2, 5e-3), (3, 1.5e-3)])
 def test_a_hundred_turns(per_axis, bound):
     """Elastic energy at the end: physical is 4.5e-4 of the initial kinetic energy."""
-    motion = spinning(0.3, per_axis)
+    motion = turning(FORM, 0.3, per_axis)
     start = motion.kinetic_energy
     turned(motion, 100, 40)
     print(

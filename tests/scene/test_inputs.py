@@ -259,10 +259,8 @@ def test_an_error_of_newton_holds_its_history_and_changes_nothing():
         fields={"u": ("displacement", "w")}, kinematics="displacement", residual=residual
     )
     grid = grid_of()
-    body, material = (
-        tawami.box(grid, grid.origin, grid.upper, per_axis=2),
-        tawami.linear_elastic(**ELASTIC),
-    )
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
+    material = tawami.linear_elastic(**ELASTIC)
     with pytest.warns(InexactSumWarning):
         scene = tawami.Scene(grid, body, material, form=form, max_iterations=3)
     scene.fix("left", "x")

@@ -56,10 +56,8 @@ def measure(setting: Setting) -> dict[str, Any]:
 def first_scene(setting: Setting) -> float:
     """Seconds of the first scene of a process, most of it for the form and its kernels."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=1.0, cells=(4, 2))
-    body, law = (
-        tawami.box(grid, grid.origin, grid.upper, per_axis=2),
-        tawami.linear_elastic(E=E, nu=NU),
-    )
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
+    law = tawami.linear_elastic(E=E, nu=NU)
     start = perf_counter()
     tawami.Scene(grid, body, law, form="u_epsv", assembly=setting.assembly)
     return perf_counter() - start

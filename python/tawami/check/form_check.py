@@ -199,7 +199,7 @@ def _symmetry(form: Form, given: Settings) -> Found:
 
 def _differences(form: Form, given: Settings) -> Found:
     plastic = "plastic law"
-    if form.kinematics.has_mean_stress and not scenes.has_plastic_volume(form, given):
+    if scenes.preserves_volume(form, given):
         plastic += " that preserves the volume (the form has no eps_p)"
     for law, name in ((None, "elastic law"), (scenes.soil(form, given), plastic)):
         scene = scenes.cloud(form, given, law)

@@ -47,14 +47,15 @@ def grid_of(
 
 def soil(form: Form, given: Settings) -> Law:
     """A plastic law whose flow changes the volume, if the form has a term for that."""
-    if form.kinematics.has_mean_stress and not has_plastic_volume(form, given):
+    if preserves_volume(form, given):
         return lambda elastic: von_mises(elastic, yield_stress=0.1, hardening=0.1)
     return lambda elastic: drucker_prager(elastic, phi=20.0, c=0.05, psi=10.0)
 
 
-def has_plastic_volume(form: Form, given: Settings) -> bool:
-    """Whether the residual names the plastic volumetric strain."""
-    return compile_form(MPI.COMM_SELF, form, form.settings(given)[1]).names("eps_p")
+def preserves_volume(form: Form, given: Settings) -> bool:
+    """Whether the form serves only laws whose flow preserves the volume."""
+    compiled = compile_form(MPI.COMM_SELF, form, form.settings(given)[1])
+    return form.kinematics.has_mean_stress and not compiled.names("eps_p")
 
 
 def cloud(form: Form, given: Settings, law: Law | None = None, **options: Any) -> Scene:

@@ -59,6 +59,10 @@ from tawami.form.quantities import COMPONENTS
 
 #: Default of declarations that are optional.
 NOTHING: Mapping[str, Any] = {}
+#: What a form declares besides its residual; the first two are required.
+DECLARATIONS = (
+    "fields", "kinematics", "parameters", "options", "static_options", "strain", "whole_cells"
+)  # fmt: skip
 #: Keys that a parameter may declare.
 LIMITS = ("default", "minimum", "maximum", "usual")
 #: Names that every form has.
@@ -309,14 +313,5 @@ def _from_module(module: ModuleType, _residual: Any, name: str | None = None) ->
     name = name or f"'{module.__name__}'"
     if missing:
         raise FormError(f"form {name} declares no {quoted(missing)}: see tawami.form.form")
-    return Form(
-        fields=module.fields,
-        kinematics=module.kinematics,
-        residual=module.residual,
-        parameters=getattr(module, "parameters", {}),
-        options=getattr(module, "options", {}),
-        strain=getattr(module, "strain", "small"),
-        whole_cells=getattr(module, "whole_cells", ()),
-        static_options=getattr(module, "static_options", {}),
-        name=name,
-    )
+    declared = {key: getattr(module, key) for key in DECLARATIONS if hasattr(module, key)}
+    return Form(residual=module.residual, name=name, **declared)

@@ -54,15 +54,18 @@ class Steps(list[Step]):
 
     Attributes:
         loads: Share of the new loads that is in equilibrium after each step.
-        complete: Whether the end was reached.
         error: Why the next step failed; None if none did.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self.loads: list[float] = []
-        self.complete = False
         self.error: ConvergenceError | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Whether the end was reached."""
+        return self.error is None
 
     @property
     def reached(self) -> float:

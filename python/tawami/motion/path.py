@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
-from mpi4py import MPI
 
-from tawami.base import checks
+from tawami.base import checks, ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import ConvergenceError, InputError
 from tawami.field.constraints import held_point
@@ -133,13 +132,13 @@ class PathStep:
             )  # fmt: skip
             return controls.PointControl(held.indices, held.weights, following.sign * self.size)
         particles, comm, space = domain.particles, domain.model.grid.comm, domain.model.space
-        total = float(comm.allreduce(float(particles.volume.sum())))
+        total = ranks.sum_of(comm, np.array([particles.volume.sum()]))[0]
         last = following.direction[particles.number]
 
         def product(a: Array, b: Array) -> float:
             """Mean over the volume of a . b, particles x dim; the same bits on all ranks."""
-            own = float(particles.volume @ np.sum(a * b, axis=1))
-            return float(comm.allreduce(own, op=MPI.SUM) / total)
+            own = np.array([particles.volume @ np.sum(a * b, axis=1)])
+            return float(ranks.sum_of(comm, own)[0] / total)
 
         def at_particles(u: Array) -> Array:
             return domain.at_particles(space.vectors(u))
@@ -159,7 +158,7 @@ class PathStep:
         domain, point, dim = now.domain, following.point, now.model.space.dim
         own = np.zeros_like(following.direction)
         own[domain.particles.number] = domain.at_particles(accepted.u)
-        direction = now.model.grid.comm.allreduce(own, op=MPI.SUM)
+        direction = ranks.sum_of(now.model.grid.comm, own)
         control = accepted.problem.path.control if accepted.problem.path else None
         if now.model.moves and isinstance(control, controls.PointControl) and point is not None:
             x, y = point + control.weights @ accepted.u[control.indices // dim]
@@ -263,7 +262,6 @@ def follow(
         end_early(steps, error, stop, f"follow, with {following.factor:g} of the load,", scene)
     finally:
         scene.configuration.accept(following.factor)
-    steps.complete = steps.error is None
     return steps
 
 

@@ -141,7 +141,6 @@ def ramp(
         steps.loads = [step.end for step in steps]
         if pace.at < 1.0:
             scene.configuration.accept(pace.at)
-    steps.complete = steps.error is None
     return steps
 
 

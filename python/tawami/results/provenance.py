@@ -16,7 +16,7 @@ from typing import Any
 from tawami.base import program, ranks
 from tawami.base.files import atomic_file, result_folder
 from tawami.fem import environment
-from tawami.form.form import Form
+from tawami.form.form import DECLARATIONS, Form
 from tawami.form.kinematics import Kinematics, StrainMeasure
 from tawami.motion.observer import Subject
 
@@ -133,15 +133,7 @@ def source_of(form: Form) -> bytes | None:
     name = getattr(form.residual, "__name__", "residual")
     lines = [f"# Form {form.name}: defined in {file}"]
     lines += [f"from ufl import {', '.join(names)}"] if names else []
-    for key in (
-        "fields",
-        "kinematics",
-        "parameters",
-        "options",
-        "static_options",
-        "strain",
-        "whole_cells",
-    ):
+    for key in DECLARATIONS:
         value = getattr(form, key)
         text = str(value) if isinstance(value, Kinematics | StrainMeasure) else value
         lines.append(f"{key} = {text!r}")

@@ -232,27 +232,27 @@ class Configuration:
             return self._outcome(accepted, coefficients)
         problem, grid = accepted.problem, self.model.grid
         self.supports.follow(accepted.u, problem.reduction.points, problem.crossings)
-        travel = mean_stress.travel(self.domain, moved)
+        projects = self._must_project(moved)
         self.domain.particles.move_to(moved)
         outcome = self._outcome(accepted, coefficients)
         particles, gone = placement.removed(grid, self.domain.particles)
         self.left += [(number, x, time) for number, x in gone]
         self._attach(*placement.migrated(grid, particles))
-        self._project(travel)
-        return outcome
-
-    def _project(self, travel: float) -> None:
-        """Project the mean stress on the present grid once the particles have travelled far enough.
-
-        Args:
-            travel: In the last step, in cells.
-        """
         self.projected = 0.0
-        self._travel += travel
-        if self.model.form.kinematics.has_eps_v and self._travel > mean_stress.TRAVEL:
-            self._travel = 0.0
+        if projects:
             with self.stopwatch("commit"):
                 self.projected = mean_stress.project(self.domain)
+        return outcome
+
+    def _must_project(self, moved: Array) -> bool:
+        """Count the way to new positions, and whether the mean stress must be projected there."""
+        if not self.model.form.kinematics.has_eps_v:
+            return False
+        self._travel += mean_stress.travel(self.domain, moved)
+        if self._travel <= mean_stress.TRAVEL:
+            return False
+        self._travel = 0.0
+        return True
 
     def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:
         particles, comm = self.domain.particles, self.model.grid.comm

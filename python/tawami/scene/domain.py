@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,18 +70,18 @@ class Domain:
         stopwatch: Stopwatch,
     ) -> Domain:
         """Attach the form and the laws to particles at their present location."""
-        form = model.form
         with stopwatch("set-up"):
             attachment = Attachment(
                 model.grid, model.compiled, model.basis, location, particles.volume, model.values,
                 stopwatch,
             )  # fmt: skip
             assembly = ASSEMBLIES[numerics.assembly](attachment)
-        stage = _stage(model, particles, location, form.kinematics)
-        responses = Responses(
-            model.compiled, particles, location, stage, _constants(model, particles),
-            model.grid.comm, stopwatch,
-        )  # fmt: skip
+
+        def responses_of(stage: _rust.Stage | NumpyStage) -> Responses:
+            return Responses(
+                model.compiled, particles, location, stage, _constants(model, particles),
+                model.grid.comm, stopwatch,
+            )  # fmt: skip
 
         def elastic() -> Responses:
             """The same particles with the elastic parts of their laws."""
@@ -88,14 +89,12 @@ class Domain:
                 _rust.Material.linear_elastic_k_mu(float(K), float(mu)) if np.isfinite(K) else given
                 for given, (K, mu) in zip(model.materials, model.moduli, strict=True)
             ]
-            stage = _rust.Stage(
-                particles, location, laws, form.kinematics.name, model.moves, model.basis
+            return responses_of(
+                _rust_stage(model, particles, location, model.form.kinematics, laws)
             )
-            return Responses(
-                model.compiled, particles, location, stage, _constants(model, particles),
-                model.grid.comm, stopwatch,
-            )  # fmt: skip
 
+        stage = _stage(model, particles, location, model.form.kinematics)
+        responses = responses_of(stage)
         newton = Newton(assembly, responses, numerics, stopwatch, elastic)
         return cls(
             model, particles, location, assembly, Tractions(attachment), stage, responses, newton
@@ -192,12 +191,20 @@ class Domain:
             )
 
 
+def _rust_stage(
+    model: Model,
+    particles: _rust.Particles,
+    location: _rust.Location,
+    kinematics: Kinematics,
+    laws: Sequence[_rust.Material],
+) -> _rust.Stage:
+    return _rust.Stage(particles, location, list(laws), kinematics.name, model.moves, model.basis)
+
+
 def _stage(
     model: Model, particles: _rust.Particles, location: _rust.Location, kinematics: Kinematics
 ) -> _rust.Stage | NumpyStage:
-    rust = _rust.Stage(
-        particles, location, list(model.materials), kinematics.name, model.moves, model.basis
-    )
+    rust = _rust_stage(model, particles, location, kinematics, model.materials)
     return rust if model.law is None else NumpyStage(rust, particles, model.law, kinematics)
 
 

@@ -21,11 +21,9 @@ from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.scene.domain import Domain
 
-#: Size of the residual of the projection over that of its right-hand side, and most iterations. What is
-#: not reached stays as it was.
+#: Size of the residual of the projection over that of its right-hand side, and most iterations. The part
+#: that iterations do not find is lost, and rounding would make it depend on the number of ranks.
 TOLERANCE, MOST_ITERATIONS = 1e-11, 200
-
-
 #: Cells that the particles travel between two projections. A body at rest is left alone.
 TRAVEL = 0.25
 

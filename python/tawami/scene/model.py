@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks
+from tawami.base.arrays import Mask
 from tawami.base.errors import InputError, LockingWarning, ParameterWarning
 from tawami.base.sealed import Settings
 from tawami.base.space import Space
@@ -160,10 +161,11 @@ def build(
             "only"
         )
     _warn_of_locking(grid, loaded, materials, particles)
-    dilates = law is not None or any(one.pressure_dependent for one in materials)
-    compiled = compile_form(grid.comm, loaded, options, tangent_rule, plastic_volume=dilates)
+    dilates = np.array([law is not None or one.pressure_dependent for one in materials])
+    plastic_volume = bool(dilates.any())
+    compiled = compile_form(grid.comm, loaded, options, tangent_rule, plastic_volume=plastic_volume)
     check_used(compiled, options, parameters)
-    _check_plastic_volume(compiled, materials, law, particles)
+    _check_plastic_volume(compiled, dilates, law, particles)
     instead = "the form's parameters are fixed when a scene is made: Scene(..., {}=...)"
     used = {name: value for name, value in values.items() if name in compiled.used}
     model = Model(
@@ -188,7 +190,7 @@ def _particles(
 
 def _check_plastic_volume(
     compiled: CompiledForm,
-    materials: Sequence[_rust.Material],
+    dilates: Mask,
     law: NumpyLaw | None,
     particles: _rust.Particles,
 ) -> None:
@@ -200,7 +202,6 @@ def _check_plastic_volume(
     form = compiled.form
     if not form.kinematics.has_mean_stress or compiled.names("eps_p"):
         return
-    dilates = np.array([law is not None or m.pressure_dependent for m in materials])
     bad = np.flatnonzero(dilates[particles.material])
     if len(bad):
         why = "is a NumpyLaw" if law is not None else "depends on the mean stress"

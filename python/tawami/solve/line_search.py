@@ -11,6 +11,7 @@ small strain without friction; elsewhere it was not measured, or finds equilibri
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -35,9 +36,19 @@ class LineSearch:
     """
 
     def __init__(self, comm: Any, change: Array, residual: Array, num_displacement: int) -> None:
-        self._comm, self._weights = comm, change.copy()
-        self._weights[num_displacement:] *= -1
-        self._start = self._work(residual)
+        self._comm, self._change, self._residual = comm, change, residual
+        self._num_displacement = num_displacement
+
+    @functools.cached_property
+    def _weights(self) -> Array:
+        weights = self._change.copy()
+        weights[self._num_displacement :] *= -1
+        return weights
+
+    @functools.cached_property
+    def _start(self) -> float:
+        """The work at the beginning; most steps never ask for it."""
+        return self._work(self._residual)
 
     def _work(self, residual: Array) -> float:
         return float(self._comm.bcast(float(self._weights @ residual)))
