@@ -47,7 +47,7 @@ HIGHEST = 1.5  # load of a complete ramp, over Prandtl's
 GROUND = {0: (4, 2), 20: (6, 3), 30: (11, 5)}
 LAWS = {"mohr_coulomb": tawami.mohr_coulomb, "drucker_prager": tawami.drucker_prager}
 COLUMNS = (
-    "law", "phi", "psi", "nu", "n", "q", "error", "over_davis", "steps", "iterations", "seconds"
+    "form", "law", "phi", "psi", "nu", "n", "q", "error", "over_davis", "steps", "iterations", "seconds"
 )  # fmt: skip
 
 
@@ -163,6 +163,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     work += [("mohr_coulomb", 20, 20.0, 0.49, 8)]
     work = [one for one in work if one[-1] <= options.cells]
     rows = [solve(*one) for one in progress(work, desc="bearing capacity")]
+    rows.append(solve("mohr_coulomb", 20, 20.0, 0.49, 2, form="u"))
     print(as_text(rows, COLUMNS))
     PROGRAM.write("table.csv", as_csv(rows, COLUMNS))
     PROGRAM.list_results()
