@@ -25,6 +25,11 @@ def any_of(comm: Any, mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     return mask
 
 
+def least_of(comm: Any, value: float) -> float:
+    """The least of the numbers of all ranks."""
+    return float(comm.allreduce(value, op=MPI.MIN))
+
+
 def allgathered(comm: Any, part: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """The arrays of all ranks one after the other, on every rank."""
     if comm.size == 1:
