@@ -117,8 +117,10 @@ class Reduction:
         shape = (self.layout.size, self.size)
         if self._places is not None:
             rows, columns = self._places
-            start = np.concatenate([[0], np.cumsum(self._number_of >= 0)])
-            return sp.csr_matrix((np.ones(len(rows)), columns, start), shape=shape)
+            start = np.zeros(shape[0] + 1, dtype=np.int32)
+            np.cumsum(self._number_of >= 0, out=start[1:])
+            entries = (np.ones(len(rows)), columns.astype(np.int32), start)
+            return sp.csr_matrix(entries, shape=shape)
         assert self._eliminated is not None
         dependent, involved, weights = self._eliminated
         number, (row, column) = np.full(self.layout.size, -1), np.nonzero(weights)
