@@ -31,6 +31,6 @@ def check_in_body(domain: Domain, point: Sequence[float], what: str) -> None:
     grid = domain.model.grid
     edges.locate_point(grid, point, what)
     mine = np.linalg.norm(domain.particles.x - np.asarray(point), axis=1)
-    distance = ranks.least_of(grid.comm, float(mine.min(initial=np.inf)))
+    distance = -ranks.largest(grid.comm, -float(mine.min(initial=np.inf)))
     if distance > (0.5 + ROUND_OFF) * np.sqrt(grid.space.dim) * grid.h:
         raise InputError(f"{what}: {far(distance)}")
