@@ -27,12 +27,14 @@ class Term:
         number: Number in its action, in the order in which the driver script gave them.
         values: Components of the value: numbers, or functions of position.
         course: Its course in time.
+        since: Number of the term that the course came with.
         share: What of it the body carries.
     """
 
     number: int
     values: tuple[Profile, ...]
     course: Course
+    since: int
     share: Share = field(default_factory=Share)
 
     def at(self, now: Moment) -> float:
@@ -104,10 +106,11 @@ class Action:
 
     def _begin(self, values: tuple[Profile, ...], course: Course) -> None:
         """Replace the last term by another one."""
+        kept = [term.since for term in self.terms if term.course is course]
         for term in self.terms:
             term.share.target = 0.0
         self.terms = [term for term in self.terms if not term.share.is_gone]
-        self.terms.append(Term(self._made, values, course))
+        self.terms.append(Term(self._made, values, course, kept[-1] if kept else self._made))
         self._made += 1
         self._owner.changed()
 
@@ -184,8 +187,10 @@ class Action:
         terms = [
             {
                 "number": term.number,
+                "since": term.since,
                 "share": term.share.state(),
                 "values": [*map(plain, term.values)],
+                "course": term.course.plain,
             }
             for term in self.terms
         ]
@@ -197,20 +202,23 @@ class Action:
         """The reverse of :meth:`state`.
 
         Raises:
-            CheckpointError: A function of position, or of time, was given while the run went.
+            CheckpointError: It was changed to a function while the run went.
         """
         known = {term.number: term for term in self.terms}
-        last, self.terms = self.terms[-1], []
+        courses = {term.since: term.course for term in self.terms}
+        name, self.terms = f"{self}", []
         for stored in state["terms"]:
-            number, values = stored["number"], stored["values"]
+            number, since, values = stored["number"], stored["since"], stored["values"]
+            course = courses.get(since)
+            if course is None and not isinstance(stored["course"], str):
+                course = Course(name, stored["course"])
             term = known.get(number)
-            if term is None:
-                if any(isinstance(value, str) for value in values):
-                    raise CheckpointError(
-                        f"{self} was changed to a function while the run went (each=): expected changes "
-                        "to functions between two phases, or an amplitude"
-                    )
-                term = Term(number, tuple(values), last.course)
+            if course is None or (term is None and any(isinstance(v, str) for v in values)):
+                raise CheckpointError(
+                    f"{name} was changed to a function or another velocity while the run went (each=): "
+                    "expected such changes between two phases, or an amplitude"
+                )
+            term = term or Term(number, tuple(values), course, since)
             term.share.restore(stored["share"])
             self.terms.append(term)
         self._made, self.released = state["made"], state["released"]

@@ -90,6 +90,11 @@ class Course:
             return 0.5 * (end - start) * sum(self.rates(start, end))
         return self.factor(end) - self.factor(start)
 
+    @property
+    def plain(self) -> float | str:
+        """A constant amplitude; a word for a function or a velocity."""
+        return "a function" if self.moves else float(self._value(0.0))
+
     def identity(self) -> list[Any]:
         """What decides the results of a run, as JSON holds it."""
         return [self._name, text(self._given)]
