@@ -7,20 +7,9 @@ from contextlib import contextmanager
 
 from tawami.base.errors import InputError
 
-#: What a scene may be doing when a function of the driver script is called, and what to do instead.
-STEP = (
-    "while a step of this scene was being solved, by a law, an amplitude, a velocity or another "
-    "function that the step evaluates: expected a function that returns its values and leaves the "
-    "scene as it is"
-)
-CALLBACK = (
-    "within a run of this scene, by each=... or an output: expected each=... to read the solution or to "
-    "change loads and supports. Call it after the run"
-)
-
 
 class Activity:
-    """The time of a scene, and the steps and callbacks that it is in.
+    """The time of a scene, and whether it is in a step or in a callback of a run.
 
     Attributes:
         time: Time at the end of the last phase of statics, or of the last dynamic step [s].
@@ -28,7 +17,7 @@ class Activity:
 
     def __init__(self) -> None:
         self.time = 0.0
-        self._within: list[str] = []
+        self._in_step = self._in_callback = False
 
     @contextmanager
     def step(self, what: str) -> Iterator[None]:
@@ -41,22 +30,20 @@ class Activity:
             InputError: The scene is in a step or a callback already.
         """
         self.check_idle(what)
-        with self._in(STEP):
+        self._in_step = True
+        try:
             yield
+        finally:
+            self._in_step = False
 
     @contextmanager
     def callback(self) -> Iterator[None]:
         """A block that calls functions of the driver script between two steps of a run."""
-        with self._in(CALLBACK):
-            yield
-
-    @contextmanager
-    def _in(self, what: str) -> Iterator[None]:
-        self._within.append(what)
+        self._in_callback = True
         try:
             yield
         finally:
-            self._within.pop()
+            self._in_callback = False
 
     def check_idle(self, what: str) -> None:
         """Check that a step or a run may begin.
@@ -64,8 +51,12 @@ class Activity:
         Raises:
             InputError: The scene is in a step or a callback.
         """
-        if self._within:
-            raise InputError(f"{what} was called {self._within[-1]}")
+        self.check_between_steps(what)
+        if self._in_callback:
+            raise InputError(
+                f"{what} was called within a run of this scene, by each=... or an output: expected "
+                "each=... to read the solution or to change loads and supports. Call it after the run"
+            )
 
     def check_between_steps(self, what: str) -> None:
         """Check that loads, supports and the state of the particles may be changed.
@@ -73,5 +64,9 @@ class Activity:
         Raises:
             InputError: The scene is in a step.
         """
-        if STEP in self._within:
-            raise InputError(f"{what} was called {STEP}")
+        if self._in_step:
+            raise InputError(
+                f"{what} was called while a step of this scene was being solved, by a law, an "
+                "amplitude, a velocity or another function that the step evaluates: expected a function that "
+                "returns its values and leaves the scene as it is"
+            )

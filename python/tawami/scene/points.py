@@ -15,9 +15,17 @@ from tawami.scene.domain import Domain
 ROUND_OFF = 1e-9
 
 
-def far(distance: float) -> str:
-    """What is wrong with a point that is not in the body, for messages; the distance in m."""
-    return f"no body there; the nearest particle is {distance:.3g} m away: expected a point of the body"
+def outside(what: str, distance: float) -> InputError:
+    """The error for a point that is not in the body.
+
+    Args:
+        what: The point, for the message.
+        distance: To the nearest particle [m].
+    """
+    return InputError(
+        f"{what}: no body there; the nearest particle is {distance:.3g} m away: expected a point of the "
+        "body"
+    )
 
 
 def check_in_body(domain: Domain, point: Sequence[float], what: str) -> None:
@@ -33,4 +41,4 @@ def check_in_body(domain: Domain, point: Sequence[float], what: str) -> None:
     mine = np.linalg.norm(domain.particles.x - np.asarray(point), axis=1)
     distance = -ranks.largest(grid.comm, -float(mine.min(initial=np.inf)))
     if distance > (0.5 + ROUND_OFF) * np.sqrt(grid.space.dim) * grid.h:
-        raise InputError(f"{what}: {far(distance)}")
+        raise outside(what, distance)

@@ -18,7 +18,7 @@ from tawami.form.kinematics import KINEMATICS
 from tawami.grid import edges
 from tawami.scene.absent import Elsewhere
 from tawami.scene.configuration import Configuration, Outcome
-from tawami.scene.points import ROUND_OFF, far
+from tawami.scene.points import ROUND_OFF, outside
 
 Array = npt.NDArray[np.float64]
 
@@ -137,7 +137,7 @@ class Solution(Elsewhere, Sealed, Unique):
         reached = float(share.min())
         if reached < LEAST_SHARE:
             distance = np.linalg.norm(self.x - np.asarray(point), axis=1).min(initial=np.inf)
-            raise InputError(f"{what}: {far(float(distance))}")
+            raise outside(what, float(distance))
         return value if reached > 1 - ROUND_OFF else value / reached
 
     def reaction(self, place: str | Sequence[float]) -> Array:
