@@ -67,6 +67,6 @@ class Activity:
         if self._in_step:
             raise InputError(
                 f"{what} was called while a step of this scene was being solved, by a law, an "
-                "amplitude, a velocity or another function that the step evaluates: expected a function that "
-                "returns its values and leaves the scene as it is"
+                "amplitude, a velocity or another function that the step evaluates: expected a function "
+                "that returns its values and leaves the scene as it is"
             )
