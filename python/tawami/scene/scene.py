@@ -225,6 +225,7 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
             SupportError: Supports that leave a rigid motion free or contradict each other.
             ConvergenceError: Newton did not converge; the particles are as they were.
             SingularError: The tangent cannot be solved; the message names the cells.
+            SolverError: Memory for the linear system ran out.
             InputError: NaN or infinity in an array of the particles, a particle that would leave the
                 grid, a support with a velocity, an earlier time, or a call from within a step.
         """

@@ -25,6 +25,7 @@ from petsc4py import PETSc
 from tawami.base.arrays import Array
 from tawami.base.errors import SingularError
 from tawami.base.timing import Stopwatch
+from tawami.solve import failures
 from tawami.solve.linear_solver import Blocks, LinearSolver
 
 #: Iterations of FGMRES up to which a factorisation costs more, and at which FGMRES stops.
@@ -108,8 +109,8 @@ class DirectSolver(LinearSolver):
         """See `LinearSolver.solve`; direct if the tangent is factorised.
 
         Raises:
-            SingularError: The factorisation ran out of memory, or failed for a reason other than a
-                singular matrix.
+            SingularError: The tangent is singular, and so is its neighbour, or it holds NaN.
+            SolverError: Memory ran out, or MUMPS failed for a reason other than a singular matrix.
         """
         if not self._always and self._matrix is matrix and self.iterations <= PAYS:
             self._multiply(matrix, self._scale)
@@ -167,11 +168,8 @@ class DirectSolver(LinearSolver):
             code, detail = self._mumps(matrix, room)
             if code != -9:
                 break
-        if code < 0 and code not in (-10, -6):
-            raise SingularError(
-                f"MUMPS could not factorise the tangent (INFOG(1) = {code}, INFOG(2) = {detail}): see "
-                "the MUMPS users' guide; -9 and -13 mean too little memory"
-            )
+        if code < 0 and code not in failures.SINGULAR:
+            raise failures.of_mumps(code, detail, "factorise", matrix.getSize()[0])
         return code >= 0
 
     def _mumps(self, matrix: Any, room: int) -> tuple[int, int]:

@@ -21,6 +21,7 @@ from tawami.particles.responses import Responses
 from tawami.solve.diagnosis import Diagnosis
 from tawami.solve.direct import DirectSolver
 from tawami.solve.equations import Equations
+from tawami.solve.failures import reported
 from tawami.solve.inertia import Inertia
 from tawami.solve.iterate import Forces, Friction, Iterate
 from tawami.solve.iterative import IterativeSolver
@@ -156,6 +157,7 @@ class Newton:
             ConvergenceError: Newton did not reach the tolerance within `max_iterations`, or the
                 tangent became singular where that of an elastic body is not.
             SingularError: The tangent cannot be solved; the message names the cells.
+            SolverError: Memory ran out, or a library failed.
         """
         clean_up(self._comm)
         self._stopwatch.start()
@@ -188,7 +190,8 @@ class Newton:
             if len(history) > self.numerics.max_iterations:
                 advice = self._diagnosis.material()
                 self._fail(history, advice or equations.advice)
-            change, of_factor = self._change(iterate, forces, equations, add_mass, history)
+            with reported():
+                change, of_factor = self._change(iterate, forces, equations, add_mass, history)
             if equations.at_rest and not self._responses.form.strain.finite:
                 n = reduction.layout.num_displacement
                 search = LineSearch(self._comm, change, forces.residual, n)
