@@ -98,6 +98,6 @@ def unpack(arrays: Mapping[str, Any]) -> list[Step]:
             tuple(map(int, solves)),
         )
         for end, size, history, solves in zip(
-            arrays["end"], arrays["size"], histories, krylov, strict=False
+            arrays["end"], arrays["size"], histories, krylov, strict=True
         )
     ]
