@@ -130,8 +130,10 @@ def test_an_error_names_a_checkpoint_only_if_it_exists(tmp_path):
     for at, notes in ((1, []), (3, ["the state after step 2 of 3 is in '{}'"])):
         folder = tmp_path / f"{at}"
 
-        def fill(_solution, at=at, count=count(1)):
-            if next(count) == at:
+        calls = count(1)
+
+        def fill(_solution, at=at, calls=calls):
+            if next(calls) == at:
                 limit.enter_context(small_files(4000))
                 raise tawami.InputError("no")
 

@@ -23,7 +23,7 @@ from tawami.base.errors import CheckpointError
 from tawami.base.files import atomic_file, reason
 
 #: Version of the content of a state.
-FORMAT = 2
+FORMAT = 3
 #: Entry of the archive with the JSON.
 ABOUT = "about.json"
 #: Folder of the checkpoints in the folder of a run.
@@ -119,8 +119,12 @@ def check_particles(arrays: Any) -> None:
         if np.ndim(array) != 2 or len(rows) != 1:
             raise ValueError(f"'{name}' of the particles has the shape {np.shape(array)}")
     number = arrays["number"]
-    if (number != np.floor(number)).any() or len(np.unique(number)) != number.size:
-        raise ValueError("numbers of the particles are not whole, or repeat")
+    if (
+        (number != np.floor(number)).any()
+        or (number < 0).any()
+        or len(np.unique(number)) != number.size
+    ):
+        raise ValueError("numbers of the particles are not whole, negative, or repeat")
     if (arrays["volume"] <= 0).any():
         raise ValueError("volumes of the particles are not positive")
 

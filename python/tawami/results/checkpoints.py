@@ -18,6 +18,7 @@ from tawami.base.files import reason, writing
 from tawami.base.identity import same
 from tawami.base.ranks import raise_together
 from tawami.motion.observer import Subject
+from tawami.motion.pace import check as check_pace
 
 log = logging.getLogger("tawami")
 
