@@ -132,7 +132,7 @@ def check_particles(arrays: Any) -> None:
 def check_like(found: Any, own: Any, name: str) -> None:
     """Check a stored value against one of the same kind: type, columns of an array, finite numbers.
 
-    What `own` leaves open is not checked: None, an empty list, the number of rows.
+    What `own` leaves open is not checked: None, an empty list or dictionary, the number of rows.
 
     Args:
         found: The stored value.
@@ -150,8 +150,8 @@ def check_like(found: Any, own: Any, name: str) -> None:
         if np.isfinite(own).all() and not np.isfinite(found).all():
             raise ValueError(f"{name} is not finite")
     elif isinstance(own, Mapping):
-        if not isinstance(found, Mapping) or found.keys() != own.keys():
-            raise ValueError(f"{name} has not the entries {', '.join(own)}")
+        if not isinstance(found, Mapping) or (own and found.keys() != own.keys()):
+            raise ValueError(f"{name or 'the state'} has not the entries {', '.join(own)}")
         for key, value in own.items():
             check_like(found[key], value, f"{name}.{key}" if name else key)
     elif isinstance(own, list | tuple):

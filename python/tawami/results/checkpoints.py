@@ -138,10 +138,8 @@ class Checkpoints:
         try:
             archive.check_particles(state["scene"]["particles"])
             archive.check_like({name: state[name] for name in like}, like, "")
-            if not state["pace"]["size"] > 0:
-                raise ValueError(
-                    f"pace.size is {state['pace']['size']}, expected a positive number"
-                )
+            check_pace(state["pace"], state["steps"])
+            archive.check_like(state["outputs"], dict.fromkeys(state["outputs"], {}), "outputs")
         except (AttributeError, LookupError, TypeError, ValueError) as error:
             raise _unusable(path, error) from error
         return state
