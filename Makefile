@@ -33,7 +33,8 @@ cantilever: setup
 	$(PYTHON) -m cases.verification.cantilever
 
 # A file is tested by one process, so that what its tests share is computed once.
-PYTEST = $(PYTHON) -m pytest --quiet -n $(shell nproc) --dist loadfile --no-loadscope-reorder
+# nproc obeys OMP_NUM_THREADS, which make 4.4 passes on to $(shell).
+PYTEST = $(PYTHON) -m pytest --quiet -n $(shell env -u OMP_NUM_THREADS nproc) --dist loadfile --no-loadscope-reorder
 
 test: setup $(STAMPS)/cargo-tests
 	cargo test --locked --quiet

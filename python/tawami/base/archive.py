@@ -22,7 +22,7 @@ from tawami.base.errors import CheckpointError
 from tawami.base.files import atomic_file, reason
 
 #: Version of the content of a state.
-FORMAT = 2
+FORMAT = 3
 #: Entry of the archive with the JSON.
 ABOUT = "about.json"
 #: Folder of the checkpoints in the folder of a run.

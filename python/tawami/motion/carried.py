@@ -81,13 +81,11 @@ class Carried:
         if stationary is not None:
             return stationary
         domain = self._now.domain
-        v, a = (
-            divided(to_grid(domain, domain.mass, values, gradient), mass[:, None])
-            for values, gradient in (
-                (self.velocity, self.velocity_gradient),
-                (self.acceleration, self.acceleration_gradient),
-            )
+        fields = (
+            (self.velocity, self.velocity_gradient),
+            (self.acceleration, self.acceleration_gradient),
         )
+        v, a = (divided(sums, mass[:, None]) for sums in to_grid(domain, domain.mass, fields))
         return v, a
 
     def at_end(self, u: Array, before: Array, v1: Array, a1: Array, dt: float) -> dict[str, Array]:
@@ -104,12 +102,12 @@ class Carried:
         if self.transfer.flip and self._now.model.moves:
             flip = self.velocity + domain.at_particles(v1 - before)
             velocity = pic + np.exp(-dt / self.damping) * (flip - pic)
-        f = np.eye(self._space.dim) + domain.gradients(u)
+        back = np.linalg.inv(np.eye(self._space.dim) + domain.gradients(u))
         return {
             "velocity": velocity,
             "acceleration": domain.at_particles(a1),
-            "velocity_gradient": gradient_of(self.transfer, domain, v1, f),
-            "acceleration_gradient": gradient_of(self.transfer, domain, a1, f),
+            "velocity_gradient": gradient_of(self.transfer, domain, v1, back),
+            "acceleration_gradient": gradient_of(self.transfer, domain, a1, back),
         }
 
     def store(self, arrays: Mapping[str, Array], v1: Array, a1: Array) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 from tawami.base import checks
 from tawami.base.errors import InputError
@@ -43,6 +43,9 @@ class Results:
     Raises:
         InputError: A parameter out of its range.
     """
+
+    #: Number of phases that have begun in this process.
+    begun: ClassVar[int] = 0
 
     def __init__(
         self,
@@ -92,6 +95,7 @@ class Results:
             InputError: The folder holds a run, and `existing` is 'stop'.
             OutputError: The folder cannot be written.
         """
+        Results.begun += 1
         comm = subject.scene.grid.comm
         if not self._phases:
             with raise_together(comm):

@@ -18,6 +18,7 @@ show where a singular system is weak. So a singular tangent is noticed when it i
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -27,6 +28,7 @@ from petsc4py import PETSc
 from tawami.base.arrays import Array
 from tawami.base.errors import SingularError
 from tawami.base.timing import Stopwatch
+from tawami.solve import failures
 from tawami.solve.linear_solver import Blocks, LinearSolver
 
 #: Iterations of FGMRES up to which the factorisation is kept for the next tangent.
@@ -130,8 +132,8 @@ class DirectSolver(LinearSolver):
         """See `LinearSolver.solve`; direct if the tangent is factorised.
 
         Raises:
-            SingularError: The factorisation ran out of memory, or failed for a reason other than a
-                singular matrix.
+            SingularError: The tangent is singular, and so is its neighbour, or it holds NaN.
+            SolverError: Memory ran out, or MUMPS failed for a reason other than a singular matrix.
         """
         if not self._always and self._matrix is matrix and self.iterations <= PAYS:
             self._multiply(matrix, self._scale)
@@ -156,7 +158,7 @@ class DirectSolver(LinearSolver):
         """Factorise and solve; estimate the condition number and its direction."""
         begin, end = matrix.getOwnershipRange()
         size = matrix.getSize()[0]
-        probes = np.random.default_rng(0).standard_normal((PROBES, size))[:, begin:end]
+        probes = _probes(size)[:, begin:end]
         with self._stopwatch("scale"):
             self.symmetric = self._is_symmetric(matrix, probes[0])
         with self._stopwatch("factorise"):
@@ -194,11 +196,8 @@ class DirectSolver(LinearSolver):
                 self._analysed = None
             if code != -9:
                 break
-        if code < 0 and code not in (-10, -6):
-            raise SingularError(
-                f"MUMPS could not factorise the tangent (INFOG(1) = {code}, INFOG(2) = {detail}): see "
-                "the MUMPS users' guide; -9 and -13 mean too little memory"
-            )
+        if code < 0 and code not in failures.SINGULAR:
+            raise failures.of_mumps(code, detail, "factorise", matrix.getSize()[0])
         return code >= 0
 
     def _mumps(self, matrix: Any, room: int) -> tuple[int, int]:
@@ -286,3 +285,9 @@ class _Pays:
             if np.log(norm / target) > COST * rate or iteration >= LIMIT:
                 return int(PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT)
         return 0
+
+
+@functools.lru_cache(maxsize=1)
+def _probes(size: int) -> Array:
+    """Random vectors for the condition number, the same in every factorisation."""
+    return np.random.default_rng(0).standard_normal((PROBES, size))
