@@ -139,7 +139,7 @@ class Checkpoints:
             archive.check_particles(state["scene"]["particles"])
             archive.check_like({name: state[name] for name in like}, like, "")
             check_pace(state["pace"], state["steps"])
-            archive.check_like(state["outputs"], dict.fromkeys(state["outputs"], {}), "outputs")
+            archive.check_like(state["outputs"], {key: {} for key in state["outputs"]}, "outputs")
         except (AttributeError, LookupError, TypeError, ValueError) as error:
             raise _unusable(path, error) from error
         return state
