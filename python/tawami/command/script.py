@@ -19,6 +19,7 @@ from mpi4py import MPI
 from tawami.base import program
 from tawami.base.errors import InputError
 from tawami.base.files import readable_file, reason
+from tawami.results.results import EXISTING, Results
 
 #: Exit code of a program that Ctrl-C ended, as in a shell.
 INTERRUPTED = 130
@@ -139,10 +140,21 @@ def _run_on_ranks(script: Script, number: int) -> int:
 
 def _run_here(script: Script) -> int:
     """Run a script under the rules of `tawami.run`."""
+    before = Results.begun
     try:
         program.run(lambda: _run_as_main(script), script.name)
+    except SystemExit as end:
+        if end.code:
+            raise
     except Exception as error:
         program.stop("".join(traceback.format_exception(_from_script(error))))
+    existing = os.environ.get(EXISTING)
+    if existing is not None and Results.begun == before and MPI.COMM_WORLD.rank == 0:
+        print(
+            f"{script.name}: --{existing} had no effect: the script ran from its beginning, and wrote "
+            "no results with tawami.Results(...) and results=...",
+            file=sys.stderr,
+        )
     return 0
 
 
