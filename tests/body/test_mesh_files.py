@@ -198,6 +198,7 @@ def test_abaqus_with_one_set_of_two_types(tmp_path):
         (abaqus("CPE4", QUADS, "*Instance\n1., 0.\n"), r"\*INSTANCE moves its part"),
         (abaqus("CPE4", QUADS, "*Node\n11, a, b\n"), "'a b': expected numbers"),
         (abaqus("CPE4", QUADS, "*Node\n11, 1, 2, 3, 4\n"), "'11 1 2 3 4': expected a node, its number"),
+        ("", "holds no elements: expected triangles or quadrilaterals"),
         ("*Heading\n", "holds no elements: expected triangles or quadrilaterals"),
     ],
 )  # fmt: skip

@@ -44,7 +44,7 @@ def _sections(text: list[str]) -> Iterator[tuple[int, str, dict[str, str], list[
         else:
             joined.append((k, line))
     starts = [k for k, (_, line) in enumerate(joined) if line.startswith("*")]
-    for start, end in zip(starts, [*starts[1:], len(joined)], strict=True):
+    for start, end in zip(starts, [*starts[1:], len(joined)], strict=bool(starts)):
         number, head = joined[start]
         keyword, *given = (word.strip() for word in head[1:].split(","))
         options = {

@@ -110,7 +110,13 @@ def _sets(read: Any, blocks: Blocks) -> dict[str, Mask]:
             continue
         masks = [np.zeros(len(block.data), dtype=bool) for _, block in blocks]
         for mask, (k, _) in zip(masks, blocks, strict=True):
-            mask[np.asarray(of_block[k], dtype=np.int64)] = True
+            members = np.asarray(of_block[k], dtype=np.int64)
+            if len(members) and not (members.min() >= 0 and members.max() < len(mask)):
+                raise InputError(
+                    f"mesh: cell set '{name}' has the elements {members.min()} to {members.max()} of "
+                    f"block {k}: expected numbers from 0 to {len(mask) - 1}"
+                )
+            mask[members] = True
         if any(mask.any() for mask in masks):
             found[str(name)] = np.concatenate(masks)
     return found
@@ -122,6 +128,7 @@ def _values(read: Any, blocks: Blocks, name: str) -> Indices:
     values = np.concatenate([np.ravel(part) for part in data])
     if (
         len(values) != sum(len(block.data) for _, block in blocks)
+        or values.dtype.kind not in "iuf"
         or not np.isfinite(values).all()
         or (values.astype(np.int64) != values).any()
     ):

@@ -99,8 +99,8 @@ def _plane(grid: Grid, read: Any, used: Indices) -> Array:
         z = points[used, 2]
         if not np.ptp(z) <= clipping.tolerance(grid.in_cells(plane[used])) * grid.h:
             raise InputError(
-                f"mesh: its nodes have z from {z.min():g} to {z.max():g} m: expected a plane mesh, "
-                "with one z everywhere"
+                f"mesh: its nodes have z from {z.min():g} to {z.max():g} m: expected a plane mesh in "
+                "x and y, with one z everywhere"
             )
     return plane
 
@@ -115,10 +115,17 @@ def _blocks(read: Any) -> list[tuple[int, Any]]:
             "quadratic (points and lines are ignored)"
         )
     blocks = [(k, block) for k, block in found if block.type in CORNERS]
+    for _, block in blocks:
+        if block.data.min() < 0 or block.data.max() >= len(read.points):
+            raise InputError(
+                f"mesh: its elements have nodes {block.data.min()} to {block.data.max()}: expected "
+                f"numbers from 0 to {len(read.points) - 1}, as there are {len(read.points)} nodes"
+            )
     if not blocks:
         raise InputError(
             f"mesh: it holds {', '.join(sorted({b.type for _, b in found})) or 'no elements'}: expected "
-            "triangles or quadrilaterals; in Gmsh the surface must be meshed and in a physical group"
+            "triangles or quadrilaterals; mesh the surface before the file is saved (Gmsh saves only "
+            "physical groups, if there are any)"
         )
     return blocks
 
