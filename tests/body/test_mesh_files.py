@@ -57,6 +57,22 @@ def gmsh_4(groups, names, *, binary=False, lines=()):
     return head
 
 
+def gmsh_40(groups, names, lines=()):
+    """Version 4.0 has other sections of nodes and elements."""
+    head = gmsh_4(groups, names, lines=lines).decode().replace("4.1 0 8", "4.0 0 8")
+    rows = ["$Nodes", "1 8", "1 2 0 8", *(f"{k} {x} {y} 0" for k, (x, y) in enumerate(NODES, 1))]
+    rows += ["$EndNodes", "$Elements", f"{3 + len(lines)} {6 + len(lines)}"]
+    rows += [
+        row for k in range(1, len(lines) + 1) for row in (f"{k} 1 1 1", f"{6 + k} {k} {k + 1}")
+    ]
+    for k in range(3):
+        rows += [f"{k + 1} 2 2 2"]
+        rows += [
+            f"{e + 1} {' '.join(str(n + 1) for n in TRIANGLES[e])}" for e in (2 * k, 2 * k + 1)
+        ]
+    return head[: head.index("$Nodes")] + "\n".join([*rows, "$EndElements", ""])
+
+
 def gmsh_2(groups, names, **_):
     """Version 2.2: an element is listed for each of its physical groups."""
     lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names))]
@@ -75,6 +91,7 @@ def gmsh_2(groups, names, **_):
 NAMES = [(2, 1, "soil"), (2, 2, "clay"), (2, 3, "sand"), (1, 9, "clay")]
 WRITERS = {
     "2.2": lambda *a, **o: gmsh_2(*a, **o).encode(),
+    "4.0": lambda *a, **o: gmsh_40(*a, **o).encode(),
     "4.1": gmsh_4,
     "4.1 binary": lambda *a, **o: gmsh_4(*a, **o, binary=True),
 }
