@@ -74,7 +74,8 @@ class Attachment:
             sums = _rust.nodal_sums(location, once, once[:, None], basis)
             self.layout.tie(self.summed(sums)[:, 0], UNRESOLVED)
         self.points: dict[Rule, list[tuple[int, ...]]] = {
-            rule: _point_indices(rule, swapped=grid.rectangle.swapped) for rule in compiled.densities
+            rule: _point_indices(rule, swapped=grid.rectangle.swapped)
+            for rule in compiled.densities
         }
 
     def constants(self, integral: Integral) -> Array:

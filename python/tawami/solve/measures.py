@@ -110,7 +110,9 @@ class Measures:
         volume = None
         if self._responses.form.kinematics.volume_fields:
             sums = self._responses.sums(self._volume_scale(coefficients)[:, None])
-            volume = float(np.divide(norm(free[~of_u]), norm(sums.ravel())))  # NaN without any scale
+            volume = float(
+                np.divide(norm(free[~of_u]), norm(sums.ravel()))
+            )  # NaN without any scale
         return ranks.same(self._comm, (momentum, volume))  # the same bits on all ranks
 
     def _is_at_rest(self, scale: float, u: Array, offset: Array, inertia: Inertia | None) -> bool:
