@@ -27,6 +27,7 @@ enter() {
     shift
     mount -t proc proc "$root/proc"
     mount --rbind /dev "$root/dev"
+    mount --rbind /sys "$root/sys" # MPI looks for processors and network devices there
     mount -t tmpfs tmpfs "$root/tmp"
     if [ -d "$root/opt/rust" ]; then
         mount --bind "$MATRIX_RUST" "$root/opt/rust"

@@ -70,7 +70,7 @@ def to_grid(
     space, columns = domain.model.space, list[Array]()
     for values, gradient in fields:
         at_origin = values - np.einsum("pij,pj->pi", gradient, at)
-        columns += [at_origin, gradient.reshape(-1, space.dim**2)]  # a rank may have no particles
+        columns += [at_origin, gradient.reshape(-1, space.dim**2)]
     sums = np.split(domain.sums(mass, np.hstack(columns)), len(fields), axis=1)
     moments = (np.einsum("ikl,il->ik", space.tensors(s[:, space.dim :]), points) for s in sums)
     return tuple(s[:, : space.dim] + moment for s, moment in zip(sums, moments, strict=True))

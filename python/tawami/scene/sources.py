@@ -60,7 +60,7 @@ def _of_numbers(source: Any, n: int, width: int, name: str) -> Array:
     few = {1: "a number", 2: "two numbers"}.get(width, f"{width} numbers")
     shape = (n, width) if width > 1 else (n,)
     try:
-        array = np.asarray(source, dtype=float)
+        array = checks.real_values(source)
         if array.shape not in (shape, shape[1:]):
             raise ValueError
         given = np.broadcast_to(array, shape)
@@ -75,7 +75,9 @@ def _of_numbers(source: Any, n: int, width: int, name: str) -> Array:
 
 def _shape(source: Any) -> str:
     try:
-        return f"shape {np.asarray(source, dtype=float).shape}"
+        if np.iscomplexobj(source):
+            return "complex numbers"
+        return f"shape {checks.real_values(source).shape}"
     except (TypeError, ValueError, OverflowError):
         if isinstance(source, tuple | list):
             with suppress(ValueError):
@@ -96,9 +98,9 @@ def _of_function(f: Callable[[Array, Array], Any], x: Array, name: str, componen
         if isinstance(result, tuple | list) and width > 1:
             if len(result) != width:
                 raise ValueError
-            columns = [np.broadcast_to(np.asarray(part, dtype=float), n) for part in result]
+            columns = [np.broadcast_to(checks.real_values(part), n) for part in result]
             return np.column_stack(columns)
-        array = np.asarray(result, dtype=float)
+        array = checks.real_values(result)
         if width == 1:
             return np.broadcast_to(array, n)[:, None]
         if array.shape not in ((n, width), (width,)):
