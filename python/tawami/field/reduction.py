@@ -72,10 +72,10 @@ class Reduction:
         free = layout.active & ~self.fixed
         self._eliminated = None
         if points:
-            dependent, *others, values = _eliminate(
+            dependent, involved, weights, values = _eliminate(
                 points, self.fixed, total, start, tolerance, held
             )
-            self._eliminated = (dependent, *others)
+            self._eliminated = (dependent, involved, weights)
             free[dependent] = False
             self.offset[dependent] = values
         self._number(free)
