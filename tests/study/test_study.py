@@ -96,7 +96,7 @@ def test_every_setting_is_run_once(tmp_path, capsys):
     before = (tmp_path / "runs.jsonl").read_bytes()
     assert study.run().rows == table.rows
     assert (tmp_path / "runs.jsonl").read_bytes() == before
-    assert {"toy.csv", "toy.png", "runs.jsonl"} == {path.name for path in tmp_path.iterdir()}
+    assert {"toy.csv", "toy.png", "runs.jsonl"} == {path.name for path in tmp_path.glob("[!.]*")}
 
 
 @pytest.mark.usefixtures("in_this_process")

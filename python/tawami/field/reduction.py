@@ -168,7 +168,7 @@ class Reduction:
         rows, columns = self._places
         if len(rows) == self.size:
             return np.asarray(forces[self.unknowns])
-        return np.asarray(np.bincount(columns, forces[rows], minlength=self.size), dtype=float)
+        return np.asarray(np.bincount(columns, forces[rows], self.size), dtype=float)
 
     def diagonal(self, masses: Array) -> Array | None:
         """The diagonal of S^T M S, M the diagonal matrix of masses of all coefficients.

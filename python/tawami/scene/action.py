@@ -224,6 +224,8 @@ class Action:
             term = term or Term(number, tuple(values), course, since)
             term.share.restore(stored["share"])
             self.terms.append(term)
+        if not self.terms:
+            raise CheckpointError(f"{name} has no value in the checkpoint: expected one")
         self._made, self.released = state["made"], state["released"]
 
 

@@ -12,7 +12,8 @@ import numpy as np
 from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array
-from tawami.base.errors import SingularError
+from tawami.base.errors import CheckpointError, SingularError
+from tawami.base.files import reason
 from tawami.base.petsc import clean_up
 from tawami.base.timing import Stopwatch, tally
 from tawami.field.assembly import Assembly
@@ -123,9 +124,16 @@ class Newton:
     def _restore(self, tangent: Any, reduction: Reduction) -> None:
         """Factorise a stored state again, if the first tangent after it has the same unknowns."""
         state, self._stored = self._stored, None
-        if state is None or self._comm.size > 1 or reduction.digest != state["unknowns"]:
+        if state is None or self._comm.size > 1:
             return
-        self._solver.restore(state["factorised"], tangent)
+        try:
+            if reduction.digest == state["unknowns"]:
+                self._solver.restore(state["factorised"], tangent)
+        except Exception as error:
+            raise CheckpointError(
+                f"the factorisation in the checkpoint cannot be used ({reason(error)}): its content is "
+                "not what tawami writes. Remove the checkpoint to resume from the one before it"
+            ) from error
 
     # -- one step ----------------------------------------------------------------
 
