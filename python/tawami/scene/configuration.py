@@ -321,6 +321,7 @@ class Configuration:
             self.model.grid, self.domain.particles, state["particles"], moving=self.model.moves
         )
         self.activity.time, self.total = state["time"], state["total"]
+        self.activity.statics += 1
         self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
         self._coverage_checked, self.begun = state["coverage_checked"], True
         self._travel = state["travel"]
