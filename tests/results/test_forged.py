@@ -80,19 +80,19 @@ def resumed_from_all(scene, folder, begin, step):
             rejected += 1
             assert "\n" not in str(error) or isinstance(error, tawami.ConvergenceError)
         except Exception as error:
-            error.add_note(f"{at} = {value!r}")
+            error.add_note(f"{at} = {value!s:.200}")
             raise
         shutil.rmtree(work)
     return rejected
 
 
-def test_a_forged_checkpoint_is_rejected_with_one_sentence(tmp_path):
+def test_a_forged_checkpoint_is_rejected_with_an_error_message(tmp_path):
     assert resumed_from_all(block, tmp_path, 7, 79) > 10
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("scene", [block, small_strain])
 @pytest.mark.parametrize("begin", range(2))
-def test_every_forged_checkpoint_is_rejected_with_one_sentence(tmp_path, scene, begin):
+def test_every_forged_checkpoint_is_rejected_with_an_error_message(tmp_path, scene, begin):
     assert resumed_from_all(scene, tmp_path, begin, 2) > 400

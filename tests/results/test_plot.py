@@ -183,3 +183,23 @@ def test_a_missing_package_or_program_is_named(scene, tmp_path, monkeypatch):
         tawami.MissingDependencyError, match="'mp4' needs ffmpeg: install it, or use"
     ):
         plot(tmp_path, movie="mp4")
+
+
+def test_nothing_outside_the_folder_is_read(scene, tmp_path):
+    """Links to a table, an index, a file of a series, a phase and the record of the run."""
+    home, other = tmp_path / "run", tmp_path / "other"
+    for folder in (home, other):
+        run_of(folder, scene, phases=("motion",), frames=2)
+    for name in ("motion/table.csv", "motion/particles.pvd", "motion", "run.json"):
+        kept = home / "kept"
+        (home / name).rename(kept)
+        (home / name).symlink_to(other / name)
+        with pytest.raises(tawami.InputError, match=rf"is a link to '{other}/{name}.*outside the"):
+            plot(home, movie=None)
+        (home / name).unlink()
+        kept.rename(home / name)
+    last = home / "motion" / "particles" / "particles-000001.vtu"
+    last.unlink()
+    last.symlink_to(other / "motion" / "particles" / "particles-000001.vtu")
+    with pytest.raises(tawami.OutputError, match="its entry 2 has the file .*not in this folder"):
+        plot(home, movie=None)

@@ -115,7 +115,7 @@ def check_particles(arrays: Any) -> None:
         raise ValueError("it has no positions, numbers and volumes of particles")
     rows = {getattr(array, "shape", (None,))[:1] for array in arrays.values()}
     for name, array in arrays.items():
-        check_like(array, np.zeros((0, *np.shape(array)[1:])), f"'{name}' of the particles")
+        check_like(array, np.zeros((1, *np.shape(array)[1:])), f"'{name}' of the particles")
         if np.ndim(array) != 2 or len(rows) != 1:
             raise ValueError(f"'{name}' of the particles has the shape {np.shape(array)}")
     number = arrays["number"]
@@ -147,7 +147,7 @@ def check_like(found: Any, own: Any, name: str) -> None:
         if not same or found.shape[1:] != own.shape[1:] or found.ndim != own.ndim:
             shown = f"{found.dtype} {found.shape}" if isinstance(found, np.ndarray) else repr(found)
             raise ValueError(f"{name} is {shown[:60]}, expected {own.dtype} {own.shape}")
-        if np.isfinite(own).all() and not np.isfinite(found).all():
+        if own.size and np.isfinite(own).all() and not np.isfinite(found).all():
             raise ValueError(f"{name} is not finite")
     elif isinstance(own, Mapping):
         if not isinstance(found, Mapping) or (own and found.keys() != own.keys()):

@@ -158,10 +158,15 @@ def _add_run(commands: Any) -> None:
 
 def _add_resume(commands: Any) -> None:
     parser = _add(commands, "resume", _resume, "resume an interrupted run", (
-        "Runs the script or module of these results again, with the same arguments, in the same "
-        "directory: finished phases are loaded, the interrupted phase continues from its newest "
-        "checkpoint."
+        "Runs the copy of the script in this folder, with the same arguments, in the same directory: "
+        "finished phases are loaded, the interrupted phase continues from its newest checkpoint. A "
+        "folder of results is code: resume only runs that you trust."
     ))  # fmt: skip
+    parser.add_argument(
+        "--trust",
+        action="store_true",
+        help="run the copy also if it is not the script that the run was started with",
+    )
     parser.add_argument("folder", metavar="FOLDER", help="folder of results, as results/pile")
     _add_ranks(parser)
     _add_log_level(parser)
@@ -251,9 +256,8 @@ def _run(asked: argparse.Namespace) -> int:
 
 
 def _resume(asked: argparse.Namespace) -> int:
-    return resume(
-        checks.path("tawami resume: folder", asked.folder), asked.ranks, _environment(asked)
-    )
+    folder = checks.path("tawami resume: folder", asked.folder)
+    return resume(folder, asked.ranks, _environment(asked), trust=asked.trust)
 
 
 def _plot(asked: argparse.Namespace) -> int:

@@ -43,11 +43,13 @@ def plot(
         The files.
 
     Raises:
-        InputError: No run, neither particles nor tables in it, or no such quantity.
+        InputError: No run, neither particles nor tables in it, no such quantity, or a link out of the
+            folder.
         OutputError: A file of the run cannot be read, or a picture cannot be written.
         MissingDependencyError: matplotlib is not installed, or ffmpeg for an mp4.
     """
     home = checks.path("plot: folder", folder)
+    _check_inside(home)
     grid = _corners(home)
     if movie is not None:
         checks.choice("movie", movie, ("gif", "mp4"))
@@ -66,7 +68,7 @@ def plot(
         quantity = USUAL if USUAL in known else next(iter(known), USUAL)
     else:
         checks.choice("quantity", quantity, known, "the run did not write it: ")
-    pictures, stem = result_folder(home / "figures"), quantity.replace(" ", "-")
+    pictures, stem = result_folder(home / "figures"), re.sub(r"[^\w.+]", "-", quantity)
     written = []
     for phase, times in series:
         if quantity in scalars(times[-1][1]()):
@@ -77,6 +79,20 @@ def plot(
     for path, table in tables:
         written += _table(table, pictures / f"{path.name}-{table.stem}.png")
     return written
+
+
+def _check_inside(home: Path) -> None:
+    """Check that the files to read are in the folder: links could lead to any other file.
+
+    Raises:
+        InputError: A link leads out of the folder.
+    """
+    for path in (home / RUN, *(p for ending in ("pvd", "csv") for p in home.glob(f"*/*.{ending}"))):
+        if not path.resolve().is_relative_to(home.resolve()):
+            raise InputError(
+                f"plot: '{path}' is a link to '{path.resolve()}', outside the folder: expected the "
+                "files of the run in its folder; copy them into it"
+            )
 
 
 def _corners(home: Path) -> Corners:

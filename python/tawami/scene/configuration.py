@@ -16,8 +16,8 @@ import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks, ranks, signals
-from tawami.base.errors import ConvergenceError
-from tawami.base.identity import fingerprint
+from tawami.base.errors import CheckpointError, ConvergenceError
+from tawami.base.meaning import fingerprint
 from tawami.base.process import check_process
 from tawami.base.timing import Stopwatch
 from tawami.particles import placement
@@ -315,11 +315,13 @@ class Configuration:
         """The reverse of :meth:`state`, for a scene that was made in the same way; a call for all ranks.
 
         Raises:
-            CheckpointError: Particles with other arrays.
+            CheckpointError: Particles or fields with other arrays.
         """
         particles, location = placement.scattered(
             self.model.grid, self.domain.particles, state["particles"], moving=self.model.moves
         )
+        if np.shape(state["total"]) != self.total.shape:
+            raise CheckpointError("its fields have another number of coefficients than the scene")
         self.activity.time, self.total = state["time"], state["total"]
         self.activity.statics += 1
         self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
