@@ -123,7 +123,7 @@ $(STAMPS)/debian: $(STAMPS)/rust Makefile
 PIP = $(PYTHON) -m pip install --quiet --disable-pip-version-check --constraint .venv/constraints.txt
 
 $(STAMPS)/python: .venv/constraints.txt pyproject.toml
-	$(PIP) 'maturin>=1.12.1,<2' 'meshio>=5.3' 'shapely>=2.1' 'matplotlib>=3.7' 'tqdm>=4.60' 'hypothesis>=6.80' 'mypy>=1.10' 'pytest>=7.4' 'pytest-xdist>=3.7'
+	$(PIP) 'maturin>=1.12.1,<2' 'filelock>=4.3' 'meshio>=5.3' 'shapely>=2.1' 'matplotlib>=3.7' 'tqdm>=4.60' 'hypothesis>=6.80' 'mypy>=1.10' 'pytest>=7.4' 'pytest-xdist>=3.7'
 	@mkdir -p $(STAMPS) && touch $@
 
 $(STAMPS)/lint: $(STAMPS)/python

@@ -51,9 +51,10 @@ from tawami.particles.numpy_law import NumpyLaw
 from tawami.results.outputs import GridOutput, ParticleOutput
 from tawami.results.results import Results
 from tawami.results.table import TableOutput
+from tawami.scene.earlier import earlier
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
-from tawami.scene.sources import earlier, table
+from tawami.scene.table import table
 from tawami.study import Series, Study, recommend
 
 __all__ = [

@@ -101,7 +101,7 @@ def solved(scene: tawami.Scene, method: str) -> Callable[..., Any]:
 
     def call(**arguments: Any) -> None:
         getattr(scene, method)(**arguments)
-        if any(support.velocity is not None for support in scene.configuration.supports.all):
+        if any(support.has_velocity for support in scene.configuration.supports.all):
             tawami.Dynamics(scene).step(0.01)
         else:
             scene.solve()

@@ -131,7 +131,7 @@ def test_a_static_scene_assembles_no_mass(monkeypatch):
     def refuse(*_):
         raise AssertionError("a mass")
 
-    monkeypatch.setattr(Inertia, "reduced", refuse)
+    monkeypatch.setattr(Inertia, "adder", refuse)
     monkeypatch.setattr(Domain, "mass", property(refuse))
     scene = scene_of(density=1.0, form="u_epsv_finite")
     scene.traction("top", (0.0, -0.1))
@@ -140,7 +140,7 @@ def test_a_static_scene_assembles_no_mass(monkeypatch):
     with pytest.raises(AssertionError, match="a mass"):
         scene.solve()
     monkeypatch.undo()
-    monkeypatch.setattr(Inertia, "reduced", refuse)
+    monkeypatch.setattr(Inertia, "adder", refuse)
     scene.solve()
     with pytest.raises(AssertionError, match="a mass"):
         tawami.Dynamics(scene).step(0.01)

@@ -87,3 +87,11 @@ def add_rows(matrix: Any, rows: sp.csr_matrix) -> None:
     start, columns = (part.astype(PETSc.IntType) for part in (rows.indptr, rows.indices))
     matrix.setValuesCSR(start, columns, rows.data, addv=True)
     matrix.assemble()
+
+
+def add_diagonal(matrix: Any, values: Any) -> None:
+    """Add to the diagonal of a PETSc matrix whose pattern contains it, the entries of this rank."""
+    vector = matrix.createVecLeft()
+    vector.setArray(values)
+    matrix.setDiagonal(vector, addv=True)
+    vector.destroy()

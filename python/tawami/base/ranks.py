@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
+
+Value = TypeVar("Value")
 
 
 def sum_of(comm: Any, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -23,6 +25,19 @@ def any_of(comm: Any, mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     if comm.size > 1:
         comm.Allreduce(MPI.IN_PLACE, mask, op=MPI.LOR)
     return mask
+
+
+def same(comm: Any, value: Value) -> Value:
+    """The value that rank 0 has, on every rank."""
+    if comm.size == 1:
+        return value
+    received: Value = comm.bcast(value)
+    return received
+
+
+def largest(comm: Any, value: float) -> float:
+    """The largest value of all ranks, on every rank."""
+    return value if comm.size == 1 else float(comm.allreduce(value, op=MPI.MAX))
 
 
 def allgathered(comm: Any, part: npt.NDArray[Any]) -> npt.NDArray[Any]:

@@ -22,15 +22,9 @@ class Stopwatch:
         self.cpu: dict[str, float] = {}
         self.laps: list[dict[str, float]] = []
 
-    @contextmanager
-    def __call__(self, stage: str) -> Iterator[None]:
+    def __call__(self, stage: str) -> Stage:
         """Add the time of the block to a stage."""
-        start, busy = perf_counter(), process_time()
-        try:
-            yield
-        finally:
-            self.seconds[stage] = self.seconds.get(stage, 0.0) + perf_counter() - start
-            self.cpu[stage] = self.cpu.get(stage, 0.0) + process_time() - busy
+        return Stage(self, stage)
 
     def start(self) -> None:
         """Begin a step."""
@@ -39,6 +33,23 @@ class Stopwatch:
     def lap(self) -> None:
         """End a Newton iteration."""
         self.laps.append(dict(self.seconds))
+
+
+class Stage:
+    """A block whose time is added to a stage. A class, because steps enter many short blocks."""
+
+    __slots__ = ("_busy", "_stage", "_start", "_watch")
+
+    def __init__(self, watch: Stopwatch, stage: str) -> None:
+        self._watch, self._stage = watch, stage
+
+    def __enter__(self) -> None:
+        self._start, self._busy = perf_counter(), process_time()
+
+    def __exit__(self, *error: object) -> None:
+        seconds, cpu, stage = self._watch.seconds, self._watch.cpu, self._stage
+        seconds[stage] = seconds.get(stage, 0.0) + perf_counter() - self._start
+        cpu[stage] = cpu.get(stage, 0.0) + process_time() - self._busy
 
 
 @dataclass

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from typing import Any
 
@@ -73,21 +74,9 @@ class Attachment:
             sums = _rust.nodal_sums(location, once, once[:, None], basis)
             self.layout.tie(self.summed(sums)[:, 0], UNRESOLVED)
         self.points: dict[Rule, list[tuple[int, ...]]] = {
-            rule: self._point_indices(rule) for rule in compiled.densities
+            rule: _point_indices(rule, swapped=grid.rectangle.swapped)
+            for rule in compiled.densities
         }
-
-    def _point_indices(self, rule: Rule) -> list[tuple[int, ...]]:
-        """Indices along each axis, in the rule of one axis, of each point of a rule of dolfinx."""
-        if rule == "mean":
-            return []
-        points = self.grid.rectangle.to_grid_axes(rule_points(rule))
-        along = np.array([0.0, 1.0])
-        if rule != "vertex":
-            along, _ = _rust.gauss(round(len(points) ** (1 / self.grid.space.dim)))
-        distance = np.abs(points[:, :, None] - along[None, None, :])
-        if distance.min(axis=2).max() > 1e-12:
-            raise RuntimeError("internal: dolfinx' quadrature is not the tensor Gauss rule")
-        return [tuple(map(int, index)) for index in distance.argmin(axis=2)]
 
     def constants(self, integral: Integral) -> Array:
         """Values of the constants that an integral names."""
@@ -96,3 +85,19 @@ class Attachment:
     def summed(self, of_cells: Any) -> Array:
         """The sum over all ranks of arrays from their cells."""
         return ranks.sum_of(self.grid.comm, np.ascontiguousarray(of_cells))
+
+
+@functools.lru_cache(maxsize=32)
+def _point_indices(rule: Rule, *, swapped: bool) -> list[tuple[int, ...]]:
+    """Indices along each axis, in the rule of one axis, of each point of a rule of dolfinx."""
+    if rule == "mean":
+        return []
+    points = rule_points(rule)
+    points = points[:, ::-1] if swapped else points  # as Rectangle.to_grid_axes
+    along = np.array([0.0, 1.0])
+    if rule != "vertex":
+        along, _ = _rust.gauss(round(len(points) ** (1 / points.shape[1])))
+    distance = np.abs(points[:, :, None] - along[None, None, :])
+    if distance.min(axis=2).max() > 1e-12:
+        raise RuntimeError("internal: dolfinx' quadrature is not the tensor Gauss rule")
+    return [tuple(map(int, index)) for index in distance.argmin(axis=2)]

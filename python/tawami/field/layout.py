@@ -18,7 +18,7 @@ from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.space import lattice
 from tawami.fem import dolfinx
 from tawami.fem.mesh import FunctionSpace
-from tawami.grid.basis import Basis, greville_1d
+from tawami.grid.basis import Basis, greville
 from tawami.grid.grid import Grid
 
 
@@ -142,12 +142,10 @@ class Layout:
         nodes = self.grid.rectangle.to_grid_axes(dolfinx.reference_nodes(degree))
         return _rust.extraction(basis, self.grid.cells, cells, np.ascontiguousarray(nodes))
 
-    @functools.cached_property
+    @property
     def greville(self) -> Array:
         """Greville points [m] of the displacement functions, functions x components."""
-        grid = self.grid
-        axes = zip(grid.origin, grid.cells, strict=True)
-        return lattice([x + grid.h * greville_1d(self.basis, n) for x, n in axes])
+        return greville(self.basis, self.grid.origin, self.grid.h, self.grid.cells)
 
     def split(self, coefficients: Array) -> tuple[Array, Array | None]:
         """Coefficients of the displacement and of the bilinear field (None if there is none)."""

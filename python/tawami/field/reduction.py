@@ -41,7 +41,6 @@ class Reduction:
         size: Number of unknowns.
         unknowns: Coefficient of each unknown, sorted by the rank that owns it.
         own: Unknowns whose rows belong to this rank.
-        selection: S, coefficients x unknowns.
         offset: Increments of the coefficients if all unknowns are zero.
         fixed: Whether each coefficient is prescribed by itself, along an edge.
         points: The multi-point constraints.
@@ -49,6 +48,9 @@ class Reduction:
     Raises:
         SupportError: Supports contradict each other, or leave a rigid motion free.
     """
+
+    #: What point constraints eliminate: dependent coefficients, the others involved, and their weights.
+    _eliminated: tuple[Indices, Indices, Array] | None
 
     def __init__(
         self,
@@ -66,33 +68,75 @@ class Reduction:
         self.fixed, total = _prescribed(held, layout.size, tolerance)
         if not moving:
             check_rigid_motions(layout, self.fixed, points)
-        dependent, involved, weights, values = _eliminate(
-            points, self.fixed, total, start, tolerance
-        )
+        self.offset = np.where(self.fixed, total - start, 0.0)
         free = layout.active & ~self.fixed
-        free[dependent] = False
+        self._eliminated = None
+        if points:
+            dependent, *others, values = _eliminate(
+                points, self.fixed, total, start, tolerance, held
+            )
+            self._eliminated = (dependent, *others)
+            free[dependent] = False
+            self.offset[dependent] = values
         self._number(free)
-        number = np.full(layout.size, -1)
+        followers, leaders = self._tied
+        self.offset[followers] = self.offset[leaders]
+
+    @property
+    def _tied(self) -> Indices:
+        """Coefficients that follow others, and those that they follow."""
+        tied = self.layout.tied
+        return np.asarray(tied[~self.fixed[tied[:, 0]]].T)
+
+    @functools.cached_property
+    def of_displacement(self) -> Mask:
+        """Whether each unknown belongs to the displacement."""
+        return np.asarray(self.unknowns < self.layout.num_displacement)
+
+    @functools.cached_property
+    def _number_of(self) -> Indices:
+        """Unknown that gives the value of each coefficient; -1 for those that none gives by itself."""
+        number = np.full(self.layout.size, -1)
         number[self.unknowns] = np.arange(self.size)
-        row, column = np.nonzero(weights)
+        followers, leaders = self._tied
+        number[followers] = number[leaders]
+        return number
+
+    @functools.cached_property
+    def _places(self) -> tuple[Indices, Indices] | None:
+        """Row and column of each entry of S, if all entries are 1 and each row has one at most.
+
+        This is so without point constraints. Products with S then need no sparse matrix.
+        """
+        if self._eliminated is not None:
+            return None
+        rows = np.flatnonzero(self._number_of >= 0)
+        return rows, self._number_of[rows]
+
+    @functools.cached_property
+    def selection(self) -> sp.csr_matrix:
+        """S, coefficients x unknowns."""
+        shape = (self.layout.size, self.size)
+        if self._places is not None:
+            rows, columns = self._places
+            start = np.zeros(shape[0] + 1, dtype=np.int32)
+            np.cumsum(self._number_of >= 0, out=start[1:])
+            entries = (np.ones(len(rows)), columns.astype(np.int32), start)
+            return sp.csr_matrix(entries, shape=shape)
+        assert self._eliminated is not None
+        dependent, involved, weights = self._eliminated
+        number, (row, column) = np.full(self.layout.size, -1), np.nonzero(weights)
+        number[self.unknowns] = np.arange(self.size)
         entries = np.concatenate([np.ones(self.size), -weights[row, column]])
         rows = np.concatenate([self.unknowns, dependent[row]])
         columns = np.concatenate([np.arange(self.size), number[involved[column]]])
-        shape = (layout.size, self.size)
-        self.selection = sp.csr_matrix((entries, (rows, columns)), shape=shape)
-        self.offset = np.where(self.fixed, total - start, 0.0)
-        self.offset[dependent] = values
-        self._tie()
-
-    def _tie(self) -> None:
-        """Let the tied coefficients of the layout follow others."""
-        tied = self.layout.tied
-        followers, leaders = tied[~self.fixed[tied[:, 0]]].T
-        if len(followers):
-            shape = (self.layout.size, self.layout.size)
-            swap = sp.csr_matrix((np.ones(len(followers)), (followers, leaders)), shape=shape)
-            self.selection = sp.csr_matrix(self.selection + swap @ self.selection)
-            self.offset[followers] = self.offset[leaders]
+        selection = sp.csr_matrix((entries, (rows, columns)), shape=shape)
+        followers, leaders = self._tied
+        if not len(followers):
+            return selection
+        shape = (self.layout.size, self.layout.size)
+        swap = sp.csr_matrix((np.ones(len(followers)), (followers, leaders)), shape=shape)
+        return sp.csr_matrix(selection + swap @ selection)
 
     @classmethod
     def of_all(cls, layout: Layout) -> Reduction:
@@ -100,26 +144,42 @@ class Reduction:
         reduction = cls.__new__(cls)
         reduction.layout, reduction.points = layout, []
         reduction.fixed = np.zeros(layout.size, dtype=bool)
+        reduction._eliminated = None
         reduction._number(np.ones(layout.size, dtype=bool))
-        entries = (np.ones(layout.size), (reduction.unknowns, np.arange(layout.size)))
-        reduction.selection = sp.csr_matrix(entries, shape=(layout.size, layout.size))
+        number = np.empty(layout.size, dtype=np.int64)
+        number[reduction.unknowns] = np.arange(layout.size)
+        reduction._number_of = number  # tied coefficients are unknowns as well
         reduction.offset = np.zeros(layout.size)
         return reduction
 
+    def expanded(self, unknowns: Array) -> Array:
+        """S x: all coefficients, from the unknowns."""
+        if self._places is None:
+            return np.asarray(self.selection @ unknowns)
+        rows, columns = self._places
+        coefficients = np.zeros(self.layout.size)
+        coefficients[rows] = unknowns[columns]
+        return coefficients
+
     def restricted(self, forces: Array) -> Array:
         """S^T f: forces on the unknowns, from those on all coefficients."""
-        return np.asarray(self._transposed @ forces)
+        if self._places is None:
+            return np.asarray(self._transposed @ forces)
+        rows, columns = self._places
+        if len(rows) == self.size:
+            return np.asarray(forces[self.unknowns])
+        return np.asarray(np.bincount(columns, forces[rows], minlength=self.size), dtype=float)
+
+    def diagonal(self, masses: Array) -> Array | None:
+        """The diagonal of S^T M S, M the diagonal matrix of masses of all coefficients.
+
+        None if point constraints make it another matrix.
+        """
+        return None if self._places is None else self.restricted(masses)
 
     @functools.cached_property
     def _transposed(self) -> sp.csc_matrix:
         return self.selection.T
-
-    @functools.cached_property
-    def _displacement(self) -> tuple[sp.csr_matrix, Indices]:
-        """The part of S for the displacement, and the coefficients of its unknowns."""
-        n = self.layout.num_displacement
-        free = self.unknowns < n
-        return self.selection[:n][:, free], self.unknowns[free]
 
     def imposed(self, values: Array, mass: Array, offset: Array) -> Array:
         """Velocities after an impulse of the supports.
@@ -131,11 +191,21 @@ class Reduction:
             mass: Mass of each [kg per metre depth].
             offset: As `offset`, for the rate.
         """
-        (s, unknowns), g = self._displacement, offset[: len(values)]
-        if not self.points and not len(self.layout.tied):
-            return np.asarray(s @ (values - g)[unknowns] + g)
-        weighted = s.T @ sp.diags(mass)
-        return np.asarray(s @ spsolve((weighted @ s).tocsc(), weighted @ (values - g)) + g)
+        n, g = len(values), offset[: len(values)]
+        if self._places is None:
+            s = self.selection[:n][:, self.of_displacement]
+            weighted = s.T @ sp.diags(mass)
+            return np.asarray(s @ spsolve((weighted @ s).tocsc(), weighted @ (values - g)) + g)
+        rows, columns = self._places
+        rows, columns = rows[: np.searchsorted(rows, n)], columns[: np.searchsorted(rows, n)]
+        rates = (values - g)[rows]
+        if len(self._places[0]) > self.size:  # tied coefficients share the momentum of all
+            momentum = np.bincount(columns, mass[rows] * rates, minlength=self.size)
+            whole = np.bincount(columns, mass[rows], minlength=self.size)
+            rates = np.divide(momentum, whole, out=momentum, where=whole > 0)[columns]
+        imposed = g.copy()
+        imposed[rows] += rates
+        return np.asarray(imposed)
 
     def _number(self, free: Mask) -> None:
         """Number the free coefficients, rank by rank."""
@@ -162,6 +232,8 @@ class Reduction:
         """Whether another reduction has the same unknowns and S, so that matrices are alike."""
         if other is None or other.layout is not self.layout or other.size != self.size:
             return False
+        if self._places is not None and other._places is not None:
+            return np.array_equal(self._number_of, other._number_of)
         mine, others = self.selection, other.selection
         return (
             np.array_equal(self.unknowns, other.unknowns)
@@ -173,23 +245,36 @@ class Reduction:
 
 def _prescribed(held: Sequence[Held], size: int, tolerance: float) -> tuple[Mask, Array]:
     """Which coefficients are prescribed, and their values."""
-    fixed, total = np.zeros(size, dtype=bool), np.zeros(size)
-    for support in held:
-        twice = fixed[support.indices]
-        change = np.abs(total[support.indices] - support.values)[twice].max(initial=0.0)
-        if change > tolerance:
+    fixed, total, last = np.zeros(size, dtype=bool), np.zeros(size), np.full(size, -1)
+    for number, support in enumerate(held):
+        change = np.abs(total[support.indices] - support.values) * fixed[support.indices]
+        worst = int(np.argmax(change)) if len(change) else 0
+        if change.max(initial=0.0) > tolerance:
+            other = held[last[support.indices[worst]]]
             raise SupportError(
-                f"two supports prescribe displacements that differ by {change:.3g} m where they meet "
-                "(an end of an edge?): expected supports that agree there. Profiles are projected in "
-                "L2, which may miss their values at an end by the error of the projection"
+                f"{other.where} and {support.where} prescribe displacements that differ by "
+                f"{change[worst]:.3g} m where they meet (an end of an edge?): expected supports that "
+                "agree there; change or release one. Profiles are projected in L2, which may miss their "
+                "values at an end by the error of the projection"
             )
         total[support.indices] = support.values
+        last[support.indices] = number
         fixed[support.indices] = True
     return fixed, total
 
 
+def _meet(other: Held | PointHeld, point: PointHeld) -> bool:
+    """Whether a support acts on coefficients of a point."""
+    return bool(np.isin(other.indices, point.indices).any())
+
+
 def _eliminate(
-    points: Sequence[PointHeld], fixed: Mask, total: Array, start: Array, tolerance: float
+    points: Sequence[PointHeld],
+    fixed: Mask,
+    total: Array,
+    start: Array,
+    tolerance: float,
+    held: Sequence[Held],
 ) -> tuple[Indices, Indices, Array, Array]:
     """Solve each multi-point constraint for the coefficient with the largest weight.
 
@@ -212,9 +297,11 @@ def _eliminate(
         pivot = int(np.argmax(np.abs(a[k]))) if len(involved) else -1
         if pivot < 0 or abs(a[k, pivot]) < NO_PIVOT:
             if abs(b[k]) > tolerance:
+                given: list[Held | PointHeld] = [*held, *points[:k]]
+                names = ", ".join(dict.fromkeys(one.where for one in given if _meet(one, point)))
                 raise SupportError(
-                    f"{point.where}: other supports already give this point a displacement that "
-                    f"differs by {abs(b[k]):.3g} m; expected supports that agree, or one of them"
+                    f"{point.where}: {names} already give this point a displacement that differs by "
+                    f"{abs(b[k]):.3g} m: expected supports that agree; change or release one"
                 )
             continue
         b[k] /= a[k, pivot]

@@ -7,6 +7,7 @@ coefficients. The rows of the extraction matrix E sum to 1.
 
 from __future__ import annotations
 
+import functools
 from typing import Literal, get_args
 
 import numpy as np
@@ -15,7 +16,7 @@ import scipy.sparse as sp
 
 from tawami import _rust
 from tawami.base.arrays import Array, Indices
-from tawami.base.space import Counts, lattice
+from tawami.base.space import Counts, Position, lattice
 
 Basis = Literal["quadratic_spline", "bilinear", "biquadratic"]
 BASES: tuple[Basis, ...] = get_args(Basis)
@@ -50,7 +51,10 @@ def functions_on(basis: Basis, n: int, cells: npt.ArrayLike) -> Indices:
     """Functions on a row of `n` cells that do not vanish on all of these cells, ascending."""
     chosen = np.atleast_1d(np.asarray(cells, dtype=np.int64))
     first, _ = _rust.basis_1d(basis, n, chosen, np.full(len(chosen), 0.5))
-    return np.unique(first[:, None] + np.arange(_per_cell(basis)))
+    used = np.zeros(_rust.basis_len(basis, n), dtype=bool)
+    for k in range(_per_cell(basis)):
+        used[first + k] = True
+    return np.flatnonzero(used)
 
 
 def extraction(basis: Basis, cells: Counts, degree: int) -> sp.csr_matrix:
@@ -72,6 +76,15 @@ def extraction(basis: Basis, cells: Counts, degree: int) -> sp.csr_matrix:
     matrix = sp.csr_matrix((entries.ravel(), index), shape=(len(rows), int(np.prod(count))))
     matrix.eliminate_zeros()
     return matrix
+
+
+@functools.lru_cache(maxsize=2)
+def greville(basis: Basis, origin: Position, h: float, cells: Counts) -> Array:
+    """Greville points [m] of the functions of a grid, functions x axes; not to be written."""
+    axes = zip(origin, cells, strict=True)
+    points = lattice([x + h * greville_1d(basis, n) for x, n in axes])
+    points.flags.writeable = False
+    return points
 
 
 def greville_1d(basis: Basis, n: int) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
@@ -11,6 +12,7 @@ from tawami import _rust
 from tawami.base import checks
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import InputError
+from tawami.base.space import Counts
 from tawami.grid.basis import Basis
 from tawami.grid.grid import Edge, Grid
 
@@ -29,7 +31,7 @@ def evaluate(profile: Profile, x: Array, y: Array, what: str) -> Array:
     """
     try:
         value = profile(x, y) if callable(profile) else profile
-        values = np.broadcast_to(np.asarray(value, dtype=float), x.shape)
+        values = np.broadcast_to(checks.real_values(value), x.shape)
     except Exception as error:
         raise InputError(
             f"{what}: expected a number or a function f(x, y) on arrays of shape {x.shape}, got "
@@ -69,10 +71,16 @@ def cells_between(grid: Grid, edge: Edge, between: Interval | None) -> Mask:
 
 def edge_functions(grid: Grid, basis: Basis, edge: Edge) -> Indices:
     """Numbers of the displacement functions that do not vanish on an edge of the grid, along it."""
-    axis, end = grid.edge(edge)
-    shape = [_rust.basis_len(basis, n) for n in grid.cells]
+    return _at_end(basis, grid.cells, *grid.edge(edge))
+
+
+@functools.lru_cache(maxsize=32)
+def _at_end(basis: Basis, cells: Counts, axis: int, end: int) -> Indices:
+    """Numbers of the functions that do not vanish at an end of an axis; not to be written."""
+    shape = [_rust.basis_len(basis, n) for n in cells]
     numbers = np.arange(np.prod(shape)).reshape(shape, order="F")
     functions: Indices = np.take(numbers, end, axis=axis)
+    functions.flags.writeable = False
     return functions
 
 

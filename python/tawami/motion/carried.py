@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami.base import ranks
+from tawami.base.archive import check_like
 from tawami.motion.transfer import Transfer, gradient_of, to_grid
 from tawami.scene.configuration import Configuration
 
@@ -81,13 +82,11 @@ class Carried:
         if stationary is not None:
             return stationary
         domain = self._now.domain
-        v, a = (
-            divided(to_grid(domain, domain.mass, values, gradient), mass[:, None])
-            for values, gradient in (
-                (self.velocity, self.velocity_gradient),
-                (self.acceleration, self.acceleration_gradient),
-            )
+        fields = (
+            (self.velocity, self.velocity_gradient),
+            (self.acceleration, self.acceleration_gradient),
         )
+        v, a = (divided(sums, mass[:, None]) for sums in to_grid(domain, domain.mass, fields))
         return v, a
 
     def at_end(self, u: Array, before: Array, v1: Array, a1: Array, dt: float) -> dict[str, Array]:
@@ -104,12 +103,12 @@ class Carried:
         if self.transfer.flip and self._now.model.moves:
             flip = self.velocity + domain.at_particles(v1 - before)
             velocity = pic + np.exp(-dt / self.damping) * (flip - pic)
-        f = np.eye(self._space.dim) + domain.gradients(u)
+        back = np.linalg.inv(np.eye(self._space.dim) + domain.gradients(u))
         return {
             "velocity": velocity,
             "acceleration": domain.at_particles(a1),
-            "velocity_gradient": gradient_of(self.transfer, domain, v1, f),
-            "acceleration_gradient": gradient_of(self.transfer, domain, a1, f),
+            "velocity_gradient": gradient_of(self.transfer, domain, v1, back),
+            "acceleration_gradient": gradient_of(self.transfer, domain, a1, back),
         }
 
     def store(self, arrays: Mapping[str, Array], v1: Array, a1: Array) -> None:
@@ -126,8 +125,17 @@ class Carried:
         return {"on_grid": None if stationary is None else list(stationary)}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """The reverse of :meth:`state`, after the particles were restored."""
+        """The reverse of :meth:`state`, after the particles were restored.
+
+        Raises:
+            ValueError: v and a do not belong to the grid.
+        """
         on_grid = state["on_grid"]
+        if on_grid is not None:
+            shape = (self._now.domain.layout.num_displacement // self._space.dim, self._space.dim)
+            if [np.shape(values) for values in on_grid] != [shape, shape]:
+                raise ValueError("v and a of the grid have another number of functions")
+            check_like(on_grid, [np.zeros(shape)] * 2, "v and a of the grid")
         self._stationary = None if on_grid is None else (*on_grid, np.array(self.velocity))
 
 

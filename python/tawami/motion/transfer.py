@@ -13,6 +13,7 @@ With the lumped mass m_i = sum_p N_i m_p, x_i the Greville point of the spline, 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -55,42 +56,46 @@ TRANSFERS: dict[str, Transfer] = {
 }
 
 
-def to_grid(domain: Domain, mass: Array, values: Array, gradient: Array) -> Array:
-    """Momentum per component of a particle field and its gradient: functions x dim.
+def to_grid(
+    domain: Domain, mass: Array, fields: Sequence[tuple[Array, Array]]
+) -> tuple[Array, ...]:
+    """Momentum per component of each of several particle fields: functions x dim.
 
     Args:
         domain: The particles where they are.
         mass: Their masses [kg per metre depth].
-        values: v_p or a_p, particles x dim.
-        gradient: Its gradient, particles x dim x dim.
+        fields: v_p or a_p, particles x dim, each with its gradient, particles x dim x dim.
     """
     points, at = _positions(domain)
-    at_origin = values - np.einsum("pij,pj->pi", gradient, at)
+    columns = list[Array]()
+    for values, gradient in fields:
+        at_origin = values - np.einsum("pij,pj->pi", gradient, at)
+        columns += [at_origin, gradient.reshape(len(at), -1)]
     space = domain.model.space
-    sums = domain.sums(mass, np.column_stack([at_origin, gradient.reshape(-1, space.dim**2)]))
-    values, gradients = sums[:, : space.dim], space.tensors(sums[:, space.dim :])
-    return np.asarray(values + np.einsum("ikl,il->ik", gradients, points))
+    sums = np.split(domain.sums(mass, np.hstack(columns)), len(fields), axis=1)
+    moments = (np.einsum("ikl,il->ik", space.tensors(s[:, space.dim :]), points) for s in sums)
+    return tuple(s[:, : space.dim] + moment for s, moment in zip(sums, moments, strict=True))
 
 
-def gradient_of(transfer: Transfer, domain: Domain, field: Array, f: Array) -> Array:
+def gradient_of(transfer: Transfer, domain: Domain, field: Array, back: Array) -> Array:
     """C_p of a field of the grid at the end of the step: particles x dim x dim.
 
     Args:
         transfer: How.
         domain: The particles where they were at the start of the step.
         field: v1 or a1, functions x dim.
-        f: I + grad u of the step.
+        back: f^-1, f = I + grad u of the step.
     """
     if transfer.gradient == "none":
-        return np.zeros_like(f)
-    gradient = domain.gradients(field).copy()
+        return np.zeros_like(back)
+    gradient = domain.gradients(field)
     if transfer.gradient == "moments":
         spread = _moments(domain, None)
         # at the ends of the grid, and on its lines with bilinear functions, D_p is singular
         enough = np.linalg.det(spread) > 1e-8 * domain.model.grid.h ** (2 * domain.model.space.dim)
         moments = _moments(domain, field)[enough]
         gradient[enough] = moments @ np.linalg.inv(spread[enough])
-    return np.asarray(gradient @ np.linalg.inv(f))
+    return np.asarray(gradient @ back)
 
 
 def _positions(domain: Domain) -> tuple[Array, Array]:

@@ -29,8 +29,10 @@ def located(grid: Grid, x: Array, *, moving: bool) -> _rust.Location:
 def outside(grid: Grid, x: Array) -> Mask:
     """Whether each position is outside the grid, by more than the round-off that Rust accepts."""
     margin = 1e-9 * grid.h
-    inside = (x >= np.subtract(grid.origin, margin)) & (x <= np.add(grid.upper, margin))
-    return np.asarray(~inside.all(axis=1))
+    gone = np.zeros(len(x), dtype=bool)
+    for along, low, high in zip(x.T, grid.origin, grid.upper, strict=True):
+        gone |= ~((along >= low - margin) & (along <= high + margin))
+    return gone
 
 
 def distributed(

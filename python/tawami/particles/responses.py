@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from tawami import _rust
 from tawami.base import ranks
@@ -78,7 +77,7 @@ class Responses:
         self._requests = _rust.Requests([of_rule for of_rule in requests.values() if of_rule])
         softer = np.minimum(constants["K"], LOCKED * constants["mu"])
         self.stiffest, self.largest_mu = (
-            comm.allreduce(float(modulus.max(initial=0.0)), op=MPI.MAX)
+            ranks.largest(comm, float(modulus.max(initial=0.0)))
             for modulus in (softer, constants["mu"])
         )
 

@@ -254,7 +254,8 @@ def _velocity(now: Snapshot) -> Array:
     kept = motion.on_grid
     if kept is not None:  # a grid that is not reset has its own velocity
         return _at_vertices(now.scene, kept[0])
-    momentum = to_grid(attached, motion.mass, motion.velocity, motion.velocity_gradient)
+    fields = [(motion.velocity, motion.velocity_gradient)]
+    (momentum,) = to_grid(attached, motion.mass, fields)
     mass = attached.sums(motion.mass, np.ones((len(motion.mass), 1)))
     v = np.divide(momentum, mass, out=np.zeros_like(momentum), where=mass > 0)
     near = attached.sums(motion.mass, np.ones((len(motion.mass), 1)), "bilinear") > 0

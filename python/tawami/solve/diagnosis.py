@@ -11,7 +11,6 @@ from mpi4py import MPI
 from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import ConvergenceError, SingularError, SolverError
-from tawami.base.petsc import add_rows
 from tawami.base.timing import Stopwatch
 from tawami.field.assembly import Assembly
 from tawami.field.reduction import Reduction
@@ -120,7 +119,7 @@ class Diagnosis:
         data = self._elastic().evaluate(*self._layout.split(zero))
         tangent = self._assembly.tangent(zero, data, reduction)
         if equations.inertia is not None:
-            add_rows(tangent, equations.inertia.reduced(reduction))
+            equations.inertia.adder(reduction)(tangent)
         solver = DirectSolver(self._comm, Stopwatch(), always=True)
         try:
             solver.solve(

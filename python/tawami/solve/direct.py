@@ -15,6 +15,7 @@ show where a singular system is weak. So a singular tangent is noticed when it i
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -131,7 +132,7 @@ class DirectSolver(LinearSolver):
         """Factorise and solve; estimate the condition number and its direction."""
         begin, end = matrix.getOwnershipRange()
         size = matrix.getSize()[0]
-        probes = np.random.default_rng(0).standard_normal((PROBES, size))[:, begin:end]
+        probes = _probes(size)[:, begin:end]
         with self._stopwatch("scale"):
             self.symmetric = self._is_symmetric(matrix, probes[0])
         with self._stopwatch("factorise"):
@@ -217,3 +218,9 @@ class DirectSolver(LinearSolver):
         y.axpy(-1.0, forward)
         forward.destroy()
         return bool(y.norm() <= 1e-12 * size)
+
+
+@functools.lru_cache(maxsize=1)
+def _probes(size: int) -> Array:
+    """Random vectors for the condition number, the same in every factorisation."""
+    return np.random.default_rng(0).standard_normal((PROBES, size))

@@ -8,12 +8,16 @@ has all digits by itself: Newton's method updates both.
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from tawami.base.arrays import Array
+from tawami.base.petsc import add_diagonal, add_rows
 from tawami.field.reduction import Reduction
 
 #: Distance from 1 to the next floating-point number.
@@ -59,8 +63,12 @@ class Inertia:
         forces[: len(acceleration)] = self.mass * acceleration
         return forces
 
-    def reduced(self, reduction: Reduction) -> sp.csr_matrix:
-        """This rank's rows of S^T (slope M) S, which is diagonal without point constraints."""
-        padding = len(reduction.offset) - len(self.mass)
-        mass = sp.diags(np.pad(self.slope * self.mass, (0, padding)))
-        return (reduction.selection.T @ mass @ reduction.selection).tocsr()[reduction.own]
+    def adder(self, reduction: Reduction) -> Callable[[Any], None]:
+        """A function that adds S^T (slope M) S to a reduced tangent; a call for all ranks."""
+        mass = self.force(np.full(len(self.mass), self.slope), len(reduction.offset))
+        diagonal = reduction.diagonal(mass)
+        if diagonal is not None:
+            return functools.partial(add_diagonal, values=diagonal[reduction.own])
+        selection = reduction.selection
+        rows = (selection.T @ sp.diags(mass) @ selection).tocsr()[reduction.own]
+        return functools.partial(add_rows, rows=rows)

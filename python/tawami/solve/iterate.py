@@ -60,7 +60,7 @@ class Iterate:
         self.factor = factor
         unknowns = np.zeros(reduction.size) if guess is None else guess[reduction.unknowns]
         self._inertia, self._layout = inertia, reduction.layout
-        self.coefficients: Array = reduction.selection @ unknowns + reduction.offset
+        self.coefficients: Array = reduction.expanded(unknowns) + reduction.offset
         #: u - dt v, which is updated by itself to keep its digits.
         self._deviation = None if inertia is None else inertia.deviation(self.coefficients)
 

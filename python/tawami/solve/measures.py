@@ -8,6 +8,7 @@ volume     |R_q| / |sum_p V_p W_p q (max(|div u|, |eps_v|) + p_ref/K_p + floor)|
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -33,9 +34,17 @@ STRAIN_FLOOR = 1e-7
 NO_FORCE, NO_STRAIN = 1e-14, 1e-10
 
 
+def norm(values: Array) -> float:
+    """Euclidean norm of an array of one dimension."""
+    return math.sqrt(values @ values)
+
+
 def worst(measures: Measured) -> float:
     """The larger of the two measures; NaN if one of them is."""
-    return float(np.max([m for m in measures if m is not None]))
+    momentum, volume = measures
+    if volume is None or np.isnan(momentum):
+        return momentum
+    return volume if np.isnan(volume) else max(momentum, volume)
 
 
 def forcing(history: History, tolerance: float) -> float:
@@ -46,7 +55,7 @@ def forcing(history: History, tolerance: float) -> float:
     """
     now = worst(history[-1])
     rate = now / worst(history[-2]) if len(history) > 1 else 1.0
-    return float(np.clip(0.1 * rate**2, min(0.1 * tolerance / now, 1e-3), 1e-3))
+    return min(max(0.1 * rate**2, min(0.1 * tolerance / now, 1e-3)), 1e-3)
 
 
 class Measures:
@@ -90,20 +99,21 @@ class Measures:
         """
         n = self._layout.num_displacement
         free = reduction.restricted(forces.residual)
-        of_u = reduction.unknowns < n
+        of_u = reduction.of_displacement
         parts = [forces.internal, forces.external]
         parts += [] if forces.inertia is None else [forces.inertia]
-        scale = max(self._at_start, *(float(np.linalg.norm(part[:n])) for part in parts))
+        scale = max(self._at_start, *(norm(part[:n]) for part in parts))
         at_rest = not forces.external.any() and self._is_at_rest(
             scale, coefficients[:n], reduction.offset[:n], inertia
         )
-        momentum = 0.0 if at_rest or scale == 0 else float(np.linalg.norm(free[of_u])) / scale
+        momentum = 0.0 if at_rest or scale == 0 else norm(free[of_u]) / scale
         volume = None
         if self._responses.form.kinematics.volume_fields:
             sums = self._responses.sums(self._volume_scale(coefficients)[:, None])
-            volume = float(np.linalg.norm(free[~of_u]) / np.linalg.norm(sums))
-        measures: Measured = self._comm.bcast((momentum, volume))  # the same bits on all ranks
-        return measures
+            volume = float(
+                np.divide(norm(free[~of_u]), norm(sums.ravel()))
+            )  # NaN without any scale
+        return ranks.same(self._comm, (momentum, volume))  # the same bits on all ranks
 
     def _is_at_rest(self, scale: float, u: Array, offset: Array, inertia: Inertia | None) -> bool:
         """Whether forces without a load are round-off.
@@ -117,7 +127,7 @@ class Measures:
             distance = max(prescribed, float(np.abs(inertia.coasting).max(initial=0.0)))
         distance = 10 * min(distance, float(np.abs(u).max())) + self._layout.grid.h
         largest = NO_FORCE * self._responses.stiffest * distance * np.sqrt(len(u))
-        at_rest: bool = self._comm.bcast(scale <= largest)  # the same branch on all ranks
+        at_rest = ranks.same(self._comm, bool(scale <= largest))  # the same branch on all ranks
         if at_rest and inertia is None:
             return self._moves_rigidly(u, prescribed)
         return at_rest

@@ -12,8 +12,9 @@ import numpy as np
 from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array
-from tawami.base.errors import SingularError
-from tawami.base.petsc import add_rows, clean_up
+from tawami.base.errors import CheckpointError, SingularError
+from tawami.base.files import reason
+from tawami.base.petsc import clean_up
 from tawami.base.timing import Stopwatch, tally
 from tawami.field.assembly import Assembly
 from tawami.field.reduction import Reduction
@@ -123,9 +124,16 @@ class Newton:
     def _restore(self, tangent: Any, reduction: Reduction) -> None:
         """Factorise a stored state again, if the first tangent after it has the same unknowns."""
         state, self._stored = self._stored, None
-        if state is None or self._comm.size > 1 or reduction.digest != state["unknowns"]:
+        if state is None or self._comm.size > 1:
             return
-        self._solver.restore(state["factorised"], tangent)
+        try:
+            if reduction.digest == state["unknowns"]:
+                self._solver.restore(state["factorised"], tangent)
+        except Exception as error:
+            raise CheckpointError(
+                f"the factorisation in the checkpoint cannot be used ({reason(error)}): its content is "
+                "not what tawami writes. Remove the checkpoint to resume from the one before it"
+            ) from error
 
     # -- one step ----------------------------------------------------------------
 
@@ -164,7 +172,7 @@ class Newton:
         self._measures.begin(self.internal if inertia is None else None)
         equations = Equations(reduction, external, inertia, friction, path)
         iterate, history, krylov = equations.first(guess), History(), list[int]()
-        mass = None if inertia is None else inertia.reduced(reduction)
+        add_mass = None if inertia is None else inertia.adder(reduction)
         search: LineSearch | None = None
         while True:
             try:
@@ -191,7 +199,7 @@ class Newton:
                 advice = self._diagnosis.material()
                 self._fail(history, advice or equations.advice)
             with reported():
-                change, of_factor = self._change(iterate, forces, equations, mass, history)
+                change, of_factor = self._change(iterate, forces, equations, add_mass, history)
             if equations.at_rest and not self._responses.form.strain.finite:
                 n = reduction.layout.num_displacement
                 search = LineSearch(self._comm, change, forces.residual, n)
@@ -236,14 +244,14 @@ class Newton:
         iterate: Iterate,
         forces: Forces,
         equations: Equations,
-        mass: Any,
+        add_mass: Callable[[Any], None] | None,
         history: History,
     ) -> tuple[Array, float]:
         """Change of all increments and of the load factor by one tangent."""
         solver, data, reduction = self._solver, self._responses.data, equations.reduction
         tangent = self._assembly.tangent(iterate.coefficients, data, reduction)
-        if mass is not None:
-            add_rows(tangent, mass)
+        if add_mass is not None:
+            add_mass(tangent)
         if self._stored is not None:
             self._restore(tangent, reduction)
         tolerance = ON_PATH
@@ -280,7 +288,7 @@ class Newton:
 
     def _on_all(self, reduction: Reduction, unknowns: Array) -> Array:
         """All coefficients from this rank's unknowns."""
-        return np.asarray(reduction.selection @ ranks.allgathered(self._comm, unknowns))
+        return reduction.expanded(ranks.allgathered(self._comm, unknowns))
 
     def _fail(self, history: History, advice: str) -> NoReturn:
         self._diagnosis.report_divergence(history, self.numerics.tolerance, advice)

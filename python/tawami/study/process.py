@@ -194,7 +194,12 @@ def _plain(values: Any) -> dict[str, Any]:
         )
     plain: dict[str, Any] = {}
     for name, value in values.items():
-        array = np.asarray(value, dtype=float)
+        try:
+            array = checks.real_values(value)
+        except (TypeError, ValueError):
+            raise InputError(
+                f"quantity '{name}' = {checks.shown(value)}: expected real numbers"
+            ) from None
         if not np.isfinite(array).all():
             raise InputError(f"quantity '{name}' is not finite: expected numbers")
         plain[str(name)] = array.tolist()
