@@ -59,7 +59,9 @@ def test_every_object_says_what_it_is(scene):
     assert repr(scene) == (
         "Scene(48 particles on 4 x 3 cells of 0.5 m, form 'u_epsv', linear_elastic)"
     )
-    assert repr(motion) == f"Dynamics({scene!r}, affine_flip, gamma 0.5, at 0 s after 0 steps)"
+    assert repr(motion) == (
+        f"Dynamics({scene!r}, affine_flip, gamma 0.5, at {scene.time:g} s after 0 steps)"
+    )
     assert repr(motion.step(1e-3)).startswith("Solution('u_epsv': 48 particles, 68 unknowns, ")
 
 

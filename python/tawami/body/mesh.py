@@ -12,7 +12,7 @@ from tawami.base.checks import one_of, path, shown
 from tawami.base.errors import GeometryWarning, InputError
 from tawami.base.files import unreadable
 from tawami.base.warn import warn
-from tawami.body import elements
+from tawami.body import clipping, elements
 from tawami.body.body import Body
 from tawami.body.filling import PER_AXIS, Filling
 from tawami.grid.grid import Grid
@@ -26,8 +26,6 @@ CORNERS = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4,
 IGNORED = ("vertex", "line", "line3", "line4", "line5")
 #: Name that Gmsh gives to the array of the physical groups.
 PHYSICAL = "gmsh:physical"
-#: A side is curved if its middle node is off by more than this share of its length.
-STRAIGHT = 1e-6
 
 
 def mesh(
@@ -45,10 +43,15 @@ def mesh(
     fills gets `per_axis` x `per_axis` particles. In any other cell each group gets at most 28, which
     have the volume and the moments up to degree 6 of its elements, to round-off.
 
+    Nodes may be rounded: positions that differ by less than 1e-6 of the size of the mesh, or of a cell
+    if that is larger, are the same. Nodes this near to a line of the grid are moved onto it, the mesh
+    is plane if z varies by less, and gaps and overlaps of four times this width are accepted. Sides may
+    have hanging nodes, or two surfaces their own nodes along a common side.
+
     Args:
         grid: The grid.
         source: A mesh of meshio, or a file that meshio reads (Gmsh's .msh, .vtu, .vtk, .inp, ...). If
-            it has a third coordinate, this must be the same everywhere.
+            it has a third coordinate, this must be the same at all nodes of elements.
         tags: What tells the groups apart: the name of an array of cell data with whole numbers, or
             'sets' for the cell sets of the mesh. By default Gmsh's physical groups if there are any,
             else the cell sets if there are any, else all elements are one group. `Body.names` are the
@@ -66,13 +69,13 @@ def mesh(
     """
     filling = Filling("mesh", grid, per_axis, gauss)
     read = _read(source)
-    x = _plane(read)
     blocks = _blocks(read)
-    material, names = _materials(read, blocks, tags)
-    _warn_of_curved_sides(read, blocks, x)
     corners = [b.data[:, : CORNERS[b.type]] for _, b in blocks]
+    x = _plane(grid, read, np.unique(np.concatenate([c.ravel() for c in corners])))
+    material, names = _materials(read, blocks, tags)
     parts = elements.triangles(grid, x, corners, material)
     elements.check_apart(grid, parts)
+    _warn_of_curved_sides(blocks, x, elements.DEEP * parts.tolerance * grid.h)
     full, of_full, cut = elements.by_cells(grid, parts, max(len(names), 1))
     return filling.body(full, cut, material=of_full, names=names)
 
@@ -104,19 +107,20 @@ def _read(source: Any) -> Any:
         ) from error
 
 
-def _plane(read: Any) -> Array:
-    """Positions of the nodes [m], nodes x 2."""
+def _plane(grid: Grid, read: Any, used: Indices) -> Array:
+    """Positions of the nodes [m], nodes x 2; those of elements must lie in a plane."""
     points = np.asarray(read.points, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise InputError(f"mesh: points of shape {points.shape}: expected nodes x 2 or 3")
-    if points.shape[1] == 3 and len(points):
-        z = points[:, 2]
-        if not np.ptp(z) <= 1e-9 * np.nanmax(np.abs(points)):
+    plane = points[:, :2]
+    if points.shape[1] == 3:
+        z = points[used, 2]
+        if not np.ptp(z) <= clipping.tolerance(grid.in_cells(plane[used])) * grid.h:
             raise InputError(
                 f"mesh: its nodes have z from {z.min():g} to {z.max():g} m: expected a plane mesh, "
                 "with one z everywhere"
             )
-    return points[:, :2]
+    return plane
 
 
 def _blocks(read: Any) -> list[tuple[int, Any]]:
@@ -197,7 +201,8 @@ def _of_sets(
     return of_element, tuple(names)
 
 
-def _warn_of_curved_sides(read: Any, blocks: list[tuple[int, Any]], x: Array) -> None:
+def _warn_of_curved_sides(blocks: list[tuple[int, Any]], x: Array, rounding: float) -> None:
+    """Warn of middle nodes that are off their side by more than rounding [m]."""
     furthest = 0.0
     for _, block in blocks:
         n = CORNERS[block.type]
@@ -206,8 +211,9 @@ def _warn_of_curved_sides(read: Any, blocks: list[tuple[int, Any]], x: Array) ->
             after = np.roll(corner, -1, axis=1)
             side = np.linalg.norm(after - corner, axis=2)
             off = np.linalg.norm(middle - (corner + after) / 2, axis=2)
-            furthest = max(furthest, float((off / np.maximum(side, 1e-300)).max()))
-    if furthest > STRAIGHT:
+            share = off / np.maximum(side, 1e-300)
+            furthest = max(furthest, float(share[off > rounding].max(initial=0.0)))
+    if furthest > 0:
         warn(
             f"mesh: quadratic elements have curved sides, by up to {furthest:.2g} of a side: they are "
             "taken as straight between their corners; refine the mesh if this is not accurate enough",

@@ -139,7 +139,7 @@ class Checkpoints:
             archive.check_particles(state["scene"]["particles"])
             archive.check_like({name: state[name] for name in like}, like, "")
             check_pace(state["pace"], state["steps"])
-            archive.check_like(state["outputs"], {name: {} for name in state["outputs"]}, "outputs")
+            archive.check_like(state["outputs"], {key: {} for key in state["outputs"]}, "outputs")
         except (AttributeError, LookupError, TypeError, ValueError) as error:
             raise _unusable(path, error) from error
         return state
@@ -190,8 +190,8 @@ class Checkpoints:
             self._since = monotonic()
             last = self.last()
             kept = "there is none yet" if last is None else f"the last one is '{last}'"
-            run = "" if ends else ". The run continues"
-            self._warn(f"no checkpoint: {error}; {kept}{run}")
+            goes_on = "" if ends else ". The run continues"
+            self._warn(f"no checkpoint: {error}; {kept}{goes_on}")
 
     def last(self) -> Path | None:
         """The newest checkpoint of this phase in the folder; a call for all ranks."""
