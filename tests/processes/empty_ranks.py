@@ -8,6 +8,7 @@ python tests/processes/empty_ranks.py FOLDER
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from pathlib import Path
 from typing import Any

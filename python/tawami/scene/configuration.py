@@ -159,6 +159,8 @@ class Configuration:
         try:
             with leave_together():  # laws and other functions of the driver script are called here
                 accepted = self._solve(kind)
+            if not self.model.moves:
+                strain_limit.check_digits(self.domain, accepted.step, self.numerics.tolerance)
             moved = self._moved(accepted, kind.end)
             self._warn_of_strain(accepted)
             update = kind.accept(accepted)
