@@ -177,7 +177,7 @@ def test_a_change_that_fails_has_changed_nothing():
         (lambda: side.change("held"), "expected a number or a function"),
         (lambda: side.change(velocity=1.0), "it was made with a value: expected a value; release it"),
         (lambda: scene.fix("left", "x", amplitude=1.0, velocity=1.0), "amplitude or a velocity, not"),
-        (lambda: scene.gravity((0.0, 1.0), amplitude="slow"), "amplitude = 'slow': expected a number"),
+        (lambda: scene.gravity((0.0, 1.0), amplitude="slow"), "at 0 s = 'slow': expected a number"),
     ):  # fmt: skip
         with pytest.raises(tawami.InputError, match=words):
             call()

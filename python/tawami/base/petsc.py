@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import weakref
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy.sparse as sp
 from petsc4py import PETSc
+
+if TYPE_CHECKING:  # SciPy takes longer to import than all of this room
+    import scipy.sparse as sp
 
 
 class Handles(dict[str, Any]):
@@ -68,7 +70,7 @@ def aij(comm: Any, rows: sp.spmatrix, own_columns: int) -> Any:
         rows: Rows of this rank, with columns numbered over all ranks.
         own_columns: Number of columns that this rank owns.
     """
-    csr: sp.csr_matrix = sp.csr_matrix(rows)
+    csr: sp.csr_matrix = rows.tocsr()
     csr.sort_indices()
     arrays = (csr.indptr.astype(PETSc.IntType), csr.indices.astype(PETSc.IntType), csr.data)
     size = ((csr.shape[0], PETSc.DETERMINE), (own_columns, PETSc.DETERMINE))
@@ -77,9 +79,11 @@ def aij(comm: Any, rows: sp.spmatrix, own_columns: int) -> Any:
 
 def rows_of(matrix: Any) -> sp.csr_matrix:
     """Rows of a PETSc matrix on this rank, with columns numbered over all ranks."""
+    from scipy.sparse import csr_matrix
+
     start, columns, values = matrix.getValuesCSR()
     shape = (len(start) - 1, matrix.getSize()[1])
-    return sp.csr_matrix((np.array(values), columns, start), shape=shape)
+    return csr_matrix((np.array(values), columns, start), shape=shape)
 
 
 def add_rows(matrix: Any, rows: sp.csr_matrix) -> None:

@@ -72,10 +72,10 @@ class Reduction:
         free = layout.active & ~self.fixed
         self._eliminated = None
         if points:
-            dependent, *others, values = _eliminate(
+            dependent, involved, weights, values = _eliminate(
                 points, self.fixed, total, start, tolerance, held
             )
-            self._eliminated = (dependent, *others)
+            self._eliminated = (dependent, involved, weights)
             free[dependent] = False
             self.offset[dependent] = values
         self._number(free)
@@ -168,7 +168,7 @@ class Reduction:
         rows, columns = self._places
         if len(rows) == self.size:
             return np.asarray(forces[self.unknowns])
-        return np.asarray(np.bincount(columns, forces[rows], minlength=self.size), dtype=float)
+        return np.asarray(np.bincount(columns, forces[rows], self.size), dtype=float)
 
     def diagonal(self, masses: Array) -> Array | None:
         """The diagonal of S^T M S, M the diagonal matrix of masses of all coefficients.

@@ -67,11 +67,10 @@ def to_grid(
         fields: v_p or a_p, particles x dim, each with its gradient, particles x dim x dim.
     """
     points, at = _positions(domain)
-    columns = list[Array]()
+    space, columns = domain.model.space, list[Array]()
     for values, gradient in fields:
         at_origin = values - np.einsum("pij,pj->pi", gradient, at)
-        columns += [at_origin, gradient.reshape(len(at), -1)]
-    space = domain.model.space
+        columns += [at_origin, gradient.reshape(-1, space.dim**2)]
     sums = np.split(domain.sums(mass, np.hstack(columns)), len(fields), axis=1)
     moments = (np.einsum("ikl,il->ik", space.tensors(s[:, space.dim :]), points) for s in sums)
     return tuple(s[:, : space.dim] + moment for s, moment in zip(sums, moments, strict=True))

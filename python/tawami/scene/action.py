@@ -96,6 +96,9 @@ class Action:
         self.terms: list[Term] = []
         self._begin(self._checked(value), course)
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self}{', released' if self.released else ''})"
+
     def _checked(self, value: Any) -> tuple[Profile, ...]:
         """The components of a value.
 

@@ -323,6 +323,7 @@ class Configuration:
         if np.shape(state["total"]) != self.total.shape:
             raise CheckpointError("its fields have another number of coefficients than the scene")
         self.activity.time, self.total = state["time"], state["total"]
+        self.activity.statics += 1
         self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
         self._coverage_checked, self.begun = state["coverage_checked"], True
         self._travel = state["travel"]

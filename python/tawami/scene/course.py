@@ -55,7 +55,7 @@ class Course:
             raise InputError(
                 f"{what}({time:g}) gave {error!r}: expected a function of time [s]"
             ) from error
-        return checks.number(f"{what} at {time:g} s" if callable(given) else what, value)
+        return checks.number(f"{what} at {time:g} s", value)
 
     @property
     def moves(self) -> bool:

@@ -113,7 +113,7 @@ def _checkpoint(file: Path) -> tuple[Any, dict[str, Any]]:
     _, state = archive.read(file)
     arrays: Mapping[str, Any] = state["scene"]["particles"]
     labels = {"stress": f"stress {' '.join(PLANE.tensor)}"}
-    return arrays["x"], {labels.get(name, name): values for name, values in arrays.items()}
+    return arrays["x"], {labels.get(k, k): values for k, values in arrays.items() if k != "x"}
 
 
 def _vtu(file: Path, name: str) -> tuple[Any, dict[str, Any]]:

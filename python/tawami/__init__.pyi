@@ -1,0 +1,118 @@
+"""tawami: implicit material point method with the mixed displacement - volumetric strain form."""
+
+from tawami._rust import Material
+from tawami.base.errors import (
+    CheckpointError,
+    CheckpointWarning,
+    ConvergenceError,
+    EnergyWarning,
+    FormError,
+    GeometryWarning,
+    IncompleteWarning,
+    InexactSumWarning,
+    InputError,
+    InstabilityWarning,
+    LockingWarning,
+    MissingDependencyError,
+    NotModelledError,
+    OutputError,
+    ParameterWarning,
+    QuadratureWarning,
+    RotationWarning,
+    SingularError,
+    SmallStrainWarning,
+    SofteningWarning,
+    SolverError,
+    SupportError,
+    TawamiError,
+    TawamiWarning,
+)
+from tawami.base.program import run
+from tawami.body.body import Body
+from tawami.body.box import box
+from tawami.body.disc import disc
+from tawami.body.level_set import level_set
+from tawami.body.mesh import mesh
+from tawami.body.polygon import polygon
+from tawami.check.form_check import FormReport, check_form
+from tawami.form.form import Form
+from tawami.grid.grid import Grid
+from tawami.motion.dynamics import Dynamics
+from tawami.motion.path import follow
+from tawami.motion.stepping import ramp, settle
+from tawami.particles.laws import (
+    drucker_prager,
+    linear_elastic,
+    mohr_coulomb,
+    neo_hookean,
+    von_mises,
+)
+from tawami.particles.numpy_law import NumpyLaw
+from tawami.results.outputs import GridOutput, ParticleOutput
+from tawami.results.results import Results
+from tawami.results.table import TableOutput
+from tawami.scene.earlier import earlier
+from tawami.scene.scene import Scene
+from tawami.scene.solution import Solution
+from tawami.scene.table import table
+from tawami.study import Series, Study, recommend
+
+__all__ = [
+    "Body",
+    "CheckpointError",
+    "CheckpointWarning",
+    "ConvergenceError",
+    "Dynamics",
+    "EnergyWarning",
+    "Form",
+    "FormError",
+    "FormReport",
+    "GeometryWarning",
+    "Grid",
+    "GridOutput",
+    "IncompleteWarning",
+    "InexactSumWarning",
+    "InputError",
+    "InstabilityWarning",
+    "LockingWarning",
+    "Material",
+    "MissingDependencyError",
+    "NotModelledError",
+    "NumpyLaw",
+    "OutputError",
+    "ParameterWarning",
+    "ParticleOutput",
+    "QuadratureWarning",
+    "Results",
+    "RotationWarning",
+    "Scene",
+    "Series",
+    "SingularError",
+    "SmallStrainWarning",
+    "SofteningWarning",
+    "Solution",
+    "SolverError",
+    "Study",
+    "SupportError",
+    "TableOutput",
+    "TawamiError",
+    "TawamiWarning",
+    "box",
+    "check_form",
+    "disc",
+    "drucker_prager",
+    "earlier",
+    "follow",
+    "level_set",
+    "linear_elastic",
+    "mesh",
+    "mohr_coulomb",
+    "neo_hookean",
+    "polygon",
+    "ramp",
+    "recommend",
+    "run",
+    "settle",
+    "table",
+    "von_mises",
+]
