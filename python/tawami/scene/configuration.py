@@ -95,7 +95,10 @@ class Configuration:
         self._small_strain, self._softens = not model.moves, False
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
-        self.domain = Domain.attach(self.model, particles, location, self.numerics, self.stopwatch)
+        earlier: Domain | None = getattr(self, "domain", None)
+        self.domain = Domain.attach(
+            self.model, particles, location, self.numerics, self.stopwatch, earlier
+        )
 
     @property
     def before(self) -> Array:
