@@ -33,7 +33,8 @@ cantilever: setup
 	$(PYTHON) -m cases.verification.cantilever
 
 # A file is tested by one process, so that what its tests share is computed once.
-PYTEST = $(PYTHON) -m pytest --quiet -n $(shell nproc) --dist loadfile --no-loadscope-reorder
+# nproc obeys OMP_NUM_THREADS, which make 4.4 passes on to $(shell).
+PYTEST = $(PYTHON) -m pytest --quiet -n $(shell env -u OMP_NUM_THREADS nproc) --dist loadfile --no-loadscope-reorder
 
 test: setup $(STAMPS)/cargo-tests
 	cargo test --locked --quiet
@@ -122,7 +123,7 @@ $(STAMPS)/debian: $(STAMPS)/rust Makefile
 PIP = $(PYTHON) -m pip install --quiet --disable-pip-version-check --constraint .venv/constraints.txt
 
 $(STAMPS)/python: .venv/constraints.txt pyproject.toml
-	$(PIP) 'maturin>=1.12.1,<2' 'meshio>=5.3' 'shapely>=2.1' 'matplotlib>=3.7' 'tqdm>=4.60' 'hypothesis>=6.80' 'mypy>=1.10' 'pytest>=7.4' 'pytest-xdist>=3.7'
+	$(PIP) 'maturin>=1.12.1,<2' 'filelock>=4.3' 'meshio>=5.3' 'shapely>=2.1' 'matplotlib>=3.7' 'tqdm>=4.60' 'hypothesis>=6.80' 'mypy>=1.10' 'pytest>=7.4' 'pytest-xdist>=3.7'
 	@mkdir -p $(STAMPS) && touch $@
 
 $(STAMPS)/lint: $(STAMPS)/python

@@ -27,6 +27,7 @@ enter() {
     shift
     mount -t proc proc "$root/proc"
     mount --rbind /dev "$root/dev"
+    mount --rbind /sys "$root/sys" # MPI looks for processors and network devices there
     mount -t tmpfs tmpfs "$root/tmp"
     if [ -d "$root/opt/rust" ]; then
         mount --bind "$MATRIX_RUST" "$root/opt/rust"
@@ -44,8 +45,14 @@ if [ "${1:-}" = --enter ]; then
     enter "$@"
 fi
 
-within() { # root command ...: ends with all that the command started
-    unshare --mount --propagation private --pid --fork --kill-child "$0" --enter "$@"
+# root command ...: ends with all that the command started. The first process of the namespace is a shell,
+# because orphans become its children: some programs take a parent of number 1 for the end of theirs.
+within() {
+    local root=$1
+    shift
+    # shellcheck disable=SC2016 # the shell inside fills it in, and does not replace itself by the command
+    unshare --mount --propagation private --pid --fork --kill-child "$0" --enter "$root" \
+        /bin/sh -c '"$@"; exit "$?"' sh "$@"
 }
 
 # -- what is needed ----------------------------------------------------------
@@ -82,7 +89,8 @@ cleanup() {
     local status=$?
     trap - EXIT INT TERM HUP
     if [ -n "$running" ]; then
-        kill -TERM -- "-$running" 2>/dev/null || true
+        # unshare ignores SIGTERM while it waits; its end is that of its namespace
+        kill -KILL -- "-$running" 2>/dev/null || true
         wait "$running" 2>/dev/null || true
     fi
     # nothing that is mounted is ever removed
@@ -119,8 +127,8 @@ prepare() { # suite root
     else # Debian's own, which make refuses where it is too old
         within "$root" sh -c 'apt-get update -qq && apt-get install -qq -y cargo' || return
     fi
-    git clone --quiet --no-hardlinks "$repository" "$root/root/tawami" || return
-    git -C "$root/root/tawami" checkout --quiet --detach "$commit"
+    git clone --quiet --no-hardlinks "$repository" "$root/opt/tawami" || return
+    git -C "$root/opt/tawami" checkout --quiet --detach "$commit"
 }
 
 versions='
@@ -139,10 +147,10 @@ try_suite() { # suite: writes its log, and its row of the table beside it
     {
         prepare "$suite" "$root" &&
             within "$root" timeout --kill-after=30 $((60 * minutes)) \
-                make -C /root/tawami test-all TESTS="${MATRIX_TESTS:-}"
+                make -C /opt/tawami test-all TESTS="${MATRIX_TESTS:-}"
     } >"$log" 2>&1 || status=$?
     [ "$status" != 124 ] || echo "make test-all was ended after $minutes minutes" >>"$log"
-    found=$(within "$root" /root/tawami/.venv/bin/python -c "$versions" 2>/dev/null) || found='- - -'
+    found=$(within "$root" /opt/tawami/.venv/bin/python -c "$versions" 2>/dev/null) || found='- - -'
     local passed failed
     passed=$(counted passed "$log")
     failed=$(counted '(failed|error)' "$log")

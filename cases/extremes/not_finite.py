@@ -48,7 +48,7 @@ def after_a_step() -> tawami.Scene:
     """A scene after one step, with the loads of the next."""
     scene = scene_of()
     scene.solve()
-    scene.gravity((0.02, -0.22))
+    scene.gravity((0.02, -0.02))
     return scene
 
 

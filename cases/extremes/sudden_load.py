@@ -51,13 +51,13 @@ def ramped(form: str, factor: float) -> float:
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=block.E, nu=0.3), form=form)
     scene.fix("left", "x")
     scene.fix("bottom", "y")
-    scene.load(body.x[:, 0] > 0.4, (factor * FORCE, 0.0))
+    pull = scene.load(body.x[:, 0] > 0.4, (factor * FORCE, 0.0))
     reactions = [0.0]
 
     def wrong() -> float:
         """Difference of the last reaction and the carried share of the load, over the load."""
         # internal, because `ramp` does not return the share that it reached when it fails
-        share = scene.configuration.loads.forces[0].share.carried
+        share = pull.terms[0].share.carried
         if not np.isfinite(scene.particles.stress).all():
             return np.inf
         return float(abs(reactions[-1] / (factor * FORCE) + share))

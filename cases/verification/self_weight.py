@@ -90,8 +90,9 @@ def solve(form: str, *, h: float = 1.0, increments: int = 20, **options: object)
     """Apply the weight in increments."""
     scene = build(form, h, **options)
     iterations = []
+    weight = scene.gravity((0.0, 0.0))
     for k in range(1, increments + 1):
-        scene.gravity((0.0, -G * k / increments))
+        weight.change((0.0, -G * k / increments))
         iterations.append(scene.solve().iterations)
     height, stress = errors(scene, form)
     return Result(form, (1 + height) * final_height(), height, stress, tuple(iterations))

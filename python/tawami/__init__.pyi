@@ -22,6 +22,7 @@ from tawami.base.errors import (
     SingularError,
     SmallStrainWarning,
     SofteningWarning,
+    SolverError,
     SupportError,
     TawamiError,
     TawamiWarning,
@@ -50,9 +51,10 @@ from tawami.particles.numpy_law import NumpyLaw
 from tawami.results.outputs import GridOutput, ParticleOutput
 from tawami.results.results import Results
 from tawami.results.table import TableOutput
+from tawami.scene.earlier import earlier
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
-from tawami.scene.sources import earlier, table
+from tawami.scene.table import table
 from tawami.study import Series, Study, recommend
 
 __all__ = [
@@ -89,6 +91,7 @@ __all__ = [
     "SmallStrainWarning",
     "SofteningWarning",
     "Solution",
+    "SolverError",
     "Study",
     "SupportError",
     "TableOutput",

@@ -8,6 +8,7 @@ import moments
 import numpy as np
 import pytest
 import shapely
+import shapely.affinity
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from mpi4py import MPI
@@ -140,7 +141,44 @@ def test_small_parts_of_cells_in_other_forms():
         assert np.abs(shelf("u_epsv_residual_based", 1e-2).mean_stress).max() > 1.9
     assert np.abs(shelf("u_epsv", 1e-2).mean_stress).max() < 0.3
     with pytest.raises(tawami.SingularError):
-        shelf("u_bbar", 2e-6)
+        shelf("u_bbar", 9e-6)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e3])
+@pytest.mark.parametrize("degrees", range(0, 91, 10))
+def test_rounding_does_not_make_a_polygon_invalid(degrees, scale):
+    """The first vertex is repeated with noise, so that the last side crosses the first one."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.3 * scale, cells=(10, 10))
+    for noise in (1e-7, 1e-2):
+        square = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (noise, -noise)])
+        turned = scale * (square @ np.array([[c, s], [-s, c]]) + 1.5)
+        if noise > 1e-6:
+            with pytest.raises(tawami.InputError, match="sides cross or touch"):
+                tawami.polygon(grid, turned)
+        else:
+            body = tawami.polygon(grid, turned)
+            assert body.volume.sum() == pytest.approx(scale**2, rel=1e-5)
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e-4])
+def test_polygons_that_are_much_smaller_than_a_cell(size):
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=1, cells=(2, 2))
+    body = tawami.polygon(grid, np.array([(0, 0), (size, 0), (0, size / 2)]) + 0.3)
+    assert body.volume.sum() == pytest.approx(size**2 / 4, rel=1e-6)
+
+
+@pytest.mark.parametrize("degrees", range(0, 91, 10))
+def test_parts_and_holes_that_touch_along_a_side(degrees):
+    """They are valid whatever round-off does to the common side."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.3, cells=(12, 12))
+    parts = [shapely.box(-1, 0, 0, 1), shapely.box(0, 0, 1, 0.7)]
+    bitten = shapely.Polygon(
+        [(-1, 0), (1, 0), (1, 1), (-1, 1)], [[(0.2, 0), (0.7, 0), (0.7, 0.3), (0.2, 0.3)]]
+    )
+    for shape, area in ((shapely.MultiPolygon(parts), 1.7), (bitten, 1.85)):
+        placed = shapely.affinity.translate(shapely.affinity.rotate(shape, degrees), 1.7, 1.6)
+        assert tawami.polygon(grid, placed).volume.sum() == pytest.approx(area, rel=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib.util
+import shlex
 import sys
 import types
 from pathlib import Path
@@ -38,7 +40,7 @@ def test_plot_passes_its_options_on(capsys, rejected, monkeypatch):
     monkeypatch.setitem(sys.modules, "tawami.results.plot", fake)
     assert main.main(["plot", "pile"]) == 0
     assert main.main(["plot", "pile", "--quantity", "velocity", "--movie", "none"]) == 0
-    assert asked == [("pile", "mean stress", "gif"), ("pile", "velocity", None)]
+    assert asked == [("pile", None, "gif"), ("pile", "velocity", None)]
     assert capsys.readouterr().out.splitlines()[:2] == ["pile/a.png", "pile/b.gif"]
     assert rejected("plot", "empty") == "tawami plot: 'empty' holds no results\n"
 
@@ -80,9 +82,49 @@ def test_new_writes_a_script_but_not_over_another(capsys, rejected, tmp_path, ki
     path.write_text("mine")
     assert "exists already, and was not changed" in rejected("new", path)
     assert path.read_text() == "mine"
-    assert "expected a name of letters" in rejected("new", tmp_path / "my-case")
     assert main.main(["new", str(tmp_path / "nowhere" / "case")]) == 1
     assert "cannot be written: No such file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("my-case", "'my-case' is not a name of Python"),
+        ("my.case", "'my.case' is not a name of Python"),
+        ("2cases", "'2cases' is not a name of Python"),
+        ("my case.py", "'my case' is not a name of Python"),
+        ("class", "'class' is a keyword of Python"),
+        ("None.py", "'None' is a keyword of Python"),
+        ("__init__", "'__init__' has a meaning to Python"),
+        ("numpy", "the module 'numpy' is installed"),
+        ("tawami.py", "the module 'tawami' is installed"),
+        ("random", "the module 'random' is installed"),
+        ("sys", "the module 'sys' is installed"),
+    ],
+)
+def test_new_rejects_a_name_that_python_cannot_import(
+    rejected, monkeypatch, tmp_path, name, message
+):
+    monkeypatch.chdir(tmp_path)
+    said = rejected("new", name)
+    assert f"tawami new: '{name}': {message}: expected another name of letters" in said
+    assert "as mycase" in said
+    assert not list(tmp_path.iterdir())
+
+
+def test_new_writes_a_script_that_python_imports(here, tmp_path):
+    (tmp_path / "mycase.py").touch()
+    folder = tmp_path / "my folder"
+    folder.mkdir()
+    for name in ("match", "mycase", "_case", "case.py"):  # words that are keywords in places only
+        written = here("new", folder / name, cwd=tmp_path)
+        assert written.returncode == 0, written.stderr
+        run_it = written.stdout.partition("run it with: ")[2]
+        assert shlex.split(run_it) == ["tawami", "run", str((folder / name).with_suffix(".py"))]
+        spec = importlib.util.spec_from_file_location(name, (folder / name).with_suffix(".py"))
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        assert callable(module.main)
 
 
 def test_the_new_script_of_statics_runs(here, tmp_path):
@@ -92,8 +134,19 @@ def test_the_new_script_of_statics_runs(here, tmp_path):
     (tip,) = (line for line in run.stdout.splitlines() if line.startswith("tip deflection"))
     # the limit of finite elements for the clamped beam, cases/cantilever/report.md
     assert float(tip.split()[-1]) == pytest.approx(0.009684, rel=0.01)
-    written = {path.name for path in (tmp_path / "results" / "beam").iterdir()}
-    assert written == {"particles.vtu", "grid.vtu"}
+    written = {path.name for path in (tmp_path / "results" / "beam" / "ramp").iterdir()}
+    assert written == {"particles", "particles.pvd", "grid", "grid.pvd", "table.csv"}
+    drawn = here("plot", "results/beam", "--movie", "none", cwd=tmp_path)
+    assert drawn.returncode == 0, drawn.stderr
+    assert [(tmp_path / line).name for line in drawn.stdout.splitlines()] == [
+        "ramp-mean-stress.png", "ramp-table.png"
+    ]  # fmt: skip
+    again = here("run", "beam.py", cwd=tmp_path)
+    assert (again.returncode, again.stdout) == (0, run.stdout)
+    finished = here("run", "beam.py", "--resume", cwd=tmp_path)
+    assert finished.returncode == 0, finished.stderr
+    assert "tip deflection" not in finished.stdout
+    assert "no effect" not in finished.stderr
 
 
 #: Ends the new script of dynamics in its sixtieth step, after the checkpoint of the fiftieth.
@@ -131,6 +184,23 @@ def test_the_new_script_of_dynamics_is_stopped_resumed_and_drawn(here, process, 
         "motion-plastic_strain.png", "motion-plastic_strain.gif", "motion-table.png"
     }  # fmt: skip
     assert all(path.stat().st_size > 1000 for path in pictures)
+
+
+@pytest.mark.slow
+@pytest.mark.mpi
+@pytest.mark.parametrize("kind", ["--statics", "--dynamics"])
+def test_the_commands_of_the_readme_work_in_turn_on_four_ranks(process, tmp_path, kind):
+    """Two of the four ranks of the slump have no particles at the start."""
+    for command in (
+        ["new", "mycase", kind], ["run", "mycase.py", "--ranks", "4"],
+        ["resume", "results/mycase", "--ranks", "4"], ["plot", "results/mycase"],
+    ):  # fmt: skip
+        run = process(*command, cwd=tmp_path)
+        assert run.returncode == 0, run.stderr
+    figures = {path.name for path in (tmp_path / "results" / "mycase" / "figures").iterdir()}
+    phases = ["ramp"] if kind == "--statics" else ["ramp", "motion"]
+    kinds = ("mean-stress.png", "mean-stress.gif", "table.png")
+    assert figures == {f"{phase}-{what}" for phase in phases for what in kinds}
 
 
 def test_form_check_prints_its_report(capsys, rejected, tmp_path):

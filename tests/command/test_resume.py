@@ -25,6 +25,7 @@ def results(script, tmp_path):
     folder = tmp_path / "results"
     folder.mkdir()
     (folder / "run.json").write_text(json.dumps(described(script)))
+    (folder / "script.py").write_bytes(script.read_bytes())
     return folder
 
 
@@ -40,17 +41,65 @@ def test_a_script_is_run_again_where_it_was_run(script, results, here):
     assert (environment, ranks) == ("resume None", "ranks 1")
 
 
-def test_a_changed_module_is_run_with_a_remark(script, results, here):
+def test_the_copy_of_a_module_is_run_with_a_remark(script, results, here):
     (results / "run.json").write_text(json.dumps(described(script, module="case", ranks=2)))
-    assert Run.of(results).number == 2
-    assert not Run.of(results).changed
+    run = Run.of(results)
+    assert (run.number, run.remark) == (2, None)
     script.write_text(script.read_text() + "print('changed')")
     run = here("resume", results, "--ranks", 1)
     assert run.returncode == 0, run.stderr
     lines = run.stdout.splitlines()
     assert lines[0].startswith("tawami resume: runs -m case ranks in ")
-    assert lines[1].startswith("tawami resume: case has changed since;")
-    assert lines[-2:] == ["ranks 1", "changed"]
+    again = f"(cd {script.parent} && tawami run -m case --resume -- ranks)"
+    assert lines[1] == (
+        f"tawami resume: '{script}' has changed since; the copy in the folder is run. To resume with "
+        f"the changed script: {again}"
+    )
+    assert lines[2].startswith(f"__main__ {script} {[str(script), 'ranks']} {script.parent}")
+    assert lines[-1] == "ranks 1"
+    run = here("run", "-m", "case", "--resume", "--", "ranks", cwd=script.parent)
+    assert run.stdout.splitlines()[-2:] == ["ranks 1", "changed"]
+
+
+def test_the_copy_runs_in_the_place_of_a_script_that_is_gone(script, results, here):
+    """It imports what the script imported, and its errors show its own lines."""
+    (script.parent / "beside.py").write_text("value = 3")
+    script.write_text("from beside import value\nprint('here', value, __file__)\n1 / 0\n")
+    (results / "script.py").write_bytes(script.read_bytes())
+    (results / "run.json").write_text(json.dumps(described(script)))
+    script.unlink()
+    run = here("resume", results)
+    assert run.stdout.splitlines()[1:] == [
+        f"tawami resume: '{script}' does not exist; the copy in the folder is run",
+        f"here 3 {script}",
+    ]
+    assert run.stderr.splitlines()[1:3] == [f'  File "{script}", line 3, in <module>', "    1 / 0"]
+
+
+def test_another_script_is_run_only_if_it_is_trusted(script, results, here, rejected):
+    copy = results / "script.py"
+    copy.write_text("print('another')\n")
+    said = rejected("resume", results)
+    assert "is not the script that the run was started with" in said
+    assert f"tawami resume --trust {results}" in said
+    run = here("resume", "--trust", results)
+    assert (run.returncode, run.stdout.splitlines()[-1]) == (0, "another")
+    copy.unlink()
+    for options in ([], ["--trust"]):
+        said = rejected("resume", *options, results)
+        assert f"copy of the script '{copy}' cannot be read (No such file or directory)" in said
+        assert "tawami run SCRIPT --resume" in said
+
+
+@pytest.mark.mpi
+def test_the_copy_runs_on_ranks(script, results, process):
+    (results / "run.json").write_text(json.dumps(described(script)))
+    script.write_text("print('changed')")
+    run = process("resume", results, "--ranks", 2)
+    assert run.returncode == 0, run.stderr
+    lines = run.stdout.splitlines()
+    assert lines.count("ranks 2") == 1  # the first rank prints
+    assert sum("the copy in the folder is run" in line for line in lines) == 1
 
 
 def test_a_run_that_cannot_be_resumed_is_rejected(rejected, script, results):
@@ -76,9 +125,3 @@ def test_a_run_that_cannot_be_resumed_is_rejected(rejected, script, results):
         said = rejected("resume", results)
         assert message in said
         assert "to run again" not in said or "tawami run SCRIPT --resume" in said
-    file.write_text(json.dumps(described(script)))
-    script.unlink()
-    assert "does not exist: expected it there" in rejected("resume", results)
-    (results / "script.py").touch()
-    said = rejected("resume", results)
-    assert f"(cd {script.parent} && tawami run {results}/script.py --resume -- ranks)" in said

@@ -34,6 +34,20 @@ def test_a_module_runs_as_python_runs_it(script, here):
     ]
 
 
+@pytest.mark.parametrize("way", ["", "exit"])
+def test_an_option_without_effect_is_reported(script, here, way):
+    text = script.read_text().replace("sys.exit(3)", "sys.exit(0)")
+    script.write_text(text)
+    for option in ("--resume", "--replace"):
+        run = here("run", script, option, "--", way)
+        assert run.returncode == 0
+        assert run.stderr == (
+            f"case.py: {option} had no effect: the script ran from its beginning, and wrote no results "
+            "with tawami.Results(...) and results=...\n"
+        )
+    assert here("run", script, "--", way).stderr == ""
+
+
 def test_the_traceback_of_a_script_begins_in_the_script(script, process):
     fails = process("run", script, "--", "fails")
     assert fails.returncode == 1

@@ -101,7 +101,7 @@ def solved(scene: tawami.Scene, method: str) -> Callable[..., Any]:
 
     def call(**arguments: Any) -> None:
         getattr(scene, method)(**arguments)
-        if any(support.velocity is not None for support in scene.configuration.supports.all):
+        if any(support.has_velocity for support in scene.configuration.supports.all):
             tawami.Dynamics(scene).step(0.01)
         else:
             scene.solve()
@@ -228,7 +228,7 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "mesh": (tawami.mesh, {
         "grid": grid_of(), "source": meshio.Mesh([(-1, 0.5), (0, 0.5), (0, 1.2)],
                                                  [("triangle", [[0, 1, 2]])]),
-        "tags": None, "per_axis": 2, "gauss": True}),
+        "tags": None, "groups": None, "per_axis": 2, "gauss": True}),
     "table": (in_folder(tabled), {"path": "field.csv", "column": "value", "outside": "stop"}),
     "earlier": (beside_a_run(tawami.earlier), {"path": "run", "outside": "stop"}),
     "initial": (on_scene("initial"), {"name": "stress", "source": (1.0, 1.0, 1.0, 0.0),
@@ -265,18 +265,24 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         "factorise": "always", "linear_solver": "direct", "density": 1.0, "leaving": "stop",
         "alpha": 0.1, "stabilisation": "laplacian"}),
     "fix": (lambda **a: solved(scene_of(), "fix")(**a),
-            {"edge": "left", "component": "y", "value": 0.0, "velocity": None, "between": (0.5, 1.0)}),
+            {"edge": "left", "component": "y", "value": 0.0, "amplitude": 1.0, "velocity": None,
+             "between": (0.5, 1.0)}),
     "fix, moving": (lambda **a: solved(scene_of(), "fix")(**a),
                     {"edge": "left", "component": "y", "velocity": 0.0}),
     "hold": (lambda **a: solved(scene_of(), "hold")(**a),
-             {"point": (0.0, 1.0), "component": "x", "value": 0.0, "velocity": None}),
+             {"point": (0.0, 1.0), "component": "x", "value": 0.0, "amplitude": 1.0,
+              "velocity": None}),
     "wall": (lambda **a: solved(scene_of(), "wall")(**a),
              {"edge": "bottom", "friction": 0.1, "separates": True}),
     "release": (on_scene("release"), {"place": (-1.0, 0.5), "component": "x"}),
     "traction": (lambda **a: solved(scene_of(), "traction")(**a),
-                 {"edge": "right", "value": (1.0, 0.0), "between": (0.5, 1.5)}),
+                 {"edge": "right", "value": (1.0, 0.0), "amplitude": 1.0, "between": (0.5, 1.5)}),
     "load": (lambda **a: solved(scene_of(), "load")(**a), {"particles": [0, 3], "force": (1.0, 0.0)}),
-    "gravity": (lambda **a: solved(scene_of(), "gravity")(**a), {"acceleration": (0.0, -1.0)}),
+    "gravity": (lambda **a: solved(scene_of(), "gravity")(**a),
+                {"acceleration": (0.0, -1.0), "amplitude": 1.0}),
+    "change": (lambda **a: scene_of().gravity((0.0, -1.0)).change(**a),
+               {"value": (0.0, 1.0), "amplitude": 2.0}),
+    "solve": (on_scene("solve"), {"until": 1.0}),
     "residual": (on_scene("residual"), {"coefficients": np.zeros(41)}),
     "tangent": (on_scene("tangent"), {"coefficients": np.zeros(41)}),
     "displacement": (lambda **a: scene_of().solve().displacement(**a), {"point": (0.0, 1.0)}),
@@ -288,7 +294,7 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "run": (in_motion("run"), {"end": 0.02, "dt": 0.01, "smallest": 1e-3, "each": enough}),
     "angular_momentum": (in_motion("angular_momentum"), {"about": (0.0, 0.0)}),
     "ramp": (lambda **a: tawami.ramp(**a),
-             {"scene": scene_of(), "size": 0.5, "smallest": 0.1, "each": enough}),
+             {"scene": scene_of(), "size": 0.5, "smallest": 0.1, "until": 1.0, "each": enough}),
     "settle": (lambda **a: tawami.settle(**a),
                {"scene": scene_of("u_finite"), "tolerance": 1e-10, "max_resets": 3}),
     "Series": (tawami.Series, {"label": "own", "run": run_of, "knobs": {"n": (1, 2)}}),
@@ -313,7 +319,8 @@ CALLED = {
     "force": "load", "function": "run|series", "stabilisation": "stabilisation", "label": "series",
     "main": "run", "path": "'|folder|name", "acceleration": "gravity",
     "body": "Body|Scene|particles|volume", "grid": "Grid|grid|mesh", "body.x": "x",
-    "value": "fix|traction|hold|Newton", "edge": "edge|wall", "cells": "grid", "folder": "folder|'",
+    "value": "fix|traction|hold|gravity|Newton", "edge": "edge|wall", "cells": "grid",
+    "folder": "folder|'",
     "volume": "volume|particle|body", "x": "particle|body", "material": "elastic|particle|law|form",
     "material_of": "particle", "fields": "field|declare|form", "residual": "form",
     "options": "option|form", "parameters": "parameter|form", "kinematics": "form", "strain": "form",

@@ -58,7 +58,7 @@ def test_without_the_advice_the_block_gains_energy():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("per_axis", "bound"), [(2, 5e-3), (3, 1.5e-3)])
+@pytest.mark.parametrize(("per_axis", "bound"), [(2, 3e-3), (3, 1.5e-3)])
 def test_a_hundred_turns(per_axis, bound):
     """Elastic energy at the end: physical is 4.5e-4 of the initial kinetic energy."""
     motion = turning(FORM, 0.3, per_axis)

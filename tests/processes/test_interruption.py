@@ -51,7 +51,7 @@ def state(motion: tawami.Dynamics) -> dict[str, Any]:
     arrays["total"] = scene.configuration.total
     arrays["cell"] = scene.configuration.domain.location.cell
     balance = (energies.kinetic, energies.elastic, energies.dissipated, energies.left)
-    carried = scene.configuration.loads.weight.carried[1]
+    carried = scene.configuration.loads.all[0].terms[0].share.carried
     arrays["numbers"] = [motion.time, motion.steps, *balance, len(scene.left), carried]
     return {name: np.array(values) for name, values in arrays.items()}
 

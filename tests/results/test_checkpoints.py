@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
+from itertools import count
 
 import numpy as np
 import pytest
@@ -107,7 +109,9 @@ def test_a_failed_step_leaves_a_checkpoint_of_the_state_before_it(tmp_path):
     """The driver fails after a step, and a ramp fails at its smallest step."""
     with pytest.raises(tawami.InputError) as error:
         run(tmp_path / "a", each=Kill(3, error=tawami.InputError("no")), checkpoint_steps=None)
-    assert "the state after the last accepted step, at 0.015 s" in error.value.__notes__[0]
+    (note,) = error.value.__notes__
+    (path,) = (tmp_path / "a" / "checkpoints").iterdir()
+    assert note == f"the state after the last accepted step, at 0.015 s, is in '{path}'"
     kill = Kill()
     run(tmp_path / "a", each=kill)
     assert kill.count == 7
@@ -119,6 +123,31 @@ def test_a_failed_step_leaves_a_checkpoint_of_the_state_before_it(tmp_path):
     log = (tmp_path / "b" / "log.txt").read_text()
     assert "failed, now 0.005" in log
     assert "ramp ended by" in log
+
+
+def test_an_error_names_a_checkpoint_only_if_it_exists(tmp_path):
+    """The disk is full before the first checkpoint, and after it."""
+    for at, notes in ((1, []), (3, ["the state after step 2 of 3 is in '{}'"])):
+        folder = tmp_path / f"{at}"
+
+        calls = count(1)
+
+        def fill(_solution, at=at, calls=calls):
+            if next(calls) == at:
+                limit.enter_context(small_files(4000))
+                raise tawami.InputError("no")
+
+        with (
+            contextlib.ExitStack() as limit,
+            pytest.warns(tawami.CheckpointWarning, match="no checkpoint:") as warned,
+            pytest.raises(tawami.InputError) as error,
+        ):
+            run(folder, each=fill)
+        files = list((folder / "checkpoints").glob("*.npz"))
+        assert getattr(error.value, "__notes__", []) == [n.format(*files) for n in notes]
+        said = str(warned[0].message)
+        assert ("the last one is" in said) == bool(notes) == ("none yet" not in said)
+        assert "continues" not in said
 
 
 def test_checkpoints_are_written_by_the_clock(tmp_path, monkeypatch):
@@ -142,7 +171,7 @@ def test_a_full_disk_stops_no_run_before_its_end(tmp_path):
     with pytest.raises(Killed):
         run(tmp_path / "run", each=Kill(5))
     with (
-        pytest.warns(tawami.CheckpointWarning, match="no checkpoint: .*The run continues"),
+        pytest.warns(tawami.CheckpointWarning, match=r"no checkpoint: .*'.*-00000004.npz'"),
         pytest.raises(tawami.OutputError, match=os.strerror(errno.EFBIG)),
         small_files(9000),
     ):

@@ -161,11 +161,12 @@ def test_an_error_of_an_output_leaves_no_gap_in_a_table(tmp_path):
 def test_gravity_that_changes_during_a_run_is_part_of_its_state(tmp_path):
     def driven(folder, each):
         scene = block()
+        (weight,) = scene.configuration.loads.all
         motion = tawami.Dynamics(scene, velocity=(1.0, 0.0))
 
         def turned(solution):
             if motion.steps == 3:
-                scene.gravity((0.0, 5.0))
+                weight.change((0.0, 5.0))
             if each is not None:
                 each(solution)
 
@@ -192,7 +193,9 @@ def test_loads_that_are_added_during_a_run_cannot_be_resumed(tmp_path):
 
     with pytest.raises(Killed):
         driven(Kill(6))
-    with pytest.raises(tawami.CheckpointError, match="1 loads of a kind .* the script made 0"):
+    with pytest.raises(
+        tawami.CheckpointError, match="2 loads when it was stored, and the script made 1"
+    ):
         driven(Kill())
 
 
@@ -257,3 +260,78 @@ def test_a_resumed_run_may_have_more_iterations(interrupted):
     kill = Kill()
     run(interrupted, scene=scene, each=kill)
     assert kill.count == 4
+
+
+def cycled(results, each, form="u_epsv_finite"):
+    """Loads and supports that follow amplitudes, change, fade and are released, in three phases."""
+    scene = block()
+    (weight,) = scene.configuration.loads.all
+    plate = scene.hold((0.75, 0.5), "y", -0.01, amplitude=lambda t: t)
+    push = scene.load([3, 5], (40.0, 0.0), amplitude=lambda t: np.cos(3 * t))
+    side = scene.hold((0.5, 0.25), "x")
+    steps = [tawami.ramp(scene, 0.3, until=1.0, results=results, each=each)]
+    weight.change((0.0, -5.0))
+    push.release()
+    plate.change(-0.02)
+    steps.append(tawami.ramp(scene, 0.3, until=2.0, results=results, each=each))
+    plate.release()
+    side.release()
+    wall = scene.wall("right")
+    wall.change(0.2)
+    scene.load([7], (0.0, 3.0), amplitude=lambda t: np.sin(50 * t))
+    motion = tawami.Dynamics(scene, velocity=(0.3, 0.0), gamma=0.6)
+    steps.append(motion.run(2.03, 0.004, results=results, each=each))
+    state = scene.configuration.loads.state(), scene.configuration.supports.state()["supports"]
+    return scene.particles.rows().tobytes(), str(motion.energies), scene.time, steps, state
+
+
+def test_a_killed_run_with_changed_and_released_loads_resumes_to_the_bit(tmp_path):
+    whole = cycled(results_of(tmp_path / "whole"), None)
+    kill, attempts = Kill(2, 5, 8, 12), 0
+    while True:
+        attempts += 1
+        try:
+            found = cycled(results_of(tmp_path / "killed"), kill)
+            break
+        except Killed:
+            continue
+    assert attempts == 5
+    assert found == whole
+    again = cycled(results_of(tmp_path / "killed"), Kill(1))  # nothing is solved
+    assert again == whole
+
+
+@pytest.mark.parametrize(
+    ("change", "resumes"),
+    [
+        (lambda load, side: load.change((0.0, -4.0), amplitude=0.5), True),
+        (lambda load, side: side.change(velocity=0.1), False),
+        (lambda load, side: load.change(amplitude=lambda t: 0.5), False),
+    ],
+)
+def test_changes_to_numbers_during_a_run_are_part_of_its_state(tmp_path, change, resumes):
+    def driven(folder, each):
+        scene = block()
+        (weight,) = scene.configuration.loads.all
+        side = scene.hold((0.75, 0.25), "x", velocity=0.2)
+        motion = tawami.Dynamics(scene)
+
+        def changing(solution):
+            if motion.steps == 3:
+                change(weight, side)
+            if each is not None:
+                each(solution)
+
+        motion.run(0.05, 0.005, results=results_of(folder), each=changing)
+        return scene.particles.rows()
+
+    with pytest.raises(Killed):
+        driven(tmp_path / "run", Kill(6))
+    if not resumes:
+        with pytest.raises(
+            tawami.CheckpointError, match="was changed to a function or another velocity"
+        ):
+            driven(tmp_path / "run", None)
+        return
+    whole = driven(tmp_path / "whole", None)
+    assert driven(tmp_path / "run", None).tobytes() == whole.tobytes()

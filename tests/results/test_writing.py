@@ -21,7 +21,7 @@ from scenes import grid_of
 
 import tawami
 from cases.common import figure
-from tawami.base.files import atomic_file, result_folder
+from tawami.base.files import atomic_file, host, result_folder, temporary
 from tawami.results.single import write_grid, write_particles
 from tawami.study import process
 from tawami.study.figure import picture
@@ -104,7 +104,7 @@ def test_a_full_disk_leaves_the_old_file(name, solution, folder):
         if why[0] == "F":
             limit = small_files(2000)
         else:
-            (folder / f".{os.getpid()}-{name}").symlink_to("/dev/full")
+            temporary(path).symlink_to("/dev/full")
         with limit, pytest.raises(tawami.OutputError, match=f"{name}' cannot be written: {why}"):
             write(path, solution)
         assert path.read_text() == BEFORE
@@ -170,7 +170,7 @@ def test_a_study_keeps_its_runs_on_a_full_disk(folder, monkeypatch):
     ):
         study.run(quiet=True)
     assert kept.read_text() == before
-    assert [p.name for p in folder.iterdir()] == ["runs.jsonl"]
+    assert [p.name for p in folder.glob("[!.]*")] == ["runs.jsonl"]
     assert len(study.run(quiet=True).rows) == 1
 
 
@@ -195,7 +195,8 @@ def test_a_killed_process_leaves_the_old_file(tmp_path):
         assert child.stdout.readline() == "now\n"
         child.send_signal(signal.SIGKILL)
     assert path.read_text() == BEFORE
-    assert {p.name for p in tmp_path.iterdir()} == {"x.csv", f".{child.pid}-x.csv"}  # hidden
+    left = {f".{child.pid}@{host()}@x.csv"}  # hidden
+    assert {p.name for p in tmp_path.iterdir()} == {"x.csv"} | left
     with atomic_file(path) as part:
         part.write_text("after")
     assert path.read_text() == "after"
@@ -224,6 +225,6 @@ def test_a_cache_of_kernels_that_cannot_be_written_is_named(place, most, why, tm
     run = python("-c", MADE, most, variables={"XDG_CACHE_HOME": str(tmp_path / place)})
     assert run.returncode == 1
     said = run.stderr.splitlines()[-1]
-    assert said.startswith("scene: the code of form 'u' cannot be compiled"), run.stderr
+    assert said.startswith("scene: form 'u': the cache of compiled forms '"), run.stderr
     assert why in said
     assert "XDG_CACHE_HOME" in said

@@ -4,37 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mpi4py import MPI
+from k0_column import HEIGHT, K0, LAWS, RHO, SOIL, G, column, k0
 from scenes import grid_of
 
 import tawami
-from tawami.results.single import write_particles
-
-RHO, G, HEIGHT, K0 = 2000.0, 9.81, 4.0, 0.5
-SOIL = tawami.linear_elastic(E=1e7, nu=0.3)
-LAWS = {
-    "elastic": SOIL,
-    "mohr_coulomb": tawami.mohr_coulomb(SOIL, phi=30.0),
-    "drucker_prager": tawami.drucker_prager(SOIL, phi=30.0),
-}
-
-
-def k0(x, y, K0=K0):
-    """K0 stress of a column under its weight."""
-    vertical = RHO * G * (y - HEIGHT)
-    return K0 * vertical, vertical, K0 * vertical, 0.0
-
-
-def column(law="elastic", form="u_epsv", per_axis=2, **options):
-    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.5, cells=(4, 8))
-    body = tawami.box(grid, (0, 0), (2, HEIGHT), per_axis=per_axis, gauss=True)
-    material = law if isinstance(law, tawami.Material) else LAWS[law]
-    scene = tawami.Scene(grid, body, material, form=form, density=RHO, **options)
-    scene.fix("left", "x")
-    scene.fix("right", "x")
-    scene.fix("bottom", "y")
-    scene.gravity((0, -G))
-    return scene
 
 
 @pytest.mark.parametrize("form", ["u", "u_epsv", "u_epsv_finite", "u_finite"])
@@ -164,70 +137,6 @@ def test_fields_are_given_as_numbers_arrays_and_functions():
     assert np.array_equal(motion.velocity, np.column_stack([y, 0 * y]))
 
 
-def write_table(path, points, values, header):
-    rows = np.column_stack([points, values]).tolist()
-    lines = [header, *(",".join(map(repr, row)) for row in rows)]
-    path.write_text("\n".join(lines) + "\n")
-
-
-def test_tables_are_linear_between_their_points(tmp_path):
-    random = np.random.default_rng(0)
-    points = np.concatenate([random.random((40, 2)), [[0, 0], [1, 0], [0, 1], [1, 1]]]) * [2, 4]
-    stress = np.column_stack([*k0(*points.T, 0.6)[:3], 3 * points[:, 0]])
-    path = tmp_path / "field.csv"
-    write_table(path, points, stress, "x, y, sxx, syy, szz, sxy")
-    scene = column()
-    scene.initial("stress", tawami.table(path))
-    x, y = scene.particles.x.T
-    expected = np.column_stack([*k0(x, y, 0.6)[:3], 3 * x])
-    assert scene.particles.stress == pytest.approx(expected, rel=1e-10, abs=1e-6)
-    scene.initial("displacement", tawami.table(path, "sxy", "syy"))
-    assert scene.particles.displacement[:, 0] == pytest.approx(3 * x)
-    motion = tawami.Dynamics(scene, velocity=tawami.table(path, "sxy", "sxy"))
-    assert motion.velocity[:, 1] == pytest.approx(3 * x)
-
-
-def test_points_outside_a_table_are_rejected_or_take_the_nearest_value(tmp_path):
-    path = tmp_path / "field.csv"
-    write_table(
-        path, [[0.2, 0], [2, 0], [2, 4], [0.2, 4]], [[1, 0], [2, 0], [3, 0], [4, 0]], "x,y,a,b"
-    )
-    scene = column()
-    with pytest.raises(tawami.InputError, match=r"particle 0 at \(0.1.*outside='nearest'"):
-        scene.initial("displacement", tawami.table(path))
-    scene.initial("displacement", tawami.table(path, outside="nearest"))
-    assert scene.particles.displacement[0, 0] == 1.0
-
-
-def test_an_earlier_run_gives_its_fields(tmp_path):
-    """The same particles take the values of the file, others interpolate linearly."""
-    first = column("mohr_coulomb")
-    first.initial("stress", lambda x, y: k0(x, y, 0.45))
-    solution = first.solve()
-    path = tmp_path / "particles.vtu"
-    write_particles(path, solution)
-    state = tawami.earlier(path)
-    second = column("mohr_coulomb")
-    for name in ("stress", "eps_v", "displacement"):
-        second.initial(name, state)
-    assert np.array_equal(second.particles.stress, solution.stress)
-    assert np.array_equal(second.particles.eps_v, solution.eps_v)
-    assert np.array_equal(second.particles.displacement, solution.displacement_of_particles)
-    finer = column("mohr_coulomb", per_axis=3)
-    with pytest.raises(tawami.InputError, match=r"stress: particle 0 at .* are outside the points"):
-        finer.initial("stress", state)
-    finer.initial("stress", tawami.earlier(path, outside="nearest"))
-    inside = (abs(finer.particles.x - [1, 2]) < [0.85, 1.85]).all(axis=1)
-    expected = np.column_stack(k0(*finer.particles.x.T, 0.45)[:3])
-    assert finer.particles.stress[inside, :3] == pytest.approx(expected[inside], rel=1e-6)
-    grid = first.grid
-    again = tawami.Scene(grid, state.body, LAWS["mohr_coulomb"])
-    assert np.array_equal(again.particles.x, solution.x)
-    assert np.array_equal(again.particles.volume, solution.volume)
-    with pytest.raises(tawami.InputError, match=r"has no array 'velocity' of 2 components: it has"):
-        tawami.Dynamics(column(), velocity=state)
-
-
 @pytest.mark.parametrize(
     ("name", "source", "message"),
     [
@@ -266,40 +175,6 @@ def test_initial_fields_are_set_before_the_first_solve_and_the_motion():
         assert np.array_equal(scene.particles.stress, before)
     with pytest.raises(tawami.InputError, match="beyond = 'ignore': expected 'stop' or 'return'"):
         column().initial("stress", k0, beyond="ignore")
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "its first row is empty: expected names"),
-        ("x,z,a\n1,2,3\n", "its first row is x, z, a: expected names of columns, x, y and at least"),
-        ("x,y\n1,2\n", "first row is x, y: expected names"),
-        ("x,y,a\n0,0,1\n1,0,b\n0,1,1\n", "row 3: 1,0,b: expected finite numbers"),
-        ("x,y,a\n0,0,1\n1,0\n0,1,1\n", "row 3: 1,0: expected finite numbers"),
-        ("x,y,a\n0,0,1\n1,0,nan\n0,1,1\n", "row 3: 1,0,nan: expected finite numbers"),
-        ("x,y,a\n0,0,1\n1,0,1\n", "has 2 points: expected three or more"),
-        ("x,y,a\n0,0,1\n1,0,1\n0,0,2\n", r"the point \(0, 0\) m is there 2 times"),
-        ("x,y,a\n0,0,1\n0,1,1\n0,2,2\n", "are less than a triangle: .* np.interp"),
-        ("x,y,a,b\n0,0,1,1\n0,1,1,1\n9,2,2,2\n", r"has 2 columns besides x and y: expected 1 \(value\)"),
-    ],
-)  # fmt: skip
-def test_a_wrong_table_is_rejected(tmp_path, text, message):
-    path = tmp_path / "field.csv"
-    path.write_text(text)
-    with pytest.raises(tawami.InputError, match=message):
-        column().initial("eps_v", tawami.table(path))
-
-
-def test_missing_files_are_named(tmp_path):
-    with pytest.raises(tawami.InputError, match=r"table\('.*none.csv'\) cannot be read"):
-        tawami.table(tmp_path / "none.csv")
-    with pytest.raises(tawami.InputError, match=r"earlier\('.*none.vtu'\) cannot be read"):
-        tawami.earlier(tmp_path / "none.vtu")
-    (tmp_path / "text.vtu").write_text("no particles")
-    with pytest.raises(tawami.InputError, match=r"earlier\('.*text.vtu'\) cannot be read"):
-        tawami.earlier(tmp_path / "text.vtu")
-    with pytest.raises(tawami.InputError, match="outside = 'far': expected 'stop' or 'nearest'"):
-        tawami.table("any.csv", outside="far")
 
 
 def test_a_law_in_numpy_rejects_a_stress_too():

@@ -71,7 +71,7 @@ def test_a_block_leaves_a_wall_that_separates():
     found = {}
     for separates in (True, False):
         scene = block(friction=0.3, separates=separates)
-        scene.gravity((0.0, 0.0))
+        scene.configuration.loads.all[0].change((0.0, 0.0))
         motion = tawami.Dynamics(scene, velocity=(0.0, 0.5))
         motion.run(0.2, 0.01)
         found[separates] = speed(motion)[1], scene.particles.x[:, 1].min()

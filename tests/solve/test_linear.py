@@ -106,6 +106,59 @@ def test_a_load_beyond_the_strength_raises_an_error(form, load):
     assert not scene.particles.stress.any()
 
 
+@pytest.mark.parametrize("stabilisation", ["laplacian", "residual_based"])
+def test_mumps_works_with_the_options_that_were_chosen(stabilisation, monkeypatch):
+    """INFOG(7) is the ordering that MUMPS used. PETSc 3.18 ignores ICNTL(7) set by a call."""
+    used = []
+    mumps = direct.DirectSolver._mumps
+
+    def observed(self, *arguments):
+        result, factor = mumps(self, *arguments), self._handles["factor"]
+        used.append([factor.getMumpsInfog(7), *(factor.getMumpsIcntl(k) for k in (6, 7, 8, 14))])
+        return result
+
+    monkeypatch.setattr(direct.DirectSolver, "_mumps", observed)
+    solution = mpm.build("u_epsv", "paper", 16, alpha=0.1, stabilisation=stabilisation).solve()
+    assert solution.symmetric == (stabilisation == "laplacian")
+    assert used == [[6, 0, 6, 0, direct.ROOM[0]]]
+
+
+def test_the_analysis_serves_all_factorisations_of_one_matrix(monkeypatch):
+    scenes = [beam(hardening(20.0), factorise="always") for _ in range(2)]
+    analyses = []
+    analyse = direct.DirectSolver._analyse_next
+
+    def counted(self, *arguments):
+        analyses.append(self)
+        analyse(self, *arguments)
+
+    monkeypatch.setattr(direct.DirectSolver, "_analyse_next", counted)
+    once = scenes[0].solve()
+    assert len(once.krylov) > 3
+    assert len(analyses) == 1
+    mumps = direct.DirectSolver._mumps
+
+    def anew(self, *arguments):
+        self._analysed = None
+        return mumps(self, *arguments)
+
+    monkeypatch.setattr(direct.DirectSolver, "_mumps", anew)
+    every_time = scenes[1].solve()
+    assert len(analyses) == 1 + len(every_time.krylov)
+    assert once.u.tobytes() == every_time.u.tobytes()
+
+
+def test_iterations_that_cost_more_than_a_factorisation_are_not_made():
+    """Of a residual that falls by a tenth in each iteration, and of one that falls by nine tenths."""
+    pays = direct._Pays(1e-6)
+    assert [pays(None, k, 0.1**k) for k in range(6)] == [0] * 6
+    assert pays(None, 7, 0.1**7) > 0
+    pays = direct._Pays(1e-6)
+    assert [pays(None, k, 0.9**k) for k in range(direct.TRIAL)] == [0] * direct.TRIAL
+    assert pays(None, direct.TRIAL, 0.9**direct.TRIAL) < 0
+    assert pays(None, direct.TRIAL, np.nan) < 0
+
+
 def test_a_tangent_with_nan_is_named():
     def residual(u, w, sigma, mu, sum_p, t, ds):
         root = sum_p(mu, inner((div(u) ** 2) ** 0.5, div(w)))

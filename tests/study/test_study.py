@@ -18,12 +18,21 @@ from tawami.study import Series, Table, process
 MB = 2**20
 
 
+#: Read by `scaled`.
+FACTOR = 1.0
+
+
 # -- functions that studies run --------------------------------------------------
 
 
 def converges(n, order=1):
     """Converge to 1 with first or second order."""
     return {"x": 1 + 1 / n**order, "unknowns": n}
+
+
+def scaled(n):
+    """Return a constant of this file."""
+    return {"x": FACTOR * n}
 
 
 def stretched(n, tolerance=1e-6):
@@ -50,7 +59,7 @@ def misbehaves(how):
         return {"x": 1 / 0}
     if how == "a list":
         return [1.0]
-    return {"x": {"nan": np.nan, "is well": 1.0}[how], "y": 1.0}
+    return {"x": {"nan": np.nan, "is complex": np.complex128(1.0), "is well": 1.0}[how], "y": 1.0}
 
 
 def allocates(megabytes):
@@ -96,7 +105,7 @@ def test_every_setting_is_run_once(tmp_path, capsys):
     before = (tmp_path / "runs.jsonl").read_bytes()
     assert study.run().rows == table.rows
     assert (tmp_path / "runs.jsonl").read_bytes() == before
-    assert {"toy.csv", "toy.png", "runs.jsonl"} == {path.name for path in tmp_path.iterdir()}
+    assert {"toy.csv", "toy.png", "runs.jsonl"} == {path.name for path in tmp_path.glob("[!.]*")}
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -149,19 +158,19 @@ def test_the_finest_run_is_a_reference(tmp_path):
 
 @pytest.mark.usefixtures("in_this_process")
 def test_failed_runs_are_reported_and_the_others_are_run(tmp_path):
-    ways = ("refuses", "divides", "nan", "a list", "is well")
+    ways = ("refuses", "divides", "nan", "is complex", "a list", "is well")
     study = tawami.Study("toy", misbehaves, {"how": ways}, {"x": 1.0}, folder=tmp_path)
     table = study.run(quiet=True)
     *failures, last = table.rows
     assert last.failure is None
     expected = (
         "InputError: no", "ZeroDivisionError", "quantity 'x' is not finite",
-        "returned list: expected a mapping",
+        "quantity 'x' = (1+0j): expected real numbers", "returned list: expected a mapping",
     )  # fmt: skip
     for row, words in zip(failures, expected, strict=True):
         assert words in row.failure
-    assert len(table.failed) == 4
-    assert "4 of 5 runs failed" in table.in_words("x")
+    assert len(table.failed) == 5
+    assert "5 of 6 runs failed" in table.in_words("x")
 
 
 def test_a_process_that_dies_does_not_stop_a_study(tmp_path):
@@ -259,3 +268,10 @@ def test_cases_trade_runs_a_sample(tmp_path):
     )
     assert "The knee:" in run.stdout
     assert (tmp_path / "cook" / "cook.png").exists()
+
+
+def test_a_run_depends_on_the_constants_that_its_function_reads(monkeypatch):
+    before = process.fingerprint(scaled)
+    assert process.fingerprint(scaled) == before
+    monkeypatch.setitem(globals(), "FACTOR", 2.0)
+    assert process.fingerprint(scaled) != before

@@ -37,9 +37,14 @@ def beam(n: int) -> Any:
     return scene
 
 
-def pile() -> Any:
-    """The pile of `cases.showcase.collapse` in motion, 800 particles."""
-    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.01, cells=(80, 14))
+def pile(finer: int = 1) -> Any:
+    """The pile of `cases.showcase.collapse` in motion.
+
+    Args:
+        finer: How much smaller cells are than 1 cm: 800 finer^2 particles.
+    """
+    cells = (80 * finer, 14 * finer)
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.01 / finer, cells=cells)
     body = tawami.box(grid, (0.0, 0.0), (0.2, 0.1), per_axis=2)
     rods = tawami.drucker_prager(tawami.linear_elastic(E=0.84e6, nu=0.3), phi=21.9)
     scene = tawami.Scene(grid, body, rods, form="u_epsv_finite", density=RHO, alpha=0.01)

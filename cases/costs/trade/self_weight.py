@@ -19,8 +19,9 @@ def run(form: str, h: float, inertia: str, increments: int, **options: object) -
     """Errors of height and stress, with `increments` of the weight or time steps of a natural period."""
     scene = self_weight.build(form, h, **options)
     if inertia == "none":
+        weight = scene.gravity((0.0, 0.0))
         for k in range(1, increments + 1):
-            scene.gravity((0.0, -G * k / increments))
+            weight.change((0.0, -G * k / increments))
             scene.solve()
     else:
         scene.gravity((0.0, -G))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 import re
 import zipfile
@@ -22,7 +23,7 @@ from tawami.base.errors import CheckpointError
 from tawami.base.files import atomic_file, reason
 
 #: Version of the content of a state.
-FORMAT = 2
+FORMAT = 3
 #: Entry of the archive with the JSON.
 ABOUT = "about.json"
 #: Folder of the checkpoints in the folder of a run.
@@ -45,6 +46,11 @@ def files(folder: Path) -> list[Path]:
 def phase_of(path: Path) -> int:
     """Number of the phase that a checkpoint belongs to."""
     return int(path.name.partition("-")[0])
+
+
+def steps_of(path: Path) -> int:
+    """Number of steps of a checkpoint."""
+    return int(path.stem.rpartition("-")[2])
 
 
 def write(path: Path, identity: Mapping[str, Any], state: Mapping[str, Any]) -> None:
@@ -96,6 +102,71 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
             f"checkpoint '{path}' has format {found!r}: this version of tawami reads format {FORMAT}"
         )
     return identity, state
+
+
+def check_particles(arrays: Any) -> None:
+    """Check the arrays of the particles in a state, each particles x components.
+
+    Raises:
+        ValueError: They are not such arrays, or not finite; numbers that repeat, volumes that are not
+            positive.
+    """
+    if not isinstance(arrays, Mapping) or not {"x", "number", "volume"} <= set(arrays):
+        raise ValueError("it has no positions, numbers and volumes of particles")
+    rows = {getattr(array, "shape", (None,))[:1] for array in arrays.values()}
+    for name, array in arrays.items():
+        check_like(array, np.zeros((1, *np.shape(array)[1:])), f"'{name}' of the particles")
+        if np.ndim(array) != 2 or len(rows) != 1:
+            raise ValueError(f"'{name}' of the particles has the shape {np.shape(array)}")
+    number = arrays["number"]
+    if (
+        (number != np.floor(number)).any()
+        or (number < 0).any()
+        or len(np.unique(number)) != number.size
+    ):
+        raise ValueError("numbers of the particles are not whole, negative, or repeat")
+    if (arrays["volume"] <= 0).any():
+        raise ValueError("volumes of the particles are not positive")
+
+
+def check_like(found: Any, own: Any, name: str) -> None:
+    """Check a stored value against one of the same kind: type, columns of an array, finite numbers.
+
+    What `own` leaves open is not checked: None, an empty list or dictionary, the number of rows.
+
+    Args:
+        found: The stored value.
+        own: The value that the program has now.
+        name: Of the value in the message.
+
+    Raises:
+        ValueError: Another kind of value; the message names it.
+    """
+    if isinstance(own, np.ndarray):
+        same = isinstance(found, np.ndarray) and found.dtype == own.dtype
+        if not same or found.shape[1:] != own.shape[1:] or found.ndim != own.ndim:
+            shown = f"{found.dtype} {found.shape}" if isinstance(found, np.ndarray) else repr(found)
+            raise ValueError(f"{name} is {shown[:60]}, expected {own.dtype} {own.shape}")
+        if own.size and np.isfinite(own).all() and not np.isfinite(found).all():
+            raise ValueError(f"{name} is not finite")
+    elif isinstance(own, Mapping):
+        if not isinstance(found, Mapping) or (own and found.keys() != own.keys()):
+            raise ValueError(f"{name or 'the state'} has not the entries {', '.join(own)}")
+        for key, value in own.items():
+            check_like(found[key], value, f"{name}.{key}" if name else key)
+    elif isinstance(own, list | tuple):
+        if found is not None and not isinstance(found, list):
+            raise ValueError(f"{name} is {str(found)[:60]!r}, expected a list")
+        if found is not None and len(found) == len(own):
+            for k, value in enumerate(own):
+                check_like(found[k], value, f"{name}[{k}]")
+    elif isinstance(own, bool | str) or own is None:
+        if own is not None and not isinstance(found, type(own)):
+            raise ValueError(f"{name} is {str(found)[:60]!r}, expected a {type(own).__name__}")
+    elif isinstance(found, bool) or not isinstance(found, int | float):
+        raise ValueError(f"{name} is {str(found)[:60]!r}, expected a number")
+    elif math.isfinite(own) and not math.isfinite(found):
+        raise ValueError(f"{name} is {found}, expected a finite number")
 
 
 def _pack(value: Any, path: str, arrays: dict[str, Any]) -> Any:

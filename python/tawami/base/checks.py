@@ -214,6 +214,19 @@ def array(name: str, values: Any, dimensions: int) -> Array:
         return np.ascontiguousarray(raw, dtype=np.float64)
 
 
+def real_values(values: Any) -> Array:
+    """An array of real numbers, from what a function of the driver script returned.
+
+    Raises:
+        TypeError: Complex numbers, whose imaginary parts NumPy would drop, or no numbers.
+        ValueError: No array.
+    """
+    raw = np.asarray(values)
+    if raw.dtype.kind == "c":
+        raise TypeError("complex numbers")
+    return raw.astype(float)
+
+
 def any_array(name: str, values: Any) -> npt.NDArray[Any]:
     """Any array of NumPy.
 

@@ -11,7 +11,11 @@ from typing import NoReturn
 
 import numpy as np
 
+from tawami.base import blas
 from tawami.base.errors import MissingDependencyError
+
+#: Kernels of the BLAS, chosen before MPI starts.
+CORE = blas.choose()
 
 
 def report_missing(error: ImportError) -> NoReturn:

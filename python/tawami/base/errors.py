@@ -10,6 +10,7 @@ TawamiError               base of all of them
   FormError               a weak form that cannot be used
   SupportError            supports that leave a rigid motion free, contradict each other, miss the body
   SingularError           a singular tangent
+  SolverError             a linear system that could not be solved for lack of memory, for example
   ConvergenceError        an iteration that did not converge, with its history
   OutputError             a result that cannot be written
   CheckpointError         a checkpoint that cannot be used
@@ -102,6 +103,10 @@ class SingularError(TawamiError):
     """A singular tangent; the message names the cells."""
 
 
+class SolverError(TawamiError):
+    """A linear system that could not be solved for a reason other than its values, such as memory."""
+
+
 class ConvergenceError(TawamiError):
     """A Newton iteration that did not converge.
 
@@ -155,6 +160,7 @@ __all__ = [
     "SingularError",
     "SmallStrainWarning",
     "SofteningWarning",
+    "SolverError",
     "SupportError",
     "TawamiError",
     "TawamiWarning",

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import errno
 import os
+import platform
+import re
 import stat
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from tawami.base import checks
 from tawami.base.errors import InputError, OutputError
+
+#: Temporary files: .PROCESS@HOST@NAME.
+PART = re.compile(r"\.(\d+)@([^@]*)@.*", re.DOTALL)
+#: Age from which a temporary file of another host is a leftover [s].
+OLD = 86400.0
 
 
 def reason(error: BaseException) -> str:
@@ -53,7 +61,7 @@ def result_folder(path: str | Path) -> Path:
         OutputError: It cannot be created or written.
     """
     folder = checks.path("result folder", path)
-    probe = folder / f".probe-{os.getpid()}"
+    probe = temporary(folder / "probe")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         probe.touch()
@@ -78,7 +86,7 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
     target = checks.path("path", path)
     if not target.name:
         raise OutputError(f"'{target}': expected the name of a file")
-    part = target.with_name(f".{os.getpid()}-{target.name}")
+    part = temporary(target)
     with writing(target):
         try:
             check_regular(target, new=True)
@@ -87,6 +95,42 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
         finally:
             with suppress(OSError):  # it was never created, or its folder is gone
                 part.unlink(missing_ok=True)
+
+
+def host() -> str:
+    """Name of this computer, as it can be part of the name of a file."""
+    return platform.node().replace("@", "-")[:40]
+
+
+def alive(number: int) -> bool:
+    """Whether a process of this host runs."""
+    try:
+        os.kill(number, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:  # of another user
+        return True
+    return True
+
+
+def temporary(target: Path) -> Path:
+    """Temporary path for a file; it names the process and its host."""
+    return target.with_name(f".{os.getpid()}@{host()}@{target.name}")
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove temporary files of processes that were killed, in a folder and the folders in it.
+
+    On this host a process tells whether it runs. The file of another host must be a day old.
+    """
+    for path in folder.rglob(".*@*@*"):
+        match = PART.fullmatch(path.name)
+        if match is None:
+            continue
+        with suppress(OSError):  # it is gone, or cannot be removed
+            old = time.time() - path.lstat().st_mtime > OLD
+            if old if match[2] != host() else not alive(int(match[1])):
+                path.unlink()
 
 
 def append_line(path: str | Path, line: str, *, sync: bool = False) -> None:

@@ -15,10 +15,23 @@ from tawami.body.points import ROUND_OFF
 from tawami.grid.grid import ON_LINE, Grid
 
 
+def tolerance(scaled: Array) -> float:
+    """The length below which two positions of a shape are the same [cells].
+
+    This is ON_LINE times the larger of a cell and of the shape: files state positions with six digits
+    or more of the size of the shape.
+
+    Args:
+        scaled: Positions of the shape [cells], n x dim; those that are NaN are ignored.
+    """
+    known = scaled[np.isfinite(scaled).all(axis=-1)]
+    return ON_LINE * max(1.0, float(np.ptp(known, axis=0).max()) if len(known) else 0.0)
+
+
 def on_lines(grid: Grid, x: Array) -> Array:
-    """Positions [m] in cells; those within ON_LINE of a line of the grid are moved onto it."""
+    """Positions [m] of a shape in cells; those at a line of the grid are moved onto it."""
     scaled = grid.in_cells(x)
-    near = np.isclose(scaled, np.rint(scaled), rtol=0, atol=ON_LINE)
+    near = np.isclose(scaled, np.rint(scaled), rtol=0, atol=tolerance(scaled))
     return np.where(near, np.rint(scaled), scaled)
 
 

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
 from tawami.base.arrays import Array, Indices
 from tawami.base.errors import InputError
 from tawami.body import clipping
-from tawami.body.points import ROUND_OFF, Points, areas, in_triangles
+from tawami.body.points import Points, areas, in_triangles
 from tawami.grid.grid import Grid
 
-#: A cell is full if less than this share is not covered. More than this share above 1 is an overlap.
+#: A cell is full if less than this share is not covered.
 COVERED = 1e-9
+#: Elements overlap if a disc of this radius fits into both [tolerances]: their nodes are up to
+#: 3.4 tolerances away from their true places, by rounding and by moving them onto lines of the grid.
+DEEP = 2.0
+#: An element is flat if it is thinner than this [tolerances], which is round-off.
+FLAT = 1e-6
+#: Corners of the two halves of a quadrilateral, along one diagonal or the other.
+DIAGONALS = (([0, 1, 2], [0, 2, 3]), ([1, 2, 3], [1, 3, 0]))
 
 
 @dataclass(frozen=True)
@@ -23,15 +30,15 @@ class Elements:
 
     Attributes:
         corners: Positions [cells], counter-clockwise, n x 3 x 2.
-        nodes: Their numbers in the mesh, n x 3.
         number: Number of the element among the elements that are used, n.
         material: Number of the material of each triangle, n.
+        tolerance: Length below which two positions are the same [cells].
     """
 
     corners: Array
-    nodes: Indices
     number: Indices
     material: Indices
+    tolerance: float
 
 
 def triangles(grid: Grid, x: Array, blocks: list[Indices], material: Indices) -> Elements:
@@ -46,29 +53,34 @@ def triangles(grid: Grid, x: Array, blocks: list[Indices], material: Indices) ->
     Raises:
         InputError: An element is outside the grid, has no area, or crosses itself.
     """
-    scaled = clipping.on_lines(grid, x)
-    nodes, number, first = list[Indices](), list[Indices](), 0
+    used = np.unique(np.concatenate([block.ravel() for block in blocks]))
+    scaled = np.full(x.shape, np.nan)
+    scaled[used] = clipping.on_lines(grid, x[used])
+    tolerance = clipping.tolerance(scaled[used])
+    corners, number, first = list[Array](), list[Indices](), 0
     for block in blocks:
         count = np.arange(first, first + len(block))
         _check_nodes(grid, x, scaled, block, first)
         if block.shape[1] == 4:
-            nodes += list(_halves(scaled, block, first))
+            corners += list(_halves(scaled[block], first, tolerance))
             number += [count, count]
         else:
-            nodes.append(block)
+            corners.append(scaled[block])
             number.append(count)
         first += len(block)
-    all_nodes, all_numbers = np.concatenate(nodes).astype(np.int64), np.concatenate(number)
-    area = areas(scaled[all_nodes])
-    flat = np.flatnonzero(np.abs(area) <= ROUND_OFF)
+    parts, of = np.concatenate(corners), np.concatenate(number)
+    area = areas(parts)
+    large = np.abs(area) > FLAT * tolerance * longest(parts)
+    flat = np.setdiff1d(of, of[large])
     if len(flat):
+        px, py = grid.in_metres(parts[of == flat[0]].mean(axis=(0, 1)))
         raise InputError(
-            f"mesh: {len(flat)} of its triangles have no area, the first in element "
-            f"{all_numbers[flat[0]]}: expected elements that are not flat"
+            f"mesh: {len(flat)} of its elements have no area, the first is element {flat[0]} at "
+            f"({px:g}, {py:g}) m: expected elements that are not flat on cells of {grid.h:g} m; "
+            "remove them from the mesh (lengths are metres)"
         )
-    turned = area < 0
-    all_nodes[turned] = all_nodes[turned][:, ::-1]
-    return Elements(scaled[all_nodes], all_nodes, all_numbers, material[all_numbers])
+    parts[area < 0] = parts[area < 0][:, ::-1]
+    return Elements(parts[large], of[large], material[of[large]], tolerance)
 
 
 def _check_nodes(grid: Grid, x: Array, scaled: Array, block: Indices, first: int) -> None:
@@ -83,60 +95,65 @@ def _check_nodes(grid: Grid, x: Array, scaled: Array, block: Indices, first: int
         )
 
 
-def _halves(x: Array, quads: Indices, first: int) -> tuple[Indices, Indices]:
-    """Two triangles of each quadrilateral, divided along a diagonal that is inside it."""
-    along = (quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]), (quads[:, [1, 2, 3]], quads[:, [1, 3, 0]])
-    signs = [np.sign(areas(x[a])) * np.sign(areas(x[b])) for a, b in along]
-    twisted = np.flatnonzero((signs[0] <= 0) & (signs[1] <= 0))
+def _halves(corners: Array, first: int, tolerance: float) -> tuple[Array, Array]:
+    """Two triangles of each quadrilateral (n x 4 x 2), divided along a diagonal that is inside it.
+
+    One of them has no area if two corners are at the same place, as in triangles that are stored as
+    quadrilaterals.
+    """
+    along = [(corners[:, a], corners[:, b]) for a, b in DIAGONALS]
+    area = np.array([[areas(half) for half in halves] for halves in along])
+    thinner = np.abs(area).min(axis=1)
+    inside = np.where(area[:, 0] * area[:, 1] > 0, thinner, -thinner)
+    side = np.array([longest(a) for a, _ in along])
+    twisted = np.flatnonzero((inside < -tolerance * side).all(axis=0))
     if len(twisted):
         raise InputError(
             f"mesh: {len(twisted)} of its quadrilaterals cross themselves, the first is element "
             f"{first + twisted[0]}: expected their corners in order around them"
         )
-    take = (signs[0] > 0)[:, None]
+    take = ((inside[0] > 0) | (inside[0] >= inside[1]))[:, None, None]
     a, b = (np.where(take, along[0][k], along[1][k]) for k in range(2))
     return a, b
 
 
-def check_apart(grid: Grid, elements: Elements) -> None:
-    """Check that no two elements overlap.
+def longest(triangles: Array) -> Array:
+    """Longest side of triangles, n x 3 x 2."""
+    sides = triangles - np.roll(triangles, -1, axis=1)
+    return np.asarray(np.linalg.norm(sides, axis=2).max(axis=1))
 
-    They do if both lie on the same side of a common side, if the middle of one is in another, or if
-    sides of the border cross.
+
+def check_apart(grid: Grid, elements: Elements) -> None:
+    """Check that no two elements overlap by more than the tolerance.
+
+    Every triangle is made smaller by moving its sides inwards, which scales it about the centre of its
+    inscribed circle. Two of these that meet have a disc in common.
 
     Raises:
         InputError: Two elements overlap.
     """
     import shapely
 
-    sides = np.concatenate([elements.nodes[:, [k, (k + 1) % 3]] for k in range(3)])
-    of = np.tile(np.arange(len(elements.nodes)), 3)
-    width = int(elements.nodes.max()) + 1
-    key = sides @ [width, 1]
-    order = np.argsort(key, kind="stable")
-    twice = np.flatnonzero(np.diff(key[order]) == 0)
-    if len(twice):
-        _overlap(grid, elements, of[order[twice[0]]], of[order[twice[0] + 1]])
-    shapes = shapely.polygons(elements.corners)
-    middle = shapely.points(elements.corners.mean(axis=1))
-    tree = shapely.STRtree(shapes)
-    point, shape = tree.query(middle, predicate="within")
-    wrong = np.flatnonzero(point != shape)
-    if len(wrong):
-        _overlap(grid, elements, point[wrong[0]], shape[wrong[0]])
-    border = ~np.isin(key, sides[:, ::-1] @ [width, 1])
-    corner = np.concatenate([elements.corners[:, [k, (k + 1) % 3]] for k in range(3)])[border]
-    lines = shapely.linestrings(corner)
-    a, b = shapely.STRtree(lines).query(lines, predicate="crosses")
-    if len(a):
-        _overlap(grid, elements, of[border][a[0]], of[border][b[0]])
-
-
-def _overlap(grid: Grid, elements: Elements, a: int, b: int) -> NoReturn:
-    x, y = grid.in_metres(elements.corners[a].mean(axis=0))
+    x, depth = elements.corners, DEEP * elements.tolerance
+    opposite = np.linalg.norm(np.roll(x, -1, axis=1) - np.roll(x, 1, axis=1), axis=2)
+    around = opposite.sum(axis=1)
+    radius = 2 * areas(x) / around
+    centre = (x * (opposite / around[:, None])[..., None]).sum(axis=1)
+    large = np.flatnonzero(radius > depth)
+    share = (1 - depth / radius[large])[:, None, None]
+    shapes = shapely.polygons(centre[large, None] + share * (x[large] - centre[large, None]))
+    a, b = large[shapely.STRtree(shapes).query(shapes, predicate="intersects")]
+    wrong = np.flatnonzero(elements.number[a] < elements.number[b])
+    if not len(wrong):
+        return
+    a, b = a[wrong[0]], b[wrong[0]]
+    common = shapely.intersection(*shapely.polygons(x[[a, b]]))
+    px, py = grid.in_metres(shapely.get_coordinates(common.centroid)[0])
     raise InputError(
-        f"mesh: elements {elements.number[a]} and {elements.number[b]} overlap near ({x:g}, {y:g}) m: "
-        "one is turned inside out, or both are the same; expected every point in one element"
+        f"mesh: elements {elements.number[a]} and {elements.number[b]} overlap by "
+        f"{common.area * grid.h**2:.3g} m2 near ({px:g}, {py:g}) m: one is turned inside out, both are "
+        "the same, or two surfaces lie over each other; expected every point in one element (to "
+        f"{2 * depth * grid.h:.2g} m)"
     )
 
 
@@ -146,9 +163,6 @@ def by_cells(grid: Grid, elements: Elements, num_materials: int) -> tuple[Indice
     Returns:
         Numbers of the cells that are filled by one material; this material; points that integrate over
         the other parts.
-
-    Raises:
-        InputError: Elements cover more than a cell.
     """
     triangles, of = _cut(elements.corners)
     area = areas(triangles)
@@ -157,14 +171,6 @@ def by_cells(grid: Grid, elements: Elements, num_materials: int) -> tuple[Indice
     cell = grid.cell_numbers(grid.cell_at(triangles.mean(axis=1)))
     key = cell * num_materials + elements.material[of]
     covered = np.bincount(key, area, minlength=grid.num_cells * num_materials)
-    in_cell = covered.reshape(-1, num_materials).sum(axis=1)
-    worst = int(in_cell.argmax())
-    if in_cell[worst] > 1 + COVERED:
-        x, y = grid.in_metres(grid.cell_indices(np.array(worst)) + 0.5)
-        raise InputError(
-            f"mesh: its elements cover {in_cell[worst]:.6g} times the cell at ({x:g}, {y:g}) m: "
-            "expected every point in one element"
-        )
     full = np.flatnonzero(covered > 1 - COVERED)
     rest = covered[key] <= 1 - COVERED
     cut = in_triangles(triangles[rest], cell[rest], elements.material[of[rest]])

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami.base.arrays import Array, Indices, Mask
-from tawami.base.checks import names, number, room, shown, whole_number
+from tawami.base.checks import names, number, real_values, room, shown, whole_number
 from tawami.base.errors import InputError
 from tawami.base.space import lattice
 from tawami.body.body import Body
@@ -34,7 +34,7 @@ class Function:
         """-1 if the function is negative, else 1, as bytes; for positions of shape (..., 2)."""
         points = self.grid.in_metres(x).reshape(-1, 2)
         try:
-            values = np.asarray(self.f(points[:, 0], points[:, 1]), dtype=float)
+            values = real_values(self.f(points[:, 0], points[:, 1]))
         except (TypeError, ValueError, OverflowError) as error:
             raise InputError(
                 f"level_set: f failed on arrays ({error}): expected f(x, y) on arrays of positions, "

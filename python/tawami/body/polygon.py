@@ -34,8 +34,9 @@ def polygon(
     A full cell gets `per_axis` x `per_axis` particles, placed as by `box`. The part of a cut cell that
     the polygon covers is divided into triangles with the 12 points of a Gauss rule in each. More than
     28 points in a cell are replaced by at most 28. However small the part, volumes are positive and
-    moments up to degree 6 are exact. The area is exact to 1e-12, but a vertex within 1e-6 cells of a
-    line of the grid is moved onto this line.
+    moments up to degree 6 are exact. The area is exact to 1e-12, but a vertex at a line of the grid is
+    moved onto this line, if it is nearer than 1e-6 of the polygon's size or of a cell, whichever is
+    larger. Sides may cross by as little as this. Parts may touch, and a hole may touch the border.
 
     Args:
         grid: The grid.
@@ -46,8 +47,8 @@ def polygon(
         gauss: Place the particles of full cells at the Gauss points with the Gauss weights.
 
     Raises:
-        InputError: The polygon has fewer than three vertices or no area, its sides cross or touch, a
-            hole is not inside it, or a vertex is outside the grid.
+        InputError: The polygon has fewer than three vertices or no area, its sides cross, a hole is not
+            inside it, or a vertex is outside the grid.
     """
     filling = Filling("polygon", grid, per_axis, gauss)
     valid = _valid(grid, _geometry(grid, shape, holes))
@@ -102,14 +103,32 @@ def _valid(grid: Grid, shape: Any) -> Any:
     """The polygon, if it is simple and has an area."""
     import shapely
 
-    if shape.convex_hull.area < ROUND_OFF:
+    hull = shape.convex_hull
+    if hull.area <= ROUND_OFF * hull.length**2:
         raise InputError(
             "polygon: its vertices lie on a line, so the body has no particles: expected an area"
         )
-    if not shape.is_valid:
+    mended = shape if shape.is_valid else _without_noise(shape)
+    if mended is None:
         where = shapely.is_valid_reason(shapely.transform(shape, grid.in_metres))
         raise InputError(
             f"polygon: its sides cross or touch each other ({where} m): expected a simple polygon, "
             "with its vertices in order and its holes inside"
         )
-    return shape
+    return mended
+
+
+def _without_noise(shape: Any) -> Any | None:
+    """A polygon whose sides touch, or cross by less than the tolerance, as a valid one; else None.
+
+    Sides touch where two parts are neighbours, or a hole is at the border. They cross by rounding,
+    for example where the last vertex repeats the first one. A vertex at the tip of a spike is an error.
+    """
+    import shapely
+
+    tolerance = clipping.tolerance(shapely.get_coordinates(shape))
+    parts = shapely.get_parts(shapely.make_valid(shape, method="structure"))
+    mended = shapely.union_all([part for part in parts if part.area > 0])
+    same_area = abs(mended.area - shape.area) <= tolerance * shape.length
+    near = shapely.hausdorff_distance(shape.boundary, mended.boundary) <= tolerance
+    return mended if same_area and near else None

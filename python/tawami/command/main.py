@@ -7,9 +7,12 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import keyword
 import os
+import shlex
 import sys
 from collections.abc import Callable, Sequence
+from importlib.machinery import PathFinder
 from pathlib import Path
 from typing import Any
 
@@ -155,10 +158,15 @@ def _add_run(commands: Any) -> None:
 
 def _add_resume(commands: Any) -> None:
     parser = _add(commands, "resume", _resume, "resume an interrupted run", (
-        "Runs the script or module of these results again, with the same arguments, in the same "
-        "directory: finished phases are loaded, the interrupted phase continues from its newest "
-        "checkpoint."
+        "Runs the copy of the script in this folder, with the same arguments, in the same directory: "
+        "finished phases are loaded, the interrupted phase continues from its newest checkpoint. A "
+        "folder of results is code: resume only runs that you trust."
     ))  # fmt: skip
+    parser.add_argument(
+        "--trust",
+        action="store_true",
+        help="run the copy also if it is not the script that the run was started with",
+    )
     parser.add_argument("folder", metavar="FOLDER", help="folder of results, as results/pile")
     _add_ranks(parser)
     _add_log_level(parser)
@@ -170,7 +178,9 @@ def _add_plot(commands: Any) -> None:
     ))  # fmt: skip
     plot.add_argument("folder", metavar="FOLDER", help="folder of results, as results/pile")
     plot.add_argument(
-        "--quantity", default="mean stress", metavar="Q", help="colour (default: mean stress)"
+        "--quantity",
+        metavar="Q",
+        help="colour (default: mean stress, or the first quantity written)",
     )
     plot.add_argument("--movie", choices=("gif", "mp4", "none"), default="gif", help="default: gif")
 
@@ -246,9 +256,8 @@ def _run(asked: argparse.Namespace) -> int:
 
 
 def _resume(asked: argparse.Namespace) -> int:
-    return resume(
-        checks.path("tawami resume: folder", asked.folder), asked.ranks, _environment(asked)
-    )
+    folder = checks.path("tawami resume: folder", asked.folder)
+    return resume(folder, asked.ranks, _environment(asked), trust=asked.trust)
 
 
 def _plot(asked: argparse.Namespace) -> int:
@@ -262,18 +271,37 @@ def _plot(asked: argparse.Namespace) -> int:
 def _new(asked: argparse.Namespace) -> int:
     path = checks.path("tawami new: NAME", asked.file)
     path = path if path.suffix == ".py" else path.parent / f"{path.name}.py"
-    if not path.stem.isidentifier():
-        raise InputError(
-            f"'{asked.file}': expected a name of letters, digits and _, as mycase: other Python files "
-            "can then import it"
-        )
-    text = (TEMPLATES / f"{asked.kind}.py").read_text(encoding="utf-8")
     if os.path.lexists(path):
         raise InputError(f"'{path}' exists already, and was not changed: expected a new name")
+    problem = _unusable(path)
+    if problem is not None:
+        raise InputError(
+            f"'{asked.file}': {problem}: expected another name of letters, digits and _, as mycase, so "
+            "that Python files can import it"
+        )
+    text = (TEMPLATES / f"{asked.kind}.py").read_text(encoding="utf-8")
     with writing(path), path.open("x", encoding="utf-8") as file:
         file.write(text.replace("SCRIPT.py", path.name).replace("SCRIPT", path.stem))
-    print(f"{path} is written; run it with: tawami run {path}")
+    print(f"{path} is written; run it with: tawami run {shlex.quote(str(path))}")
     return 0
+
+
+def _unusable(path: Path) -> str | None:
+    """Why a script cannot have this name; None if it can."""
+    name = path.stem
+    if not name.isidentifier():
+        return f"'{name}' is not a name of Python"
+    if keyword.iskeyword(name):
+        return f"'{name}' is a keyword of Python"
+    if name.startswith("__"):
+        return f"'{name}' has a meaning to Python"
+    # a script is the first that Python finds: a numpy.py would be imported instead of NumPy
+    own = {Path.cwd(), path.parent.resolve()}
+    installed = [folder for folder in sys.path if folder and Path(folder).resolve() not in own]
+    names = {*sys.stdlib_module_names, *sys.builtin_module_names}
+    if name in names or PathFinder.find_spec(name, installed) is not None:
+        return f"the module '{name}' is installed"
+    return None
 
 
 def _form_check(asked: argparse.Namespace) -> int:

@@ -13,7 +13,7 @@ from typing import Any
 from mpi4py import MPI
 
 from tawami.base.errors import InputError
-from tawami.base.files import readable_file, reason
+from tawami.base.files import readable_file, reason, unreadable
 from tawami.command.script import Script, start
 from tawami.results.provenance import RUN, SCRIPT
 from tawami.results.results import EXISTING
@@ -38,14 +38,16 @@ class Run:
         script: The script that was run.
         directory: Working directory in which it was run.
         number: Number of ranks.
-        source: File of the script or module, and its sha256; None if they are not known.
+        file: File of the script or module; None if it is not known.
+        sha256: Of this file when the run began; None if it is not known.
     """
 
     folder: Path
     script: Script
     directory: Path
     number: int
-    source: tuple[Path, str] | None
+    file: Path | None
+    sha256: str | None
 
     @staticmethod
     def of(folder: Path) -> Run:
@@ -66,40 +68,50 @@ class Run:
             ) from error
 
     @property
-    def changed(self) -> bool:
-        """Whether the script has changed since."""
-        if self.source is None:
-            return False
-        path, sha256 = self.source
-        try:
-            return hashlib.sha256(path.read_bytes()).hexdigest() != sha256
-        except OSError:
-            return False
+    def copy(self) -> Path:
+        """The copy of the script in the folder, which is run."""
+        return self.folder.resolve() / SCRIPT
 
-    def check(self) -> None:
+    def check(self, *, trust: bool) -> None:
         """Check that it can be run again.
 
+        Args:
+            trust: Whether the copy of the script may differ from the one that was run.
+
         Raises:
-            InputError: Its script or its directory does not exist any more.
+            InputError: The folder has no copy of the script, or another one; the directory does not
+                exist any more.
         """
         if not os.path.isdir(self.directory):
             raise InputError(
                 f"the run in '{self.folder}' was started in '{self.directory}', which does not exist: "
                 "expected that folder; create it, or run the script itself elsewhere"
             )
-        path, copy = self.script.path, (self.folder / SCRIPT).resolve()
-        if path is not None and not os.path.isfile(path):
-            instead = "expected it there"
-            if os.path.isfile(copy):
-                again = ["tawami", "run", str(copy), "--resume"]
-                again += ["--", *self.script.arguments] if self.script.arguments else []
-                instead = (
-                    "the folder of the results has a copy: put it back, or run it with "
-                    f"(cd {shlex.quote(str(self.directory))} && {shlex.join(again)})"
-                )
+        expected = (
+            "the script, as the run has stored it; run the script itself with: "
+            "tawami run SCRIPT --resume"
+        )
+        readable_file("copy of the script", self.copy, expected)
+        if _hash(self.copy) != self.sha256 and not trust:
             raise InputError(
-                f"the script '{path}' of the run in '{self.folder}' does not exist: {instead}"
+                f"'{self.copy}' is not the script that the run was started with (its checksum differs "
+                f"from that in {RUN}): expected the same file. Read it, and run it with: "
+                f"tawami resume --trust {shlex.quote(str(self.folder))}"
             )
+
+    @property
+    def remark(self) -> str | None:
+        """What differs from the script that was run, and how to run that one; None if nothing does."""
+        if self.file is None or _hash(self.file) == _hash(self.copy):
+            return None
+        if not os.path.isfile(self.file):
+            return f"'{self.file}' does not exist; the copy in the folder is run"
+        again = ["tawami", "run", *self.script.command, "--resume"]
+        again += ["--", *self.script.arguments] if self.script.arguments else []
+        return (
+            f"'{self.file}' has changed since; the copy in the folder is run. To resume with the "
+            f"changed script: (cd {shlex.quote(str(self.directory))} && {shlex.join(again)})"
+        )
 
     def __str__(self) -> str:
         command = shlex.join([*self.script.command, *self.script.arguments])
@@ -124,18 +136,30 @@ def _from_record(folder: Path, record: Any) -> Run:
         raise ValueError(f"arguments are {arguments!r}, ranks {number!r}")
     if path is None and module is None:
         raise ValueError("it was an interactive session, not a script")
-    script = Script(None if module else Path(path), module, tuple(arguments))
-    source = (Path(path), sha256) if path and sha256 else None
-    return Run(folder, script, Path(record["directory"]), number, source)
+    copy = folder.resolve() / SCRIPT
+    script = Script(None if module else Path(path), module, tuple(arguments), copy)
+    return Run(folder, script, Path(record["directory"]), number, path and Path(path), sha256)
 
 
-def resume(folder: Path, number: int | None, environment: dict[str, str]) -> int:
+def _hash(path: Path) -> str | None:
+    """Checksum of a file; None if it cannot be read."""
+    if unreadable(path) is not None:
+        return None
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def resume(
+    folder: Path, number: int | None, environment: dict[str, str], *, trust: bool = False
+) -> int:
     """Run the script of an interrupted run again: it loads the finished phases and resumes the last.
+
+    The copy of the script in the folder is run: a folder of results is code.
 
     Args:
         folder: Of the results.
         number: Number of ranks; as before by default.
         environment: Further environment variables for the script.
+        trust: Whether the copy of the script may differ from the script that was run.
 
     Returns:
         The exit code.
@@ -146,15 +170,11 @@ def resume(folder: Path, number: int | None, environment: dict[str, str]) -> int
     run = Run.of(folder)
     present = MPI.COMM_WORLD.size
     run = replace(run, number=number or (present if present > 1 else run.number))
-    run.check()
-    if MPI.COMM_WORLD.rank == 0:
+    run.check(trust=trust)
+    if MPI.COMM_WORLD.rank == 0 and run.number == present:  # other ranks are started by mpirun
         print(f"tawami resume: runs {run}", flush=True)
-        if run.changed:
-            print(
-                f"tawami resume: {run.script.name} has changed since; finished phases are kept, and a "
-                "checkpoint of another scene is rejected",
-                flush=True,
-            )
+        if run.remark is not None:
+            print(f"tawami resume: {run.remark}", flush=True)
     try:
         os.chdir(run.directory)
     except OSError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import linecache
 import os
 import runpy
 import shutil
@@ -11,14 +12,17 @@ import subprocess
 import sys
 import traceback
 from dataclasses import dataclass
+from importlib.machinery import ModuleSpec
 from pathlib import Path
-from types import TracebackType
+from types import ModuleType, TracebackType
 
 from mpi4py import MPI
 
 from tawami.base import program
 from tawami.base.errors import InputError
 from tawami.base.files import readable_file, reason
+from tawami.results.provenance import SOURCE
+from tawami.results.results import EXISTING, Results
 
 #: Exit code of a program that Ctrl-C ended, as in a shell.
 INTERRUPTED = 130
@@ -32,11 +36,13 @@ class Script:
         path: The file; None for a module.
         module: The module, as after `python -m`; None for a file.
         arguments: Its arguments.
+        copy: The copy in a folder of results, which is run in its place.
     """
 
     path: Path | None
     module: str | None
     arguments: tuple[str, ...] = ()
+    copy: Path | None = None
 
     @property
     def name(self) -> str:
@@ -54,7 +60,9 @@ class Script:
         Raises:
             InputError: No such file or module, or a file that is not Python.
         """
-        if self.path is not None:
+        if self.copy is not None:
+            _check_file(self.copy)
+        elif self.path is not None:
             _check_file(self.path)
         else:
             _check_module(str(self.module))
@@ -74,9 +82,7 @@ def _check_file(path: Path) -> None:
 def _check_module(name: str) -> None:
     sys.path.insert(0, os.getcwd())
     try:
-        found = importlib.util.find_spec(name)
-        if found is not None and found.submodule_search_locations is not None:
-            found = importlib.util.find_spec(f"{name}.__main__")
+        found = _found_module(name)
     except ModuleNotFoundError as error:
         if error.name is None or not f"{name}.".startswith(f"{error.name}."):
             raise  # a module that the package itself imports
@@ -90,6 +96,14 @@ def _check_module(name: str) -> None:
             f"no module '{name}' can be run from '{Path.cwd()}': expected its name as after python -m, "
             "or the path of a script without -m"
         )
+
+
+def _found_module(name: str) -> ModuleSpec | None:
+    """The module that `python -m name` runs."""
+    found = importlib.util.find_spec(name)
+    if found is not None and found.submodule_search_locations is not None:
+        found = importlib.util.find_spec(f"{name}.__main__")
+    return found
 
 
 def start(script: Script, number: int | None, environment: dict[str, str]) -> int:
@@ -123,8 +137,10 @@ def _run_on_ranks(script: Script, number: int) -> int:
         raise InputError(
             f"--ranks {number} needs mpirun, which was not found: on Debian: apt install openmpi-bin"
         )
-    own = [sys.executable, "-m", "tawami", "run", *script.command, "--", *script.arguments]
-    command, variables = program.mpirun(number, own)
+    words = ["run", *script.command, "--", *script.arguments]
+    if script.copy is not None:  # it was checked
+        words = ["resume", "--trust", str(script.copy.parent)]
+    command, variables = program.mpirun(number, [sys.executable, "-m", "tawami", *words])
     process, interrupted = subprocess.Popen(command, env=variables), False
     while process.poll() is None:
         try:
@@ -139,16 +155,29 @@ def _run_on_ranks(script: Script, number: int) -> int:
 
 def _run_here(script: Script) -> int:
     """Run a script under the rules of `tawami.run`."""
+    before = Results.begun
     try:
         program.run(lambda: _run_as_main(script), script.name)
+    except SystemExit as end:
+        if end.code:
+            raise
     except Exception as error:
         program.stop("".join(traceback.format_exception(_from_script(error))))
+    existing = os.environ.get(EXISTING)
+    if existing is not None and Results.begun == before and MPI.COMM_WORLD.rank == 0:
+        print(
+            f"{script.name}: --{existing} had no effect: the script ran from its beginning, and wrote "
+            "no results with tawami.Results(...) and results=...",
+            file=sys.stderr,
+        )
     return 0
 
 
 def _run_as_main(script: Script) -> None:
     """Run it as `python script` or `python -m module` would."""
-    if script.path is None:
+    if script.copy is not None:
+        _run_copy(script, script.copy)
+    elif script.path is None:
         sys.path.insert(0, os.getcwd())
         sys.argv = [str(script.module), *script.arguments]
         runpy.run_module(str(script.module), run_name="__main__", alter_sys=True)
@@ -157,6 +186,33 @@ def _run_as_main(script: Script) -> None:
         sys.path.insert(0, str(path.parent))
         sys.argv = [str(script.path), *script.arguments]
         runpy.run_path(str(path), run_name="__main__")
+
+
+def _run_copy(script: Script, copy: Path) -> None:
+    """Run a copy of a script as if it were in the place of the script.
+
+    Its `__file__` and its modules are those of the script. Sources in tracebacks, and those that
+    tawami stores again, are of the copy.
+    """
+    source, main = copy.read_bytes(), ModuleType("__main__")
+    if script.path is None:
+        sys.path.insert(0, os.getcwd())
+        spec = _found_module(str(script.module))
+        file = str(copy) if spec is None else str(spec.origin)
+        main.__spec__, main.__package__ = spec, None if spec is None else spec.parent
+    else:
+        file = str(script.path.resolve())
+        sys.path.insert(0, str(Path(file).parent))
+    main.__file__, sys.argv = file, [str(script.path or file), *script.arguments]
+    vars(main)[SOURCE] = source
+    lines = source.decode(errors="replace").splitlines(keepends=True)
+    linecache.cache[file] = (len(source), None, lines, file)
+    before = sys.modules["__main__"]
+    sys.modules["__main__"] = main
+    try:
+        exec(compile(source, file, "exec", dont_inherit=True), vars(main))
+    finally:
+        sys.modules["__main__"] = before
 
 
 def _from_script(error: Exception) -> Exception:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from petsc4py import PETSc
 
+from tawami.base.dependencies import CORE
 from tawami.fem import dolfinx
 
 #: Libraries that this process has loaded (Linux).
@@ -67,6 +68,8 @@ def versions() -> dict[str, str]:
 def header() -> str:
     """A line for the start of a run, with a warning below it if the BLAS is slow."""
     name, slow = blas()
+    if CORE.name:
+        name += f" ({CORE})"
     line = ", ".join(f"{package} {number}" for package, number in versions().items())
     line += (
         f", BLAS {name}, OMP_NUM_THREADS={os.environ.get('OMP_NUM_THREADS', 'unset')}, "
@@ -77,4 +80,6 @@ def header() -> str:
             "\nWarning: the reference BLAS makes the factorisation 3 to 5 times slower. On Debian: "
             "apt install libopenblas0-serial"
         )
+    elif CORE.advice:
+        line += f"\nWarning: {CORE.advice}"
     return line

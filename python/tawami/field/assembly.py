@@ -32,6 +32,9 @@ class Assembly(Protocol):
     attachment: Attachment
     reduction: Reduction | None = None
 
+    def __init__(self, attachment: Attachment) -> None:
+        """Assemble over the active cells of an attachment."""
+
     @property
     def layout(self) -> Layout:
         """Places of the coefficients."""
@@ -54,9 +57,13 @@ class Assembly(Protocol):
         """
 
     def unreduced_tangent(self, coefficients: Array, data: Mapping[Rule, Array]) -> sp.csr_matrix:
-        """E^T K E, the tangent of :meth:`residual`, complete on every rank."""
+        """E^T K E, the tangent of :meth:`residual`, complete on every rank.
+
+        The matrix of the steps, whose factorisation the next one may use, stays as it is.
+        """
         everything, comm = Reduction.of_all(self.layout), self.layout.grid.comm
-        mine = rows_of(self.tangent(coefficients, data, everything)).tocoo()
+        apart = type(self)(self.attachment)
+        mine = rows_of(apart.tangent(coefficients, data, everything)).tocoo()
         rows, columns, values = (
             ranks.allgathered(comm, part)
             for part in (mine.row + everything.own.start, mine.col, mine.data)

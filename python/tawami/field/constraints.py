@@ -40,10 +40,12 @@ class Held:
     Attributes:
         indices: The coefficients, all of one displacement component.
         values: Their values [m].
+        where: Name of the support, for messages.
     """
 
     indices: Indices
     values: Array
+    where: str = "a support"
 
 
 @dataclass(frozen=True)

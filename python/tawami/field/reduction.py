@@ -73,9 +73,9 @@ class Reduction:
         self._eliminated = None
         if points:
             dependent, involved, weights, values = _eliminate(
-                points, self.fixed, total, start, tolerance
+                points, self.fixed, total, start, tolerance, held
             )
-            self._eliminated = dependent, involved, weights
+            self._eliminated = (dependent, involved, weights)
             free[dependent] = False
             self.offset[dependent] = values
         self._number(free)
@@ -245,23 +245,36 @@ class Reduction:
 
 def _prescribed(held: Sequence[Held], size: int, tolerance: float) -> tuple[Mask, Array]:
     """Which coefficients are prescribed, and their values."""
-    fixed, total = np.zeros(size, dtype=bool), np.zeros(size)
-    for support in held:
-        twice = fixed[support.indices]
-        change = np.abs(total[support.indices] - support.values)[twice].max(initial=0.0)
-        if change > tolerance:
+    fixed, total, last = np.zeros(size, dtype=bool), np.zeros(size), np.full(size, -1)
+    for number, support in enumerate(held):
+        change = np.abs(total[support.indices] - support.values) * fixed[support.indices]
+        worst = int(np.argmax(change)) if len(change) else 0
+        if change.max(initial=0.0) > tolerance:
+            other = held[last[support.indices[worst]]]
             raise SupportError(
-                f"two supports prescribe displacements that differ by {change:.3g} m where they meet "
-                "(an end of an edge?): expected supports that agree there. Profiles are projected in "
-                "L2, which may miss their values at an end by the error of the projection"
+                f"{other.where} and {support.where} prescribe displacements that differ by "
+                f"{change[worst]:.3g} m where they meet (an end of an edge?): expected supports that "
+                "agree there; change or release one. Profiles are projected in L2, which may miss their "
+                "values at an end by the error of the projection"
             )
         total[support.indices] = support.values
+        last[support.indices] = number
         fixed[support.indices] = True
     return fixed, total
 
 
+def _meet(other: Held | PointHeld, point: PointHeld) -> bool:
+    """Whether a support acts on coefficients of a point."""
+    return bool(np.isin(other.indices, point.indices).any())
+
+
 def _eliminate(
-    points: Sequence[PointHeld], fixed: Mask, total: Array, start: Array, tolerance: float
+    points: Sequence[PointHeld],
+    fixed: Mask,
+    total: Array,
+    start: Array,
+    tolerance: float,
+    held: Sequence[Held],
 ) -> tuple[Indices, Indices, Array, Array]:
     """Solve each multi-point constraint for the coefficient with the largest weight.
 
@@ -284,9 +297,11 @@ def _eliminate(
         pivot = int(np.argmax(np.abs(a[k]))) if len(involved) else -1
         if pivot < 0 or abs(a[k, pivot]) < NO_PIVOT:
             if abs(b[k]) > tolerance:
+                given: list[Held | PointHeld] = [*held, *points[:k]]
+                names = ", ".join(dict.fromkeys(one.where for one in given if _meet(one, point)))
                 raise SupportError(
-                    f"{point.where}: other supports already give this point a displacement that "
-                    f"differs by {abs(b[k]):.3g} m; expected supports that agree, or one of them"
+                    f"{point.where}: {names} already give this point a displacement that differs by "
+                    f"{abs(b[k]):.3g} m: expected supports that agree; change or release one"
                 )
             continue
         b[k] /= a[k, pivot]

@@ -31,7 +31,7 @@ def evaluate(profile: Profile, x: Array, y: Array, what: str) -> Array:
     """
     try:
         value = profile(x, y) if callable(profile) else profile
-        values = np.broadcast_to(np.asarray(value, dtype=float), x.shape)
+        values = np.broadcast_to(checks.real_values(value), x.shape)
     except Exception as error:
         raise InputError(
             f"{what}: expected a number or a function f(x, y) on arrays of shape {x.shape}, got "

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami.base import ranks
+from tawami.base.archive import check_like
 from tawami.motion.transfer import Transfer, gradient_of, to_grid
 from tawami.scene.configuration import Configuration
 
@@ -124,8 +125,17 @@ class Carried:
         return {"on_grid": None if stationary is None else list(stationary)}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """The reverse of :meth:`state`, after the particles were restored."""
+        """The reverse of :meth:`state`, after the particles were restored.
+
+        Raises:
+            ValueError: v and a do not belong to the grid.
+        """
         on_grid = state["on_grid"]
+        if on_grid is not None:
+            shape = (self._now.domain.layout.num_displacement // self._space.dim, self._space.dim)
+            if [np.shape(values) for values in on_grid] != [shape, shape]:
+                raise ValueError("v and a of the grid have another number of functions")
+            check_like(on_grid, [np.zeros(shape)] * 2, "v and a of the grid")
         self._stationary = None if on_grid is None else (*on_grid, np.array(self.velocity))
 
 

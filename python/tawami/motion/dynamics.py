@@ -22,6 +22,7 @@ from tawami.motion.rotation import Rotation
 from tawami.motion.stepping import march
 from tawami.motion.transfer import TRANSFERS, Transfer, TransferName
 from tawami.scene import description, sources
+from tawami.scene.configuration import Configuration
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
 from tawami.scene.sources import Source
@@ -29,6 +30,8 @@ from tawami.scene.sources import Source
 Array = npt.NDArray[np.float64]
 #: Steps [s] whose squares, and quotients by these, are finite numbers.
 SHORTEST, LONGEST = 1e-100, 1e100
+#: Difference of two factors of a displacement that is round-off.
+ALIKE = 1e-9
 #: Steps of a run, beyond which it would never end.
 MOST_STEPS = 1e12
 
@@ -67,6 +70,7 @@ class Dynamics(Sealed, Unique):
         gamma: float = 0.5,
     ) -> None:
         checks.instance("Dynamics: scene", scene, Scene, "a tawami.Scene")
+        scene.configuration.activity.check_idle("Dynamics(...)")
         _check_scene(scene)
         if not checks.one_of(transfer, TRANSFERS):
             raise InputError(
@@ -132,7 +136,7 @@ class Dynamics(Sealed, Unique):
     @property
     def time(self) -> float:
         """Present time [s]."""
-        return self._clock.time
+        return self._now.activity.time
 
     @property
     def steps(self) -> int:
@@ -148,27 +152,22 @@ class Dynamics(Sealed, Unique):
         """
         dt = checks.number("dt", dt, low=SHORTEST, high=LONGEST)
         now = self._now
-        with ranks.raise_together(now.model.grid.comm):
-            now.domain.particles.check()
-        for support in now.supports.all:
-            prescribes = support.velocity is None and not support.is_zero
-            if prescribes and support.share.applied < 1.0:
-                raise InputError(
-                    f"{support} prescribes a displacement that the body does not have yet: expected "
-                    "fix(..., velocity=...) for a motion, or ramp(scene) before Dynamics"
-                )
-        self._balance.begin()
-        kind = NewmarkStep(
-            now,
-            self._carried,
-            self._balance,
-            self._rotation,
-            self._clock,
-            self.gamma,
-            self.beta,
-            dt,
-        )
-        return Solution(self.scene, now.advance(kind))
+        with now.activity.step("step(...)"):
+            with ranks.raise_together(now.model.grid.comm):
+                now.domain.particles.check()
+            _check_displacements(now)
+            self._balance.begin()
+            kind = NewmarkStep(
+                now,
+                self._carried,
+                self._balance,
+                self._rotation,
+                self._clock,
+                self.gamma,
+                self.beta,
+                dt,
+            )
+            return Solution(self.scene, now.advance(kind))
 
     def run(
         self,
@@ -196,6 +195,7 @@ class Dynamics(Sealed, Unique):
                 in the particles.
             InputError: dt <= 0, or a step longer than the remaining time.
         """
+        self._now.activity.check_idle("run(...)")
         dt = checks.number("dt", dt, low=SHORTEST, high=LONGEST)
         remaining = checks.number("end", end) - self.time
         if dt > remaining * (1 + 1e-9):
@@ -208,8 +208,9 @@ class Dynamics(Sealed, Unique):
         each = checks.function("each", each, "of a solution")
         with observed(results, "motion", self, end, "s") as observer:
             return march(
-                Pace(self.time, dt), end, least, lambda _, size: self.step(size), observer, each
-            )
+                Pace(self.time, dt), end, least, lambda _, size: self.step(size), observer,
+                self._now.activity, each,
+            )  # fmt: skip
 
     # -- as the subject of a run ---------------------------------------------
 
@@ -236,7 +237,6 @@ class Dynamics(Sealed, Unique):
     def state(self) -> dict[str, Any]:
         """As `Scene.state`, with the motion."""
         own = {
-            "time": self.time,
             "steps": self.steps,
             "loads_changed": signature(self._now) != self._clock.loads,
             "carried": self._carried.state(),
@@ -249,8 +249,8 @@ class Dynamics(Sealed, Unique):
         """The reverse of :meth:`state`, as `Scene.restore`."""
         self.scene.restore(state)
         own = state["motion"]
-        loads = () if own["loads_changed"] else signature(self._now)
-        vars(self._clock).update(time=own["time"], steps=own["steps"], loads=loads)
+        loads: tuple[int, ...] = () if own["loads_changed"] else signature(self._now)
+        vars(self._clock).update(steps=own["steps"], loads=loads)
         self._carried.restore(own["carried"])
         self._balance.restore(own["balance"])
         self._rotation.warned = own["rotation_warned"]
@@ -284,6 +284,20 @@ class Dynamics(Sealed, Unique):
     def elastic_energy(self) -> float:
         """Energy that the laws store [J per metre depth]."""
         return self._balance.elastic
+
+
+def _check_displacements(now: Configuration) -> None:
+    """Check that the body has the displacements that supports prescribe at the present time."""
+    at = now.moment()
+    for support in now.supports.all:
+        for term in support.terms:
+            missing = term.at(at) - term.share.applied
+            if not (term.course.has_velocity or term.is_zero) and abs(missing) > ALIKE:
+                raise InputError(
+                    f"{support} prescribes a displacement that the body does not have yet: expected "
+                    "fix(..., velocity=...) or an amplitude that is 0 at first for a motion, or "
+                    "ramp(scene) before Dynamics"
+                )
 
 
 def _check_scene(scene: Scene) -> None:

@@ -18,10 +18,11 @@ from tawami.field.reduction import Reduction
 from tawami.motion.carried import Carried, divided
 from tawami.motion.energy import Balance, Energies
 from tawami.motion.rotation import Rotation
+from tawami.scene.action import Term
 from tawami.scene.configuration import Configuration
 from tawami.scene.contact import ActiveSet
+from tawami.scene.share import Moment
 from tawami.scene.step import Accepted, Problem
-from tawami.scene.supports import Support
 from tawami.solve.inertia import Inertia
 
 Array = npt.NDArray[np.float64]
@@ -29,17 +30,15 @@ Array = npt.NDArray[np.float64]
 
 @dataclass
 class Clock:
-    """Time and number of steps of a motion, and the loads that its accelerations belong to.
+    """Number of steps of a motion, and the loads that its accelerations belong to.
 
     Attributes:
-        time: [s]
         steps: Number of accepted steps.
         loads: Signature of loads and supports when the last step was stored.
     """
 
-    time: float = 0.0
     steps: int = 0
-    loads: tuple[object, ...] = ()
+    loads: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ class NewmarkStep:
         carried: Velocities and accelerations of its particles.
         balance: Its energy balance.
         rotation: Warns of rotations that are too large for a step.
-        clock: Its time.
+        clock: Its steps.
         gamma, beta: Newmark's parameters.
         dt: [s]
     """
@@ -85,31 +84,35 @@ class NewmarkStep:
         self._now, self._carried, self._balance, self._rotation, self._clock = (
             configuration, carried, balance, rotation, clock
         )  # fmt: skip
-        self._gamma, self._beta, self._dt, self.end = gamma, beta, dt, clock.time + dt
+        self._gamma, self._beta, self._dt = gamma, beta, dt
+        start = configuration.activity.time
+        self.end = start + dt
+        self._begin, self._finish = Moment(1.0, start, start), Moment(1.0, start, self.end)
         domain = configuration.domain
         self._loads = signature(configuration)
         self._mass = domain.sums(domain.mass, np.ones((len(domain.particles), 1)))[:, 0]
         self._masses = np.repeat(self._mass, configuration.model.space.dim)
-        self._external = configuration.external()
+        self._first = self._external = configuration.external(self._finish)
+        if configuration.loads.vary:
+            self._first = configuration.external(self._begin)
         self._mapped = carried.mapped(self._mass)
-        self._speed = self._prescribed(lambda support: support.velocity_at(clock.time))
-        self._speed1 = self._prescribed(lambda support: support.velocity_at(self.end))
+        self._speed = self._prescribed(lambda term: term.rates(self._finish)[0])
+        self._speed1 = self._prescribed(lambda term: term.rates(self._finish)[1])
         self._speed_rate = (self._speed1 - self._speed) / dt
 
-    def _constraints(self, amount: Callable[[Support], float]) -> tuple[Reduction, ActiveSet]:
+    def _constraints(self, amount: Callable[[Term], float]) -> tuple[Reduction, ActiveSet]:
         now, zero = self._now, np.zeros(self._now.domain.layout.size)
         return now.supports.constraints(now.domain, amount, zero, now.before, moving=True)
 
-    def _prescribed(self, rate: Callable[[Support], float]) -> Array:
+    def _prescribed(self, rate: Callable[[Term], float]) -> Array:
         """Prescribed velocities on all coefficients [m/s]."""
-        if not any(support.velocity is not None for support in self._now.supports.all):
+        if not any(support.moves for support in self._now.supports.all):
             return np.zeros(self._now.domain.layout.size)
         return self._constraints(rate)[0].offset
 
-    def _displacement(self, support: Support) -> float:
-        """Displacement that a support prescribes in the step [m]."""
-        start, end = (support.velocity_at(time) for time in (self._clock.time, self.end))
-        return 0.5 * self._dt * (start + end)
+    def _displacement(self, term: Term) -> float:
+        """Change of the factor of a prescribed displacement in the step."""
+        return term.changed(self._finish)
 
     def problem(self) -> Problem:
         """The problem in the present states of the walls."""
@@ -134,7 +137,7 @@ class NewmarkStep:
         """Acceleration by the momentum equation: g in free fall, 0 at rest."""
         domain = self._now.domain
         internal = domain.newton.internal(np.zeros(domain.layout.size))
-        force = (self._external - internal)[: like.size].reshape(like.shape)
+        force = (self._first - internal)[: like.size].reshape(like.shape)
         return divided(force, self._mass[:, None])
 
     def _guess(self, u: Array) -> Array:
@@ -166,10 +169,13 @@ class NewmarkStep:
         given = float(start.inertia.impulse @ start.v.ravel()) * dt
         energies.external += given
         energies.impact += given
-        clock = Clock(self.end, self._clock.steps + 1, self._loads)
+        # loads that follow an amplitude do the work of their mean in the step
+        lag = 0.5 * (self._first - self._external)[: accepted.u.size]
+        energies.external += float(lag @ accepted.u.ravel())
+        clock = Clock(self._clock.steps + 1, self._loads)
         return NewmarkUpdate(
-            self._now, self._carried, self._balance, self._clock, clock, arrays, (v1, a1), energies,
-            len(self._now.left),
+            self._now, self._carried, self._balance, self._clock, clock, self._finish, arrays,
+            (v1, a1), energies, len(self._now.left),
         )  # fmt: skip
 
 
@@ -179,7 +185,8 @@ class NewmarkUpdate:
 
     Attributes:
         configuration, carried, balance, clock: What it changes.
-        time: The clock at the end of the step.
+        after: The clock at the end of the step.
+        moment: The end of the step.
         arrays: Of the particles.
         on_grid: v1 and a1, functions x dim.
         energies: Terms of the balance.
@@ -190,7 +197,8 @@ class NewmarkUpdate:
     carried: Carried
     balance: Balance
     clock: Clock
-    time: Clock
+    after: Clock
+    moment: Moment
     arrays: dict[str, Array]
     on_grid: tuple[Array, Array]
     energies: Energies
@@ -199,18 +207,18 @@ class NewmarkUpdate:
     def store(self, dissipated: float) -> None:
         """After the particles have their stress and before they move."""
         self.carried.store(self.arrays, *self.on_grid)
-        vars(self.clock).update(vars(self.time))
-        self.balance.store(self.energies, dissipated, self.clock.steps, self.clock.time)
+        vars(self.clock).update(vars(self.after))
+        self.balance.store(self.energies, dissipated, self.clock.steps, self.moment.time)
 
     def finish(self) -> None:
         """After the particles have moved."""
-        self.configuration.accept(1.0)
+        self.configuration.supports.apply(self.moment)
+        self.configuration.accept(self.moment)
         self.balance.project(self.configuration.projected)
         if len(self.configuration.left) > self.left:
             self.balance.remove_left()
 
 
-def signature(configuration: Configuration) -> tuple[object, ...]:
+def signature(configuration: Configuration) -> tuple[int, ...]:
     """A value that differs once loads or supports are others."""
-    supports = configuration.supports
-    return (*configuration.loads.signature, *map(id, supports.all), *map(id, supports.walls))
+    return configuration.loads.version, configuration.supports.version

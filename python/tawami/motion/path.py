@@ -12,12 +12,12 @@ from tawami.base import checks, ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import ConvergenceError, InputError
 from tawami.field.constraints import held_point
-from tawami.grid import edges
 from tawami.grid.edges import Component
 from tawami.motion.observer import Recorder, observed
 from tawami.motion.pace import Pace, Steps
 from tawami.motion.stepping import Stop, end_early, march
 from tawami.scene.configuration import Configuration
+from tawami.scene.points import check_in_body
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
 from tawami.scene.statics import StaticStep
@@ -111,8 +111,8 @@ class PathStep:
         """The problem in the present states of the walls."""
         now, factor = self.configuration, self.following.factor
         stressed = now.model.moves and bool(self.following.loads)
-        static = StaticStep(now, factor, stressed).problem()
-        rate = now.external(1.0) - now.external(0.0)
+        static = StaticStep(now, now.moment(factor), stressed).problem()
+        rate = now.external(now.moment(1.0)) - now.external(now.moment(0.0))
         if not rate.any():
             raise InputError(
                 "follow(...): there is no new load: expected a traction, a force or gravity that the "
@@ -189,8 +189,8 @@ class PathUpdate:
         following = self.following
         following.factor, following.direction = self.factor, self.direction
         following.point = self.point
-        for support in self.configuration.supports.all:
-            support.share.apply(self.factor)
+        self.configuration.activity.statics += 1
+        self.configuration.supports.apply(self.configuration.moment(self.factor))
 
 
 def follow(
@@ -237,6 +237,7 @@ def follow(
         IncompleteWarning: The path ended before `to`, with stop='return'.
     """
     checks.instance("follow: scene", scene, Scene, "a tawami.Scene")
+    scene.configuration.activity.check_idle("follow(...)")
     point, component = _checked(scene, control)
     to = checks.number("to", to)
     if to == 0 or (point is None and to < 0):
@@ -247,8 +248,9 @@ def follow(
     least = size / 1024 if smallest is None else checks.number("smallest", smallest, low=0.0)
     each = checks.function("each", each, "of a solution")
     checks.choice("stop", stop, get_args(Stop))
-    for support in scene.configuration.supports.all:
-        if not support.is_zero and support.share.carried != support.share.target:
+    now = scene.configuration
+    for support in now.supports.all:
+        if any(t.share.carried != t.at(now.moment()) and not t.is_zero for t in support.terms):
             raise InputError(
                 f"{support} prescribes a displacement that the body does not have yet, and follow(...) "
                 "changes loads only: expected scene.solve() or ramp(scene) before the loads are added"
@@ -257,11 +259,14 @@ def follow(
     steps.loads, pace = following.loads, Pace(0.0, size)
     try:
         with observed(results, "path", following, abs(to), "m") as observer:
-            march(pace, abs(to), least, lambda _, h: following.step(h), observer, each, steps)
+            march(
+                pace, abs(to), least, lambda _, h: following.step(h), observer, now.activity, each,
+                steps,
+            )  # fmt: skip
     except ConvergenceError as error:
         end_early(steps, error, stop, f"follow, with {following.factor:g} of the load,", scene)
     finally:
-        scene.configuration.accept(following.factor)
+        now.accept(now.moment(following.factor))
     return steps
 
 
@@ -269,12 +274,12 @@ def _checked(scene: Scene, control: Any) -> tuple[tuple[float, float] | None, in
     """The control point and its component; no point for an arc length.
 
     Raises:
-        InputError: Neither of them, or a point outside the grid.
+        InputError: Neither of them, or a point outside the grid or the body.
     """
     if isinstance(control, str) and control == "arc length":
         return None, 0
     if isinstance(control, str) or not isinstance(control, list | tuple) or len(control) != 2:
         raise InputError(f"follow(...): control = {checks.shown(control)}: {EXPECTED}")
     place = checks.point("follow(...): control", control[0])
-    edges.locate_point(scene.grid, place, "follow(...): control")
+    check_in_body(scene.configuration.domain, place, f"follow(...): control = {place}")
     return place, scene.grid.space.axis(control[1])

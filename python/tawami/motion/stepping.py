@@ -7,9 +7,11 @@ from typing import Literal, get_args
 
 from tawami.base import checks
 from tawami.base.errors import ConvergenceError, IncompleteWarning, InputError, SingularError
+from tawami.base.program import leave_together
 from tawami.base.warn import warn
 from tawami.motion.observer import Observer, Recorder, observed
 from tawami.motion.pace import Pace, Step, Steps
+from tawami.scene.activity import Activity
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
 
@@ -23,6 +25,7 @@ def march(
     smallest: float,
     attempt: Callable[[float, float], Solution],
     observer: Observer,
+    activity: Activity,
     each: Callable[[Solution], None] | None = None,
     steps: list[Step] | None = None,
 ) -> list[Step]:
@@ -35,6 +38,7 @@ def march(
         attempt: Function of the end of a step and its size that takes the step; if it raises, it must
             leave everything as it was.
         observer: Observer of the steps.
+        activity: Of the scene; no step may begin while observer and `each` are called.
         each: Called with the solution of each accepted step.
         steps: List to which the accepted steps are added, and that is returned; a new one by default.
 
@@ -42,7 +46,8 @@ def march(
         ConvergenceError, SingularError: At the smallest size.
     """
     largest, steps = pace.size, list[Step]() if steps is None else steps
-    observer.begin(pace, steps)
+    with activity.callback():
+        observer.begin(pace, steps)
     while end - pace.at > 1e-9 * largest:
         now = min(pace.size, end - pace.at)
         # the last step must not be tiny
@@ -62,10 +67,11 @@ def march(
         pace.good += 1
         if pace.good >= 3 and pace.size < largest:
             pace.size, pace.good = min(2 * pace.size, largest), 0
-        observer.accepted(solution, last=end - pace.at <= 1e-9 * largest)
-        if each is not None:
-            each(solution)
-        observer.checkpoint()
+        with leave_together(), activity.callback():
+            observer.accepted(solution, last=end - pace.at <= 1e-9 * largest)
+            if each is not None:
+                each(solution)
+            observer.checkpoint()
     return steps
 
 
@@ -93,19 +99,23 @@ def ramp(
     size: float = 0.05,
     *,
     smallest: float | None = None,
+    until: float | None = None,
     each: Callable[[Solution], None] | None = None,
     results: Recorder | None = None,
     stop: Stop = "return",
 ) -> Steps:
     """Apply the new loads and prescribed displacements of a scene in steps, without inertia.
 
-    New loads grow in proportion from 0 to their values; loads that are in equilibrium already stay.
+    New loads grow in proportion from 0 to their values; loads that are in equilibrium already stay,
+    and loads that were released fade. With `until`, loads and displacements with an amplitude follow it
+    from the time of the scene to that time, which passes in proportion too.
     Where the body carries no more, the scene stays in its last equilibrium; later ramps start there.
 
     Args:
         scene: The scene.
         size: Largest share of the load in a step, above 0 to 1.
         smallest: Share below which a step is not halved any more; size/1024 by default.
+        until: Time for amplitudes at the end [s]; the time of the scene by default.
         each: Called with the solution of each accepted step.
         results: `tawami.Results` of the run, with outputs and checkpoints.
         stop: What to do if the smallest step does not converge: 'return' the steps with a warning, or
@@ -124,6 +134,9 @@ def ramp(
         IncompleteWarning: The ramp stopped before the whole load, with stop='return'.
     """
     checks.instance("ramp: scene", scene, Scene, "a tawami.Scene")
+    now = scene.configuration
+    now.activity.check_idle("ramp(...)")
+    now.moment(1.0, until)
     size = checks.number("size", size, low=checks.LEAST, high=1.0)
     checks.number("size", size, low=1e-9)  # with smaller steps it would not end
     least = size / 1024 if smallest is None else checks.number("smallest", smallest, low=0.0)
@@ -133,14 +146,15 @@ def ramp(
     try:
         with observed(results, "ramp", scene, 1.0, "of the load") as observer:
             march(
-                pace, 1.0, least, lambda part, _size: scene.solve_part(part), observer, each, steps
-            )
+                pace, 1.0, least, lambda part, _: scene.solve_part(part, until), observer,
+                now.activity, each, steps,
+            )  # fmt: skip
     except ConvergenceError as error:
         end_early(steps, error, stop, "ramp", scene)
     finally:
         steps.loads = [step.end for step in steps]
         if pace.at < 1.0:
-            scene.configuration.accept(pace.at)
+            now.accept(now.moment(pace.at, until))
     return steps
 
 
@@ -169,6 +183,8 @@ def settle(
         ConvergenceError: No equilibrium after `max_resets` solves.
     """
     checks.instance("settle: scene", scene, Scene, "a tawami.Scene")
+    activity = scene.configuration.activity
+    activity.check_idle("settle(...)")
     tolerance = checks.number("tolerance", tolerance, low=1e-14, high=0.1)
     max_resets = checks.whole_number("max_resets", max_resets, low=1)
     if not scene.form.strain.finite:
@@ -180,14 +196,16 @@ def settle(
         scene.configuration.tolerance(max(0.1 * tolerance, 1e-14)),
         observed(results, "settle", scene, max_resets, "resets") as observer,
     ):
-        observer.begin(pace, steps)
+        with activity.callback():
+            observer.begin(pace, steps)
         while pace.at < max_resets and not observer.finished:
             solution = scene.solve()
             steps.append(Step(1.0, 0.0, solution.history, solution.krylov))
             pace.at += 1.0
             settled = solution.history[0][0] < tolerance
-            observer.accepted(solution, last=settled)
-            observer.checkpoint()
+            with leave_together(), activity.callback():
+                observer.accepted(solution, last=settled)
+                observer.checkpoint()
             if settled:
                 return steps
         if observer.finished:

@@ -17,6 +17,7 @@ from tawami.grid import edges
 from tawami.motion.energy import Energies
 from tawami.motion.observer import Motion, Snapshot, Subject
 from tawami.results.quantities import body_view
+from tawami.scene.points import check_in_body
 from tawami.scene.reactions import supported_edge
 from tawami.scene.scene import Scene
 
@@ -152,6 +153,8 @@ def _displacement(name: str, point: tuple[float, float], scene: Scene) -> Column
     moves = scene.form.strain.finite
     if moves:
         displacement_near(scene, point, name)
+    else:
+        check_in_body(scene.configuration.domain, point, name)
 
     def of(now: Snapshot, _: float) -> list[float]:
         if moves:

@@ -18,6 +18,7 @@ from tawami.base.files import atomic_file
 from tawami.base.space import PLANE
 from tawami.results.figure import new_figure, save
 from tawami.results.frame import Frame
+from tawami.results.quantities import PARTICLES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,6 +32,8 @@ MOST, RATE = 120, 12
 OUTLIERS = 0.01
 #: Colour map for values of both signs.
 DIVERGING = "RdBu_r"
+#: Numbers of a stress.
+INVARIANTS = ("mean stress", "deviatoric stress q")
 PREFIXES = (("G", 1e9), ("M", 1e6), ("k", 1e3))
 
 
@@ -44,19 +47,24 @@ class Corners:
 
 def scalars(frame: Frame) -> dict[str, tuple[str, Array]]:
     """What particles can be coloured by: name -> (unit, values). Of vectors these are the size and the
-    components, of tensors the components.
+    components, of tensors the components, of the stress its mean and q too.
     """
     found: dict[str, tuple[str, Array]] = {}
     for label, values in frame.on_points.items():
         name, _, unit = label.removesuffix("]").rpartition(" [")
-        tensor = re.fullmatch(r"(.*) xx yy zz xy", name)
+        tensor = re.fullmatch(f"(.*) {' '.join(PLANE.tensor)}", name)
         if values.ndim == 2 and values.shape[1] == 3:
             found[name] = (unit, np.linalg.norm(values, axis=1))
             found |= {f"{name} {axis}": (unit, values[:, k]) for k, axis in enumerate(PLANE.axes)}
         elif tensor is not None:
             for k, component in enumerate(PLANE.tensor):
                 found[f"{tensor[1]} {component}"] = (unit, values[:, k])
-        else:
+            if tensor[1] == "stress":
+                found |= {
+                    of: (unit, PARTICLES[of].of({"stress": values}.__getitem__))
+                    for of in INVARIANTS
+                }
+        elif values.ndim == 1:
             found[name] = (unit, values)
     return found
 
@@ -80,7 +88,9 @@ class Film:
             frame = read()
             unit, values = scalars(frame)[quantity]
             self.frames.append((time, frame.points[:, :2], values))
-        self.unit, self.factor = _scaled(unit, max(np.abs(v).max() for _, _, v in self.frames))
+        self.unit, self.factor = _scaled(
+            unit, max(np.abs(v).max(initial=0.0) for _, _, v in self.frames)
+        )
         self._draw(grid)
 
     def _draw(self, grid: Corners) -> None:

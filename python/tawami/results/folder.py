@@ -8,11 +8,13 @@ import os
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
+from weakref import WeakValueDictionary
 
 from tawami.base import archive
 from tawami.base.errors import InputError, OutputError
 from tawami.base.files import atomic_file, reason, result_folder, unreadable
+from tawami.base.lock import hold
 from tawami.results import provenance
 from tawami.results.output import PHASES
 from tawami.results.progress import LOG
@@ -31,8 +33,12 @@ class RunFolder:
         existing: What to do with a run in it: 'stop', 'replace' or 'resume'.
     """
 
+    #: Who writes into a folder: the last one of this process that opened it.
+    _writers: ClassVar[WeakValueDictionary[Path, RunFolder]] = WeakValueDictionary()
+
     def __init__(self, path: Path, existing: str) -> None:
         self.path, self.existing = path, existing
+        self._what = f"Results('{path}')"
 
     @property
     def checkpoints(self) -> list[Path]:
@@ -40,14 +46,38 @@ class RunFolder:
         return archive.files(self.path)
 
     def open(self) -> bool:
-        """Prepare the folder for a run; whether an earlier run in it is resumed.
+        """Lock the folder and prepare it for a run; whether an earlier run in it is resumed.
+
+        The lock is held until the results are freed or the process ends.
 
         Raises:
-            InputError: It holds a run and `existing` is 'stop', a finished run that cannot be resumed,
-                or files that are not of a run.
+            InputError: Another process writes into it. Or it holds a run and `existing` is 'stop', a
+                finished run that cannot be resumed, or files that are not of a run.
             OutputError: It cannot be written.
         """
-        result_folder(self.path)
+        self._lock = hold(self.path, self._what)
+        try:
+            resumes = self._prepare()
+        except BaseException:
+            self._lock.release()
+            raise
+        self._writers[self.path.resolve()] = self
+        return resumes
+
+    def check(self) -> None:
+        """Check before a further phase that the folder is still this run's.
+
+        Raises:
+            InputError: Another Results of this process has opened it since.
+        """
+        if self._writers.get(self.path.resolve()) is not self:
+            raise InputError(
+                f"{self._what}: another tawami.Results of this script has opened the folder since: "
+                "expected one for all phases of a run, or a folder for each"
+            )
+
+    def _prepare(self) -> bool:
+        """See :meth:`open`."""
         known, recorded = self._record(), os.path.exists(self.path / RUN)
         phases = known.get("phases", [])
         # a run that was refused before its first step has no phases
@@ -56,14 +86,14 @@ class RunFolder:
         if self.checkpoints or begun:
             if self.existing == "stop":
                 raise InputError(
-                    f"Results('{self.path}'): the folder holds a run{self._reached()}. Expected another "
+                    f"{self._what}: the folder holds a run{self._reached()}. Expected another "
                     "folder, existing='resume' to resume it, or existing='replace' to replace it"
                 )
             resumes = self.existing == "resume" and bool(self.checkpoints)
             finished = [one["name"] for one in phases if "finished" in one]
             if self.existing == "resume" and finished and not resumes:
                 raise InputError(
-                    f"Results('{self.path}'): the folder holds a run that finished {finished[-1]}, and "
+                    f"{self._what}: the folder holds a run that finished {finished[-1]}, and "
                     "no checkpoint to resume it from: expected its checkpoints, or existing='replace' "
                     "to start anew"
                 )
@@ -73,7 +103,7 @@ class RunFolder:
             others = [name for name in COPIES if self._is_foreign(self.path / name)]
             if others:
                 raise InputError(
-                    f"Results('{self.path}'): the folder holds '{others[0]}', which is of no run: "
+                    f"{self._what}: the folder holds '{others[0]}', which is of no run: "
                     "expected a folder of its own for the results"
                 )
         result_folder(self.path / archive.FOLDER)

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tawami.base import checks
-from tawami.base.errors import InputError
+from tawami.base import archive, checks
+from tawami.base.errors import CheckpointError, InputError
 from tawami.base.ranks import raise_together
 from tawami.motion.observer import Snapshot, Subject
 
@@ -79,8 +79,10 @@ class Output:
         Raises:
             NotModelledError, InputError: A quantity that the scene does not have, or an unknown one.
             OutputError: The folder cannot be written.
+            CheckpointError: The state is none of an output.
         """
         state = state or {}
+        _check_state(self.name, state)
         self._seen, self._written = state.get("seen", -1), state.get("written", -1)
         self._multiple = state.get("multiple", -math.inf)
         if self._every is not None and state.get("every") not in (None, self._every):
@@ -141,3 +143,16 @@ class Output:
     def _write(self, snapshot: Snapshot, size: float) -> None:
         """Write a snapshot, `size` after the one before; a call for all ranks."""
         raise NotImplementedError
+
+
+def _check_state(name: str, state: dict[str, Any]) -> None:
+    """Check the state of an output in a checkpoint: all its numbers, or nothing."""
+    known = {"seen": 0, "written": 0, "time": 0.0}
+    known |= {"multiple": 0, "every": 0.0} if "every" in state else {}
+    try:
+        archive.check_like(state, known if state else {}, f"output '{name}'")
+    except ValueError as error:
+        raise CheckpointError(
+            f"the checkpoint cannot be used ({error}): its content is not what tawami writes. Remove it "
+            "to resume from the one before it, or start anew with existing='replace'"
+        ) from None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import asdict
 from typing import Any, Self
 
@@ -82,16 +82,24 @@ class Phase:
                 self._progress.line.end()
                 log.error("%s ended by %s: %s", self.name, type(error).__name__, error)
                 if len(self._steps) == self._seen > self._checkpoints.stored:
-                    self._checkpoints.try_to_write(self._seen, self._state())
-                    error.add_note(
-                        f"the state after the last accepted step, at {self._at}, is in "
-                        f"'{self._folder.path / archive.FOLDER}'"
-                    )
+                    self._checkpoints.try_to_write(self._seen, self._state(), ends=True)
+                self._note_checkpoint(error)
         finally:
             self._progress.line.end()
             self._open.close()
         if error is None and not self._stopped and self._asked_to_stop():
             self._stop()
+
+    def _note_checkpoint(self, error: BaseException) -> None:
+        """Add to an error where the newest state is."""
+        last = self._checkpoints.last()
+        if last is None or not self._steps:
+            return
+        steps = archive.steps_of(last)
+        after = f"step {steps} of {len(self._steps)}"
+        if steps == len(self._steps):
+            after = f"the last accepted step, at {self._at},"
+        error.add_note(f"the state after {after} is in '{last}'")
 
     @property
     def _at(self) -> str:
@@ -103,9 +111,11 @@ class Phase:
         """Resume the phase from its newest checkpoint, or begin it."""
         self._pace, self._steps, self._largest = pace, steps, pace.size
         self.subject.scene.configuration.domain.newton.record()
-        state = self._checkpoints.newest()
+        like = {"scene": self.subject.state()} if self._checkpoints.resumes else {}
+        state = self._checkpoints.newest(like | self._progress_state())
         if state is not None:
-            self._restore(state)
+            with self._checkpoints.using():
+                self._restore(state)
         self._seen = len(steps)
         self._checkpoints.restart(self._seen)
         if self.finished and not pace.at < self.end * (1 - 1e-12):
@@ -117,8 +127,9 @@ class Phase:
             if self._writes:
                 result_folder(folder)
         written = {} if state is None else state["outputs"]
-        for output in self._outputs:
-            output.begin(folder, self.subject, written.get(output.name))
+        with self._checkpoints.using() if written else nullcontext():
+            for output in self._outputs:
+                output.begin(folder, self.subject, written.get(output.name))
         log.info(
             "%s %s at %s, to %g: tawami on %d ranks",
             self.name, "begins" if state is None else "resumes", self._at, self.end, self._comm.size,
@@ -136,10 +147,16 @@ class Phase:
         """State for a checkpoint; a call for all ranks."""
         return {
             "scene": self.subject.state(),
+            **self._progress_state(),
+            "outputs": {output.name: output.state() for output in self._outputs},
+        }
+
+    def _progress_state(self) -> dict[str, Any]:
+        """State of the phase without that of scene and outputs."""
+        return {
             "pace": asdict(self._pace),
             "steps": pack(self._steps),
             "largest": self._largest,
-            "outputs": {output.name: output.state() for output in self._outputs},
             "finished": self._last,
         }
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import json
+import re
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tawami.base import checks
+from tawami.base import checks, csv_file
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError, MissingDependencyError, OutputError
-from tawami.base.files import readable_file, reason, result_folder, unreadable
+from tawami.base.files import readable_file, reason, result_folder
 from tawami.results.figure import new_figure, save
 from tawami.results.film import Corners, Film, Movie, Times, scalars
 from tawami.results.provenance import RUN
@@ -23,41 +23,52 @@ from tawami.results.series import frames
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+#: What particles are coloured by.
+USUAL = "mean stress"
+
 
 def plot(
-    folder: str | Path, *, quantity: str = "mean stress", movie: Movie | None = "gif"
+    folder: str | Path, *, quantity: str | None = None, movie: Movie | None = "gif"
 ) -> list[Path]:
-    """Draw a run; the pictures go into its folder `figures`.
+    """Draw particles and tables of a run; the pictures go into its folder `figures`.
 
     Args:
         folder: Of the run, with run.json.
         quantity: What particles are coloured by, one that the run wrote: 'mean stress', 'stress xx',
-            'velocity' (its size), 'velocity x', ...
+            'velocity' (its size), 'velocity x', ...; by default the mean stress, or the first quantity
+            of a run without stresses.
         movie: 'gif', 'mp4' (needs ffmpeg), or None.
 
     Returns:
         The files.
 
     Raises:
-        InputError: No run, no particles, or no such quantity in it.
+        InputError: No run, neither particles nor tables in it, no such quantity, or a link out of the
+            folder.
         OutputError: A file of the run cannot be read, or a picture cannot be written.
         MissingDependencyError: matplotlib is not installed, or ffmpeg for an mp4.
     """
     home = checks.path("plot: folder", folder)
+    _check_inside(home)
     grid = _corners(home)
     if movie is not None:
         checks.choice("movie", movie, ("gif", "mp4"))
     if movie == "mp4" and shutil.which("ffmpeg") is None:
         raise MissingDependencyError("movie = 'mp4' needs ffmpeg: install it, or use movie='gif'")
-    found = [(path.name, _particles(path)) for path in _phases(home)]
-    series = [(name, times) for name, times in found if times]
-    if not series:
-        raise InputError(
-            f"'{home}' holds no series of particles: expected a run with tawami.ParticleOutput(...)"
-        )
+    phases = _phases(home)
+    series = [(path.name, times) for path in phases if (times := _particles(path))]
+    tables = [(path, table) for path in phases for table in sorted(path.glob("*.csv"))]
     known = list(dict.fromkeys(k for _, times in series for k in scalars(times[-1][1]())))
-    checks.choice("quantity", quantity, known, "the run did not write it: ")
-    pictures, stem = result_folder(home / "figures"), quantity.replace(" ", "-")
+    if not known and (quantity is not None or not tables):
+        raise InputError(
+            f"'{home}' holds no particles with a quantity to draw: expected a run with "
+            "tawami.ParticleOutput('stress') or other quantities"
+        )
+    if quantity is None:
+        quantity = USUAL if USUAL in known else next(iter(known), USUAL)
+    else:
+        checks.choice("quantity", quantity, known, "the run did not write it: ")
+    pictures, stem = result_folder(home / "figures"), re.sub(r"[^\w.+]", "-", quantity)
     written = []
     for phase, times in series:
         if quantity in scalars(times[-1][1]()):
@@ -65,16 +76,29 @@ def plot(
             written.append(film.picture(pictures / f"{phase}-{stem}.png"))
             if movie is not None and len(times) > 1:
                 written.append(film.movie(pictures / f"{phase}-{stem}.{movie}", movie))
-    for path in _phases(home):
-        for table in sorted(path.glob("*.csv")):
-            written += _table(table, pictures / f"{path.name}-{table.stem}.png")
+    for path, table in tables:
+        written += _table(table, pictures / f"{path.name}-{table.stem}.png")
     return written
+
+
+def _check_inside(home: Path) -> None:
+    """Check that the files to read are in the folder: links could lead to any other file.
+
+    Raises:
+        InputError: A link leads out of the folder.
+    """
+    for path in (home / RUN, *(p for ending in ("pvd", "csv") for p in home.glob(f"*/*.{ending}"))):
+        if not path.resolve().is_relative_to(home.resolve()):
+            raise InputError(
+                f"plot: '{path}' is a link to '{path.resolve()}', outside the folder: expected the "
+                "files of the run in its folder; copy them into it"
+            )
 
 
 def _corners(home: Path) -> Corners:
     """Corners of the grid of a run."""
     expected = "the folder of a run, as tawami.Results('results/pile', ...) creates it"
-    file = readable_file("plot: record of the run", home / RUN, expected)
+    file = readable_file("record of the run", home / RUN, expected)
     try:
         known = json.loads(file.read_text())["grid"]
         lower = np.array(known["origin"], dtype=float)
@@ -104,22 +128,17 @@ def _particles(phase: Path) -> Times:
 def _table(table: Path, path: Path) -> list[Path]:
     """Draw columns over time, one panel for each kind; a table needs at least two rows."""
     try:
-        problem = unreadable(table)
-        if problem is not None:
-            raise OSError(problem)
-        with table.open(newline="") as file:
-            head, *rows = list(csv.reader(file))
-        values = np.array(rows, dtype=float).reshape(-1, len(head))
+        content = csv_file.read(table)
+        head = content.header
+        values = np.column_stack([content.column(k, finite=False) for k in range(len(head))])
+        panels: dict[tuple[str, str], list[int]] = {}
+        for k, label in enumerate(head[2:], start=2):
+            panels.setdefault(_kind(label), []).append(k)
     except (OSError, ValueError) as error:
         raise OutputError(
             f"'{table}' cannot be read ({reason(error)}): expected a table of a run"
         ) from error
-    if len(values) < 2:
-        return []
-    panels: dict[tuple[str, str], list[int]] = {}
-    for k, label in enumerate(head[2:], start=2):
-        panels.setdefault((label.split()[0], label[label.rindex("[") :]), []).append(k)
-    if not panels:
+    if len(values) < 2 or not panels:
         return []
     across = min(2, len(panels))
     down = -(-len(panels) // across)
@@ -133,12 +152,19 @@ def _table(table: Path, path: Path) -> list[Path]:
     return [path]
 
 
+def _kind(label: str) -> tuple[str, str]:
+    """First word and unit of a label; columns that agree in both share a panel."""
+    found = re.fullmatch(r"(\S+).*(\[[^\[]*\])", label)
+    if found is None:
+        raise ValueError(f"its column '{label}' has no unit in brackets")
+    return found[1], found[2]
+
+
 def _panel(axes: Axes, head: Sequence[str], numbers: Sequence[int], values: Array) -> None:
     """Draw columns of one kind and unit, without those that are 0 throughout."""
     labels = [head[k] for k in numbers]
-    unit = labels[0][labels[0].rindex("[") :]
+    kind, unit = _kind(labels[0])
     names = [label.removesuffix(unit).strip() for label in labels]
-    kind = names[0].split()[0]
     drawn = [k for k in numbers if np.any(np.nan_to_num(values[:, k]))] or numbers[:1]
     of_steps = kind in ("Newton", "step")  # the first row is not a step
     for k, name in zip(numbers, names, strict=True):

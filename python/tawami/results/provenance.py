@@ -22,6 +22,8 @@ from tawami.motion.observer import Subject
 
 #: Names of the record, and of the copies of the driver script and of the form.
 RUN, SCRIPT, FORM = "run.json", "script.py", "form.py"
+#: Variable of `__main__` with its source, if this is not in its file.
+SOURCE = "__tawami_source__"
 #: Time limit of git [s].
 PATIENCE = 10
 
@@ -43,7 +45,8 @@ def write(folder: str | Path, subject: Subject) -> None:
         if comm.rank == 0:
             home = result_folder(folder)
             script, module = driver()
-            source = None if script is None else _bytes(script)
+            own = getattr(sys.modules["__main__"], SOURCE, None)
+            source = own if own or script is None else _bytes(script)
             known = {
                 "script": None if script is None else str(script),
                 "module": module,
@@ -86,9 +89,8 @@ def driver() -> tuple[Path | None, str | None]:
     file = getattr(main, "__file__", None)
     name = getattr(getattr(main, "__spec__", None), "name", None)
     script = None if file is None else Path(file).resolve()
-    return (script if script and script.is_file() else None), (name or "").removesuffix(
-        ".__main__"
-    ) or None
+    exists = script is not None and (script.is_file() or hasattr(main, SOURCE))
+    return (script if exists else None), (name or "").removesuffix(".__main__") or None
 
 
 def git(folder: Path) -> dict[str, Any] | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 from tawami.base import checks
 from tawami.base.errors import InputError
@@ -43,6 +43,9 @@ class Results:
     Raises:
         InputError: A parameter out of its range.
     """
+
+    #: Number of phases that have begun in this process.
+    begun: ClassVar[int] = 0
 
     def __init__(
         self,
@@ -89,14 +92,20 @@ class Results:
         """Observer of the next phase; see `tawami.motion.observer.Recorder`.
 
         Raises:
-            InputError: The folder holds a run, and `existing` is 'stop'.
+            InputError: The folder holds a run, and `existing` is 'stop'; another process or another
+                Results writes into it.
             OutputError: The folder cannot be written.
         """
+        Results.begun += 1
         comm = subject.scene.grid.comm
-        if not self._phases:
-            with raise_together(comm):
-                if comm.rank == 0:
+        first = not self._phases
+        with raise_together(comm):
+            if comm.rank == 0:
+                if first:
                     self._resumes = self._run.open()
+                else:
+                    self._run.check()
+        if first:
             self._resumes = comm.bcast(self._resumes)
             if not self._resumes:
                 provenance.write(self.folder, subject)

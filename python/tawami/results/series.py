@@ -7,8 +7,9 @@ series opens even if its run was killed.
 from __future__ import annotations
 
 import os
+import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
@@ -25,6 +26,8 @@ HEAD = (
     "<Collection>"
 )
 TAIL = "</Collection>\n</VTKFile>"
+#: A finite number.
+NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
 #: Time, and path of the file from the folder of the index.
 Entry = tuple[float, str]
 
@@ -123,12 +126,23 @@ def entries(index: Path) -> list[Entry]:
         if problem is not None:
             raise OSError(problem)
         found = ElementTree.parse(index).getroot().findall("Collection/DataSet")
-        return [(float(element.attrib["timestep"]), element.attrib["file"]) for element in found]
-    except (OSError, ElementTree.ParseError, KeyError, ValueError) as error:
+        return [_entry(index, k, element.attrib) for k, element in enumerate(found, 1)]
+    except (OSError, ElementTree.ParseError, ValueError) as error:
         raise OutputError(
             f"'{index}' cannot be read ({reason(error)}): expected the index of a series as this run "
             "wrote it; remove it to begin the series anew"
         ) from error
+
+
+def _entry(index: Path, number: int, given: Mapping[str, str]) -> Entry:
+    """An entry of an index: a finite time, and a file in the folder of the index."""
+    time, file = given.get("timestep", ""), given.get("file", "")
+    folder = index.parent.resolve()
+    if not re.fullmatch(NUMBER, time.strip()):
+        raise ValueError(f"its entry {number} has the time '{time}'")
+    if not file or not (folder / file).resolve().is_relative_to(folder):
+        raise ValueError(f"its entry {number} has the file '{file}', which is not in this folder")
+    return float(time), file
 
 
 def frames(index: Path) -> list[tuple[float, Callable[[], Frame]]]:

@@ -15,17 +15,20 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami import _rust
-from tawami.base import ranks, signals
-from tawami.base.errors import ConvergenceError
-from tawami.base.identity import fingerprint
+from tawami.base import checks, ranks, signals
+from tawami.base.errors import CheckpointError, ConvergenceError
+from tawami.base.meaning import fingerprint
 from tawami.base.process import check_process
+from tawami.base.program import leave_together
 from tawami.base.timing import Stopwatch
 from tawami.particles import placement
 from tawami.scene import coverage, mean_stress, softening, strain_limit
+from tawami.scene.activity import Activity
 from tawami.scene.domain import Domain
 from tawami.scene.loads import Loads
 from tawami.scene.model import Model
 from tawami.scene.reactions import Reactions
+from tawami.scene.share import Moment
 from tawami.scene.step import Accepted, Problem, StepKind
 from tawami.scene.supports import Supports
 from tawami.solve.newton import Converged
@@ -67,6 +70,7 @@ class Configuration:
     Attributes:
         domain: The particles where they are; another object after a step that moves them.
         supports, loads: As the driver script made them.
+        activity: Time of the scene, and what it is doing.
         total: Coefficients of all fields since the start, where particles do not move.
         left: Number, position [m] and time [s] of the particles that left the grid.
         begun: Whether a step was stored.
@@ -81,8 +85,9 @@ class Configuration:
         if model.form.kinematics.has_eps_v:
             mine.add_eps_v()
         self._attach(mine, location)
-        self.supports = Supports(model.grid, model.basis)
-        self.loads = Loads(model.grid, model.num_particles)
+        self.activity = Activity()
+        self.supports = Supports(model.grid, model.basis, self.activity)
+        self.loads = Loads(model.grid, np.array(particles.volume), self.activity)
         self.total = np.zeros(self.domain.layout.size)
         self.left = list[tuple[int, tuple[float, float], float]]()
         self.begun = self._coverage_checked = False
@@ -97,15 +102,27 @@ class Configuration:
         """Coefficients since the start where particles do not move, 0 where they do."""
         return np.zeros_like(self.total) if self.model.moves else self.total
 
-    def external(self, part: float = 1.0) -> Array:
-        """External forces on all coefficients [N per metre depth], under this part of what is new."""
-        return self.loads.external(self.domain, part)
+    def moment(self, part: float = 1.0, until: float | None = None) -> Moment:
+        """A part of a static phase that ends at a time [s], that of the scene by default.
 
-    def accept(self, part: float) -> None:
-        """Let later parts of loads and prescribed displacements grow from this one."""
-        for support in self.supports.all:
-            support.share.accept(part)
-        self.loads.accept(part)
+        Raises:
+            InputError: An earlier time.
+        """
+        start = self.activity.time
+        if until is None:
+            return Moment(part, start, start)
+        end = checks.number("until", until, low=start)
+        return Moment(part, start, end if part == 1.0 else start + part * (end - start))
+
+    def external(self, now: Moment | None = None) -> Array:
+        """External forces on all coefficients [N per metre depth], under all loads by default."""
+        return self.loads.external(self.domain, now or self.moment())
+
+    def accept(self, now: Moment) -> None:
+        """Let later parts of loads and prescribed displacements grow from this moment."""
+        self.supports.accept(now)
+        self.loads.accept(now)
+        self.activity.time = now.time
 
     @contextmanager
     def tolerance(self, tolerance: float) -> Iterator[None]:
@@ -140,7 +157,8 @@ class Configuration:
         walls = [copy.deepcopy(wall.state) for wall in self.supports.walls]
         committed = False
         try:
-            accepted = self._solve(kind)
+            with leave_together():  # laws and other functions of the driver script are called here
+                accepted = self._solve(kind)
             moved = self._moved(accepted, kind.end)
             self._warn_of_strain(accepted)
             update = kind.accept(accepted)
@@ -285,6 +303,7 @@ class Configuration:
         """All that is carried from one step to the next, of all ranks; a call for all ranks."""
         return {
             "particles": placement.gathered(self.model.grid, self.domain.particles),
+            "time": self.activity.time,
             "total": self.total,
             "left": self.left,
             "travel": self._travel,
@@ -298,12 +317,15 @@ class Configuration:
         """The reverse of :meth:`state`, for a scene that was made in the same way; a call for all ranks.
 
         Raises:
-            CheckpointError: Particles with other arrays.
+            CheckpointError: Particles or fields with other arrays.
         """
         particles, location = placement.scattered(
             self.model.grid, self.domain.particles, state["particles"], moving=self.model.moves
         )
-        self.total = state["total"]
+        if np.shape(state["total"]) != self.total.shape:
+            raise CheckpointError("its fields have another number of coefficients than the scene")
+        self.activity.time, self.total = state["time"], state["total"]
+        self.activity.statics += 1
         self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
         self._coverage_checked, self.begun = state["coverage_checked"], True
         self._travel = state["travel"]

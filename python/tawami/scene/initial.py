@@ -20,7 +20,8 @@ from tawami.form import quantities
 from tawami.scene import sources
 from tawami.scene.configuration import Configuration
 from tawami.scene.domain import Domain
-from tawami.scene.sources import Earlier, Source
+from tawami.scene.earlier import Earlier
+from tawami.scene.sources import Source
 
 Array = npt.NDArray[np.float64]
 Beyond = Literal["stop", "return"]

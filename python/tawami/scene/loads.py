@@ -6,8 +6,7 @@ Loads that are new since the last full solve grow with a part from 0 to 1; the o
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -20,34 +19,93 @@ from tawami.base.text import listed
 from tawami.grid import edges
 from tawami.grid.edges import Interval, Profile
 from tawami.grid.grid import Edge, Grid
+from tawami.scene.action import Action, Owner, Term, restored
+from tawami.scene.activity import Activity
+from tawami.scene.course import Course
 from tawami.scene.domain import Domain
-from tawami.scene.share import Share, check_same_number
+from tawami.scene.share import Moment
 
 Array = npt.NDArray[np.float64]
 
 
-@dataclass
-class Traction:
-    """A traction (t_x, t_y) [Pa] on an edge of the grid."""
+class Load(Action):
+    """A load of a scene: :meth:`change` replaces its value, :meth:`release` takes it away."""
 
-    edge: Edge
-    value: tuple[Profile, Profile]
-    between: Interval | None = None
-    share: Share = field(default_factory=Share)
+    __slots__ = ()
+
+    @property
+    def line(self) -> str:
+        """The load in words, for the header of a run."""
+        return f"{self}{self.terms[-1].course}{' until it fades' if self.released else ''}"
+
+    def place(self) -> list[Any]:
+        """Where it acts, as JSON holds it."""
+        return []
+
+
+class Weight(Load):
+    """The weight of the body; its values are the components of an acceleration [m/s2]."""
+
+    __slots__ = ()
+
+    def _checked(self, value: Any) -> tuple[Profile, ...]:
+        return checks.point("gravity", value)
+
+    @property
+    def acceleration(self) -> Array:
+        """The acceleration that the script asked for [m/s2]."""
+        return np.array(self.terms[-1].values if not self.released else np.zeros(2), dtype=float)
+
+    def __str__(self) -> str:
+        b = ", ".join(f"{component:g}" for component in self.terms[-1].values)
+        return f"gravity ({b}) m/s2"
+
+
+class Traction(Load):
+    """A traction on an edge of the grid; its values are components [Pa]."""
+
+    __slots__ = ("between", "edge")
+
+    def __init__(
+        self, owner: Owner, edge: Edge, value: Any, between: Interval | None, course: Course
+    ) -> None:
+        self.edge, self.between = edge, between
+        super().__init__(owner, value, course)
+
+    def _checked(self, value: Any) -> tuple[Profile, ...]:
+        t_x, t_y = checks.pair(f"{self}", value, "components (t_x, t_y)")
+        return checks.profile(f"{self}: t_x", t_x), checks.profile(f"{self}: t_y", t_y)
+
+    def place(self) -> list[Any]:
+        """Edge, and part of it."""
+        return [self.edge, text(self.between)]
 
     def __str__(self) -> str:
         return f"traction(edge='{self.edge}')"
 
 
-@dataclass
-class Forces:
-    """Forces [N per metre depth] on particles of the body, particles of the body x dim."""
+class Forces(Load):
+    """A force on particles of the body; its values are components [N per metre depth].
 
-    force: Array
-    share: Share = field(default_factory=Share)
+    Attributes:
+        shares: Share of each particle of the body.
+    """
+
+    __slots__ = ("shares",)
+
+    def __init__(self, owner: Owner, shares: Array, value: Any, course: Course) -> None:
+        self.shares = shares
+        super().__init__(owner, value, course)
+
+    def _checked(self, value: Any) -> tuple[Profile, ...]:
+        return checks.point("load(...): force", value)
+
+    def place(self) -> list[Any]:
+        """A hash of the shares."""
+        return [hashlib.sha256(self.shares.tobytes()).hexdigest()]
 
     def __str__(self) -> str:
-        return f"force on {np.count_nonzero(self.force.any(axis=1))} particles"
+        return f"force on {np.count_nonzero(self.shares)} particles"
 
 
 class Loads:
@@ -55,83 +113,129 @@ class Loads:
 
     Args:
         grid: The grid.
-        num_particles: Number of particles of the body.
+        volume: Volume of each particle of the body [m2].
+        activity: Time of the scene, and what it is doing.
 
     Attributes:
-        weight: Acceleration of gravity (b_x, b_y) [m/s2], which grows like the other loads.
+        all: The loads, also those that were released and have not faded.
+        version: A number that changes with every change of a load.
     """
 
-    def __init__(self, grid: Grid, num_particles: int) -> None:
-        self.grid, self.num_particles = grid, num_particles
-        self.weight = Share(*np.zeros((3, grid.space.dim)))
-        self.tractions: list[Traction] = []
-        self.forces: list[Forces] = []
+    def __init__(self, grid: Grid, volume: Array, activity: Activity) -> None:
+        self.grid, self._volume, self.activity = grid, volume, activity
+        self.all: list[Load] = []
+        self.version, self._made = 0, 0
 
-    @property
-    def gravity(self) -> Array:
-        """The acceleration that the script asked for [m/s2]."""
-        return np.asarray(self.weight.target)
+    def next_number(self) -> int:
+        """Number of the next load."""
+        self._made += 1
+        return self._made
 
-    @gravity.setter
-    def gravity(self, acceleration: Array) -> None:
-        self.weight.target = acceleration
+    def changed(self) -> None:
+        """A load was added, changed or released."""
+        self.version += 1
 
-    @property
-    def signature(self) -> tuple[Any, ...]:
-        """A value that differs once the loads are others."""
-        return (*self.gravity, *map(id, self.tractions), *map(id, self.forces))
+    def remove(self, action: Load) -> None:
+        """A released load stays until it has faded."""
+        self._drop_faded()
+
+    def _drop_faded(self) -> None:
+        self.all = [
+            load
+            for load in self.all
+            if not load.released or any(not t.share.is_gone for t in load.terms)
+        ]
+
+    def _course(self, where: str, amplitude: Any) -> Course:
+        self.activity.check_between_steps(where)
+        return Course(where, amplitude, time=self.activity.time)
+
+    def add_gravity(self, acceleration: Any, amplitude: Any) -> Load:
+        """Load the body by its weight."""
+        weight = Weight(self, acceleration, self._course("gravity(...)", amplitude))
+        self.all.append(weight)
+        return weight
 
     def add_traction(
-        self, edge: Edge, value: tuple[Profile, Profile], between: Interval | None
-    ) -> None:
+        self, edge: Edge, value: Any, between: Interval | None, amplitude: Any
+    ) -> Load:
         """Load an edge of the grid with a traction [Pa]."""
-        what = f"traction(edge='{edge}')"
-        t_x, t_y = checks.pair(what, value, "components (t_x, t_y)")
-        components = checks.profile(f"{what}: t_x", t_x), checks.profile(f"{what}: t_y", t_y)
+        course = self._course(f"traction(edge='{edge}')", amplitude)
         edges.cells_between(self.grid, edge, between)
-        self.tractions.append(Traction(edge, components, between))
+        traction = Traction(self, edge, value, between, course)
+        self.all.append(traction)
+        return traction
 
-    def add_forces(self, particles: npt.ArrayLike, force: Sequence[float]) -> None:
-        """Share a force [N per metre depth] out among particles of the body, a mask or numbers."""
-        total = np.array(checks.point("load(...): force", force))
-        chosen = checks.any_array("load(...): particles", particles)
-        if chosen.dtype == bool and chosen.shape == (self.num_particles,):
+    def add_forces(self, particles: npt.ArrayLike, force: Any, amplitude: Any) -> Load:
+        """Share a force [N per metre depth] out among particles of the body by volume.
+
+        Args:
+            particles: A mask of the particles of the body, or their numbers.
+            force: Components.
+            amplitude: In time.
+        """
+        n, chosen = len(self._volume), checks.any_array("load(...): particles", particles)
+        if chosen.dtype == bool and chosen.shape == (n,):
             chosen = np.flatnonzero(chosen)
         inside = chosen.dtype.kind in "iu" and chosen.ndim == 1
-        if not (inside and ((chosen >= 0) & (chosen < self.num_particles)).all()):
+        if not (inside and ((chosen >= 0) & (chosen < n)).all()):
             raise InputError(
                 f"load(particles={checks.shown(particles)}): expected a mask of the "
-                f"{self.num_particles} particles of the body, or their numbers"
+                f"{n} particles of the body, or their numbers"
             )
         chosen = np.unique(chosen)
         if chosen.size == 0:
             raise InputError("load(...): no particle was chosen; the force would act on nothing")
-        each = np.zeros((self.num_particles, self.grid.space.dim))
-        each[chosen] = total / len(chosen)
-        self.forces.append(Forces(each))
+        shares = np.zeros(n)
+        shares[chosen] = self._volume[chosen] / self._volume[chosen].sum()
+        forces = Forces(self, shares, force, self._course("load(...)", amplitude))
+        self.all.append(forces)
+        return forces
 
-    def external(self, domain: Domain, part: float) -> Array:
+    @property
+    def gravity(self) -> Array:
+        """The acceleration that the script asked for, without amplitudes [m/s2]."""
+        weights = [load.acceleration for load in self.all if isinstance(load, Weight)]
+        return sum(weights, np.zeros(self.grid.space.dim))
+
+    @property
+    def vary(self) -> bool:
+        """Whether any load follows an amplitude in time."""
+        return any(term.course.moves for load in self.all for term in load.terms)
+
+    # -- forces --------------------------------------------------------------
+
+    def external(self, domain: Domain, now: Moment) -> Array:
         """External forces on all coefficients.
 
         Args:
             domain: The particles where they are.
-            part: Share of the loads that are new.
+            now: Part of the loads that are new, and time.
         """
-        gravity, particles = self.weight.at(part), domain.particles
-        external = np.zeros(domain.layout.size)
-        if self.forces or gravity.any():
-            on_particles = np.zeros((len(particles), self.grid.space.dim))
-            if gravity.any():
-                on_particles += domain.mass[:, None] * gravity
-            for forces in self.forces:
-                on_particles += forces.share.at(part) * forces.force[particles.number]
+        particles, external = domain.particles, np.zeros(domain.layout.size)
+        on_particles, any_on_particles = np.zeros((len(particles), self.grid.space.dim)), False
+        for load, term, factor in self._acting(now):
+            if isinstance(load, Traction):
+                external += factor * self._on_edge(domain, load, term)
+                continue
+            values = factor * np.array(term.values, dtype=float)
+            weight = load.shares[particles.number] if isinstance(load, Forces) else domain.mass
+            on_particles += weight[:, None] * values
+            any_on_particles = True
+        if any_on_particles:
             sums = domain.sums(np.ones(len(particles)), on_particles)
-            external[: sums.size] = sums.ravel()
-        for traction in self.tractions:
-            external += traction.share.at(part) * self._on_edge(domain, traction)
+            external[: sums.size] += sums.ravel()
         return external
 
-    def _on_edge(self, domain: Domain, traction: Traction) -> Array:
+    def _acting(self, now: Moment) -> Iterator[tuple[Load, Term, float]]:
+        """The terms with their factors, but for those that are zero."""
+        for load in self.all:
+            for term in load.terms:
+                factor = term.at(now)
+                if not term.is_zero and (factor or isinstance(load, Traction)):
+                    yield load, term, factor
+
+    def _on_edge(self, domain: Domain, traction: Traction, term: Term) -> Array:
         """Forces of the whole traction on all coefficients."""
         edge = traction.edge
         nodes, loaded = domain.tractions.nodes(edge), self._cells(domain, traction)
@@ -141,7 +245,7 @@ class Loads:
                 "where the body is loaded, or use load(particles, force)"
             )
         x, y = nodes[..., 0].ravel(), nodes[..., 1].ravel()
-        values = [edges.evaluate(component, x, y, f"{traction}") for component in traction.value]
+        values = [edges.evaluate(component, x, y, f"{traction}") for component in term.values]
         at_nodes = np.stack(values, axis=-1).reshape(nodes.shape)
         return domain.tractions.forces(edge, np.where(loaded[:, None, None], at_nodes, 0.0))
 
@@ -151,49 +255,34 @@ class Loads:
         mask: npt.NDArray[np.bool_] = part[domain.tractions.cells(traction.edge)]
         return mask
 
-    def accept(self, part: float) -> None:
-        """Later parts grow from this share of what is new."""
-        for share in self._shares:
-            share.accept(part)
-
-    @property
-    def _shares(self) -> Iterator[Share]:
-        yield self.weight
-        yield from (traction.share for traction in self.tractions)
-        yield from (forces.share for forces in self.forces)
+    def accept(self, now: Moment) -> None:
+        """Later parts grow from this moment."""
+        for load in self.all:
+            load.accept(now)
+        self._drop_faded()
 
     # -- header, identity, checkpoints ---------------------------------------
 
     @property
     def line(self) -> str:
         """The loads in words, for the header of a run."""
-        b = ", ".join(f"{component:g}" for component in self.gravity)
-        texts = [f"gravity ({b}) m/s2"] if self.gravity.any() else []
-        return listed([*texts, *map(str, self.tractions), *map(str, self.forces)])
+        return listed(
+            [load.line for load in self.all if load.released or not load.terms[-1].is_zero]
+        )
 
     def identity(self) -> list[Any]:
         """What decides the results of a run, as JSON holds it."""
-        return [
-            list(map(float, self.gravity)),
-            *([t.edge, *map(text, t.value), text(t.between)] for t in self.tractions),
-            *(hashlib.sha256(f.force.tobytes()).hexdigest() for f in self.forces),
-        ]
+        return [[type(load).__name__, *load.place(), *load.identity()] for load in self.all]
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> list[dict[str, Any]]:
         """How much of each load the body carries."""
-        return {
-            "tractions": len(self.tractions),
-            "forces": len(self.forces),
-            "shares": [share.state() for share in self._shares],
-        }
+        return [load.state() for load in self.all]
 
-    def restore(self, state: Mapping[str, Any]) -> None:
+    def restore(self, state: list[Mapping[str, Any]]) -> None:
         """The reverse of :meth:`state`, for the same loads.
 
         Raises:
-            CheckpointError: The script has made another number of loads.
+            CheckpointError: The script has made others.
         """
-        check_same_number("load", state["tractions"], len(self.tractions))
-        check_same_number("load", state["forces"], len(self.forces))
-        for share, values in zip(self._shares, state["shares"], strict=True):
-            share.restore(values)
+        self.all = restored("load", self.all, state)
+        self.changed()

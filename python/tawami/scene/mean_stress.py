@@ -3,7 +3,7 @@
 In a mixed form the mean stress is a field, tau_m = K eps, with eps bilinear on the grid of the step.
 Once the grid has been reset it is a sum of fields of many grids. Its force then does work on changes of
 volume that the volume equation does not see: a body that turns gains energy. Once the particles have
-travelled a quarter of a cell it is therefore projected on the present functions,
+travelled a tenth of a cell it is therefore projected on the present functions,
 
     sum_p V0_p K_p M_i (eps(x_p) - tau_m,p / K_p) = 0   for all i,   tau_m,p <- K_p eps(x_p),
 
@@ -25,7 +25,7 @@ from tawami.scene.domain import Domain
 #: that iterations do not find is lost, and rounding would make it depend on the number of ranks.
 TOLERANCE, MOST_ITERATIONS = 1e-11, 200
 #: Cells that the particles travel between two projections. A body at rest is left alone.
-TRAVEL = 0.25
+TRAVEL = 0.1
 
 
 def travel(domain: Domain, moved: Array) -> float:

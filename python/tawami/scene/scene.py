@@ -22,24 +22,23 @@ from tawami.fem.rules import TangentRule
 from tawami.field.reduction import Reduction
 from tawami.form.form import Form
 from tawami.grid.basis import Basis
-from tawami.grid.edges import Component, Interval, Profile
-from tawami.grid.grid import Edge, Grid
+from tawami.grid.grid import Grid
 from tawami.particles import assignment
 from tawami.scene import description, initial
 from tawami.scene.absent import Elsewhere
+from tawami.scene.conditions import Conditions
 from tawami.scene.configuration import Configuration
 from tawami.scene.model import build
 from tawami.scene.solution import Solution
 from tawami.scene.sources import Source
 from tawami.scene.statics import StaticStep
 from tawami.scene.step import StepKind
-from tawami.scene.supports import Velocity
 from tawami.solve.numerics import Assembly, Factorise, Numerics, SolverName
 
 Array = npt.NDArray[np.float64]
 
 
-class Scene(Elsewhere, Sealed, Unique):
+class Scene(Conditions, Elsewhere, Sealed, Unique):
     """Particles on a grid with a weak form, supports and loads.
 
     By itself it is static; `ramp` applies its loads in steps, `Dynamics` sets it in motion. With a
@@ -204,166 +203,52 @@ class Scene(Elsewhere, Sealed, Unique):
             InputError: An unknown name, another shape, a number that is not finite, stress beyond the
                 yield surface, eps_v that does not fit an elastic stress, or a scene that was solved.
         """
-        initial.set_field(self.configuration, name, source, beyond)
-
-    # -- supports and loads --------------------------------------------------
-
-    def fix(
-        self,
-        edge: Edge,
-        component: Component,
-        value: Profile = 0.0,
-        *,
-        velocity: Velocity | None = None,
-        between: Interval | None = None,
-    ) -> None:
-        """Prescribe a displacement component along an edge of the grid.
-
-        Args:
-            edge: 'left', 'right', 'bottom' or 'top'.
-            component: 'x' or 'y'.
-            value: Displacement [m] from now on (at small strain from the start of the scene): a
-                number, or a function f(x, y) on arrays, which is projected in L2 on the functions of
-                the edge.
-            velocity: For `Dynamics`, in place of a value: a number [m/s], or a function of time [s].
-            between: Part of the edge, from one line of the grid to another [m].
-
-        Raises:
-            InputError: An unknown edge or component, or a part that is not one of whole cells.
-        """
-        self.configuration.supports.fix(edge, component, value, velocity, between)
-
-    def hold(
-        self,
-        point: Sequence[float],
-        component: Component,
-        value: float = 0.0,
-        *,
-        velocity: Velocity | None = None,
-    ) -> None:
-        """Prescribe a displacement component at a point of the body: a constraint on the interpolated
-        value. Where particles move the point moves with them.
-
-        Args:
-            point: Position (x, y) [m].
-            component: 'x' or 'y'.
-            value: Displacement [m], as in `fix`.
-            velocity: As in `fix`.
-
-        Raises:
-            InputError: A point outside the grid, or an unknown component.
-        """
-        self.configuration.supports.hold(point, component, value, velocity)
-
-    def wall(self, edge: Edge, friction: float = 0.0, *, separates: bool = True) -> None:
-        """Put a wall with Coulomb friction along an edge of the grid.
-
-        Args:
-            edge: 'left', 'right', 'bottom' or 'top'.
-            friction: Coefficient of friction; 0 is smooth, infinity does not slide.
-            separates: Whether the body may leave the wall.
-
-        Raises:
-            InputError: An unknown edge, a negative friction, or an edge that has a wall already.
-        """
-        self.configuration.supports.wall(edge, friction, separates)
-
-    def release(self, place: Edge | Sequence[float], component: Component | None = None) -> None:
-        """Remove supports that `fix`, `hold` or `wall` made.
-
-        Args:
-            place: Name of the edge, or point (x, y) [m].
-            component: 'x' or 'y'; both, and a wall, by default.
-
-        Raises:
-            InputError: There is no such support.
-        """
-        self.configuration.supports.release(place, component)
-
-    def traction(
-        self,
-        edge: Edge,
-        value: tuple[Profile, Profile],
-        *,
-        between: Interval | None = None,
-    ) -> None:
-        """Load an edge of the grid where the body touches it.
-
-        Args:
-            edge: 'left', 'right', 'bottom' or 'top'.
-            value: Traction (t_x, t_y) [Pa]: numbers, or functions f(x, y) on arrays, taken at the
-                biquadratic nodes of the grid (exact up to parabolas).
-            between: Part of the edge, from one line of the grid to another [m].
-
-        Raises:
-            InputError: An unknown edge or part of it, or a form without a term `dot(t, w) * ds`.
-        """
-        self.grid.edge(edge)
-        if self.configuration.model.compiled.traction is None:
-            raise InputError(
-                f"traction(edge='{edge}'): form {self.form.name} has no edge term; add "
-                "- dot(t, w) * ds to its residual"
-            )
-        self.configuration.loads.add_traction(edge, value, between)
-
-    def load(self, particles: npt.ArrayLike, force: Sequence[float]) -> None:
-        """Load particles of the body, wherever they move: a traction on a surface that is not an edge
-        of the grid. Its direction is fixed.
-
-        Args:
-            particles: A mask of the particles of the body, or their numbers.
-            force: (f_x, f_y) [N per metre depth], shared out evenly.
-
-        Raises:
-            InputError: No particle, or others than those of the body.
-        """
-        self.configuration.loads.add_forces(particles, force)
-
-    def gravity(self, acceleration: Sequence[float]) -> None:
-        """Load the body by its weight.
-
-        Args:
-            acceleration: (b_x, b_y) [m/s2], in place of an earlier one.
-
-        Raises:
-            InputError: No density, or not two finite numbers.
-        """
-        if self.configuration.model.density is None:
-            raise InputError("gravity(...) needs Scene(..., density=...) [kg/m3]")
-        self.configuration.loads.gravity = np.array(checks.point("gravity", acceleration))
+        with self.configuration.activity.step("initial(...)"):
+            initial.set_field(self.configuration, name, source, beyond)
 
     # -- solving -------------------------------------------------------------
 
-    def solve(self) -> Solution:
+    @property
+    def time(self) -> float:
+        """Time at the end of the last phase of statics with `until`, or of the last dynamic step [s]."""
+        return self.configuration.activity.time
+
+    def solve(self, *, until: float | None = None) -> Solution:
         """Find equilibrium under the present supports and loads, and store it in the particles.
 
-        May be called again after more supports or loads were added.
+        May be called again after more supports or loads were added, or others changed.
+
+        Args:
+            until: Time for amplitudes [s], from the time of the scene on; that time by default.
 
         Raises:
             SupportError: Supports that leave a rigid motion free or contradict each other.
             ConvergenceError: Newton did not converge; the particles are as they were.
             SingularError: The tangent cannot be solved; the message names the cells.
+            SolverError: Memory for the linear system ran out.
             InputError: NaN or infinity in an array of the particles, a particle that would leave the
-                grid, or a support with a velocity.
+                grid, a support with a velocity, an earlier time, or a call from within a step.
         """
-        return self.solve_part(1.0)
+        return self.solve_part(1.0, until)
 
-    def solve_part(self, part: float) -> Solution:
+    def solve_part(self, part: float, until: float | None = None) -> Solution:
         """Find equilibrium under a part, from 0 to 1, of the loads and prescribed displacements that
         are new since the last full solve, as :meth:`solve` does; `ramp` takes it from 0 to 1.
         """
-        return self.advanced(StaticStep(self.configuration, part))
+        now = self.configuration.moment(part, until)
+        return self.advanced(StaticStep(self.configuration, now))
 
     def advanced(self, kind: StepKind) -> Solution:
         """Take a static step, as :meth:`solve` does."""
-        for support in self.configuration.supports.all:
-            if support.velocity is not None:
-                raise InputError(
-                    f"{support} has a velocity, and solve() knows no time: expected a value, or "
-                    "Dynamics(scene)"
-                )
-        self.configuration.check_coverage()
-        return Solution(self, self.configuration.advance(kind))
+        with self.configuration.activity.step("solve()"):
+            for support in self.configuration.supports.all:
+                if support.has_velocity:
+                    raise InputError(
+                        f"{support} has a velocity, which statics does not follow: expected a value, "
+                        "with an amplitude=... and until=... for a course in time, or Dynamics(scene)"
+                    )
+            self.configuration.check_coverage()
+            return Solution(self, self.configuration.advance(kind))
 
     def header(self) -> str:
         """Lines for the start of a run: what the scene models and what it does not, with the switches
@@ -420,7 +305,7 @@ class Scene(Elsewhere, Sealed, Unique):
 
     def reduction(self) -> Reduction:
         """What the present supports leave free: coefficients = selection @ unknowns + offset."""
-        return StaticStep(self.configuration).problem().reduction
+        return StaticStep(self.configuration, self.configuration.moment()).problem().reduction
 
     def residual(self, coefficients: Array) -> Array:
         """The form's integrals over particles and cells, for every test function, before supports.
@@ -429,10 +314,12 @@ class Scene(Elsewhere, Sealed, Unique):
             coefficients: Increments of all fields: displacement (two per function, x fastest),
                 then the bilinear field, as `split` separates them.
         """
+        self.configuration.activity.check_between_steps("residual(...)")
         return self.configuration.domain.newton.internal(self._coefficients(coefficients))
 
     def tangent(self, coefficients: Array) -> sp.csr_matrix:
         """Derivative of :meth:`residual` as the form's tangent gives it, before supports."""
+        self.configuration.activity.check_between_steps("tangent(...)")
         coefficients, domain = self._coefficients(coefficients), self.configuration.domain
         domain.newton.internal(coefficients)
         return domain.assembly.unreduced_tangent(coefficients, domain.responses.data)

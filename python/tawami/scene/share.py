@@ -6,54 +6,57 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tawami.base.errors import CheckpointError
+from tawami.scene.course import Course
+
+
+@dataclass(frozen=True)
+class Moment:
+    """Where a phase is.
+
+    Attributes:
+        part: Share of what is new that has been applied, from 0 to 1; 1 in dynamics.
+        start: Time at the start of the phase, or of the dynamic step [s].
+        time: Present time [s].
+    """
+
+    part: float
+    start: float
+    time: float
 
 
 @dataclass
 class Share:
-    """What grows from `carried` to `target` while a run goes from part 0 to part 1.
-
-    Numbers, or vectors, of one kind: shares of a load from 0 to 1, or an acceleration [m/s2].
+    """The factor of a value, from what the body carries to what the driver script asks for.
 
     Attributes:
+        target: 1; 0 once it was replaced or released.
         carried: What later parts grow from: the body was in equilibrium with it.
-        target: What the driver script asked for.
         applied: What the last equilibrium was found for.
     """
 
-    carried: Any = 0.0
-    target: Any = 1.0
-    applied: Any = 0.0
+    target: float = 1.0
+    carried: float = 0.0
+    applied: float = 0.0
 
-    def at(self, part: float) -> Any:
-        """The value once `part` of what is new has been applied."""
-        return self.carried + part * (self.target - self.carried)
+    def at(self, now: Moment, course: Course) -> float:
+        """The factor: the course, and what differs from it at the start, which fades."""
+        wanted = self._wanted(course, now.time)
+        if now.part == 1.0:
+            return wanted
+        return wanted - (1 - now.part) * (self._wanted(course, now.start) - self.carried)
 
-    def apply(self, part: float) -> None:
-        """The body is in equilibrium with this part."""
-        self.applied = self.at(part)
+    def _wanted(self, course: Course, time: float) -> float:
+        return self.target * course.factor(time) if self.target else 0.0
 
-    def accept(self, part: float) -> None:
-        """Later parts grow from this one."""
-        self.carried = self.at(part)
+    @property
+    def is_gone(self) -> bool:
+        """Whether nothing of it is wanted or carried."""
+        return not (self.target or self.carried or self.applied)
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> dict[str, float]:
         """The values for a checkpoint."""
         return dict(vars(self))
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`state`."""
         vars(self).update(state)
-
-
-def check_same_number(what: str, stored: int, made: int) -> None:
-    """Check that a stored state has as many loads or supports as the script has made.
-
-    Raises:
-        CheckpointError: It has another number of them.
-    """
-    if stored != made:
-        raise CheckpointError(
-            f"the run had {stored} {what}s of a kind when it was stored, and the script made {made}. "
-            f"They were changed while it ran (each=): expected {what}s to change between two phases"
-        )

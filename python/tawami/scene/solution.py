@@ -9,13 +9,16 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami import _rust
+from tawami.base import checks
 from tawami.base.errors import InputError
 from tawami.base.process import Unique
 from tawami.base.sealed import Sealed
+from tawami.field.constraints import LEAST_SHARE
 from tawami.form.kinematics import KINEMATICS
 from tawami.grid import edges
 from tawami.scene.absent import Elsewhere
 from tawami.scene.configuration import Configuration, Outcome
+from tawami.scene.points import ROUND_OFF, outside
 
 Array = npt.NDArray[np.float64]
 
@@ -61,6 +64,7 @@ class Solution(Elsewhere, Sealed, Unique):
         self._model = scene.configuration.model
         layout, step = outcome.accepted.problem.reduction.layout, outcome.accepted.step
         self.u, self._volumetric = layout.split(outcome.coefficients)
+        self._active = layout.active[: layout.num_displacement].astype(float)
         self.unknowns, self.iterations = outcome.accepted.problem.reduction.size, step.iterations
         self.load, self.history = outcome.accepted.load, step.history
         self.krylov = tuple(step.krylov)
@@ -119,11 +123,22 @@ class Solution(Elsewhere, Sealed, Unique):
         """Displacement (u_x, u_y) [m] of the grid at a point.
 
         Raises:
-            InputError: The point is outside the grid.
+            InputError: The point is outside the grid or the body.
         """
-        location = edges.locate_point(self._model.grid, point, "displacement(...)")
-        value = _rust.interpolate(location, self._model.basis, self._model.space.dim, self.u)[0]
-        return np.asarray(value)
+        what = f"displacement({checks.shown(point)})"
+        location = edges.locate_point(self._model.grid, point, what)
+        fields = np.column_stack([self.u, self._active])
+        value, share = (
+            np.asarray(
+                _rust.interpolate(location, self._model.basis, self._model.space.dim, field)[0]
+            )
+            for field in np.ascontiguousarray(fields.T)
+        )
+        reached = float(share.min())
+        if reached < LEAST_SHARE:
+            distance = np.linalg.norm(self.x - np.asarray(point), axis=1).min(initial=np.inf)
+            raise outside(what, float(distance))
+        return value if reached > 1 - ROUND_OFF else value / reached
 
     def reaction(self, place: str | Sequence[float]) -> Array:
         """Force (x, y) [N per metre depth] that a support or wall exerts on the body.

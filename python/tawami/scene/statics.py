@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tawami.scene.action import Term
 from tawami.scene.configuration import Configuration
+from tawami.scene.share import Moment
 from tawami.scene.step import Accepted, Problem
-from tawami.scene.supports import Support
 
 
 @dataclass(frozen=True)
@@ -17,12 +18,12 @@ class StaticStep:
 
     Attributes:
         configuration: What it starts from.
-        part: From 0 to 1.
+        now: From part 0 to 1.
         stressed: Whether stress may hold what supports leave free, as in a truss that snaps through.
     """
 
     configuration: Configuration
-    part: float = 1.0
+    now: Moment
     stressed: bool = False
 
     @property
@@ -34,18 +35,17 @@ class StaticStep:
         """The problem in the present states of the walls."""
         now, moves = self.configuration, self.configuration.model.moves
 
-        def amount(support: Support) -> float:
+        def amount(term: Term) -> float:
             """Factor of a value: all of it where coefficients are totals, what is missing elsewhere."""
-            share = support.share
-            return float(share.at(self.part) - (share.applied if moves else 0.0))
+            return term.at(self.now) - (term.share.applied if moves else 0.0)
 
         with now.stopwatch("set-up"):
             crossings = now.supports.crossings(amount) if moves else {}
             reduction, contact = now.supports.constraints(
                 now.domain, amount, now.before, now.before, moving=self.stressed
             )
-            external = now.external(self.part)
-        return Problem(reduction, contact, external, crossings=crossings, load=self.part)
+            external = now.external(self.now)
+        return Problem(reduction, contact, external, crossings=crossings, load=self.now.part)
 
     def accept(self, accepted: Accepted) -> StaticStep:
         """Nothing is to be prepared."""
@@ -56,7 +56,7 @@ class StaticStep:
 
     def finish(self) -> None:
         """Record that the body is in equilibrium with this part."""
-        for support in self.configuration.supports.all:
-            support.share.apply(self.part)
-        if self.part == 1.0:
-            self.configuration.accept(1.0)
+        self.configuration.activity.statics += 1
+        self.configuration.supports.apply(self.now)
+        if self.now.part == 1.0:
+            self.configuration.accept(self.now)

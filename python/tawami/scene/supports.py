@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from tawami.base import checks
-from tawami.base.errors import InputError
+from tawami.base.errors import CheckpointError, InputError
 from tawami.base.identity import text
 from tawami.base.text import listed
 from tawami.field.constraints import Held, PointHeld, held_edge, held_point
@@ -19,75 +18,16 @@ from tawami.grid import edges
 from tawami.grid.basis import Basis
 from tawami.grid.edges import Component, Interval, Profile
 from tawami.grid.grid import Edge, Grid
+from tawami.scene.action import Term, restored
+from tawami.scene.activity import Activity
 from tawami.scene.contact import ActiveSet
+from tawami.scene.course import Course, InTime
 from tawami.scene.domain import Domain
-from tawami.scene.share import Share, check_same_number
-from tawami.scene.walls import Contact, Wall
+from tawami.scene.share import Moment
+from tawami.scene.support import Place, Support
+from tawami.scene.walls import Wall, checked_friction
 
 Array = npt.NDArray[np.float64]
-#: A velocity [m/s], constant or a function of time [s].
-Velocity = float | Callable[[float], float]
-
-
-@dataclass
-class Support:
-    """One displacement component that is prescribed along an edge or at a point.
-
-    Attributes:
-        place: Name of the edge, or the point (x, y) [m], which moves with the body.
-        given: The same as the driver script gave it.
-        component: 0 or 1.
-        value: Displacement [m]; 1 where a velocity is prescribed.
-        velocity: [m/s]; None where a displacement is prescribed.
-        between: Part of the edge [m]; None for all of it.
-        share: What of the value the body carries.
-        crossing: How far it has moved the body across its edge [m], where particles move.
-    """
-
-    place: Edge | tuple[float, float]
-    component: int
-    value: Profile
-    velocity: Velocity | None = None
-    between: Interval | None = None
-    share: Share = field(default_factory=Share)
-    crossing: float = 0.0
-    given: Edge | tuple[float, float] = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.given = self.place
-
-    def __str__(self) -> str:
-        where = f"edge='{self.place}'" if isinstance(self.place, str) else f"point={self.place}"
-        return f"{'fix' if isinstance(self.place, str) else 'hold'}({where})"
-
-    @property
-    def motion(self) -> str:
-        """What it prescribes, in words; nothing for zero."""
-        if self.velocity is not None:
-            return " with a velocity"
-        if self.is_zero:
-            return ""
-        return " by a function" if callable(self.value) else f" = {self.value:g} m"
-
-    @property
-    def is_zero(self) -> bool:
-        """Whether it prescribes a displacement of zero."""
-        return self.velocity is None and not callable(self.value) and self.value == 0
-
-    def velocity_at(self, time: float) -> float:
-        """Its velocity at a time [m/s].
-
-        Raises:
-            InputError: The function fails, or its value is not a finite number.
-        """
-        given = self.velocity
-        try:
-            value = given(time) if callable(given) else given or 0.0
-            return checks.number(f"{self}: velocity at {time:g} s", value)
-        except InputError:
-            raise
-        except Exception as error:
-            raise InputError(f"{self}: velocity({time:g}) gave {error!r}: expected m/s") from error
 
 
 class Supports:
@@ -96,59 +36,101 @@ class Supports:
     Args:
         grid: The grid.
         basis: Basis of the displacement.
+        activity: Time of the scene, and what it is doing.
+
+    Attributes:
+        all: The supports along edges and at points.
+        walls: The walls.
+        version: A number that changes with every change of a support or wall by the driver script.
     """
 
-    def __init__(self, grid: Grid, basis: Basis) -> None:
-        self.grid, self.basis = grid, basis
+    def __init__(self, grid: Grid, basis: Basis, activity: Activity) -> None:
+        self.grid, self.basis, self.activity = grid, basis, activity
         self.all: list[Support] = []
         self.walls: list[Wall] = []
+        self.version, self._made = 0, 0
+
+    def next_number(self) -> int:
+        """Number of the next support."""
+        self._made += 1
+        return self._made
+
+    def changed(self) -> None:
+        """A support was added, changed or released."""
+        self.version += 1
+
+    def remove(self, action: Support | Wall) -> None:
+        """Take a support or a wall away."""
+        self.all = [support for support in self.all if support is not action]
+        self.walls = [wall for wall in self.walls if wall is not action]
+        self.changed()
 
     def fix(
         self,
         edge: Edge,
         component: Component,
         value: Profile,
-        velocity: Velocity | None,
+        amplitude: InTime | None,
+        velocity: InTime | None,
         between: Interval | None,
-    ) -> None:
+    ) -> Support:
         """Prescribe a component along an edge."""
         edges.cells_between(self.grid, edge, between)
-        value = checks.profile(f"fix(edge='{edge}'): value", value)
-        self._add(Support(edge, self.grid.space.axis(component), value, velocity, between))
+        return self._add(
+            edge, f"fix(edge='{edge}')", component, value, amplitude, velocity, between
+        )
 
     def hold(
         self,
         point: Sequence[float],
         component: Component,
         value: float,
-        velocity: Velocity | None,
-    ) -> None:
+        amplitude: InTime | None,
+        velocity: InTime | None,
+    ) -> Support:
         """Prescribe a component at a point."""
         what = f"hold(point={checks.shown(point)})"
         edges.locate_point(self.grid, point, what)
         place = checks.point(what, point)
-        held = checks.number(f"{what}: value", value)
-        self._add(Support(place, self.grid.space.axis(component), held, velocity))
+        return self._add(place, what, component, value, amplitude, velocity, None)
 
-    def _add(self, support: Support) -> None:
-        if support.velocity is not None:
-            if not support.is_zero and (callable(support.value) or support.value != 0):
-                raise InputError(f"{support}: expected a value or a velocity, not both")
-            support.value = 1.0
-            support.velocity_at(0.0)
+    def _add(
+        self,
+        place: Place,
+        where: str,
+        component: Component,
+        value: Profile,
+        amplitude: InTime | None,
+        velocity: InTime | None,
+        between: Interval | None,
+    ) -> Support:
+        self.activity.check_between_steps(where)
+        axis = self.grid.space.axis(component)
+        if velocity is not None:
+            if callable(value) or value != 0:
+                raise InputError(f"{where}: expected a value or a velocity, not both")
+            value = 1.0
+        course = Course(where, amplitude, velocity, time=self.activity.time)
+        support = Support(self, place, axis, component, value, course, between)
         self.all.append(support)
+        return support
 
-    def wall(self, edge: Edge, friction: float, separates: bool) -> None:
+    def wall(self, edge: Edge, friction: float, separates: bool) -> Wall:
         """A wall along an edge."""
-        self.grid.edge(edge)
         what = f"wall(edge='{edge}')"
-        mu = checks.real(f"{what}: friction", friction)
-        if mu != np.inf:
-            checks.number(f"{what}: friction", friction, low=0.0)
+        self.activity.check_between_steps(what)
+        self.grid.edge(edge)
         separates = checks.switch(f"{what}: separates", separates)
+        mu = checked_friction(what, friction)
         if any(wall.edge == edge for wall in self.walls):
-            raise InputError(f"wall(edge='{edge}'): there is one already; release('{edge}') first")
-        self.walls.append(Wall(self.grid, self.basis, edge, mu, separates))
+            raise InputError(
+                f"wall(edge='{edge}'): there is one already: change(...) or release() it, or "
+                f"release('{edge}') first"
+            )
+        wall = Wall(self.grid, self.basis, edge, mu, separates, self)
+        self.walls.append(wall)
+        self.changed()
+        return wall
 
     def release(self, place: Edge | Sequence[float], component: Component | None) -> None:
         """Take supports away."""
@@ -162,15 +144,29 @@ class Supports:
                 f"release({checks.shown(place)}): no such support: expected one of "
                 f"{', '.join(places) or 'none'}"
             )
-        self.all = [s for s in self.all if s not in gone]
-        self.walls = [w for w in self.walls if w not in walls]
+        for support in gone:
+            support.release()
+        for wall in walls:
+            wall.release()
+
+    # -- steps ---------------------------------------------------------------
+
+    def apply(self, now: Moment) -> None:
+        """The body is in equilibrium with the supports at this moment."""
+        for support in self.all:
+            support.apply(now)
+
+    def accept(self, now: Moment) -> None:
+        """Later parts grow from this moment."""
+        for support in self.all:
+            support.accept(now)
 
     # -- what they prescribe in a step ---------------------------------------
 
     def constraints(
         self,
         domain: Domain,
-        amount: Callable[[Support], float],
+        amount: Callable[[Term], float],
         start: Array,
         before: Array,
         *,
@@ -180,7 +176,7 @@ class Supports:
 
         Args:
             domain: The particles where they are.
-            amount: Factor of each support's value.
+            amount: Factor of each value of a support.
             start: Coefficients at the start of the step, which the amounts include.
             before: Displacement coefficients since the start of the scene where particles do not move,
                 0 where they do: what walls measure distances from.
@@ -197,10 +193,10 @@ class Supports:
         )
         for support in self.all:
             if isinstance(support.place, str):
-                if not (moving and support.velocity is None and self._is_left(domain, support)):
-                    held.append(self._on_edge(domain, support, amount(support)))
+                if not (moving and not support.moves and self._is_left(domain, support)):
+                    held.append(self._on_edge(domain, support, amount))
             else:
-                points.append(self._at_point(domain, support, amount(support)))
+                points.append(self._at_point(domain, support, amount))
         fixed = np.zeros(layout.size, dtype=bool)
         for edge in held:
             fixed[edge.indices] = True
@@ -220,20 +216,24 @@ class Supports:
         part = edges.cells_between(self.grid, support.place, support.between)
         return not part[domain.tractions.cells(support.place)].any()
 
-    def _on_edge(self, domain: Domain, support: Support, amount: float) -> Held:
+    def _on_edge(self, domain: Domain, support: Support, amount: Callable[[Term], float]) -> Held:
         assert isinstance(support.place, str)
-        edge = held_edge(
-            self.grid, self.basis, domain.active, support.place, support.component,
-            support.value, support.between,
-        )  # fmt: skip
-        return Held(edge.indices, amount * edge.values)
+        indices, values = np.empty(0, dtype=np.int64), np.zeros(1)
+        for term in support.terms:
+            edge = held_edge(
+                self.grid, self.basis, domain.active, support.place, support.component,
+                term.values[0], support.between,
+            )  # fmt: skip
+            indices, values = edge.indices, values + amount(term) * edge.values
+        return Held(indices, values, support.line)
 
-    def _at_point(self, domain: Domain, support: Support, amount: float) -> PointHeld:
+    def _at_point(
+        self, domain: Domain, support: Support, amount: Callable[[Term], float]
+    ) -> PointHeld:
         assert not isinstance(support.place, str)
-        assert not callable(support.value)
         return held_point(
             self.grid, self.basis, domain.active, support.place, support.component,
-            amount * support.value, domain.layout.active,
+            _total(support, amount), domain.layout.active,
         )  # fmt: skip
 
     def num_free(self, domain: Domain) -> int:
@@ -243,7 +243,7 @@ class Supports:
 
     # -- where particles move ------------------------------------------------
 
-    def crossings(self, amount: Callable[[Support], float]) -> dict[int, float]:
+    def crossings(self, amount: Callable[[Term], float]) -> dict[int, float]:
         """How far each support will have moved the body across its edge [m], by its number.
 
         The functions of the edge stay where they are and would soon hold nothing.
@@ -257,9 +257,9 @@ class Supports:
                 isinstance(support.place, str)
                 and self.grid.edge(support.place)[0] == support.component
             ):
-                value = 1.0 if callable(support.value) else support.value
-                crossings[number] = support.crossing + amount(support) * value
-                if abs(crossings[number]) > 0.25 * self.grid.h and not callable(support.value):
+                crossings[number] = support.crossing + _total(support, amount)
+                profiled = any(callable(term.values[0]) for term in support.terms)
+                if abs(crossings[number]) > 0.25 * self.grid.h and not profiled:
                     raise InputError(
                         f"{support} would have moved the body {crossings[number]:.3g} m across its edge "
                         "of the grid, whose functions stay there: expected at most a quarter of a cell, "
@@ -297,44 +297,46 @@ class Supports:
     @property
     def line(self) -> str:
         """The supports in words, for the header of a run."""
-        texts = [
-            f"{support} {self.grid.space.axes[support.component]}{support.motion}"
-            for support in self.all
-        ]
-        texts += [f"wall(edge='{wall.edge}') friction {wall.friction:g}" for wall in self.walls]
-        return listed(texts)
+        return listed([*(support.line for support in self.all), *map(str, self.walls)])
 
     def identity(self) -> list[list[Any]]:
         """What decides the results of a run, as JSON holds it."""
-        given = [
-            [str(s.given), s.component, *map(text, (s.value, s.velocity, s.between))]
-            for s in self.all
-        ]
+        given = [[str(s.given), s.component, text(s.between), *s.identity()] for s in self.all]
         return given + [["wall", w.edge, w.friction, w.separates] for w in self.walls]
 
     def state(self) -> dict[str, Any]:
         """Where points are, what of each support the body carries, and what touches the walls."""
         return {
             "supports": [
-                {"place": s.place, "share": s.share.state(), "crossing": s.crossing}
-                for s in self.all
+                support.state() | {"place": support.place, "crossing": support.crossing}
+                for support in self.all
             ],
-            "walls": [{"touching": w.state.touching, "slip": w.state.slip} for w in self.walls],
+            "walls": [wall.stored() for wall in self.walls],
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`state`, for the same supports.
 
         Raises:
-            CheckpointError: The script has made another number of supports.
+            CheckpointError: The script has made others.
         """
-        check_same_number("support", len(state["supports"]), len(self.all))
-        check_same_number("wall", len(state["walls"]), len(self.walls))
+        if len(state["walls"]) != len(self.walls):
+            raise CheckpointError(
+                f"the run had {len(state['walls'])} walls when it was stored, and the script made "
+                f"{len(self.walls)}: expected walls to be added and released between two phases"
+            )
+        self.all = restored("support", self.all, state["supports"])
         for support, values in zip(self.all, state["supports"], strict=True):
             if not isinstance(support.place, str):
                 x, y = values["place"]
                 support.place = (x, y)
-            support.share.restore(values["share"])
             support.crossing = values["crossing"]
         for wall, values in zip(self.walls, state["walls"], strict=True):
-            wall.state = Contact(values["touching"], values["slip"])
+            wall.restore(values)
+        self.changed()
+
+
+def _total(support: Support, amount: Callable[[Term], float]) -> float:
+    """A prescribed displacement [m], with 1 for each function of position."""
+    values = ((1.0 if callable(v) else v, amount(t)) for t in support.terms for v in t.values)
+    return sum(value * factor for value, factor in values)

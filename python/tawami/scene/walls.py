@@ -12,15 +12,20 @@ contradict it are changed, and it is solved again from there.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from tawami.base import checks
+from tawami.base.errors import InputError
 from tawami.field.constraints import Held
 from tawami.grid.basis import Basis
 from tawami.grid.edges import edge_functions
 from tawami.grid.grid import Edge, Grid
+from tawami.scene.action import Owner
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -30,6 +35,16 @@ Mask = npt.NDArray[np.bool_]
 FORCE, GAP = 1e-6, 1e-12
 #: Times that a function may come back to the wall, or to rest, in one step.
 RETURNS = 4
+
+
+def checked_friction(what: str, friction: Any) -> float:
+    """A coefficient of friction, which may be infinite.
+
+    Raises:
+        InputError: Anything else.
+    """
+    mu = checks.real(f"{what}: friction", friction)
+    return mu if mu == np.inf else checks.number(f"{what}: friction", friction, low=0.0)
 
 
 @dataclass
@@ -45,7 +60,7 @@ class Contact:
     slip: npt.NDArray[np.int8]
 
 
-@dataclass
+@dataclass(repr=False)
 class Wall:
     """A wall along an edge of the grid.
 
@@ -55,6 +70,7 @@ class Wall:
         edge: Its edge.
         friction: Coefficient mu; 0 is smooth.
         separates: Whether the body may leave it.
+        owner: The supports of the scene that it is one of, if there is a scene.
 
     Attributes:
         functions: Displacement functions along it.
@@ -67,17 +83,63 @@ class Wall:
     edge: Edge
     friction: float
     separates: bool
+    owner: Owner | None = None
     functions: npt.NDArray[np.int64] = field(init=False)
     state: Contact = field(init=False)
     returns: npt.NDArray[np.int64] = field(init=False)
 
     def __post_init__(self) -> None:
         self.functions = edge_functions(self.grid, self.basis, self.edge)
-        n = len(self.functions)
-        # without friction nothing sticks; the sign does not matter then
-        slip = np.full(n, 1 if self.friction == 0 else 0, dtype=np.int8)
-        self.state = Contact(np.ones(n, dtype=bool), slip)
+        self._touch(np.ones(len(self.functions), dtype=bool))
         self.begin()
+
+    def _touch(self, touching: Mask) -> None:
+        """States of contact in which nothing has slipped."""
+        # without friction nothing sticks; the sign does not matter then
+        slip = np.full(len(touching), 1 if self.friction == 0 else 0, dtype=np.int8)
+        self.state = Contact(touching, slip)
+
+    def __str__(self) -> str:
+        return f"wall(edge='{self.edge}') friction {self.friction:g}"
+
+    def __repr__(self) -> str:
+        return f"Wall({self})"
+
+    def change(self, friction: float) -> None:
+        """Replace the coefficient of friction from the next step on.
+
+        Raises:
+            InputError: It was released, or the friction is negative; nothing has changed.
+        """
+        owner = self._owner("change(...)")
+        self.friction = checked_friction(f"wall(edge='{self.edge}')", friction)
+        self._touch(self.state.touching)
+        owner.changed()
+
+    def release(self) -> None:
+        """Take it away.
+
+        Raises:
+            InputError: It was released before.
+        """
+        self._owner("release()").remove(self)
+        self.owner = None
+
+    def _owner(self, what: str) -> Owner:
+        if self.owner is None:
+            raise InputError(f"{self}.{what} was called after its release: expected a new one")
+        self.owner.activity.check_between_steps(f"{self}.{what}")
+        return self.owner
+
+    def stored(self) -> dict[str, Any]:
+        """Its states for a checkpoint."""
+        state = self.state
+        return {"touching": state.touching, "slip": state.slip, "friction": self.friction}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """The reverse of :meth:`stored`."""
+        self.state = Contact(state["touching"], state["slip"])
+        self.friction = state["friction"]
 
     def begin(self) -> None:
         """Start a step: forget how often functions came back in the last one."""
@@ -121,7 +183,7 @@ class Wall:
             indices = self.grid.space.dim * chosen + axis
             indices = indices[active[indices]]
             values = start[indices] - (before[indices] if axis == across else 0.0)
-            supports.append(Held(indices, values))
+            supports.append(Held(indices, values, str(self)))
         return supports
 
     def friction_of(self, forces: Array, prescribed: Mask) -> Array:
@@ -137,7 +199,7 @@ class Wall:
     def adapt(self, forces: Array, u: Array, before: Array, active: Mask, prescribed: Mask) -> bool:
         """Change the states that contradict a solution; returns whether there were any.
 
-        A function that comes back to the wall, or to rest, more than RERETURNS times in one step
+        A function that comes back to the wall, or to rest, more than RETURNS times in one step
         keeps its state: otherwise the search could repeat the same states for ever.
 
         Args:

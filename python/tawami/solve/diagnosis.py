@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from tawami.base import ranks
 from tawami.base.arrays import Array
-from tawami.base.errors import ConvergenceError, SingularError
+from tawami.base.errors import ConvergenceError, SingularError, SolverError
 from tawami.base.timing import Stopwatch
 from tawami.field.assembly import Assembly
 from tawami.field.reduction import Reduction
@@ -129,7 +129,7 @@ class Diagnosis:
                 1e-3,
                 lambda: self._scaling.blocks(reduction),
             )
-        except SingularError:
+        except (SingularError, SolverError):
             return False
         regular = not solver.singular
         solver.forget()

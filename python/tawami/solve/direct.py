@@ -6,7 +6,10 @@ factorised again
 
 - if it is another matrix, with other unknowns or another pattern;
 - if the last solve took more than `PAYS` iterations, because a new factorisation is cheaper then;
-- if FGMRES does not converge within `LIMIT` iterations.
+- if FGMRES converges so slowly that a factorisation costs less than the iterations that are left.
+
+The analysis of a matrix (ordering and symbolic factorisation) depends on its pattern alone. It serves
+every factorisation of the same matrix.
 
 Each factorisation also solves for random vectors p of standard normal numbers. The root mean square of
 |A^-1 p| estimates the Frobenius norm of A^-1 (Kenney and Laub 1994), and the large entries of A^-1 p
@@ -25,10 +28,20 @@ from petsc4py import PETSc
 from tawami.base.arrays import Array
 from tawami.base.errors import SingularError
 from tawami.base.timing import Stopwatch
+from tawami.solve import failures
 from tawami.solve.linear_solver import Blocks, LinearSolver
 
-#: Iterations of FGMRES up to which a factorisation costs more, and at which FGMRES stops.
-PAYS, LIMIT = 8, 15
+#: Iterations of FGMRES up to which the factorisation is kept for the next tangent.
+PAYS = 8
+#: Iterations of FGMRES that cost as much as a factorisation, and those before the first comparison.
+COST, TRIAL = 15, 3
+#: Iterations at which FGMRES stops.
+LIMIT = 25
+#: Options of MUMPS (users' guide, ICNTL), by number. PETSc 3.18 takes them from its options only: of
+#: calls before the analysis it keeps few. QAMD (7: 6) is the cheapest ordering for a first
+#: factorisation (`cases.costs.ordering`). The system is scaled already (8: 0), and without a column
+#: permutation (6: 0) the analysis reads no values.
+PREFIX, OPTIONS = "tawami_direct_", {6: 0, 7: 6, 8: 0}
 #: Memory above the estimate of MUMPS [percent], for delayed pivots; a singular matrix delays many.
 ROOM = (50, 1000)
 #: Number of random vectors. They cost little: the factors are read once for all right-hand sides.
@@ -51,12 +64,23 @@ class DirectSolver(LinearSolver):
         super().__init__(comm, stopwatch)
         self._always, self._records = always, False
         self._matrix: Any = None
+        #: The matrix whose analysis the factor holds, and whether it was analysed as a symmetric one.
+        self._analysed: tuple[Any, bool] | None = None
         self._factorised: Array | None = None
 
     def forget(self) -> None:
         """Free the factorisation; the next solve makes a new one."""
         super().forget()
+        self._analysed = None
         self._matrix, self._factorised = None, None
+
+    def _begin(self, matrix: Any, scale: Callable[[], Array]) -> None:
+        """See `LinearSolver._begin`; the analysis of the same matrix is kept."""
+        if self._analysed is None or self._analysed[0] is not matrix:
+            super()._begin(matrix, scale)
+            return
+        self._matrix, self._factorised = None, None
+        self._rescale(matrix, scale)
 
     def record(self) -> None:
         """Copy each matrix that is factorised from now on, for :meth:`state`.
@@ -108,8 +132,8 @@ class DirectSolver(LinearSolver):
         """See `LinearSolver.solve`; direct if the tangent is factorised.
 
         Raises:
-            SingularError: The factorisation ran out of memory, or failed for a reason other than a
-                singular matrix.
+            SingularError: The tangent is singular, and so is its neighbour, or it holds NaN.
+            SolverError: Memory ran out, or MUMPS failed for a reason other than a singular matrix.
         """
         if not self._always and self._matrix is matrix and self.iterations <= PAYS:
             self._multiply(matrix, self._scale)
@@ -123,7 +147,10 @@ class DirectSolver(LinearSolver):
     def _iterate(self, right: Array, tolerance: float) -> Array | None:
         """Solve by FGMRES with the present factorisation; None if it takes too many iterations."""
         with self._stopwatch("solve"):
-            if not self._fgmres(self._scale * right, tolerance, LIMIT):
+            self._handles["ksp"].setConvergenceTest(_Pays(tolerance))
+            converged = self._fgmres(self._scale * right, tolerance, LIMIT)
+            self._handles["ksp"].setConvergenceTest(None)
+            if not converged:
                 return None
             return np.asarray(self._scale * self._handles["x"].array)
 
@@ -165,17 +192,28 @@ class DirectSolver(LinearSolver):
         """Factorise a matrix; False if a pivot is zero."""
         for room in ROOM:
             code, detail = self._mumps(matrix, room)
+            if code < 0:
+                self._analysed = None
             if code != -9:
                 break
-        if code < 0 and code not in (-10, -6):
-            raise SingularError(
-                f"MUMPS could not factorise the tangent (INFOG(1) = {code}, INFOG(2) = {detail}): see "
-                "the MUMPS users' guide; -9 and -13 mean too little memory"
-            )
+        if code < 0 and code not in failures.SINGULAR:
+            raise failures.of_mumps(code, detail, "factorise", matrix.getSize()[0])
         return code >= 0
 
     def _mumps(self, matrix: Any, room: int) -> tuple[int, int]:
         """Factorise with memory above the estimate [percent]; error code of MUMPS and its detail."""
+        analysed, symmetric = self._analysed or (None, False)
+        if analysed is not matrix or symmetric != self.symmetric:
+            self._analyse_next(matrix, room)
+        ksp, pc, factor = (self._handles[name] for name in ("ksp", "pc", "factor"))
+        pc.setReusePreconditioner(False)
+        ksp.setOperators(matrix)
+        ksp.setUp()
+        pc.setReusePreconditioner(True)
+        return int(factor.getMumpsInfog(1)), int(factor.getMumpsInfog(2))
+
+    def _analyse_next(self, matrix: Any, room: int) -> None:
+        """Make a factor that the next factorisation analyses."""
         self._handles.free("factor", "pc", "ksp")
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)
         ksp = self._handles["ksp"] = PETSc.KSP().create(matrix.comm)
@@ -187,11 +225,12 @@ class DirectSolver(LinearSolver):
         pc.setFactorSolverType("mumps")
         pc.setFactorSetUpSolverType()
         factor = self._handles["factor"] = pc.getFactorMatrix()
-        factor.setMumpsIcntl(7, 0)  # AMD: the cheapest first factorisation
+        factor.setOptionsPrefix(PREFIX)
+        options = PETSc.Options(PREFIX)
+        for number, value in OPTIONS.items():
+            options[f"mat_mumps_icntl_{number}"] = value
         factor.setMumpsIcntl(14, room)
-        ksp.setUp()
-        pc.setReusePreconditioner(True)
-        return int(factor.getMumpsInfog(1)), int(factor.getMumpsInfog(2))
+        self._analysed = matrix, self.symmetric
 
     def _solve_all(self, right: Array) -> Array:
         """Solve for several right-hand sides, one per row."""
@@ -220,6 +259,32 @@ class DirectSolver(LinearSolver):
         y.axpy(-1.0, forward)
         forward.destroy()
         return bool(y.norm() <= 1e-12 * size)
+
+
+class _Pays:
+    """Test of convergence that also stops FGMRES when a factorisation costs less than the rest.
+
+    Args:
+        tolerance: Of the residual, relative to the first one.
+    """
+
+    def __init__(self, tolerance: float) -> None:
+        self._tolerance, self._first = tolerance, 0.0
+
+    def __call__(self, ksp: Any, iteration: int, norm: float) -> int:
+        """Reason to stop, as PETSc numbers them; 0 to continue."""
+        if iteration == 0:
+            self._first = norm
+        target = self._tolerance * self._first
+        if norm <= target:
+            return int(PETSc.KSP.ConvergedReason.CONVERGED_RTOL)
+        if not norm < self._first:  # NaN as well
+            return int(PETSc.KSP.ConvergedReason.DIVERGED_DTOL) if iteration >= TRIAL else 0
+        if iteration >= TRIAL:
+            rate = np.log(self._first / norm) / iteration
+            if np.log(norm / target) > COST * rate or iteration >= LIMIT:
+                return int(PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT)
+        return 0
 
 
 @functools.lru_cache(maxsize=1)

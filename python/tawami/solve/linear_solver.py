@@ -118,6 +118,9 @@ class LinearSolver:
         """Make vectors and factors for another tangent, and scale it."""
         self.forget()
         self._handles["x"], self._handles["b"] = matrix.createVecs()
+        self._rescale(matrix, scale)
+
+    def _rescale(self, matrix: Any, scale: Callable[[], Array]) -> None:
         self._scale = scale()
         self._multiply(matrix, self._scale)
 

@@ -12,7 +12,8 @@ import numpy as np
 from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array
-from tawami.base.errors import SingularError
+from tawami.base.errors import CheckpointError, SingularError
+from tawami.base.files import reason
 from tawami.base.petsc import clean_up
 from tawami.base.timing import Stopwatch, tally
 from tawami.field.assembly import Assembly
@@ -21,6 +22,7 @@ from tawami.particles.responses import Responses
 from tawami.solve.diagnosis import Diagnosis
 from tawami.solve.direct import DirectSolver
 from tawami.solve.equations import Equations
+from tawami.solve.failures import reported
 from tawami.solve.inertia import Inertia
 from tawami.solve.iterate import Forces, Friction, Iterate
 from tawami.solve.iterative import IterativeSolver
@@ -122,9 +124,16 @@ class Newton:
     def _restore(self, tangent: Any, reduction: Reduction) -> None:
         """Factorise a stored state again, if the first tangent after it has the same unknowns."""
         state, self._stored = self._stored, None
-        if state is None or self._comm.size > 1 or reduction.digest != state["unknowns"]:
+        if state is None or self._comm.size > 1:
             return
-        self._solver.restore(state["factorised"], tangent)
+        try:
+            if reduction.digest == state["unknowns"]:
+                self._solver.restore(state["factorised"], tangent)
+        except Exception as error:
+            raise CheckpointError(
+                f"the factorisation in the checkpoint cannot be used ({reason(error)}): its content is "
+                "not what tawami writes. Remove the checkpoint to resume from the one before it"
+            ) from error
 
     # -- one step ----------------------------------------------------------------
 
@@ -156,6 +165,7 @@ class Newton:
             ConvergenceError: Newton did not reach the tolerance within `max_iterations`, or the
                 tangent became singular where that of an elastic body is not.
             SingularError: The tangent cannot be solved; the message names the cells.
+            SolverError: Memory ran out, or a library failed.
         """
         clean_up(self._comm)
         self._stopwatch.start()
@@ -188,7 +198,8 @@ class Newton:
             if len(history) > self.numerics.max_iterations:
                 advice = self._diagnosis.material()
                 self._fail(history, advice or equations.advice)
-            change, of_factor = self._change(iterate, forces, equations, add_mass, history)
+            with reported():
+                change, of_factor = self._change(iterate, forces, equations, add_mass, history)
             if equations.at_rest and not self._responses.form.strain.finite:
                 n = reduction.layout.num_displacement
                 search = LineSearch(self._comm, change, forces.residual, n)

@@ -17,7 +17,8 @@ from mpi4py import MPI
 
 from tawami.base import checks
 from tawami.base.errors import InputError
-from tawami.base.files import append_line, atomic_file, result_folder, unreadable
+from tawami.base.files import append_line, atomic_file, unreadable
+from tawami.base.lock import hold
 from tawami.study import figure, process
 from tawami.study.row import COSTS, Row, error_of, text_of
 from tawami.study.series import Grid, Key, Knobs, Series, is_list, knob_values, setting_text
@@ -185,8 +186,8 @@ class Study:
             All stored runs; NAME.csv and NAME.png in the folder show them too.
 
         Raises:
-            InputError: No reference for a quantity, or the finest run failed. Other runs may fail: the
-                table has their error messages.
+            InputError: No reference for a quantity, the finest run failed, or another process runs the
+                study in this folder. Other runs may fail: the table has their error messages.
         """
         checks.whole_number("seed", seed, low=0)
         limit = checks.number("limit", limit, low=checks.LEAST, high=LONGEST)
@@ -201,9 +202,19 @@ class Study:
                 f"study '{self.name}' on {MPI.COMM_WORLD.size} ranks: expected one rank; each run has "
                 "its own process"
             )
-        folder, runs = result_folder(self.path), self._runs()
+        lock = hold(self.path, f"study '{self.name}' in '{self.path}'")
+        try:
+            return self._run(self._work(sample, seed), limit, quiet)
+        finally:
+            lock.release()
+
+    def _run(
+        self, wanted: Sequence[tuple[Series, dict[str, Any]]], limit: float, quiet: bool
+    ) -> Table:
+        """Run the settings of a list that are not stored yet; the folder is locked."""
+        folder, runs = self.path, self._runs()
         done = {key for key, run in runs.items() if "cut" not in run}
-        work = [(s, k) for s, k in self._work(sample, seed) if s.key(k) not in done]
+        work = [(s, k) for s, k in wanted if s.key(k) not in done]
         start = perf_counter()
         for number, (series, setting) in enumerate(work):
             outcome = process.measure(process.name_of(series.run), setting, limit)

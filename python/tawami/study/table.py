@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from tawami.base import checks
+from tawami.base import checks, csv_file
 from tawami.base.errors import InputError
-from tawami.base.files import readable_file
+from tawami.base.files import readable_file, reason
 from tawami.study.row import COSTS, NOISE, Change, Row, mean_ratio, value_text
 
 
@@ -199,13 +199,16 @@ class Table:
         """
         path = readable_file("study", path, "the CSV file that Study.run() writes")
         try:
-            with path.open(newline="") as file:
-                lines = list(csv.DictReader(file))
-        except (ValueError, csv.Error):
-            lines = []
-        complete = all(None not in line and None not in line.values() for line in lines)
-        named = bool(lines) and {"series", "failure"} <= set(lines[0])
-        rows = [_from_line(line) for line in lines] if complete and named else []
+            content = csv_file.read(path)
+        except (OSError, ValueError) as error:
+            raise InputError(
+                f"study '{path}' cannot be read ({reason(error)}): expected the CSV file that "
+                "Study.run() writes"
+            ) from None
+        head = content.header
+        lines = [dict(zip(head, row, strict=True)) for row in content.rows]
+        complete = len(set(head)) == len(head) and {"series", "failure"} <= set(head)
+        rows = [_from_line(line) for line in lines] if complete else []
         if not rows or not all(_is_complete(row) for row in rows):
             raise InputError(f"study '{path}': expected the CSV file that Study.run() writes")
         return Table(path.stem, rows)

@@ -1,7 +1,7 @@
 """A beam of 2 m x 1 m, clamped on the left, 1 kN per metre depth down on the right.
 
-Run it with `tawami run SCRIPT.py`, on four ranks with `tawami run SCRIPT.py --ranks 4`. Metres, pascals,
-tension positive, plane strain.
+Run it with `tawami run SCRIPT.py`, on four ranks with `tawami run SCRIPT.py --ranks 4`;
+`tawami plot results/SCRIPT` draws the results. Metres, pascals, tension positive, plane strain.
 """
 
 from pathlib import Path
@@ -9,8 +9,6 @@ from pathlib import Path
 from mpi4py import MPI
 
 import tawami
-from tawami.base import result_folder
-from tawami.results import write_grid, write_particles
 
 RESULTS = Path("results") / Path(__file__).stem
 CELLS_OVER_THE_HEIGHT = 16
@@ -37,17 +35,24 @@ def main() -> None:
     scene.traction("right", (0.0, -1e3))
 
     print(scene.header())
-    solution = scene.solve()
 
-    print("tip deflection [m]:", -solution.displacement((2, 0))[1])
-    print("Newton iterations:", solution.iterations)
-    print("reaction of the clamp [N/m]:", solution.reaction("left"))
+    # the results, for ParaView and for pictures; an earlier run in the folder is replaced
+    results = tawami.Results(
+        RESULTS,
+        tawami.ParticleOutput(),
+        tawami.GridOutput(),
+        tawami.TableOutput("displacement (2, 0)", "reaction left"),
+        existing="replace",
+    )
 
-    # for ParaView
-    folder = result_folder(RESULTS)
-    write_particles(folder / "particles.vtu", solution)
-    write_grid(folder / "grid.vtu", solution)
-    print("written to", folder)
+    def report(solution: tawami.Solution) -> None:
+        print("tip deflection [m]:", -solution.displacement((2, 0))[1])
+        print("Newton iterations:", solution.iterations)
+        print("reaction of the clamp [N/m]:", solution.reaction("left"))
+
+    # the load in one step; scene.solve() does the same without results
+    tawami.ramp(scene, 1.0, each=report, results=results, stop="raise")
+    print("written to", RESULTS)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,253 @@
+"""Actions on a body: what loads and supports have in common, and their handles in a driver script.
+
+An action is a sum of terms, each a value times a factor. A change replaces the last term: the old one
+fades while the new one grows, so that the body passes from one to the other as it does to a new load.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol, TypeVar
+
+from tawami.base.errors import CheckpointError, InputError
+from tawami.grid.edges import Profile
+from tawami.scene.activity import Activity
+from tawami.scene.course import Course, InTime
+from tawami.scene.share import Moment, Share
+
+Acts = TypeVar("Acts", bound="Action")
+
+
+@dataclass
+class Term:
+    """A value and its factor.
+
+    Attributes:
+        number: Number in its action, in the order in which the driver script gave them.
+        values: Components of the value: numbers, or functions of position.
+        course: Its course in time.
+        since: Number of the term that the course came with.
+        share: What of it the body carries.
+    """
+
+    number: int
+    values: tuple[Profile, ...]
+    course: Course
+    since: int
+    share: Share = field(default_factory=Share)
+
+    def at(self, now: Moment) -> float:
+        """Its factor."""
+        return self.share.at(now, self.course)
+
+    def apply(self, now: Moment) -> None:
+        """The body is in equilibrium with it."""
+        self.share.applied = self.at(now)
+
+    def accept(self, now: Moment) -> None:
+        """Later parts grow from this moment."""
+        self.share.carried = self.at(now)
+
+    def changed(self, now: Moment) -> float:
+        """Change of the factor in a dynamic step."""
+        return self.share.target * self.course.changed(now.start, now.time)
+
+    def rates(self, now: Moment) -> tuple[float, float]:
+        """Rates of the factor at the ends of a dynamic step [1/s]."""
+        first, last = self.course.rates(now.start, now.time)
+        return self.share.target * first, self.share.target * last
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether its value is zero."""
+        return not any(callable(value) or value for value in self.values)
+
+
+class Owner(Protocol):
+    """The loads or the supports of a scene."""
+
+    activity: Activity
+
+    def next_number(self) -> int:
+        """Number of the next of them, in the order in which the driver script makes them."""
+
+    def changed(self) -> None:
+        """One of them was changed: what was computed for them is out of date."""
+
+    def remove(self, action: Any) -> None:
+        """Take one of them away."""
+
+
+class Action:
+    """A load or a support of a scene; what the methods of `Scene` return.
+
+    Args:
+        owner: The loads or the supports that it belongs to.
+        value: As the driver script gave it.
+        course: Its course in time.
+    """
+
+    __slots__ = ("_made", "_owner", "number", "released", "terms")
+
+    def __init__(self, owner: Owner, value: Any, course: Course) -> None:
+        self._owner, self._made, self.released = owner, 0, False
+        self.number = owner.next_number()
+        self.terms: list[Term] = []
+        self._begin(self._checked(value), course)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self}{', released' if self.released else ''})"
+
+    def _checked(self, value: Any) -> tuple[Profile, ...]:
+        """The components of a value.
+
+        Raises:
+            InputError: It is not one of this action.
+        """
+        raise NotImplementedError
+
+    def _begin(self, values: tuple[Profile, ...], course: Course) -> None:
+        """Replace the last term by another one."""
+        kept = [term.since for term in self.terms if term.course is course]
+        for term in self.terms:
+            term.share.target = 0.0
+        self.terms = [term for term in self.terms if not term.share.is_gone]
+        self.terms.append(Term(self._made, values, course, kept[-1] if kept else self._made))
+        self._made += 1
+        self._owner.changed()
+
+    def _check_usable(self, what: str) -> None:
+        if self.released:
+            raise InputError(f"{self}.{what} was called after its release: expected a new one")
+        self._owner.activity.check_between_steps(f"{self}.{what}")
+
+    def change(self, value: Any = None, *, amplitude: InTime | None = None) -> None:
+        """Replace the value, the amplitude, or both.
+
+        In statics the body passes from the old to the new value as it does to a new load: at once in
+        `solve`, in steps in `ramp`. In dynamics a load changes with the next step.
+
+        Args:
+            value: As in the call that made it; the present one by default.
+            amplitude: Factor, a number or a function of time [s]; the present one by default.
+
+        Raises:
+            InputError: It was released, neither is given, or one is not valid; nothing has changed.
+        """
+        self._check_usable("change(...)")
+        if value is None and amplitude is None:
+            raise InputError(f"{self}.change(): expected a value, an amplitude, or both")
+        self._begin(*self._changed(value, amplitude, None))
+
+    def _changed(
+        self, value: Any, amplitude: InTime | None, velocity: InTime | None
+    ) -> tuple[tuple[Profile, ...], Course]:
+        """Values and course after a change."""
+        last = self.terms[-1]
+        values = last.values if value is None else self._checked(value)
+        if amplitude is None and velocity is None:
+            return values, last.course
+        return values, Course(str(self), amplitude, velocity, time=self._owner.activity.time)
+
+    def release(self) -> None:
+        """Take it away. In statics a load fades as a new one grows; a support is gone at once.
+
+        Raises:
+            InputError: It was released before.
+        """
+        self._check_usable("release()")
+        self.released = True
+        for term in self.terms:
+            term.share.target = 0.0
+        self._owner.remove(self)
+        self._owner.changed()
+
+    # -- steps ---------------------------------------------------------------
+
+    def apply(self, now: Moment) -> None:
+        """The body is in equilibrium with it."""
+        for term in self.terms:
+            term.apply(now)
+
+    def accept(self, now: Moment) -> None:
+        """Later parts grow from this moment; what has faded is dropped."""
+        for term in self.terms:
+            term.accept(now)
+        self.terms = [t for t in self.terms if not t.share.is_gone or t is self.terms[-1]]
+
+    # -- identity, checkpoints -----------------------------------------------
+
+    def identity(self) -> list[Any]:
+        """What decides the results of a run, as JSON holds it."""
+        return [
+            [*map(plain, term.values), *term.course.identity(), term.share.target]
+            for term in self.terms
+        ]
+
+    def state(self) -> dict[str, Any]:
+        """What the body carries of it."""
+        terms = [
+            {
+                "number": term.number,
+                "since": term.since,
+                "share": term.share.state(),
+                "values": [*map(plain, term.values)],
+                "course": term.course.plain,
+            }
+            for term in self.terms
+        ]
+        return {
+            "number": self.number, "made": self._made, "released": self.released, "terms": terms
+        }  # fmt: skip
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """The reverse of :meth:`state`.
+
+        Raises:
+            CheckpointError: It was changed to a function while the run went.
+        """
+        known = {term.number: term for term in self.terms}
+        courses = {term.since: term.course for term in self.terms}
+        name, self.terms = f"{self}", []
+        for stored in state["terms"]:
+            number, since, values = stored["number"], stored["since"], stored["values"]
+            course = courses.get(since)
+            if course is None and not isinstance(stored["course"], str):
+                course = Course(name, stored["course"])
+            term = known.get(number)
+            if course is None or (term is None and any(isinstance(v, str) for v in values)):
+                raise CheckpointError(
+                    f"{name} was changed to a function or another velocity while the run went (each=): "
+                    "expected such changes between two phases, or an amplitude"
+                )
+            term = term or Term(number, tuple(values), course, since)
+            term.share.restore(stored["share"])
+            self.terms.append(term)
+        if not self.terms:
+            raise CheckpointError(f"{name} has no value in the checkpoint: expected one")
+        self._made, self.released = state["made"], state["released"]
+
+
+def plain(value: Profile) -> float | str:
+    """A number, or the word for a function."""
+    return "a function" if callable(value) else float(value)
+
+
+def restored(what: str, actions: Sequence[Acts], stored: Sequence[Mapping[str, Any]]) -> list[Acts]:
+    """Restore loads or supports; those that the script has released and that have faded are left out.
+
+    Raises:
+        CheckpointError: The script has made others.
+    """
+    states = {state["number"]: state for state in stored}
+    left = [action for action in actions if action.number in states or not action.released]
+    if [action.number for action in left] != list(states):
+        raise CheckpointError(
+            f"the run had {len(stored)} {what}s when it was stored, and the script made {len(left)}, or "
+            f"others. They were added or released while it ran (each=): expected {what}s to be added "
+            "and released between two phases"
+        )
+    for action in left:
+        action.restore(states[action.number])
+    return left

@@ -1,0 +1,176 @@
+"""Supports and loads of a scene, as a driver script makes them; each call returns a handle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy.typing as npt
+
+from tawami.base import checks
+from tawami.base.errors import InputError
+from tawami.grid.edges import Component, Interval, Profile
+from tawami.grid.grid import Edge
+from tawami.scene.configuration import Configuration
+from tawami.scene.course import InTime
+from tawami.scene.loads import Load
+from tawami.scene.points import check_in_body
+from tawami.scene.support import Support
+from tawami.scene.walls import Wall
+
+
+class Conditions:
+    """What acts on the body of a scene.
+
+    Loads add up, and so do several calls of one kind. Supports must agree where they meet; if not, the
+    next step raises an error that names both. What a method returns can be changed and released:
+    `load = scene.traction(...)`, then `load.change(...)`, `load.release()`.
+
+    `amplitude` is a factor of the value, a number or a function of time [s]. In `Dynamics` time is that
+    of the motion. In statics it is that of the scene, which is 0 at first and passes in
+    `ramp(..., until=...)` and `solve(until=...)`.
+    """
+
+    configuration: Configuration
+
+    def fix(
+        self,
+        edge: Edge,
+        component: Component,
+        value: Profile = 0.0,
+        *,
+        amplitude: InTime | None = None,
+        velocity: InTime | None = None,
+        between: Interval | None = None,
+    ) -> Support:
+        """Prescribe a displacement component along an edge of the grid.
+
+        Args:
+            edge: 'left', 'right', 'bottom' or 'top'.
+            component: 'x' or 'y'.
+            value: Displacement [m] from now on (at small strain from the start of the scene): a
+                number, or a function f(x, y) on arrays, which is projected in L2 on the functions of
+                the edge.
+            amplitude: Factor of the value, a number or a function of time [s].
+            velocity: For `Dynamics`, in place of a value: a number [m/s], or a function of time [s].
+            between: Part of the edge, from one line of the grid to another [m].
+
+        Raises:
+            InputError: An unknown edge or component, a part that is not one of whole cells, or an
+                amplitude or velocity that is not a finite number at the present time.
+        """
+        return self.configuration.supports.fix(edge, component, value, amplitude, velocity, between)
+
+    def hold(
+        self,
+        point: Sequence[float],
+        component: Component,
+        value: float = 0.0,
+        *,
+        amplitude: InTime | None = None,
+        velocity: InTime | None = None,
+    ) -> Support:
+        """Prescribe a displacement component at a point of the body: a constraint on the interpolated
+        value. Where particles move the point moves with them. A call for all ranks.
+
+        Args:
+            point: Position (x, y) [m].
+            component: 'x' or 'y'.
+            value: Displacement [m], as in `fix`.
+            amplitude, velocity: As in `fix`.
+
+        Raises:
+            InputError: A point outside the grid or the body, an unknown component, or as `fix`.
+        """
+        check_in_body(self.configuration.domain, point, f"hold(point={checks.shown(point)})")
+        return self.configuration.supports.hold(point, component, value, amplitude, velocity)
+
+    def wall(self, edge: Edge, friction: float = 0.0, *, separates: bool = True) -> Wall:
+        """Put a wall with Coulomb friction along an edge of the grid.
+
+        Args:
+            edge: 'left', 'right', 'bottom' or 'top'.
+            friction: Coefficient of friction; 0 is smooth, infinity does not slide.
+            separates: Whether the body may leave the wall.
+
+        Raises:
+            InputError: An unknown edge, a negative friction, or an edge that has a wall already.
+        """
+        return self.configuration.supports.wall(edge, friction, separates)
+
+    def release(self, place: Edge | Sequence[float], component: Component | None = None) -> None:
+        """Remove supports that `fix`, `hold` or `wall` made, as their `release()` does.
+
+        Args:
+            place: Name of the edge, or point (x, y) [m].
+            component: 'x' or 'y'; both, and a wall, by default.
+
+        Raises:
+            InputError: There is no such support.
+        """
+        self.configuration.supports.release(place, component)
+
+    def traction(
+        self,
+        edge: Edge,
+        value: tuple[Profile, Profile],
+        *,
+        amplitude: InTime | None = None,
+        between: Interval | None = None,
+    ) -> Load:
+        """Load an edge of the grid where the body touches it.
+
+        Args:
+            edge: 'left', 'right', 'bottom' or 'top'.
+            value: Traction (t_x, t_y) [Pa]: numbers, or functions f(x, y) on arrays, taken at the
+                biquadratic nodes of the grid (exact up to parabolas).
+            amplitude: Factor of the value, a number or a function of time [s].
+            between: Part of the edge, from one line of the grid to another [m].
+
+        Raises:
+            InputError: An unknown edge or part of it, an amplitude that is not a finite number at the
+                present time, or a form without a term `dot(t, w) * ds`.
+        """
+        model = self.configuration.model
+        model.grid.edge(edge)
+        if model.compiled.traction is None:
+            raise InputError(
+                f"traction(edge='{edge}'): form {model.form.name} has no edge term; add "
+                "- dot(t, w) * ds to its residual"
+            )
+        return self.configuration.loads.add_traction(edge, value, between, amplitude)
+
+    def load(
+        self,
+        particles: npt.ArrayLike,
+        force: Sequence[float],
+        *,
+        amplitude: InTime | None = None,
+    ) -> Load:
+        """Load particles of the body, wherever they move: a traction on a surface that is not an edge
+        of the grid. Its direction is fixed.
+
+        Args:
+            particles: A mask of the particles of the body, or their numbers.
+            force: (f_x, f_y) [N per metre depth], shared out by the volumes of the particles.
+            amplitude: Factor of the force, a number or a function of time [s].
+
+        Raises:
+            InputError: No particle, others than those of the body, or an amplitude that is not a finite
+                number at the present time.
+        """
+        return self.configuration.loads.add_forces(particles, force, amplitude)
+
+    def gravity(self, acceleration: Sequence[float], *, amplitude: InTime | None = None) -> Load:
+        """Load the body by its weight. As all loads, a second call adds to the first.
+
+        Args:
+            acceleration: (b_x, b_y) [m/s2].
+            amplitude: Factor of the acceleration, a number or a function of time [s].
+
+        Raises:
+            InputError: No density, not two finite numbers, or an amplitude that is not a finite number
+                at the present time.
+        """
+        if self.configuration.model.density is None:
+            raise InputError("gravity(...) needs Scene(..., density=...) [kg/m3]")
+        return self.configuration.loads.add_gravity(acceleration, amplitude)

@@ -1,0 +1,107 @@
+"""How a load or a prescribed displacement goes in time."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+from tawami.base import checks
+from tawami.base.errors import InputError
+from tawami.base.identity import text
+
+#: A number, or a function of time [s].
+InTime = float | Callable[[float], float]
+#: Values of a function that are kept, so that a step calls it once for each time.
+KEPT = 32
+
+
+class Course:
+    """A factor that follows an amplitude, or the integral of a velocity.
+
+    Args:
+        where: The load or support, for messages.
+        amplitude: Factor, constant or a function of time [s].
+        velocity: Rate of the factor [1/s], in place of an amplitude.
+
+    Raises:
+        InputError: Both, neither a number nor a function, or a function that is not finite at `time`.
+    """
+
+    def __init__(
+        self,
+        where: str,
+        amplitude: InTime | None = None,
+        velocity: InTime | None = None,
+        *,
+        time: float = 0.0,
+    ) -> None:
+        if amplitude is not None and velocity is not None:
+            raise InputError(f"{where}: expected an amplitude or a velocity, not both")
+        self._name = "amplitude" if velocity is None else "velocity"
+        self._where, self.has_velocity = where, velocity is not None
+        self._given: InTime = (
+            (1.0 if amplitude is None else amplitude) if velocity is None else velocity
+        )
+        self._value = functools.lru_cache(KEPT)(self._evaluated)
+        self._value(time)
+
+    def _evaluated(self, time: float) -> float:
+        given = self._given
+        what = f"{self._where}: {self._name}"
+        try:
+            value = given(time) if callable(given) else given
+        except Exception as error:
+            raise InputError(
+                f"{what}({time:g}) gave {error!r}: expected a function of time [s]"
+            ) from error
+        return checks.number(f"{what} at {time:g} s", value)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the factor may change in time."""
+        return self.has_velocity or callable(self._given)
+
+    def factor(self, time: float) -> float:
+        """The amplitude at a time; 0 with a velocity.
+
+        Raises:
+            InputError: The function fails, or its value is not a finite number.
+        """
+        return 0.0 if self.has_velocity else self._value(time)
+
+    def rates(self, start: float, end: float) -> tuple[float, float]:
+        """Rates of the factor at the ends of a step [1/s].
+
+        Their mean times the length of the step is the change of the factor. For an amplitude they are
+        those of the parabola through its values at the ends and in the middle.
+        """
+        if not self.moves:
+            return 0.0, 0.0
+        first, last = self._value(start), self._value(end)
+        if self.has_velocity:
+            return first, last
+        middle, dt = self._value(0.5 * (start + end)), end - start
+        return (4 * middle - 3 * first - last) / dt, (first - 4 * middle + 3 * last) / dt
+
+    def changed(self, start: float, end: float) -> float:
+        """Change of the factor in a step."""
+        if self.has_velocity:
+            return 0.5 * (end - start) * sum(self.rates(start, end))
+        return self.factor(end) - self.factor(start)
+
+    @property
+    def plain(self) -> float | str:
+        """A constant amplitude; a word for a function or a velocity."""
+        return "a function" if self.moves else float(self._value(0.0))
+
+    def identity(self) -> list[Any]:
+        """What decides the results of a run, as JSON holds it."""
+        return [self._name, text(self._given)]
+
+    def __str__(self) -> str:
+        if self.has_velocity:
+            return " with a velocity"
+        if callable(self._given):
+            return " with an amplitude"
+        return "" if self._given == 1.0 else f" times {self._given:g}"

@@ -1,0 +1,44 @@
+"""Points at which a driver script holds or asks for something, and whether the body reaches them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tawami.base import ranks
+from tawami.base.errors import InputError
+from tawami.grid import edges
+from tawami.scene.domain import Domain
+
+#: Share of a cell, or of a value, that is round-off.
+ROUND_OFF = 1e-9
+
+
+def outside(what: str, distance: float) -> InputError:
+    """The error for a point that is not in the body.
+
+    Args:
+        what: The point, for the message.
+        distance: To the nearest particle [m].
+    """
+    return InputError(
+        f"{what}: no body there; the nearest particle is {distance:.3g} m away: expected a point of the "
+        "body"
+    )
+
+
+def check_in_body(domain: Domain, point: Sequence[float], what: str) -> None:
+    """Check that a point is in the body: within half a diagonal of a cell of a particle.
+
+    A call for all ranks.
+
+    Raises:
+        InputError: It is not, or is outside the grid.
+    """
+    grid = domain.model.grid
+    edges.locate_point(grid, point, what)
+    mine = np.linalg.norm(domain.particles.x - np.asarray(point), axis=1)
+    distance = -ranks.largest(grid.comm, -float(mine.min(initial=np.inf)))
+    if distance > (0.5 + ROUND_OFF) * np.sqrt(grid.space.dim) * grid.h:
+        raise outside(what, distance)
