@@ -177,7 +177,7 @@ def settle(
         results: `tawami.Results` of the run, with outputs and checkpoints.
 
     Returns:
-        The solves as steps.
+        The solves as steps, which end at their numbers.
 
     Raises:
         ConvergenceError: No equilibrium after `max_resets` solves.
@@ -200,8 +200,8 @@ def settle(
             observer.begin(pace, steps)
         while pace.at < max_resets and not observer.finished:
             solution = scene.solve()
-            steps.append(Step(1.0, 0.0, solution.history, solution.krylov))
             pace.at += 1.0
+            steps.append(Step(pace.at, 1.0, solution.history, solution.krylov))
             settled = solution.history[0][0] < tolerance
             with leave_together(), activity.callback():
                 observer.accepted(solution, last=settled)
