@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import os
 import signal
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -25,16 +24,6 @@ import tawami  # noqa: E402
 signal.signal(signal.SIGINT, signal.default_int_handler)
 logging.disable(logging.INFO)  # FFCx reports every form that it compiles
 profiles.load()
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    """Remove the locks of kernels that a killed session did not finish: FFCx would wait for them."""
-    if hasattr(config, "workerinput"):  # a process of pytest-xdist
-        return
-    for source in CACHE.rglob("*.c"):
-        old = source.stat().st_mtime < time.time() - 60
-        if old and not source.with_suffix(".c.cached").exists():
-            source.unlink(missing_ok=True)
 
 
 @pytest.fixture(params=scenes.FORMS)

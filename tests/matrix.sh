@@ -127,8 +127,8 @@ prepare() { # suite root
     else # Debian's own, which make refuses where it is too old
         within "$root" sh -c 'apt-get update -qq && apt-get install -qq -y cargo' || return
     fi
-    git clone --quiet --no-hardlinks "$repository" "$root/root/tawami" || return
-    git -C "$root/root/tawami" checkout --quiet --detach "$commit"
+    git clone --quiet --no-hardlinks "$repository" "$root/opt/tawami" || return
+    git -C "$root/opt/tawami" checkout --quiet --detach "$commit"
 }
 
 versions='
@@ -147,10 +147,10 @@ try_suite() { # suite: writes its log, and its row of the table beside it
     {
         prepare "$suite" "$root" &&
             within "$root" timeout --kill-after=30 $((60 * minutes)) \
-                make -C /root/tawami test-all TESTS="${MATRIX_TESTS:-}"
+                make -C /opt/tawami test-all TESTS="${MATRIX_TESTS:-}"
     } >"$log" 2>&1 || status=$?
     [ "$status" != 124 ] || echo "make test-all was ended after $minutes minutes" >>"$log"
-    found=$(within "$root" /root/tawami/.venv/bin/python -c "$versions" 2>/dev/null) || found='- - -'
+    found=$(within "$root" /opt/tawami/.venv/bin/python -c "$versions" 2>/dev/null) || found='- - -'
     local passed failed
     passed=$(counted passed "$log")
     failed=$(counted '(failed|error)' "$log")

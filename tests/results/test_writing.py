@@ -225,6 +225,6 @@ def test_a_cache_of_kernels_that_cannot_be_written_is_named(place, most, why, tm
     run = python("-c", MADE, most, variables={"XDG_CACHE_HOME": str(tmp_path / place)})
     assert run.returncode == 1
     said = run.stderr.splitlines()[-1]
-    assert said.startswith("scene: the code of form 'u' cannot be compiled"), run.stderr
+    assert said.startswith("scene: form 'u': the cache of compiled forms '"), run.stderr
     assert why in said
     assert "XDG_CACHE_HOME" in said

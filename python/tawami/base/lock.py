@@ -30,7 +30,7 @@ PATIENCE = 0.5
 LONG = 80
 
 
-def hold(folder: Path, what: str) -> BaseFileLock:
+def hold(folder: Path, what: str, patience: float = PATIENCE) -> BaseFileLock:
     """Lock a folder for this process, until the lock is released or freed.
 
     A process can hold it several times. The first time, leftovers of killed processes are removed.
@@ -38,6 +38,7 @@ def hold(folder: Path, what: str) -> BaseFileLock:
     Args:
         folder: Created if it does not exist.
         what: What messages call it, as "Results('folder')".
+        patience: How long to wait until another process releases it [s].
 
     Raises:
         InputError: Another process holds it; the message names its host and its number.
@@ -46,7 +47,7 @@ def hold(folder: Path, what: str) -> BaseFileLock:
     from filelock import FileLock, Timeout  # here: a scene without results does without it
 
     home = result_folder(folder).resolve()
-    lock = FileLock(home / LOCK, timeout=PATIENCE, is_singleton=True, thread_local=False)
+    lock = FileLock(home / LOCK, timeout=patience, is_singleton=True, thread_local=False)
     try:
         lock.acquire()
     except Timeout:

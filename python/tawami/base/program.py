@@ -1,7 +1,7 @@
 """Programs on several ranks: how they start, and how an error on one rank ends all of them.
 
-An error that nothing catches is printed once and ends all ranks (:func:`watch`); without that the
-others would wait for ever.
+An error that nothing catches is printed once and ends all ranks (:func:`watch`), and so does sys.exit on
+one rank in a function that tawami calls (:func:`leave_together`). The others would wait for ever.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, NoReturn
 
@@ -23,6 +24,11 @@ from tawami.base.petsc import clean_up, keep_communicator
 
 #: Seconds that a rank gives each rank before it to print its message first, and the longest wait.
 COURTESY, LONGEST = 1.0, 4.0
+#: Seconds in which all ranks must call sys.exit if one does, and after which a rank that has reached the
+#: end of the program reports that others have not.
+GRACE, NOTICE = 10.0, 60.0
+#: A communicator for the end of the program alone, and the request of this rank that ends with it.
+_end: list[Any] = []
 
 
 def watch(comm: Any) -> None:
@@ -33,7 +39,52 @@ def watch(comm: Any) -> None:
     os.environ.setdefault("RAYON_NUM_THREADS", str(_processors(comm)))
     # at exit PETSc frees dropped objects in a call for all ranks: every rank must make it
     keep_communicator(comm)
-    atexit.register(clean_up, comm)
+    _end.append(comm.Dup())
+    atexit.register(_finish, comm)
+
+
+def _all_end(patience: float) -> bool:
+    """Whether all ranks come here, or to the end of the program, within some seconds."""
+    if len(_end) == 1:
+        _end.append(_end[0].Ibarrier())
+    until = time.monotonic() + patience
+    while not _end[1].Test():
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+def _finish(comm: Any) -> None:
+    """Wait for the other ranks at the end of the program, and free what is left."""
+    if not _all_end(NOTICE):
+        sys.stderr.write(
+            f"tawami: rank {comm.rank} has been at the end of the program for {NOTICE:g} s, other ranks "
+            "have not. If it called sys.exit, they may wait for it for ever: interrupt the program, "
+            "and call sys.exit on all ranks\n"
+        )
+        _end[1].Wait()
+    clean_up(comm)
+
+
+@contextmanager
+def leave_together() -> Iterator[None]:
+    """End all ranks if one rank, and not all of them, calls sys.exit in the block."""
+    try:
+        yield
+    except SystemExit as end:
+        if not _end:
+            raise
+        rank = MPI.COMM_WORLD.rank
+        if not _all_end(GRACE):
+            _abort(
+                f"sys.exit({end.code!r}) was called on rank {rank} and not on all ranks, which would "
+                "wait for it: all of them end\n",
+                end.code if isinstance(end.code, int) and end.code else 1,
+            )
+        if isinstance(end.code, str) and rank:
+            end.code = 1  # the first rank prints the text
+        raise
 
 
 def _processors(comm: Any) -> int:
@@ -49,14 +100,14 @@ def _end_all(kind: type[BaseException], error: BaseException, trace: TracebackTy
     _abort("".join(traceback.format_exception(kind, error, trace)))
 
 
-def _abort(text: str) -> NoReturn:
-    """Print a message, unless a lower rank does, and end all ranks."""
+def _abort(text: str, code: int = 1) -> NoReturn:
+    """Print a message, unless a lower rank does, and end all ranks with an exit code."""
     comm = MPI.COMM_WORLD
     time.sleep(min(COURTESY * comm.rank, LONGEST))
     sys.stderr.write(text)
     sys.stderr.flush()
-    comm.Abort(1)
-    raise SystemExit(1)
+    comm.Abort(code)
+    raise SystemExit(code)
 
 
 def own_environment() -> dict[str, str]:
@@ -99,11 +150,8 @@ def run(main: Callable[[], None], name: str) -> None:
     if comm.rank > 0:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - until the end of the process
     try:
-        main()
+        with leave_together():
+            main()
     except TawamiError as error:
         notes = getattr(error, "__notes__", [])  # as the time of a step that failed
         stop(f"{name}: {'; '.join([str(error), *notes])}\n")
-    except SystemExit as end:  # sys.exit on one rank: the others would wait for it
-        if comm.size == 1 or end.code in (0, None):
-            raise
-        _abort(f"{end.code}\n" if isinstance(end.code, str) else "")

@@ -67,14 +67,14 @@ def exchanged(comm: Any, rows: npt.NDArray[Any], to: npt.NDArray[Any]) -> npt.ND
 @contextmanager
 def raise_together(comm: Any) -> Iterator[None]:
     """Raise an error of the block on all ranks, whichever rank it happens on, so that a driver script
-    can catch it. If several ranks fail, the error of the lowest one is raised.
+    can catch it. If several ranks fail, the error of the lowest one is raised. sys.exit counts as one.
 
     The block must not communicate.
     """
-    error = None
+    error: Exception | SystemExit | None = None
     try:
         yield
-    except Exception as problem:
+    except (Exception, SystemExit) as problem:
         if comm.size == 1:
             raise
         error = problem
@@ -88,7 +88,7 @@ def raise_together(comm: Any) -> Iterator[None]:
     raise received from (error if comm.rank == first else None)
 
 
-def _portable(error: Exception | None) -> Exception:
+def _portable(error: Exception | SystemExit | None) -> Exception | SystemExit:
     """An exception that can be sent to other ranks."""
     with suppress(Exception):
         MPI.pickle.loads(MPI.pickle.dumps(error))

@@ -20,7 +20,7 @@ from mpi4py import MPI
 from tawami.base.errors import TawamiError
 from tawami.base.text import labelled
 from tawami.check import scenes
-from tawami.fem import environment, kernels
+from tawami.fem import cache, environment
 from tawami.form.form import Form
 
 MEMORY = Path("/proc/meminfo")
@@ -38,7 +38,7 @@ def lines() -> Iterator[tuple[str, str]]:
     yield "memory", _memory()
     yield "ranks", _ranks()
     yield "compiler", _compiler()
-    yield "kernels", f"compiled forms, in {kernels.cache_directory()}"
+    yield "kernels", f"compiled forms, in {cache.cache_directory()}"
     for name, purpose in OPTIONAL:
         yield name, _package(name, purpose)
     yield "ffmpeg", _program("ffmpeg", "movies as MP4")

@@ -1,7 +1,7 @@
 """The imports of dolfinx, basix and FFCx and the elements: versions 0.5.2, 0.9 and 0.11.
 
-The modules of this room take `basix`, `cpp`, `dolfinx`, `jit` and `ufl` from here, after the checks that
-tell a user what is missing. Nothing outside this room imports them.
+The modules of this room take `basix`, `cpp`, `dolfinx`, `ffcx`, `jit` and `ufl` from here, after the
+checks that tell a user what is missing. Nothing outside this room imports them.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from tawami.base.space import PLANE
 
 __all__ = [
     "BILINEAR_DOFS", "DISPLACEMENT_DOFS", "OLD", "IntegralType", "at_points", "at_vertices",
-    "basix", "cpp", "dolfinx", "domain", "function_space", "jit", "lagrange", "mixed", "per_cell",
-    "reference_nodes", "version",
+    "basix", "cpp", "dolfinx", "domain", "ffcx", "function_space", "jit", "lagrange", "mixed",
+    "per_cell", "reference_nodes", "version",
 ]  # fmt: skip
 
 _showwarning = warnings.showwarning
@@ -29,6 +29,7 @@ _showwarning = warnings.showwarning
 try:
     import basix
     import dolfinx
+    import ffcx
     import ufl
     from dolfinx import cpp, jit
 except ImportError as error:  # pragma: no cover - exercised in a subprocess by the tests
@@ -70,9 +71,9 @@ if OLD:
         """Element of vectors given at the vertices."""
         return ufl.VectorElement("Lagrange", CELL, 1, dim=components)
 
-    def function_space(mesh: Any, element: Any) -> Any:
-        """Function space on a dolfinx mesh."""
-        return dolfinx.fem.FunctionSpace(mesh, element)
+    def function_space(mesh: Any, element: Any, compiled: Any) -> Any:
+        """Function space on a dolfinx mesh; this version compiles the element, with these settings."""
+        return dolfinx.fem.FunctionSpace(mesh, element, jit_params=compiled)
 
 else:
     import basix.ufl
@@ -102,7 +103,7 @@ else:
         """Element of vectors given at the vertices."""
         return basix.ufl.element("Lagrange", CELL, 1, shape=(components,))
 
-    def function_space(mesh: Any, element: Any) -> Any:
+    def function_space(mesh: Any, element: Any, compiled: Any) -> Any:
         """Function space on a dolfinx mesh."""
         return dolfinx.fem.functionspace(mesh, element)
 

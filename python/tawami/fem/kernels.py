@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-import hashlib
 import logging
 import platform
 from collections.abc import Iterator
@@ -12,7 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from tawami.fem.dolfinx import OLD, jit
+from mpi4py import MPI
+
+from tawami.base import ranks
+from tawami.fem import cache
+from tawami.fem.dolfinx import OLD, ffcx, jit, version
 
 #: What an integral goes over, in the order of FFCx.
 Kind = Literal["cell", "exterior_facet", "interior_facet"]
@@ -25,17 +27,6 @@ COMPILER_FLAGS = (
 )  # fmt: skip
 
 
-@functools.cache
-def cache_directory() -> Path:
-    """Directory of compiled kernels; each kind of processor has its own."""
-    try:
-        flags = next(s for s in Path("/proc/cpuinfo").read_text().splitlines() if "flags" in s)
-    except (OSError, StopIteration):
-        flags = platform.processor()
-    default = jit.get_options()["cache_dir"] if not OLD else jit.get_parameters()["cache_dir"]
-    return Path(default) / f"tawami-{hashlib.sha1(flags.encode()).hexdigest()[:10]}"
-
-
 @contextmanager
 def quiet() -> Iterator[None]:
     """Silence the root logger at level INFO, where FFCx reports each build in detail."""
@@ -45,6 +36,26 @@ def quiet() -> Iterator[None]:
         yield
     finally:
         logging.disable(before)
+
+
+def settings(comm: Any, subject: Any) -> dict[str, Any]:
+    """Settings with which dolfinx loads the compiled code of a form or an element.
+
+    Args:
+        comm: Communicator, whose ranks all call this.
+        subject: A form or an element of UFL.
+    """
+    signature = subject.signature() if hasattr(subject, "signature") else repr(subject)
+    options = ffcx.get_parameters() if OLD else ffcx.get_options()
+    built_by = (version, ffcx.__version__, platform.python_version(), options, COMPILER_FLAGS)
+    common = {"cffi_extra_compile_args": list(COMPILER_FLAGS)}
+
+    def compile_into(folder: Path) -> None:
+        with quiet():
+            jit.ffcx_jit(MPI.COMM_SELF, subject, {}, common | {"cache_dir": folder})
+
+    folder = cache.compiled(comm, f"{signature} {built_by}", compile_into)
+    return common | {"cache_dir": folder}
 
 
 @dataclass(frozen=True)
@@ -64,20 +75,16 @@ class Kernel:
     module: Any
 
 
-#: How long to wait for a kernel that another process compiles [s]. FFCx would raise an error after 10 s,
-#: which is too short on a busy machine.
-PATIENCE = 60
-
-
 def compile_kernel(comm: Any, form: Any, kind: Kind = "cell") -> Kernel:
-    """Compile a UFL form with one kind of integral; the result is cached on disk."""
-    settings = {
-        "cffi_extra_compile_args": list(COMPILER_FLAGS),
-        "cache_dir": cache_directory(),
-        "timeout": PATIENCE,
-    }
-    with quiet():
-        compiled, module, _ = jit.ffcx_jit(comm, form, {}, settings)
+    """Compile a UFL form with one kind of integral; the result is cached on disk.
+
+    Raises:
+        MissingDependencyError: The compiler failed.
+        OutputError: The cache of compiled forms cannot be written.
+    """
+    options = settings(comm, form)
+    with quiet(), ranks.raise_together(comm):
+        compiled, module, _ = jit.ffcx_jit(MPI.COMM_SELF, form, {}, options)
     place = KINDS.index(kind)
     if OLD:
         integral = compiled.integrals(place)[0]

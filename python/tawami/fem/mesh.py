@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 from tawami.base.arrays import Array
 from tawami.fem.dolfinx import OLD, IntegralType, cpp, dolfinx, function_space, version
-from tawami.fem.kernels import Kernel, quiet
+from tawami.fem.kernels import Kernel, quiet, settings
 
 Integers = npt.NDArray[np.int32]
 
@@ -92,8 +92,9 @@ class FunctionSpace:
 
     def __init__(self, rectangle: Rectangle, element: Any) -> None:
         self.rectangle = rectangle
+        compiled = settings(rectangle.mesh.comm, element) if OLD else None
         with quiet():
-            self._space = function_space(rectangle.mesh, element)
+            self._space = function_space(rectangle.mesh, element, compiled)
         dofmap = self._space.dofmap
         bs = dofmap.index_map_bs
         width = dofmap.dof_layout.num_dofs

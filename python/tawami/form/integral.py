@@ -10,7 +10,7 @@ from typing import Any, Literal
 import ufl
 from ufl.algorithms.check_arities import ArityMismatch, check_form_arity
 
-from tawami.base.errors import FormError, MissingDependencyError, OutputError
+from tawami.base.errors import FormError, TawamiError
 from tawami.fem import dolfinx, kernels
 from tawami.fem.kernels import Kernel, Kind
 from tawami.fem.rules import DEGREE, Rule, rule_points
@@ -136,21 +136,12 @@ class KernelBuilder:
 
 @contextmanager
 def ufl_errors(form: Form) -> Iterator[None]:
-    """Raise the errors of UFL, FFCx and the C compiler as errors of tawami."""
+    """Raise the errors of UFL and FFCx as errors of tawami; each names the form."""
     try:
         yield
+    except TawamiError as error:  # of the cache of compiled forms
+        raise type(error)(f"form {form.name}: {error}") from error
     except (Exception, ArityMismatch) as error:  # the second is no Exception in newer UFL
-        if type(error).__name__ in ("VerificationError", "CompileError"):
-            raise MissingDependencyError(
-                f"form {form.name}: the C compiler failed on the code of FFCx: {error}. It needs gcc "
-                "and Python's headers (on Debian: apt install g++ python3-dev) and room in ~/.cache"
-            ) from error
-        if isinstance(error, OSError):
-            raise OutputError(
-                f"the code of form {form.name} cannot be compiled, because the folder of compiled forms "
-                f"cannot be written ({error}): expected room and write permission in ~/.cache, or "
-                "another folder in the environment variable XDG_CACHE_HOME"
-            ) from error
         advice = ""
         if isinstance(error, ArityMismatch):
             advice = ". Each term must be linear in one test function"

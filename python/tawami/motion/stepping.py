@@ -7,6 +7,7 @@ from typing import Literal, get_args
 
 from tawami.base import checks
 from tawami.base.errors import ConvergenceError, IncompleteWarning, InputError, SingularError
+from tawami.base.program import leave_together
 from tawami.base.warn import warn
 from tawami.motion.observer import Observer, Recorder, observed
 from tawami.motion.pace import Pace, Step, Steps
@@ -66,7 +67,7 @@ def march(
         pace.good += 1
         if pace.good >= 3 and pace.size < largest:
             pace.size, pace.good = min(2 * pace.size, largest), 0
-        with activity.callback():
+        with leave_together(), activity.callback():
             observer.accepted(solution, last=end - pace.at <= 1e-9 * largest)
             if each is not None:
                 each(solution)
@@ -202,7 +203,7 @@ def settle(
             steps.append(Step(1.0, 0.0, solution.history, solution.krylov))
             pace.at += 1.0
             settled = solution.history[0][0] < tolerance
-            with activity.callback():
+            with leave_together(), activity.callback():
                 observer.accepted(solution, last=settled)
                 observer.checkpoint()
             if settled:

@@ -194,8 +194,8 @@ class Checkpoints:
             self._since = monotonic()
             last = self.last()
             kept = "there is none yet" if last is None else f"the last one is '{last}'"
-            run = "" if ends else ". The run continues"
-            self._warn(f"no checkpoint: {error}; {kept}{run}")
+            continues = "" if ends else ". The run continues"
+            self._warn(f"no checkpoint: {error}; {kept}{continues}")
 
     def last(self) -> Path | None:
         """The newest checkpoint of this phase in the folder; a call for all ranks."""

@@ -19,6 +19,7 @@ from tawami.base import checks, ranks, signals
 from tawami.base.errors import CheckpointError, ConvergenceError
 from tawami.base.meaning import fingerprint
 from tawami.base.process import check_process
+from tawami.base.program import leave_together
 from tawami.base.timing import Stopwatch
 from tawami.particles import placement
 from tawami.scene import coverage, mean_stress, softening, strain_limit
@@ -94,7 +95,10 @@ class Configuration:
         self._small_strain, self._softens = not model.moves, False
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
-        self.domain = Domain.attach(self.model, particles, location, self.numerics, self.stopwatch)
+        earlier: Domain | None = getattr(self, "domain", None)
+        self.domain = Domain.attach(
+            self.model, particles, location, self.numerics, self.stopwatch, earlier
+        )
 
     @property
     def before(self) -> Array:
@@ -156,7 +160,10 @@ class Configuration:
         walls = [copy.deepcopy(wall.state) for wall in self.supports.walls]
         committed = False
         try:
-            accepted = self._solve(kind)
+            with leave_together():  # laws and other functions of the driver script are called here
+                accepted = self._solve(kind)
+            if not self.model.moves:
+                strain_limit.check_digits(self.domain, accepted.step, self.numerics.tolerance)
             moved = self._moved(accepted, kind.end)
             self._warn_of_strain(accepted)
             update = kind.accept(accepted)

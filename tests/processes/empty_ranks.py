@@ -1,0 +1,154 @@
+"""A small body in a long grid, which test_empty_ranks.py runs on several ranks.
+
+Ranks are without particles from the start, or lose theirs as the body moves on: every output, quantity
+and checkpoint must be that of one rank.
+
+python tests/processes/empty_ranks.py FOLDER
+"""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+import tawami
+from tawami.base.ranks import allgathered
+from tawami.results import write_grid, write_particles
+
+COMM = MPI.COMM_WORLD
+FIELDS = ("stress", "mean stress", "deviatoric stress q", "eps_v", "plastic_strain")
+OF_PARTICLES = ("displacement", *FIELDS, "volume", "velocity", "acceleration", "material", "number")
+OF_GRID = ("displacement", "velocity", "particles", "reaction", *FIELDS)
+COLUMNS = (
+    "energies", "momentum", "angular momentum", "reaction bottom", "run-out", "particles",
+    "Newton iterations", "step size", "displacement (0.4, 0.3)",
+)  # fmt: skip
+#: Speed [m/s]: the body crosses the grid in ten steps of DT [s].
+SPEED, DT, STEPS = 44.0, 0.01, 9
+
+
+def body_in(grid: tawami.Grid) -> tawami.Body:
+    return tawami.box(grid, (0.25, 0.0), (0.75, 0.5), per_axis=2)
+
+
+def moving(leaving: str = "stop", speed: float = SPEED) -> tawami.Dynamics:
+    """A plastic block that slides on a rough wall along the grid, with a stress at the start."""
+    grid = tawami.Grid(COMM, origin=(0, 0), h=0.25, cells=(24, 3))
+    body = body_in(grid)
+    laws = [
+        tawami.von_mises(tawami.linear_elastic(E=1e5, nu=0.3), yield_stress=1e3, hardening=10.0),
+        tawami.mohr_coulomb(tawami.linear_elastic(E=2e5, nu=0.3), phi=30.0, c=1e3),
+    ]
+    scene = tawami.Scene(
+        grid, body, laws, material_of=(body.x[:, 1] > 0.25).astype(int), form="u_epsv_finite",
+        density=1000.0, leaving=leaving,
+    )  # fmt: skip
+    scene.gravity((0.0, -9.81))
+    scene.wall("bottom", 0.1)
+    scene.initial("stress", lambda x, y: (-50.0 * y, -100.0 * y, -50.0 * y, 0.0))
+    scene.load(body.x[:, 1] > 0.3, (10.0, -5.0))
+    return tawami.Dynamics(scene, velocity=lambda x, y: (speed, 0.5 * y))
+
+
+def results(folder: Path, **options: Any) -> tawami.Results:
+    outputs = [
+        tawami.ParticleOutput(*OF_PARTICLES, every_steps=5),
+        tawami.GridOutput(*OF_GRID, every_steps=5),
+        tawami.GridOutput(*FIELDS, every_steps=5, name="consistent", projection="consistent"),
+        tawami.TableOutput(*COLUMNS),
+    ]
+    return tawami.Results(folder, *outputs, checkpoint_steps=1, progress=False, **options)
+
+
+class StopError(Exception):
+    """Ends a run after a step."""
+
+
+def stop_at(step: int) -> Any:
+    seen: list[int] = []
+
+    def each(_: tawami.Solution) -> None:
+        seen.append(step)
+        if len(seen) == step:
+            raise StopError
+
+    return each
+
+
+def slide(folder: Path) -> dict[str, np.ndarray]:
+    """Run with results, interrupted in the middle and resumed."""
+    counts = [COMM.allgather(len(moving().scene.particles.number))]
+    with contextlib.suppress(StopError):
+        moving().run(DT * STEPS, DT, each=stop_at(6), results=results(folder / "slide"))
+    motion = moving()
+    motion.run(DT * STEPS, DT, results=results(folder / "slide", existing="resume"))
+    counts.append(COMM.allgather(len(motion.scene.particles.number)))
+    energies = motion.energies
+    found = {
+        "counts": np.array(counts),
+        "momentum": motion.linear_momentum,
+        "energy": np.array([motion.kinetic_energy, motion.elastic_energy, energies.dissipated]),
+    }
+    return found | {f"slide {name}": values for name, values in arrays(motion).items()}
+
+
+def leave() -> dict[str, np.ndarray]:
+    """Particles that leave the grid, until a few are left on the last rank."""
+    motion = moving("remove", 1.28 * SPEED)
+    motion.run(DT * STEPS, DT)
+    return {"left": np.array([len(motion.scene.left)])} | {
+        f"leave {name}": values for name, values in arrays(motion).items()
+    }
+
+
+def arrays(motion: tawami.Dynamics) -> dict[str, np.ndarray]:
+    particles = motion.scene.particles
+    order = np.argsort(allgathered(COMM, particles.number))
+    parts = {
+        "x": particles.x, "stress": particles.stress, "velocity": motion.velocity,
+        "plastic": particles.history("plastic_strain"), "eps_v": particles.eps_v,
+    }  # fmt: skip
+    return {name: allgathered(COMM, np.array(part))[order] for name, part in parts.items()}
+
+
+def statics(folder: Path) -> dict[str, np.ndarray]:
+    """A static scene, its solution and single files."""
+    grid = tawami.Grid(COMM, origin=(0, 0), h=0.25, cells=(24, 3))
+    body = body_in(grid)
+    found = {}
+    for solver in ("direct", "iterative"):
+        law = tawami.linear_elastic(E=1e5, nu=0.3)
+        scene = tawami.Scene(grid, body, law, form="u_epsv", density=1.0, linear_solver=solver)
+        scene.fix("bottom", "x")
+        scene.fix("bottom", "y")
+        scene.gravity((1.0, -9.81))
+        scene.hold((0.5, 0.4), "x", 1e-3)
+        tawami.ramp(scene, 0.5)
+        solution = scene.solve()
+        write_particles(folder / f"{solver}.vtu", solution)
+        write_grid(folder / f"{solver} grid.vtu", solution)
+        found |= {
+            f"static {solver} u": solution.u,
+            f"static {solver} stress": solution.stress,
+            f"static {solver} mean": solution.mean_stress,
+            f"static {solver} eps_v": solution.eps_v,
+            f"static {solver} point": solution.displacement((0.5, 0.3)),
+            f"static {solver} reaction": solution.reaction("bottom"),
+        }
+    return found
+
+
+def all_of(folder: Path) -> dict[str, np.ndarray]:
+    return slide(folder) | leave() | statics(folder)
+
+
+if __name__ == "__main__":
+    where = Path(sys.argv[1])
+    found = all_of(where)
+    if COMM.rank == 0:
+        np.savez(where / "found.npz", **found)
