@@ -89,6 +89,17 @@ def test_forces_of_a_constant_stress_act_on_the_circle_only():
     assert np.abs(forces).max() > 0.1
 
 
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_a_disc_that_touches_the_edges_up_to_rounding(scale):
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.05 * scale, cells=(40, 40))
+    body = tawami.disc(grid, (scale, scale), 1.000001 * scale)
+    assert body.volume.sum() == pytest.approx(np.pi * scale**2, rel=1e-5)
+    assert (body.x >= 0).all()
+    assert (body.x <= 2 * scale).all()
+    with pytest.raises(tawami.InputError, match="leaves the grid"):
+        tawami.disc(grid, (scale, scale), 1.00001 * scale)
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -11,6 +11,8 @@ from profiles import examples
 from scenes import grid_of
 
 import tawami
+from tawami.body.border_squares import merged
+from tawami.body.moment_fitting import fewer
 
 
 def square_grid(n=16):
@@ -157,3 +159,26 @@ def test_bodies_that_end_at_edges_of_the_grid():
 def test_error_messages(f, options, message):
     with pytest.raises(tawami.InputError, match=message):
         tawami.level_set(grid_of(), f, **options)
+
+
+def test_many_points_are_thinned_to_the_same_moments():
+    rng = np.random.default_rng(0)
+    x, weight = rng.random((2000, 2)) * [1.0, 0.3], rng.random(2000)
+    found, volume = fewer(x, weight, np.ones(2000, dtype=bool))
+    assert len(found) <= 28
+    assert (volume > 0).all()
+    for i in range(7):
+        for j in range(7 - i):
+            moments = (
+                weight @ (x[:, 0] ** i * x[:, 1] ** j),
+                volume @ (found[:, 0] ** i * found[:, 1] ** j),
+            )
+            assert moments[1] == pytest.approx(moments[0], rel=1e-11)
+
+
+def test_squares_are_merged_to_boxes_within_their_cells():
+    corner = 0.25 * np.array([[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1], [4, 0], [0, 2]])
+    cell = np.array([0, 0, 0, 0, 0, 0, 1, 0])
+    lower, upper = merged(corner, 0.25, cell)
+    boxes = {tuple(box) for box in np.hstack([lower, upper])}
+    assert boxes == {(0, 0, 0.75, 0.5), (0, 0.5, 0.25, 0.75), (1, 0, 1.25, 0.25)}

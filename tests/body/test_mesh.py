@@ -249,8 +249,8 @@ def wrong(what):
         ("solid", r"holds elements 'tetra': expected triangles and quadrilaterals"),
         ("lines", r"holds line: expected triangles or quadrilaterals"),
         ("not plane", r"nodes have z from 0 to 0.5 m: expected a plane mesh"),
-        ("sets", r"36 elements, the first is 4, are in none of the cell sets \('clay'\)"),
-        ("two sets", r"elements are in the cell sets 'clay' and 'sand': expected each in one"),
+        ("sets", r"36 of its elements, the first is 4, are in none of the cell sets \('clay'\)"),
+        ("two sets", r"several cell sets, the first, element 3, in 'clay' and 'sand': expected each in"),
     ],
 )  # fmt: skip
 def test_error_messages(what, message):
@@ -263,7 +263,9 @@ def test_files_that_cannot_be_read(tmp_path):
         tawami.mesh(grid_of(), tmp_path / "none.msh", per_axis=2)
     for name in ("text.msh", "text.vtu", "text.unknown"):
         (tmp_path / name).write_text("no mesh")
-        with pytest.raises(tawami.InputError, match=rf"meshio cannot read '.*{name}'"):
+        with pytest.raises(
+            tawami.InputError, match=rf"{name}' cannot be read .*: expected a complete"
+        ):
             tawami.mesh(grid_of(), tmp_path / name, per_axis=2)
     with pytest.raises(tawami.InputError, match="source = 3: expected the path of a mesh file"):
         tawami.mesh(grid_of(), 3, per_axis=2)
@@ -271,6 +273,41 @@ def test_files_that_cannot_be_read(tmp_path):
     mesh = made(points, "triangle", cells, tag)
     with pytest.raises(tawami.InputError, match="no such cell data: .*'gmsh:physical'"):
         tawami.mesh(grid_of(), mesh, tags="layer", per_axis=2)
+
+
+SQUARE = np.array([[0, 1.0], [0.5, 1.0], [0.5, 1.5], [0, 1.5]])
+
+
+@pytest.mark.parametrize(
+    ("nodes", "data", "options", "message"),
+    [
+        ([1, 2, 3, 4], {}, {}, "nodes 1 to 4: expected numbers from 0 to 3, as there are 4 nodes"),
+        ([-1, 0, 1, 2], {}, {}, "nodes -1 to 2: expected numbers from 0 to 3"),
+        ([0, 1, 2, 3], {"cell_sets": {"a": [[3]]}}, {}, "cell set 'a' has the elements 3 to 3"),
+        ([0, 1, 2, 3], {"cell_data": {"m": [["x"]]}}, {"tags": "m"}, "'m': expected a whole number"),
+        ([0, 1, 2, 3], {"cell_data": {"m": [[1.5]]}}, {"tags": "m"}, "'m': expected a whole number"),
+        ([0, 1, 2, 3], {"cell_sets": {"a": [[0]]}}, {"groups": "a"}, "expected a list with some of 'a'"),
+        ([0, 1, 2, 3], {"cell_sets": {"a": [[0]]}}, {"groups": []}, "expected the name of a group"),
+        ([0, 1, 2, 3], {}, {"groups": ["a"]}, "its elements have no groups: expected groups=None"),
+    ],
+)  # fmt: skip
+def test_error_messages_of_numbers_and_groups(nodes, data, options, message):
+    with pytest.raises(tawami.InputError, match=message):
+        tawami.mesh(grid_of(), meshio.Mesh(SQUARE, [("quad", [nodes])], **data), **options)
+
+
+def test_advice_about_groups_works():
+    """The two messages about groups say what to write."""
+    points, cells, tag = quads()
+    sets = {"all": [np.arange(len(cells))], "sand": [np.flatnonzero(tag == SAND)]}
+    mesh = made(points, "quad", cells, cell_sets=sets)
+    with pytest.raises(tawami.InputError, match=r"with groups=\[...\] \(there are 'all', 'sand'\)"):
+        tawami.mesh(grid_of(), mesh)
+    assert tawami.mesh(grid_of(), mesh, groups=["all"]).volume.sum() == pytest.approx(1.7 * 1.1)
+    del mesh.cell_sets["all"]
+    with pytest.raises(tawami.InputError, match=r"groups=\['sand'\] leaves out the others"):
+        tawami.mesh(grid_of(), mesh)
+    assert tawami.mesh(grid_of(), mesh, groups=["sand"]).volume.sum() == pytest.approx(1.7 * 0.55)
 
 
 @pytest.mark.slow

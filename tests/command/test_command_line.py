@@ -186,6 +186,23 @@ def test_the_new_script_of_dynamics_is_stopped_resumed_and_drawn(here, process, 
     assert all(path.stat().st_size > 1000 for path in pictures)
 
 
+@pytest.mark.slow
+@pytest.mark.mpi
+@pytest.mark.parametrize("kind", ["--statics", "--dynamics"])
+def test_the_commands_of_the_readme_work_in_turn_on_four_ranks(process, tmp_path, kind):
+    """Two of the four ranks of the slump have no particles at the start."""
+    for command in (
+        ["new", "mycase", kind], ["run", "mycase.py", "--ranks", "4"],
+        ["resume", "results/mycase", "--ranks", "4"], ["plot", "results/mycase"],
+    ):  # fmt: skip
+        run = process(*command, cwd=tmp_path)
+        assert run.returncode == 0, run.stderr
+    figures = {path.name for path in (tmp_path / "results" / "mycase" / "figures").iterdir()}
+    phases = ["ramp"] if kind == "--statics" else ["ramp", "motion"]
+    kinds = ("mean-stress.png", "mean-stress.gif", "table.png")
+    assert figures == {f"{phase}-{what}" for phase in phases for what in kinds}
+
+
 def test_form_check_prints_its_report(capsys, rejected, tmp_path):
     assert main.main(["form", "check", "u_epsv", "--set", "stabilisation=projection"]) == 0
     said = capsys.readouterr().out

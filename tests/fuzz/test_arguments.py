@@ -228,7 +228,7 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "mesh": (tawami.mesh, {
         "grid": grid_of(), "source": meshio.Mesh([(-1, 0.5), (0, 0.5), (0, 1.2)],
                                                  [("triangle", [[0, 1, 2]])]),
-        "tags": None, "per_axis": 2, "gauss": True}),
+        "tags": None, "groups": None, "per_axis": 2, "gauss": True}),
     "table": (in_folder(tabled), {"path": "field.csv", "column": "value", "outside": "stop"}),
     "earlier": (beside_a_run(tawami.earlier), {"path": "run", "outside": "stop"}),
     "initial": (on_scene("initial"), {"name": "stress", "source": (1.0, 1.0, 1.0, 0.0),

@@ -108,3 +108,21 @@ def test_spurious_energy_gives_one_warning():
         given.check(Energies(kinetic=1.2, elastic=0.5, external=0.4), 3, 0.1)
     assert [w.category for w in caught] == [tawami.EnergyWarning]
     assert "after 3 steps, at 0.1 s, the body has 0.2 J/m more energy" in str(caught[0].message)
+
+
+def test_static_steps_between_those_of_a_motion_are_counted():
+    """A load that is released in statics leaves no spurious energy; then the block stays at rest."""
+    scene = falling_on_the_floor()
+    push = scene.load(scene.particles.x[:, 1] > 0.4, (0.0, -100.0))
+    motion = tawami.Dynamics(scene)
+    tawami.settle(scene)
+    motion.run(0.01, 0.005)
+    begin = motion.energies
+    assert begin.external == pytest.approx(begin.elastic, rel=1e-6)
+    push.change((0.0, -300.0))
+    tawami.settle(scene)
+    motion.run(0.02, 0.005)
+    end = motion.energies
+    assert end.elastic == pytest.approx(9 * begin.elastic, rel=0.05)
+    assert end.external == pytest.approx(end.elastic, rel=1e-6)
+    assert abs(end.integration) + end.kinetic < 1e-6 * end.elastic

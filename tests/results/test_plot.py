@@ -112,6 +112,14 @@ def test_a_run_is_drawn_whatever_it_wrote(scene, tmp_path, name, drawn):
     assert [path.name for path in plot(tmp_path, movie=None)] == [f"motion-{drawn}.png"]
 
 
+def test_a_run_without_particles_has_its_tables_drawn(scene, tmp_path):
+    run_of(tmp_path, scene, phases=("motion",), frames=2)
+    (tmp_path / "motion" / "particles.pvd").unlink()
+    assert [path.name for path in plot(tmp_path)] == ["motion-table.png"]
+    with pytest.raises(tawami.InputError, match="no particles with a quantity to draw: expected a"):
+        plot(tmp_path, quantity="stress xx")
+
+
 def test_large_stresses_are_shown_in_kpa_or_mpa():
     assert pictures._scaled("Pa", 2.5e4) == ("kPa", 1e3)
     assert pictures._scaled("Pa", 2.5e6) == ("MPa", 1e6)
@@ -124,7 +132,7 @@ def test_a_folder_that_cannot_be_drawn_is_rejected(scene, tmp_path):
         plot(tmp_path)
     provenance.write(tmp_path, scene)
     with pytest.raises(
-        tawami.InputError, match="no series of particles: expected a run with tawami"
+        tawami.InputError, match="no particles with a quantity to draw: expected a run with tawami"
     ):
         plot(tmp_path)
     with pytest.raises(tawami.InputError, match="movie = 'avi': expected 'gif' or 'mp4'"):

@@ -65,6 +65,20 @@ def test_every_object_says_what_it_is(scene):
     assert repr(motion.step(1e-3)).startswith("Solution('u_epsv': 48 particles, 68 unknowns, ")
 
 
+def test_handles_say_what_they_are():
+    grid = grid_of()
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3), density=1.0)
+    weight = scene.gravity((0, -10))
+    assert repr(weight) == "Weight(gravity (0, -10) m/s2)"
+    weight.release()
+    assert repr(weight) == "Weight(gravity (0, -10) m/s2, released)"
+    assert repr(scene.fix("left", "x", 0.1)) == "Support(fix(edge='left'))"
+    assert repr(scene.wall("top", 0.3)) == "Wall(wall(edge='top') friction 0.3)"
+    assert repr(scene.traction("right", (1.0, 0.0))) == "Traction(traction(edge='right'))"
+    assert repr(scene.load([1, 2], (1.0, 0.0))) == "Forces(force on 2 particles)"
+
+
 @pytest.mark.parametrize(
     ("name", "way"),
     [

@@ -76,9 +76,9 @@ def test_queries_change_nothing(form):
     ends = []
     for asks in (False, True):
         motion, handles = falling(form, PLASTIC)
-        for _ in range(8):
-            solution = motion.step(0.005)
-            if asks:
+        for step in range(5):
+            solution = motion.step(0.008)
+            if asks and step in (0, 3):
                 before = texts_of(motion.state())
                 look(motion, handles, solution)
                 assert texts_of(motion.state()) == before

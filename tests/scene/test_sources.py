@@ -89,9 +89,9 @@ def test_an_earlier_run_gives_its_fields(tmp_path):
     [
         ("", "it is empty"),
         ("x,z,a\n1,2,3\n", "its header is x, z, a: expected names of columns, with the positions x"),
-        ("x,y\n0,0\n1,0\n0,1\n", "has no column for eps_v: it has none. Expected columns wi"),
+        ("x,y\n0,0\n1,0\n0,1\n", "has no column for eps_v: it has none. Expected a column 'ep"),
         ("x,y,eps_v\n0,0,1\n1,0,b\n0,1,1\n", "line 3, column 'eps_v': 'b': expected a finite"),
-        ("x,y,eps_v\n0,0,1\n1,0\n0,1,1\n", "line 3 has 2 cells, and the header 3: 1,0: expected as"),
+        ("x,y,eps_v\n0,0,1\n1,0\n0,1,1\n", "line 3 has 2 cells, and the header 3: 1,0: expected"),
         ("x,y,eps_v\n0,0,1\n1,0,nan\n0,1,1\n", "line 3, column 'eps_v': 'nan': expected a finite"),
         ("x,y,eps_v\n0,0,1\n1,0,1_000\n0,1,1\n", "line 3, column 'eps_v': '1_000': expected a fin"),
         ("x,y,eps_v\n0,0,1\n1,0,1\n", "has 2 points: expected three or more"),
@@ -128,7 +128,7 @@ CORNERS = [[0, 0], [2, 0], [2, 4], [0, 4]]
         ("# X, Y,sigma_xx_kPa,sigma_yy_kPa,sigma_zz_kPa,sigma_xy_kPa", [-3, -5, -4, 0.5], ()),
         ("x,y,name,stress xx,stress yy,stress zz,stress xy", [7, -3000, -5000, -4000, 500], ()),
         ("x,y,xx,yy,zz,xy,yx,xz", [*STATE, 500, 0], ()),
-        ("x,y,a [N/mm²],b,c,d", [-3e-3, *STATE[1:]], ("a", "b", "c", "d")),
+        ("x,y,a [N/mm²],b [Pa],c [Pa],d [Pa]", [-3e-3, *STATE[1:]], ("a", "b", "c", "d")),
         ("x,y,a,b,d,c", [-3000, -5000, 500, -4000], ("a", "b", "c", "d")),
     ],
 )
@@ -151,12 +151,14 @@ def test_positions_in_millimetres_are_converted(tmp_path):
 @pytest.mark.parametrize(
     ("header", "columns", "message"),
     [
-        ("x,y,sxx,syy,sxy,tzz", (), "no column for stress zz: it has .* names in this order"),
+        ("x,y,sxx,syy,sxy,tzz", (), "no column for stress zz: it has .* present names in order"),
         ("x,y,sxx,syy,szz,S11", (), "no column for stress xy"),
         ("x,y,sxx,syy,szz,sxy", ("sxx", "sxy", "syy", "szz"), "'syy' is component yy: expected"),
         ("x,y,sxx,syy,szz,sxy", ("sxx", "syy", "szz"), r"expected 4 columns \(xx yy zz xy\)"),
-        ("x,y,sxx [psi],syy,szz,sxy", (), r"column 'sxx \[psi\]': the unit \[psi\]: expected"),
-        ("x,y,a [mPa],syy,szz,sxy", ("a", "syy", "szz", "sxy"), r"the unit \[mPa\]: expected one of Pa"),
+        ("x,y,sxx [kPa],syy,szz,sxy", (), "'syy', 'szz', 'sxy' of .* have no unit, and other columns"),
+        ("x,y,sxx psi,syy,szz,sxy", (), "no column for stress xx: it has 'sxx psi'"),
+        ("x,y,sxx [psi],syy [Pa],szz [Pa],sxy [Pa]", (), r"'sxx \[psi\]': the unit \[psi\]: expected"),
+        ("x,y,a [mPa],syy [Pa],szz [Pa],sxy [Pa]", ("a", "syy", "szz", "sxy"), r"unit \[mPa\]: e"),
         ("x,y,sxx,syy,szz,sxy", ("s",), "has no column 's': expected one of 'x', 'y', 'sxx'"),
     ],
 )  # fmt: skip

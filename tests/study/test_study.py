@@ -18,12 +18,21 @@ from tawami.study import Series, Table, process
 MB = 2**20
 
 
+#: Read by `scaled`.
+FACTOR = 1.0
+
+
 # -- functions that studies run --------------------------------------------------
 
 
 def converges(n, order=1):
     """Converge to 1 with first or second order."""
     return {"x": 1 + 1 / n**order, "unknowns": n}
+
+
+def scaled(n):
+    """Return a constant of this file."""
+    return {"x": FACTOR * n}
 
 
 def stretched(n, tolerance=1e-6):
@@ -259,3 +268,10 @@ def test_cases_trade_runs_a_sample(tmp_path):
     )
     assert "The knee:" in run.stdout
     assert (tmp_path / "cook" / "cook.png").exists()
+
+
+def test_a_run_depends_on_the_constants_that_its_function_reads(monkeypatch):
+    before = process.fingerprint(scaled)
+    assert process.fingerprint(scaled) == before
+    monkeypatch.setitem(globals(), "FACTOR", 2.0)
+    assert process.fingerprint(scaled) != before

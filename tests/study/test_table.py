@@ -52,6 +52,15 @@ def test_a_table_is_read_from_its_file(tmp_path):
     path = tmp_path / "toy.csv"
     path.write_text(table.as_csv())
     assert Table.read(path) == table
+    text = table.as_csv()
+    for new, message in [
+        (text.replace("MPM,1,", "MPM,1,000,"), "line 2 has .*, and the header .*: expected one cell"),
+        (text.replace("knobs: form", "knobs: n"), "expected the CSV file that"),
+        ("", r"cannot be read \(it is empty\): expected the CSV file that"),
+    ]:  # fmt: skip
+        path.write_text(new)
+        with pytest.raises(tawami.InputError, match=message):
+            Table.read(path)
 
 
 def test_the_cheapest_setting_within_a_tolerance_is_recommended(tmp_path):

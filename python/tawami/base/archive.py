@@ -104,6 +104,30 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     return identity, state
 
 
+def particles(path: Path) -> dict[str, Any]:
+    """Arrays of the particles in a checkpoint, by name, each particles x components.
+
+    Raises:
+        CheckpointError: As :func:`read`, or its content is not what tawami writes.
+    """
+    _, state = read(path)
+    try:
+        arrays: dict[str, Any] = state["scene"]["particles"]
+        check_particles(arrays)
+    except (LookupError, TypeError, ValueError) as error:
+        raise unusable(path, error) from error
+    return arrays
+
+
+def unusable(path: Path | None, error: Exception) -> CheckpointError:
+    """A checkpoint whose checksums are right and whose content is not."""
+    what = f"{error} is missing" if isinstance(error, KeyError) else reason(error)
+    return CheckpointError(
+        f"checkpoint '{path}' cannot be used ({what}): its content is not what tawami writes. Remove "
+        "it to resume from the one before it, or start anew with existing='replace'"
+    )
+
+
 def check_particles(arrays: Any) -> None:
     """Check the arrays of the particles in a state, each particles x components.
 
@@ -115,7 +139,7 @@ def check_particles(arrays: Any) -> None:
         raise ValueError("it has no positions, numbers and volumes of particles")
     rows = {getattr(array, "shape", (None,))[:1] for array in arrays.values()}
     for name, array in arrays.items():
-        check_like(array, np.zeros((0, *np.shape(array)[1:])), f"'{name}' of the particles")
+        check_like(array, np.zeros((1, *np.shape(array)[1:])), f"'{name}' of the particles")
         if np.ndim(array) != 2 or len(rows) != 1:
             raise ValueError(f"'{name}' of the particles has the shape {np.shape(array)}")
     number = arrays["number"]
@@ -147,7 +171,7 @@ def check_like(found: Any, own: Any, name: str) -> None:
         if not same or found.shape[1:] != own.shape[1:] or found.ndim != own.ndim:
             shown = f"{found.dtype} {found.shape}" if isinstance(found, np.ndarray) else repr(found)
             raise ValueError(f"{name} is {shown[:60]}, expected {own.dtype} {own.shape}")
-        if np.isfinite(own).all() and not np.isfinite(found).all():
+        if own.size and np.isfinite(own).all() and not np.isfinite(found).all():
             raise ValueError(f"{name} is not finite")
     elif isinstance(own, Mapping):
         if not isinstance(found, Mapping) or (own and found.keys() != own.keys()):

@@ -93,7 +93,8 @@ def _check_lengths(header: Sequence[str], rows: Sequence[Sequence[str]], lines: 
         if len(row) != len(header):
             raise ValueError(
                 f"line {line} has {len(row)} cells, and the header {len(header)}: {','.join(row)[:80]}: "
-                "expected as many, and numbers with a decimal point and without thousands separators"
+                "expected one cell for each column; numbers have a decimal point and no thousands "
+                "separators"
             )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import InputError
@@ -21,8 +22,10 @@ MANY = 20_000
 #: Corners of a square, and its two triangles by one diagonal or the other, counter-clockwise.
 CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 HALVES = np.array([[[0, 1, 3], [0, 3, 2]], [[0, 1, 2], [1, 3, 2]]])
+#: Signs, as bytes.
+Signs = npt.NDArray[np.int8]
 #: Sign of the user's function at positions (..., 2) in cells: -1 inside the body, else 1.
-Sign = Callable[[Array], Indices]
+Sign = Callable[[Array], Signs]
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ class Squares:
 
     corner: Array
     size: float
-    sign: Indices
+    sign: Signs
 
     def __getitem__(self, chosen: Any) -> Squares:
         return Squares(self.corner[chosen], self.size, self.sign[chosen])
@@ -56,8 +59,10 @@ class Squares:
         return np.isin(key, (key[mask][:, None] + steps).ravel())
 
 
-def triangulated(sign: Sign, squares: Squares, inside: float, tolerance: float) -> Array:
-    """Triangles (n x 3 x 2) that fill the body in squares along its border.
+def triangulated(
+    sign: Sign, squares: Squares, inside: float, tolerance: float
+) -> tuple[Array, list[Squares]]:
+    """Triangles (n x 3 x 2) and squares that fill the body in squares along its border.
 
     Args:
         sign: Sign of the function.
@@ -68,7 +73,7 @@ def triangulated(sign: Sign, squares: Squares, inside: float, tolerance: float) 
     Raises:
         InputError: The tolerance is not reached.
     """
-    done = list[Array]()
+    done, whole = list[Array](), list[Squares]()
     triangles, of_square = _pieces(sign, squares)
     most = MANY + 4 * len(squares.corner)
     for level in range(DEEPEST):
@@ -76,7 +81,7 @@ def triangulated(sign: Sign, squares: Squares, inside: float, tolerance: float) 
         if count > most:
             break
         if not count:
-            return np.concatenate([triangles, *done])
+            return np.concatenate([triangles, *done]), whole
         before = np.bincount(of_square, areas(triangles), minlength=count)
         parts = _quarters(sign, squares)
         triangles, of_part = _pieces(sign, parts)
@@ -88,7 +93,9 @@ def triangulated(sign: Sign, squares: Squares, inside: float, tolerance: float) 
         # If the border bends into the next square and back, only dividing that square shows it.
         again = np.repeat(squares.near(split), 4) & parts.near(parts.cut & np.repeat(split, 4))
         pending = again[of_part]
-        done.append(triangles[~pending])
+        full = (parts.sign < 0).all(axis=1)
+        whole.append(parts[full & ~again])
+        done.append(triangles[~pending & ~full[of_part]])
         inside += found[~pending].sum()
         squares, triangles = parts[again], triangles[pending]
         of_square = (np.cumsum(again) - 1)[of_part[pending]]
@@ -98,12 +105,36 @@ def triangulated(sign: Sign, squares: Squares, inside: float, tolerance: float) 
     )
 
 
+def merged(corner: Array, size: float, cell: Indices) -> tuple[Array, Array]:
+    """Boxes that are unions of squares of one cell: their lower and upper corners, n x 2.
+
+    Args:
+        corner: Lower left corners of the squares [cells], n x 2.
+        size: Their side [cells].
+        cell: Number of the cell of each.
+    """
+    low = np.rint(corner / size).astype(np.int64)
+    high, cell = low + 1, np.asarray(cell)
+    for axis in range(low.shape[1]):  # first rows along x, then equal rows along y
+        same = [cell, *np.delete(low, axis, axis=1).T, *np.delete(high, axis, axis=1).T]
+        order = np.lexsort((low[:, axis], *same))
+        low, high, cell = low[order], high[order], cell[order]
+        starts = np.ones(len(cell), dtype=bool)
+        fixed = np.column_stack([part[order] for part in same])
+        starts[1:] = (fixed[1:] != fixed[:-1]).any(axis=1) | (low[1:, axis] != high[:-1, axis])
+        first = np.flatnonzero(starts)
+        last = np.append(first[1:], len(cell)) - 1
+        high = high[last[: len(first)]]
+        low, cell = low[first], cell[first]
+    return low * size, high * size
+
+
 def _quarters(sign: Sign, squares: Squares) -> Squares:
     """The four quarters of each square, one after another."""
     half = squares.size / 2
     steps = np.array([[i, j] for j in range(3) for i in range(3)])
     known, new = [0, 2, 6, 8], [1, 3, 4, 5, 7]
-    signs = np.empty((len(squares.corner), 9), dtype=np.int64)
+    signs = np.empty((len(squares.corner), 9), dtype=np.int8)
     signs[:, known] = squares.sign
     signs[:, new] = sign(squares.corner[:, None] + half * steps[new])
     of_quarter = np.array([[0, 1, 3, 4], [1, 2, 4, 5], [3, 4, 6, 7], [4, 5, 7, 8]])
@@ -133,7 +164,7 @@ def _pieces(sign: Sign, squares: Squares) -> tuple[Array, Indices]:
         a, b, c = (corners[mine, (first + k) % 3] for k in range(3))
         p, q = _crossing(sign, a, b, alone), _crossing(sign, a, c, alone)
         middle = (p + q) / 2
-        side = sign(middle) if len(mine) else np.empty(0, dtype=np.int64)
+        side = sign(middle) if len(mine) else np.empty(0, dtype=np.int8)
         # from the middle of the chord towards the other sign
         target = np.where((side == alone)[:, None], (b + c) / 2, a)
         on = _crossing(sign, middle, target, side)

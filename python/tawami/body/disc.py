@@ -14,7 +14,7 @@ from tawami.body import clipping
 from tawami.body.body import Body
 from tawami.body.filling import PER_AXIS, Filling
 from tawami.body.points import ROUND_OFF, Points, halves, in_triangles, joined
-from tawami.grid.grid import ON_LINE, Grid
+from tawami.grid.grid import Grid
 
 #: Least number of chords around a circle.
 CHORDS = 32
@@ -60,7 +60,9 @@ def disc(
     if inner >= radius:
         raise InputError(f"disc: inner = {inner:g} m: expected less than the radius, {radius:g} m")
     middle, r = grid.in_cells(np.array([x, y])), radius / grid.h
-    if (middle - r < -ON_LINE).any() or (middle + r > np.add(grid.cells, ON_LINE)).any():
+    ends = np.array([middle - r, middle + r])
+    margin = clipping.tolerance(ends)
+    if (ends < -margin).any() or (ends > np.add(grid.cells, margin)).any():
         raise InputError(
             f"disc: the circle around ({x:g}, {y:g}) m with a radius of {radius:g} m leaves the grid, "
             f"{grid.extent}; enlarge the grid or move the disc"

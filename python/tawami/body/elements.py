@@ -76,7 +76,8 @@ def triangles(grid: Grid, x: Array, blocks: list[Indices], material: Indices) ->
         px, py = grid.in_metres(parts[of == flat[0]].mean(axis=(0, 1)))
         raise InputError(
             f"mesh: {len(flat)} of its elements have no area, the first is element {flat[0]} at "
-            f"({px:g}, {py:g}) m: expected elements that are not flat; remove them from the mesh"
+            f"({px:g}, {py:g}) m: expected elements that are not flat on cells of {grid.h:g} m; "
+            "remove them from the mesh (lengths are metres)"
         )
     parts[area < 0] = parts[area < 0][:, ::-1]
     return Elements(parts[large], of[large], material[of[large]], tolerance)

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import reduce
 
 import numpy as np
 import numpy.typing as npt
 
-from tawami.base.arrays import Array, Indices
+from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.checks import names, number, real_values, room, shown, whole_number
 from tawami.base.errors import InputError
 from tawami.base.space import lattice
 from tawami.body.body import Body
-from tawami.body.border_squares import Squares, triangulated
+from tawami.body.border_squares import Signs, Squares, merged, triangulated
 from tawami.body.filling import PER_AXIS, Filling
-from tawami.body.points import ROUND_OFF, areas, halves, in_triangles
+from tawami.body.points import ROUND_OFF, areas, in_boxes, in_triangles, joined
 from tawami.grid.grid import EDGES, Edge, Grid
 
-#: Memory of a sample while the function is evaluated [bytes].
-BYTES_PER_SAMPLE = 64.0
+#: Memory of a sample [bytes], and number of samples that the function is given at once.
+BYTES_PER_SAMPLE, BLOCK = 16.0, 1_000_000
 
 
 class Function:
@@ -29,8 +30,8 @@ class Function:
             raise InputError(f"level_set: f = {shown(f)}: expected a function f(x, y) on arrays")
         self.grid, self.f = grid, f
 
-    def __call__(self, x: Array) -> Indices:
-        """-1 if the function is negative, else 1; for positions of shape (..., 2)."""
+    def __call__(self, x: Array) -> Signs:
+        """-1 if the function is negative, else 1, as bytes; for positions of shape (..., 2)."""
         points = self.grid.in_metres(x).reshape(-1, 2)
         try:
             values = real_values(self.f(points[:, 0], points[:, 1]))
@@ -52,7 +53,19 @@ class Function:
                 f"level_set: f is NaN at {len(bad)} points, the first is ({px:g}, {py:g}) m: expected "
                 "a value everywhere on the grid"
             )
-        return np.where(values < 0, -1, 1).reshape(x.shape[:-1])
+        signs = np.ones(len(points), dtype=np.int8)
+        signs[values < 0] = -1
+        return signs.reshape(x.shape[:-1])
+
+    def at_samples(self, samples: int) -> Signs:
+        """The same at `samples` points per cell and axis, y by x; rows of them are taken together."""
+        nx, ny = (n * samples for n in self.grid.cells)
+        rows = max(1, BLOCK // (nx + 1))
+        x = np.arange(nx + 1) / samples
+        return np.concatenate([
+            self(lattice([x, along / samples]).reshape(len(along), nx + 1, 2))
+            for along in np.split(np.arange(ny + 1), range(rows, ny + 1, rows))
+        ])  # fmt: skip
 
 
 def level_set(
@@ -98,8 +111,7 @@ def level_set(
     nx, ny = (n * samples for n in grid.cells)
     what = f"level_set: samples = {shown(samples)} in {grid.cells[0]} x {grid.cells[1]} cells"
     room(what, (nx + 1) * (ny + 1), BYTES_PER_SAMPLE, "expected fewer samples")
-    x = lattice([np.arange(n + 1) / samples for n in (nx, ny)]).reshape(ny + 1, nx + 1, 2)
-    signs = sign(x)
+    signs = sign.at_samples(samples)
     if not (signs < 0).any():
         raise InputError(
             f"level_set: f is not negative at any of the {signs.size} samples, "
@@ -107,16 +119,29 @@ def level_set(
             "body; change its sign, move it into the grid, or take more samples"
         )
     _check_ends(signs, ended)
-    at = np.stack([signs[:-1, :-1], signs[:-1, 1:], signs[1:, :-1], signs[1:, 1:]], axis=-1)
-    squares = Squares(x[:-1, :-1].reshape(-1, 2), 1 / samples, at.reshape(-1, 4))
-    border = squares.near(squares.cut)
-    inside = squares.corner[(squares.sign < 0).all(axis=1) & ~border]
-    area = len(inside) / samples**2
-    triangles = triangulated(sign, squares[border], area, tolerance)
-    return _filled(filling, inside, triangles, samples)
+    corners = signs[:-1, :-1], signs[:-1, 1:], signs[1:, :-1], signs[1:, 1:]
+    least, most = reduce(np.minimum, corners), reduce(np.maximum, corners)
+    border = _grown(least != most)
+    inside = (most < 0) & ~border
+    at = np.stack([corner[border] for corner in corners], axis=-1)
+    squares = Squares(np.argwhere(border)[:, ::-1] / samples, 1 / samples, at)
+    area = np.count_nonzero(inside) / samples**2
+    triangles, whole = triangulated(sign, squares, area, tolerance)
+    return _filled(filling, inside, triangles, whole, samples)
 
 
-def _check_ends(signs: Indices, ends: Sequence[str]) -> None:
+def _grown(mask: Mask) -> Mask:
+    """A mask of squares with all squares that touch it."""
+    for axis in range(mask.ndim):
+        grown, (low, high) = mask.copy(), (slice(None, -1), slice(1, None))
+        along = (slice(None),) * axis
+        grown[(*along, low)] |= mask[(*along, high)]
+        grown[(*along, high)] |= mask[(*along, low)]
+        mask = grown
+    return mask
+
+
+def _check_ends(signs: Signs, ends: Sequence[str]) -> None:
     """Check that the body only ends at these edges of the grid; signs at the samples, y by x."""
     along = {"left": signs[:, 0], "right": signs[:, -1], "bottom": signs[0], "top": signs[-1]}
     for edge in EDGES:
@@ -127,17 +152,36 @@ def _check_ends(signs: Indices, ends: Sequence[str]) -> None:
             )
 
 
-def _filled(filling: Filling, corner: Array, triangles: Array, samples: int) -> Body:
-    """Particles for squares that are inside, and for triangles along the border."""
-    grid, size = filling.grid, 1 / samples
-    of_square = grid.cell_numbers(grid.cell_at(corner + size / 2))
+def _filled(
+    filling: Filling, inside: Mask, triangles: Array, whole: Sequence[Squares], samples: int
+) -> Body:
+    """Particles for squares between samples that are inside, and along the border.
+
+    Args:
+        filling: How cells are filled.
+        inside: Mask of the squares between samples, y by x.
+        triangles: Triangles along the border, n x 3 x 2.
+        whole: Smaller squares along the border.
+        samples: Samples per cell and axis.
+    """
+    grid, (nx, ny) = filling.grid, filling.grid.cells
+    count = inside.reshape(ny, samples, nx, samples).sum(axis=(1, 3), dtype=np.int64)
+    area = count.ravel() / samples**2
     of_triangle = grid.cell_numbers(grid.cell_at(triangles.mean(axis=1)))
-    area = np.bincount(of_square, minlength=grid.num_cells) * size**2
     area += np.bincount(of_triangle, areas(triangles), minlength=grid.num_cells)
+    for one in whole:
+        area += np.bincount(_cells(grid, one), minlength=grid.num_cells) * one.size**2
     full = area > 1 - ROUND_OFF
-    rest, cut = ~full[of_square], ~full[of_triangle]
-    points = in_triangles(
-        np.concatenate([halves(corner[rest], size).reshape(-1, 3, 2), triangles[cut]]),
-        np.concatenate([np.repeat(of_square[rest], 2), of_triangle[cut]]),
-    )
-    return filling.body(np.flatnonzero(full), points)
+    in_cut_cells = np.kron(~full.reshape(ny, nx), np.ones((samples, samples), dtype=bool))
+    corner = np.argwhere(inside & in_cut_cells)[:, ::-1] / samples
+    parts = [in_triangles(triangles[~full[of_triangle]], of_triangle[~full[of_triangle]])]
+    for one in [Squares(corner, 1 / samples, np.empty((0, 4), dtype=np.int8)), *whole]:
+        cell = _cells(grid, one)
+        lower, upper = merged(one.corner[~full[cell]], one.size, cell[~full[cell]])
+        parts.append(in_boxes(lower, upper, grid.cell_numbers(grid.cell_at((lower + upper) / 2))))
+    return filling.body(np.flatnonzero(full), joined(parts))
+
+
+def _cells(grid: Grid, squares: Squares) -> Indices:
+    """Numbers of the cells that hold squares."""
+    return grid.cell_numbers(grid.cell_at(squares.corner + squares.size / 2))

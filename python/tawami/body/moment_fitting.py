@@ -19,6 +19,8 @@ from tawami.body.points import DEGREE
 EXPONENTS = np.array([e for e in product(range(DEGREE + 1), repeat=PLANE.dim) if sum(e) <= DEGREE])
 #: Largest number of points that is left: the number of moments.
 MOST = len(EXPONENTS)
+#: Number of points beyond which the ones that are left are looked for among SOME of them first.
+MANY, SOME = 300, 150
 #: Largest error of the moments, relative to the area.
 MOMENT_ERROR = 1e-12
 
@@ -34,6 +36,8 @@ def fewer(x: Array, weight: Array, allowed: Mask) -> tuple[Array, Array]:
     allowed = allowed & (weight > 0)
     if allowed.all() and len(x) <= MOST:
         return x, weight
+    if allowed.all() and len(x) > MANY:
+        return _of_some(x, weight)
     area = weight.sum()
     allowed = allowed if allowed.any() else weight > 0
     monomials = _monomials(x)
@@ -53,23 +57,56 @@ def fewer(x: Array, weight: Array, allowed: Mask) -> tuple[Array, Array]:
     return x[allowed][chosen], found * (area / found.sum())
 
 
+def _of_some(x: Array, weight: Array) -> tuple[Array, Array]:
+    """As :func:`fewer`, for many points: those that are left are looked for among some of them first.
+
+    The points of a rule on many triangles are many more than their moments need.
+    """
+    area, (along_x, along_y) = weight.sum(), _powers(x)
+    i, j = EXPONENTS.T
+    sums = ((weight[:, None] * along_x).T @ along_y)[i, j]
+    so_far = np.cumsum(weight)
+    for number in (SOME, 4 * SOME, len(x)):
+        # points at equal shares of the area lie all over the cell
+        shares = (np.arange(number) + 0.5) / number * so_far[-1]
+        some = np.unique(np.searchsorted(so_far, shares)) if number < len(x) else slice(None)
+        root = np.sqrt(weight[some])
+        q, r = np.linalg.qr(root[:, None] * (along_x[some][:, i] * along_y[some][:, j]))
+        moments = np.linalg.solve(r.T, sums)
+        fitted = _fitted if number == len(x) else _least_squares
+        found, error = fitted((q / root[:, None]).T, moments, weight[some])
+        if error <= MOMENT_ERROR * np.linalg.norm(moments):
+            chosen = found > 0
+            return x[some][chosen], found[chosen] * (area / found.sum())
+    return x, weight
+
+
 def _monomials(x: Array) -> Array:
     """Monomials at points whose bounding box is scaled to [-1, 1], points x MOST."""
-    low, high = x.min(axis=0), x.max(axis=0)
-    t = (2 * x - low - high) / np.maximum(high - low, np.finfo(float).tiny)
-    powers = t[:, :, None] ** np.arange(DEGREE + 1)
-    factors = (powers[:, axis, e] for axis, e in enumerate(EXPONENTS.T))
+    factors = (powers[:, e] for powers, e in zip(_powers(x), EXPONENTS.T, strict=True))
     return np.ascontiguousarray(reduce(np.multiply, factors))
 
 
-def _fitted(functions: Array, moments: Array, weight: Array) -> tuple[Array, float]:
-    """Non-negative weights with these moments, and their error; `weight` if none are found."""
+def _powers(x: Array) -> list[Array]:
+    """Powers up to the degree of each coordinate, scaled to [-1, 1]: points x (DEGREE + 1) per axis."""
+    low, high = x.min(axis=0), x.max(axis=0)
+    t = (2 * x - low - high) / np.maximum(high - low, np.finfo(float).tiny)
+    return [np.vander(along, DEGREE + 1, increasing=True) for along in t.T]
+
+
+def _least_squares(functions: Array, moments: Array, weight: Array) -> tuple[Array, float]:
+    """Non-negative weights next to these moments, and their error; `weight` if SciPy finds none."""
     from scipy.optimize import nnls  # imported here: a scene without cut cells does not need it
 
-    found, error = weight, np.inf
     with suppress(RuntimeError):  # too many iterations
         found = nnls(functions, moments)[0]
-        error = float(np.linalg.norm(functions @ found - moments))
+        return found, float(np.linalg.norm(functions @ found - moments))
+    return weight, np.inf
+
+
+def _fitted(functions: Array, moments: Array, weight: Array) -> tuple[Array, float]:
+    """The same, where an error of SciPy shows."""
+    found, error = _least_squares(functions, moments, weight)
     if error > 0.1 * MOMENT_ERROR * np.linalg.norm(moments):  # SciPy 1.12 to 1.15 may stop early
         again = _active_set(functions, moments)
         error_again = float(np.linalg.norm(functions @ again - moments))

@@ -11,7 +11,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from tawami import _rust
 from tawami.base.arrays import Array, Indices, Mask
+from tawami.base.space import lattice, tensor_product
 from tawami.fem import rules
 
 #: Degree of the rule on the triangles of a cut cell: grad w : C : grad u of quadratic splines.
@@ -58,6 +60,19 @@ def halves(corner: Array | Indices, size: float = 1.0) -> Array:
     """Two triangles for each square, counter-clockwise, n x 2 x 3 x 2, given its lower left corner."""
     triangles = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], dtype=float)
     return np.asarray(corner[:, None, None] + size * triangles)
+
+
+def in_boxes(lower: Array, upper: Array, cell: Indices) -> Points:
+    """Gauss points of boxes between two corners (n x dim), each in one cell."""
+    along, weights = _rust.gauss(DEGREE // 2 + 1)
+    dim = lower.shape[1]
+    size, unit = upper - lower, lattice([along] * dim)
+    return Points(
+        (lower[:, None] + size[:, None] * unit).reshape(-1, dim),
+        np.outer(size.prod(axis=1), tensor_product([weights] * dim)).ravel(),
+        np.repeat(cell, len(unit)),
+        np.repeat(np.zeros_like(cell), len(unit)),
+    )
 
 
 def in_triangles(corners: Array, cell: Indices, material: Indices | None = None) -> Points:

@@ -34,7 +34,6 @@ tangent is derived (`tawami.form.tangent`).
 from __future__ import annotations
 
 import functools
-import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -45,7 +44,7 @@ from typing import Any, NoReturn
 
 from tawami.base.checks import TEXT, number, one_of, real, shown
 from tawami.base.errors import FormError, InputError
-from tawami.base.source import source_of
+from tawami.base.meaning import meaning
 from tawami.base.text import quoted
 from tawami.form.files import module_of
 from tawami.form.kinematics import (
@@ -226,16 +225,14 @@ class Form:
         name = f"'{Path(str(module.__file__)).stem}'"
         return _from_module(module, getattr(module, "residual", None), name)
 
-    @property
-    def source(self) -> str:
-        """Source text of the residual."""
-        return source_of(self.residual)
-
     def identity(self) -> dict[str, Any]:
         """What tells it from another form, for checkpoints."""
+        declared = {key: getattr(self, key) for key in DECLARATIONS}
+        kept = declared | {key: str(declared[key]) for key in ("kinematics", "strain")}
         return {
             "form": self.name,
-            "form source": hashlib.sha256(self.source.encode()).hexdigest(),
+            "declarations": meaning(kept),
+            "residual": meaning(self.residual),
         }
 
     def settings(

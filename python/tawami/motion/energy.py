@@ -37,7 +37,8 @@ class Energies:
         elastic: Stored by the laws.
         dissipated: Work of the stress on plastic strains.
         friction: Lost to the friction of walls.
-        external: Work of loads and of supports that move.
+        external: Work of loads and of supports that move; between two steps of a motion, the elastic
+            energy that static steps add.
         transfer: Energy lost on the way from the particles to the grid and back: kinetic, and elastic
             where the mean stress of a mixed form is projected on the present grid.
         impact: Kinetic energy lost where supports stop the grid.
@@ -121,6 +122,7 @@ class Balance:
         self._growth = Growth(self.energies.kinetic + self.energies.elastic)
         #: Kinetic energy of the particles when the last step was stored.
         self._stored_kinetic = self.energies.kinetic
+        self._statics = configuration.activity.statics
 
     def sum(self, value: float) -> float:
         """A sum over the ranks."""
@@ -138,10 +140,16 @@ class Balance:
         return self.sum(self._now.domain.stage.elastic_energy())
 
     def begin(self) -> None:
-        """Start a step: count what velocities that the script wrote into the particles have added."""
+        """Start a step: count what velocities that the script wrote into the particles have added, and
+        static steps since the last one.
+        """
         kinetic = self.kinetic
         self._growth.add(kinetic - self._stored_kinetic)
         self._stored_kinetic = kinetic
+        if self._now.activity.statics != self._statics:
+            self._statics, elastic, e = self._now.activity.statics, self.elastic, self.energies
+            external = e.external + elastic - e.elastic
+            self.energies = replace(e, elastic=elastic, external=external)
 
     def of_step(
         self, mass: Array, velocities: tuple[Array, Array, Array], accepted: Accepted
@@ -216,3 +224,4 @@ class Balance:
         self.energies = Energies(**state["energies"])
         self._growth.restore(state["growth"])
         self._stored_kinetic = state["stored_kinetic"]
+        self._statics = self._now.activity.statics

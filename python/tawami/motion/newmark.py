@@ -93,7 +93,7 @@ class NewmarkStep:
         self._mass = domain.sums(domain.mass, np.ones((len(domain.particles), 1)))[:, 0]
         self._masses = np.repeat(self._mass, configuration.model.space.dim)
         self._first = self._external = configuration.external(self._finish)
-        if configuration.loads.move:
+        if configuration.loads.vary:
             self._first = configuration.external(self._begin)
         self._mapped = carried.mapped(self._mass)
         self._speed = self._prescribed(lambda term: term.rates(self._finish)[0])

@@ -111,9 +111,13 @@ def check(pace: Mapping[str, Any], steps: Mapping[str, Any]) -> None:
         ValueError: A size that is not positive, or steps that do not end where the pace is.
     """
     size, at, ends = pace["size"], pace["at"], steps["end"]
-    if not size > 0:
+    if not 0 < size < math.inf:
         raise ValueError(f"the size of the next step is {size}, expected a positive number")
-    if (np.diff(ends, prepend=-np.inf) < 0).any() or not math.isclose(at, ends[-1], abs_tol=1e-12):
+    if (
+        not np.isfinite([at, *ends, *steps["size"]]).all()
+        or (np.diff(ends, prepend=-np.inf) < 0).any()
+        or not math.isclose(at, ends[-1], abs_tol=1e-12)
+    ):
         raise ValueError(f"the steps do not end at {at}, one after the other")
     if {len(ends)} != {len(steps[name]) for name in ("size", "residuals", "solves")}:
         raise ValueError("the records of the steps differ in number")

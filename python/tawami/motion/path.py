@@ -189,6 +189,7 @@ class PathUpdate:
         following = self.following
         following.factor, following.direction = self.factor, self.direction
         following.point = self.point
+        self.configuration.activity.statics += 1
         self.configuration.supports.apply(self.configuration.moment(self.factor))
 
 

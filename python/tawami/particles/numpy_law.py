@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +13,7 @@ from tawami import _rust
 from tawami.base import checks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError
-from tawami.base.source import source_of
+from tawami.base.identity import text
 from tawami.form.kinematics import Kinematics
 
 #: Stress, tangent and plastic volumetric strain of the particles, flat.
@@ -54,10 +55,9 @@ class NumpyLaw:
             )
         self.elastic()
 
-    @property
-    def source(self) -> str:
-        """Source text of the function."""
-        return source_of(self.respond)
+    def identity(self) -> Any:
+        """What tells it from another law of the same K and mu, for checkpoints."""
+        return text(self.respond)
 
     def elastic(self) -> _rust.Material:
         """The elastic law of K and mu, for uses that need only these."""

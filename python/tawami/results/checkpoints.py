@@ -14,8 +14,8 @@ from typing import Any
 
 from tawami.base import archive, checks
 from tawami.base.errors import CheckpointError, CheckpointWarning, OutputError, TawamiError
-from tawami.base.files import reason, writing
-from tawami.base.identity import same
+from tawami.base.files import writing
+from tawami.base.identity import differences, not_compared
 from tawami.base.ranks import raise_together
 from tawami.motion.observer import Subject
 from tawami.motion.pace import check as check_pace
@@ -91,21 +91,22 @@ class Checkpoints:
             CheckpointError: There are checkpoints, and none of them can be used.
 
         Warns:
-            CheckpointWarning: One cannot be used; the one before it is tried.
+            CheckpointWarning: One cannot be used; the one before it is tried. Or values that functions
+                of the script read cannot be compared.
         """
         if not self.resumes:
             return None
         state: dict[str, Any] | None = None
-        problems, files = list[str](), list[Path]()
+        problems, files, unknown = list[str](), list[Path](), list[str]()
         if self._comm.rank == 0:
             files = self._files()[0]
             for path in reversed(files):
                 try:
-                    state = self._read(path, like)
+                    state, unknown = self._read(path, like)
                     break
                 except CheckpointError as error:
                     problems.append(str(error))
-        state, problems, files = self._comm.bcast((state, problems, files))
+        state, problems, files, unknown = self._comm.bcast((state, problems, files, unknown))
         for problem in problems[: len(files) - 1]:
             self._warn(f"{problem}. The checkpoint before it is tried")
         if state is None and problems:
@@ -113,6 +114,11 @@ class Checkpoints:
                 f"{problems[0]}. No other checkpoint of '{self.phase}' can be used"
             )
         self._source = files[-1 - len(problems)] if files else None
+        if unknown:
+            self._warn(
+                f"'{self.phase}' is resumed, and these values cannot be compared to those of the run "
+                f"before: {'; '.join(unknown)}. Expected the same values as then"
+            )
         return state
 
     @contextmanager
@@ -123,26 +129,24 @@ class Checkpoints:
         except TawamiError:
             raise
         except Exception as error:
-            raise _unusable(self._source, error) from error
+            raise archive.unusable(self._source, error) from error
 
-    def _read(self, path: Path, like: Mapping[str, Any]) -> dict[str, Any]:
-        """The state of a checkpoint of this run."""
+    def _read(self, path: Path, like: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
+        """The state of a checkpoint of this run, and what cannot be compared to tell that it is."""
         written, state = archive.read(path)
-        for name, own in self._identity.items():
-            other = written.get(name)
-            if not same(other, own):
-                raise CheckpointError(
-                    f"checkpoint '{path}' is of another run: {name} is {_short(other)} there and "
-                    f"{_short(own)} here. Expected the same scene; start anew with existing='replace'"
-                )
+        for name, other, own in differences(written, self._identity):
+            raise CheckpointError(
+                f"checkpoint '{path}' is of another run: {name} is {_short(other)} there and "
+                f"{_short(own)} here. Expected the same scene; start anew with existing='replace'"
+            )
         try:
             archive.check_particles(state["scene"]["particles"])
             archive.check_like({name: state[name] for name in like}, like, "")
             check_pace(state["pace"], state["steps"])
-            archive.check_like(state["outputs"], {key: {} for key in state["outputs"]}, "outputs")
+            archive.check_like(state["outputs"], {name: {} for name in state["outputs"]}, "outputs")
         except (AttributeError, LookupError, TypeError, ValueError) as error:
-            raise _unusable(path, error) from error
-        return state
+            raise archive.unusable(path, error) from error
+        return state, list(dict.fromkeys(not_compared(written, self._identity)))
 
     def restart(self, steps: int) -> None:
         """Count steps and minutes from now on."""
@@ -190,8 +194,8 @@ class Checkpoints:
             self._since = monotonic()
             last = self.last()
             kept = "there is none yet" if last is None else f"the last one is '{last}'"
-            goes_on = "" if ends else ". The run continues"
-            self._warn(f"no checkpoint: {error}; {kept}{goes_on}")
+            continues = "" if ends else ". The run continues"
+            self._warn(f"no checkpoint: {error}; {kept}{continues}")
 
     def last(self) -> Path | None:
         """The newest checkpoint of this phase in the folder; a call for all ranks."""
@@ -212,15 +216,6 @@ class Checkpoints:
         with raise_together(self._comm):
             if self._comm.rank == 0:
                 warnings.warn(text, CheckpointWarning, stacklevel=3)
-
-
-def _unusable(path: Path | None, error: Exception) -> CheckpointError:
-    """A checkpoint whose checksums are right and whose content is not."""
-    what = f"{error} is missing" if isinstance(error, KeyError) else reason(error)
-    return CheckpointError(
-        f"checkpoint '{path}' cannot be used ({what}): its content is not what tawami writes. Remove "
-        "it to resume from the one before it, or start anew with existing='replace'"
-    )
 
 
 def _short(value: Any) -> str:

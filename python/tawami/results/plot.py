@@ -30,7 +30,7 @@ USUAL = "mean stress"
 def plot(
     folder: str | Path, *, quantity: str | None = None, movie: Movie | None = "gif"
 ) -> list[Path]:
-    """Draw a run; the pictures go into its folder `figures`.
+    """Draw particles and tables of a run; the pictures go into its folder `figures`.
 
     Args:
         folder: Of the run, with run.json.
@@ -43,7 +43,8 @@ def plot(
         The files.
 
     Raises:
-        InputError: No run, no particles, or no such quantity in it; a link out of the folder.
+        InputError: No run, neither particles nor tables in it, no such quantity, or a link out of the
+            folder.
         OutputError: A file of the run cannot be read, or a picture cannot be written.
         MissingDependencyError: matplotlib is not installed, or ffmpeg for an mp4.
     """
@@ -54,21 +55,19 @@ def plot(
         checks.choice("movie", movie, ("gif", "mp4"))
     if movie == "mp4" and shutil.which("ffmpeg") is None:
         raise MissingDependencyError("movie = 'mp4' needs ffmpeg: install it, or use movie='gif'")
-    found = [(path.name, _particles(path)) for path in _phases(home)]
-    series = [(name, times) for name, times in found if times]
-    if not series:
-        raise InputError(
-            f"'{home}' holds no series of particles: expected a run with tawami.ParticleOutput(...)"
-        )
+    phases = _phases(home)
+    series = [(path.name, times) for path in phases if (times := _particles(path))]
+    tables = [(path, table) for path in phases for table in sorted(path.glob("*.csv"))]
     known = list(dict.fromkeys(k for _, times in series for k in scalars(times[-1][1]())))
-    if not known:
+    if not known and (quantity is not None or not tables):
         raise InputError(
-            f"'{home}' holds particles without quantities that can be drawn: expected a run with "
-            "tawami.ParticleOutput('stress')"
+            f"'{home}' holds no particles with a quantity to draw: expected a run with "
+            "tawami.ParticleOutput('stress') or other quantities"
         )
     if quantity is None:
-        quantity = USUAL if USUAL in known else known[0]
-    checks.choice("quantity", quantity, known, "the run did not write it: ")
+        quantity = USUAL if USUAL in known else next(iter(known), USUAL)
+    else:
+        checks.choice("quantity", quantity, known, "the run did not write it: ")
     pictures, stem = result_folder(home / "figures"), re.sub(r"[^\w.+]", "-", quantity)
     written = []
     for phase, times in series:
@@ -77,9 +76,8 @@ def plot(
             written.append(film.picture(pictures / f"{phase}-{stem}.png"))
             if movie is not None and len(times) > 1:
                 written.append(film.movie(pictures / f"{phase}-{stem}.{movie}", movie))
-    for path in _phases(home):
-        for table in sorted(path.glob("*.csv")):
-            written += _table(table, pictures / f"{path.name}-{table.stem}.png")
+    for path, table in tables:
+        written += _table(table, pictures / f"{path.name}-{table.stem}.png")
     return written
 
 
@@ -100,7 +98,7 @@ def _check_inside(home: Path) -> None:
 def _corners(home: Path) -> Corners:
     """Corners of the grid of a run."""
     expected = "the folder of a run, as tawami.Results('results/pile', ...) creates it"
-    file = readable_file("plot: record of the run", home / RUN, expected)
+    file = readable_file("record of the run", home / RUN, expected)
     try:
         known = json.loads(file.read_text())["grid"]
         lower = np.array(known["origin"], dtype=float)

@@ -13,10 +13,11 @@ class Activity:
 
     Attributes:
         time: Time at the end of the last phase of statics, or of the last dynamic step [s].
+        statics: Number of states that static steps or a checkpoint have given to the scene.
     """
 
     def __init__(self) -> None:
-        self.time = 0.0
+        self.time, self.statics = 0.0, 0
         self._in_step = self._in_callback = False
 
     @contextmanager

@@ -16,8 +16,8 @@ import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks, ranks, signals
-from tawami.base.errors import ConvergenceError
-from tawami.base.identity import fingerprint
+from tawami.base.errors import CheckpointError, ConvergenceError
+from tawami.base.meaning import fingerprint
 from tawami.base.process import check_process
 from tawami.base.program import leave_together
 from tawami.base.timing import Stopwatch
@@ -95,7 +95,10 @@ class Configuration:
         self._small_strain, self._softens = not model.moves, False
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
-        self.domain = Domain.attach(self.model, particles, location, self.numerics, self.stopwatch)
+        earlier: Domain | None = getattr(self, "domain", None)
+        self.domain = Domain.attach(
+            self.model, particles, location, self.numerics, self.stopwatch, earlier
+        )
 
     @property
     def before(self) -> Array:
@@ -159,6 +162,8 @@ class Configuration:
         try:
             with leave_together():  # laws and other functions of the driver script are called here
                 accepted = self._solve(kind)
+            if not self.model.moves:
+                strain_limit.check_digits(self.domain, accepted.step, self.numerics.tolerance)
             moved = self._moved(accepted, kind.end)
             self._warn_of_strain(accepted)
             update = kind.accept(accepted)
@@ -317,12 +322,15 @@ class Configuration:
         """The reverse of :meth:`state`, for a scene that was made in the same way; a call for all ranks.
 
         Raises:
-            CheckpointError: Particles with other arrays.
+            CheckpointError: Particles or fields with other arrays.
         """
         particles, location = placement.scattered(
             self.model.grid, self.domain.particles, state["particles"], moving=self.model.moves
         )
+        if np.shape(state["total"]) != self.total.shape:
+            raise CheckpointError("its fields have another number of coefficients than the scene")
         self.activity.time, self.total = state["time"], state["total"]
+        self.activity.statics += 1
         self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
         self._coverage_checked, self.begun = state["coverage_checked"], True
         self._travel = state["travel"]

@@ -199,7 +199,7 @@ class Loads:
         return sum(weights, np.zeros(self.grid.space.dim))
 
     @property
-    def move(self) -> bool:
+    def vary(self) -> bool:
         """Whether any load follows an amplitude in time."""
         return any(term.course.moves for load in self.all for term in load.terms)
 

@@ -109,7 +109,7 @@ class Model:
 
     def identity(self) -> dict[str, Any]:
         """What tells it from another model, for checkpoints."""
-        laws = [] if self.law is None else [self.law.source]
+        laws = [] if self.law is None else [self.law.identity()]
         return (
             self.grid.identity()
             | self.form.identity()
@@ -118,6 +118,7 @@ class Model:
                 "parameters": {**self.parameters, **self.options},
                 "laws": [*map(repr, self.materials), *laws],
                 "density": None if self.density is None else self.density.tolist(),
+                "leaving": self.leaving,
                 "number of particles": self.num_particles,
             }
         )

@@ -144,6 +144,7 @@ class Scattered:
                 f"{', '.join(repr(column.label) for column in self.columns) or 'none'}. "
                 f"{self._advice(field, components)}"
             )
+        self._check_units(field, [column for some in found.values() for column in some])
         where = f"{field}: {self.name}"
         values = {c: self._one(field, found[c]).values(unit, where) for c in components}
         self._check_others(field, values, unit)
@@ -160,6 +161,15 @@ class Scattered:
             )
         return found[0]
 
+    def _check_units(self, field: str, columns: Sequence[Column]) -> None:
+        """Either all columns of a field have units or none."""
+        without = [column.label for column in columns if not split(column.label)[1]]
+        if 0 < len(without) < len(columns):
+            raise InputError(
+                f"{field}: {', '.join(map(repr, without))} of {self.name} have no unit, and other "
+                "columns of the field do: expected units in brackets for all or none, as 'sxx [kPa]'"
+            )
+
     def _check_others(self, field: str, values: dict[str, Array], unit: str) -> None:
         """Components of a three-dimensional field that the plane does not have are 0, and tensors are
         symmetric.
@@ -171,7 +181,7 @@ class Scattered:
             for column in () if component in values else named(self.columns, field, component):
                 expected = values.get(other, np.zeros(len(self.x)))
                 off = np.abs(column.values(unit, f"{field}: {self.name}") - expected)
-                if not (off <= ROUND_OFF * size).all():
+                if (off > ROUND_OFF * size).any():
                     should = f"equal to {other}" if other in values else "0 in plane strain"
                     raise InputError(
                         f"{field}: the column '{column.label}' of {self.name} is not {should} in row "

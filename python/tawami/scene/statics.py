@@ -56,6 +56,7 @@ class StaticStep:
 
     def finish(self) -> None:
         """Record that the body is in equilibrium with this part."""
+        self.configuration.activity.statics += 1
         self.configuration.supports.apply(self.now)
         if self.now.part == 1.0:
             self.configuration.accept(self.now)

@@ -45,16 +45,16 @@ class Table(Scattered):
                         f"{field}: table({self.name}, {listed}): '{column.label}' is component {other}: "
                         f"expected the columns in the order {order}"
                     )
+        self._check_units(field, self.chosen)
         where = f"{field}: table({self.name})"
         return np.column_stack([column.values(unit, where) for column in self.chosen])
 
     def _advice(self, field: str, components: Sequence[str]) -> str:
-        each = ", ".join(f"'{field} {c}'".replace(" '", "'") for c in components)
-        present = ", ".join(f"'{chr(ord('A') + k)}'" for k in range(len(components)))
-        return (
-            f"Expected columns with the names {each}, or table(path, {present}) with their present "
-            "names in this order"
-        )
+        each = ", ".join(repr(f"{field} {c}".strip()) for c in components)
+        present = ", ".join(repr(chr(ord("A") + k)) for k in range(len(components)))
+        if len(components) == 1:
+            return f"Expected a column {each}, or its present name, as table(path, {present})"
+        return f"Expected the columns {each}, or their present names in order, as table(path, {present})"
 
 
 def table(path: str | Path, *columns: str, outside: Outside = "stop") -> Table:

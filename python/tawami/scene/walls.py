@@ -60,7 +60,7 @@ class Contact:
     slip: npt.NDArray[np.int8]
 
 
-@dataclass
+@dataclass(repr=False)
 class Wall:
     """A wall along an edge of the grid.
 
@@ -83,7 +83,7 @@ class Wall:
     edge: Edge
     friction: float
     separates: bool
-    owner: Owner | None = field(default=None, repr=False)
+    owner: Owner | None = None
     functions: npt.NDArray[np.int64] = field(init=False)
     state: Contact = field(init=False)
     returns: npt.NDArray[np.int64] = field(init=False)
@@ -101,6 +101,9 @@ class Wall:
 
     def __str__(self) -> str:
         return f"wall(edge='{self.edge}') friction {self.friction:g}"
+
+    def __repr__(self) -> str:
+        return f"Wall({self})"
 
     def change(self, friction: float) -> None:
         """Replace the coefficient of friction from the next step on.

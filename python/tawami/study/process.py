@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import importlib
 import importlib.util
-import inspect
 import json
 import logging
 import os
@@ -26,6 +25,7 @@ import numpy as np
 from tawami.base import checks
 from tawami.base.errors import InputError, OutputError, TawamiError
 from tawami.base.files import reason
+from tawami.base.meaning import meaning
 from tawami.base.program import own_environment
 from tawami.base.timing import tally
 from tawami.fem.environment import peak_memory
@@ -81,12 +81,16 @@ def load(name: str) -> Run:
 
 
 def fingerprint(run: Run) -> str:
-    """Hash of what a measurement depends on besides its knobs: function, version, machine."""
-    try:
-        text = inspect.getsource(run)
-    except OSError:
-        text = name_of(run)
-    parts = (text, version("tawami"), platform.node(), platform.machine(), str(os.cpu_count()))
+    """Hash of what a measurement depends on besides its knobs: what the function computes (its code and
+    the values that it reads), version, machine.
+    """
+    parts = (
+        json.dumps(meaning(run), sort_keys=True),
+        version("tawami"),
+        platform.node(),
+        platform.machine(),
+        str(os.cpu_count()),
+    )
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from tawami.base import checks, csv_file
 from tawami.base.errors import InputError
-from tawami.base.files import readable_file
+from tawami.base.files import readable_file, reason
 from tawami.study.row import COSTS, NOISE, Change, Row, mean_ratio, value_text
 
 
@@ -200,8 +200,11 @@ class Table:
         path = readable_file("study", path, "the CSV file that Study.run() writes")
         try:
             content = csv_file.read(path)
-        except (OSError, ValueError):
-            content = csv_file.CsvFile([], [], [])
+        except (OSError, ValueError) as error:
+            raise InputError(
+                f"study '{path}' cannot be read ({reason(error)}): expected the CSV file that "
+                "Study.run() writes"
+            ) from None
         head = content.header
         lines = [dict(zip(head, row, strict=True)) for row in content.rows]
         complete = len(set(head)) == len(head) and {"series", "failure"} <= set(head)
