@@ -97,7 +97,8 @@ def tangents(cells: Sequence[int], pile_cells: Sequence[int]) -> Iterator[tuple[
 
 def last_tangent(newton: Any) -> tuple[Any, bool]:
     """The last factorised tangent, scaled, and its symmetry."""
-    return newton._solver._matrix.copy(), newton._solver.symmetric
+    matrix, symmetric = newton._solver._analysed
+    return matrix.copy(), symmetric
 
 
 def rows_of(scene: str, matrix: Any, symmetric: bool, repeat: int) -> Iterator[Row]:

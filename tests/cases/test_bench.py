@@ -7,6 +7,7 @@ import csv
 import pytest
 
 import tawami
+from cases.costs import ordering
 from cases.costs.bench import __main__ as bench
 from cases.costs.bench import compare
 
@@ -34,6 +35,16 @@ def test_a_checkout_against_itself(tmp_path, capsys):
             row = rows[scene, stage]
             ratio = float(row["new_ms"]) / float(row["old_ms"])
             assert float(row["ratio"]) == pytest.approx(ratio)
+
+
+def test_every_ordering_is_measured(tmp_path):
+    sizes = ["--cells", "2", "--pile-cells", "10", "--repeat", "1"]
+    ordering.main([*sizes, "--results", str(tmp_path)])
+    with (tmp_path / "ordering.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["ordering"] for row in rows] == 2 * list(ordering.ORDERINGS)
+    assert {row["method"] for row in rows[4:]} == {"LU"}
+    assert all(float(row["numeric_ms"]) > 0 for row in rows)
 
 
 def test_a_checkout_that_is_not_set_up(tmp_path):
