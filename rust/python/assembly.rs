@@ -15,7 +15,7 @@ use super::{require, view, InputError};
 use crate::assembly::{
     self, Bilinear, Cells, Kernel, Pattern, Selection, Slot, State, TabulateTensor,
 };
-use crate::grid::{Location, Rule};
+use crate::grid::{Grid, Location, Rule};
 use crate::space::{Index, NODES, NODES_1D, VERTICES};
 use crate::transfer::densities::Densities;
 
@@ -202,7 +202,8 @@ impl PyAssembler {
                 "the reduced matrix has more than 2147483647 entries: expected a coarser grid",
             ));
         };
-        Ok(PyPattern { location: Arc::clone(&self.location), selection, pattern })
+        let Location { grid, active, .. } = &*self.location;
+        Ok(PyPattern { grid: *grid, active: active.clone(), selection, pattern })
     }
 
     /// Fill the values of the reduced matrix in its pattern. `couplings` are kernels of rank 1; the products
@@ -220,7 +221,7 @@ impl PyAssembler {
         mut values: Write1<f64>,
     ) -> PyResult<()> {
         let values = values.as_slice_mut()?;
-        let mine = Arc::ptr_eq(&pattern.location, &self.location);
+        let mine = pattern.grid == self.location.grid && pattern.active == self.location.active;
         require(mine && values.len() == pattern.pattern.columns.len(), "another pattern")?;
         let mut sides = couplings.with(self, 1, &data)?.into_iter();
         let mut pairs = Vec::new();
@@ -244,7 +245,9 @@ impl PyAssembler {
 /// Compressed rows of the reduced matrix of one selection.
 #[pyclass(name = "Pattern", frozen, module = "tawami._rust")]
 pub(super) struct PyPattern {
-    location: Arc<Location>,
+    grid: Grid,
+    /// The active cells.
+    active: Vec<u32>,
     selection: Selection,
     pattern: Pattern,
 }

@@ -22,13 +22,14 @@ def test_ratios_are_medians_over_pairs():
 
 
 def test_a_checkout_against_itself(tmp_path, capsys):
-    options = ["--cells", "2", "--rounds", "1", "--pairs", "1", "--results", str(tmp_path)]
+    sizes = ["--cells", "2", "--particles", "800", "--rounds", "1", "--pairs", "1"]
+    options = [*sizes, "--old-kernels", "Prescott", "--results", str(tmp_path)]
     bench.main([*options, "--against", str(compare.ROOT)])
     printed = capsys.readouterr().out
     assert f"old: {compare.ROOT}" in printed
     with (tmp_path / "against.csv").open(newline="") as file:
         rows = {(row["scene"], row["stage"]): row for row in csv.DictReader(file)}
-    for scene in ("beam 2", "collapse"):
+    for scene in ("beam 2", "collapse 800"):
         for stage in ("residual calls", "tangent calls", "whole step"):
             row = rows[scene, stage]
             ratio = float(row["new_ms"]) / float(row["old_ms"])
@@ -37,7 +38,7 @@ def test_a_checkout_against_itself(tmp_path, capsys):
 
 def test_a_checkout_that_is_not_set_up(tmp_path):
     with pytest.raises(tawami.InputError, match="run make setup in it"):
-        next(compare.compare(tmp_path, [2], rounds=1, pairs=1, threads=1))
+        next(compare.compare(tmp_path, [2], [800], rounds=1, pairs=1, threads=1))
 
 
 def test_a_package_that_cannot_be_imported(tmp_path):
@@ -46,4 +47,4 @@ def test_a_package_that_cannot_be_imported(tmp_path):
     (package / "_rust.so").touch()
     (package / "__init__.py").write_text("raise ImportError('broken')")
     with pytest.raises(tawami.TawamiError, match="(?s)failed: .*ImportError: broken"):
-        next(compare.compare(tmp_path, [2], rounds=1, pairs=1, threads=1))
+        next(compare.compare(tmp_path, [2], [800], rounds=1, pairs=1, threads=1))

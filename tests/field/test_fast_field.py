@@ -18,7 +18,7 @@ from scipy.sparse import csr_matrix, identity
 import tawami
 from tawami import _rust
 from tawami.base.errors import InexactSumWarning
-from tawami.field.fast import _selection
+from tawami.field.matrix import as_arrays
 from tawami.form.form import Form
 
 SUPPORTS = {
@@ -224,9 +224,7 @@ def test_arrays_that_do_not_fit_raise_an_error(random_scene):
     owner, address, rank, width, slots, constants = field._kernel(
         field.attachment.compiled.tangent[0]
     )
-    pattern = field._assembler.pattern(
-        _selection(identity(len(c), format="csr"), np.arange(len(c)))
-    )
+    pattern = field._assembler.pattern(as_arrays(identity(len(c), format="csr"), np.arange(len(c))))
     wrong = (owner, address, rank, width + 1, slots, constants)
     with pytest.raises(RuntimeError, match="a kernel of other coefficients"):
         _rust.Kernels(field._assembler, 2, [wrong])
@@ -241,7 +239,7 @@ def test_arrays_that_do_not_fit_raise_an_error(random_scene):
     with pytest.raises(RuntimeError, match="another pattern"):
         field._assembler.matrix(kernels, none, data, volume, c, pattern, np.zeros(3))
     with pytest.raises(RuntimeError, match="not a selection of these coefficients"):
-        field._assembler.pattern(_selection(identity(3, format="csr"), np.arange(3)))
+        field._assembler.pattern(as_arrays(identity(3, format="csr"), np.arange(3)))
 
 
 def test_an_unknown_assembly_is_rejected(random_scene):

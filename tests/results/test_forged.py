@@ -90,6 +90,23 @@ def test_a_forged_checkpoint_is_rejected_with_an_error_message(tmp_path):
     assert resumed_from_all(block, tmp_path, 7, 79) > 10
 
 
+def test_forged_particles_are_no_initial_state(tmp_path):
+    x, number = np.zeros((2, 2)), np.array([[0.0], [1.0]])
+    arrays = {"x": x, "number": number, "volume": np.ones((2, 1))}
+    states = [{}, {"scene": 3}, {"scene": {"particles": [1]}}]
+    wrong = [
+        ("x", x[:1]), ("x", x + np.nan), ("x", x.astype(complex)), ("x", 3), ("volume", x[:, :1]),
+        ("number", 0 * number), ("number", number - 1), ("number", number + 0.5),
+    ]  # fmt: skip
+    states += [{"scene": {"particles": arrays | {name: value}}} for name, value in wrong]
+    for state in states:
+        archive.write(tmp_path / "a.npz", {}, state)
+        with pytest.raises(tawami.CheckpointError, match="cannot be used"):
+            tawami.earlier(tmp_path / "a.npz")
+    archive.write(tmp_path / "a.npz", {}, {"scene": {"particles": arrays}})
+    tawami.earlier(tmp_path / "a.npz")
+
+
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("scene", [block, small_strain])

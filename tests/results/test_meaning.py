@@ -166,6 +166,20 @@ def test_values_of_every_kind_are_compared(value, changed):
     assert not list(not_compared(one, same))
 
 
+def test_the_scene_in_a_function_is_not_compared_again():
+    """Its state changes in each step; its grid has a communicator."""
+    names = {"respond": lambda strain, stress: (stress, strain), "made": lambda _: 1.0}
+    made = scene(names, 0.0)
+    before = stored(lambda t: made.num_particles * made.grid.h * t)
+    made.particles.stress[:] = 1.0
+    after = stored(lambda t: made.num_particles * made.grid.h * t)
+    assert not [*differences(before, after), *not_compared(before, after)]
+    coarse = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.5, cells=(4, 4))
+    facts = [stored(lambda t, grid=grid: grid.h * t) for grid in (made.grid, coarse)]
+    assert list(differences(*facts))
+    assert not list(not_compared(*facts))
+
+
 def test_the_environment_and_loggers_make_no_difference(monkeypatch):
     log = logging.getLogger("tawami")
 

@@ -190,6 +190,21 @@ def test_a_change_that_fails_has_changed_nothing():
         weight.value = (0.0, 1.0)
 
 
+def test_functions_of_position_are_part_of_the_identity():
+    """So a run is not resumed with another profile; the same one in another object is the same."""
+
+    def identity(slope):
+        scene = beam()
+        scene.traction("right", (0.0, lambda x, y: slope * y), amplitude=lambda t: slope * t)
+        scene.fix("left", "x", lambda x, y: slope * y)
+        facts = scene.identity()
+        return facts["loads"], facts["supports"]
+
+    assert identity(1.0) == identity(1.0)
+    for one, other in zip(identity(1.0), identity(2.0), strict=True):
+        assert one != other
+
+
 def test_versions_tell_that_handles_have_changed():
     """What others keep for a set of loads or supports is valid while these numbers stay."""
     scene = block()

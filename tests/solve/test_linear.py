@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scenes import grid_of
@@ -11,6 +13,7 @@ from ufl import div, dot, grad, inner
 import tawami
 from cases.verification.cantilever import mpm
 from tawami.base.errors import InexactSumWarning
+from tawami.field import FastAssembly
 from tawami.form.form import Form
 from tawami.solve import direct
 from tawami.solve.scaling import Scaling
@@ -146,6 +149,42 @@ def test_the_analysis_serves_all_factorisations_of_one_matrix(monkeypatch):
     every_time = scenes[1].solve()
     assert len(analyses) == 1 + len(every_time.krylov)
     assert once.u.tobytes() == every_time.u.tobytes()
+
+
+def pile(steps):
+    """Particles after steps of a sliding pile, and each step's matrix and number of unknowns."""
+    grid = grid_of((8, 4), h=0.25)
+    body = tawami.box(grid, grid.origin, (grid.origin[0] + 1.0, grid.upper[1]), per_axis=2)
+    sand = tawami.drucker_prager(tawami.linear_elastic(E=1e5, nu=0.3), phi=30.0, c=10.0)
+    scene = tawami.Scene(grid, body, sand, form="u_epsv_finite", density=1e3)
+    scene.gravity((0.0, -9.81))
+    scene.fix("bottom", "y")
+    motion = tawami.Dynamics(scene, velocity=(1.0, 0.0))
+    matrices = []
+    for _ in range(steps):
+        assembly = scene.configuration.domain.assembly
+        motion.step(0.025)
+        matrices.append((assembly._matrix.summed(), assembly.reduction.size))
+    return scene.particles.rows(), matrices
+
+
+def test_pattern_and_analysis_are_kept_when_the_grid_is_reset(monkeypatch):
+    """As long as the unknowns are the same, and with the same bits as without."""
+    analyses = []
+    analyse = direct.DirectSolver._analyse_next
+
+    def counted(self, *arguments):
+        analyses.append(self)
+        analyse(self, *arguments)
+
+    monkeypatch.setattr(direct.DirectSolver, "_analyse_next", counted)
+    kept, matrices = pile(10)
+    changes = sum(a[1] != b[1] for a, b in pairwise(matrices))
+    assert 1 <= changes < 8  # the pile enters other cells, and not in every step
+    assert changes + 1 == len({id(matrix) for matrix, _ in matrices}) <= len(analyses) < 10
+    monkeypatch.setattr(FastAssembly, "follow", lambda self, earlier: None)
+    anew, _ = pile(10)
+    assert kept.tobytes() == anew.tobytes()
 
 
 def test_iterations_that_cost_more_than_a_factorisation_are_not_made():

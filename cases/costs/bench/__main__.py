@@ -4,7 +4,9 @@ By default it measures the cantilever for sizes, particles per cell, threads, ra
 Every setting runs in a process of its own. One run gives a table, a CSV file and ratios.
 
 With --against it compares this checkout with another one that has been set up, interleaved, and prints
-the ratio new/old of every stage of the cantilever's step and of a step of a collapse of 800 particles.
+the ratio new/old of the processor time of every stage, for steps of the cantilever and of collapsing
+piles.
+`--old-kernels Prescott` shows what OpenBLAS 0.3.21 does on a processor that it does not know.
 
 python -m cases.costs.bench
 python -m cases.costs.bench --cells 32,64 --against ../tawami-before
@@ -34,6 +36,8 @@ PROGRAM.option("--per-axis", type=WHOLE, default="2,4", help="particles per cell
 PROGRAM.option("--threads", type=WHOLE, default="1,2", help="threads; with --against the first")
 PROGRAM.option("--ranks", type=WHOLE, default="1,2,4", help="numbers of ranks")
 PROGRAM.option("--against", type=Path, metavar="CHECKOUT", help="compare with this checkout")
+PROGRAM.option("--particles", type=WHOLE, default="800,12800", help="with --against: of the piles")
+PROGRAM.option("--old-kernels", default="", metavar="CORE", help="OPENBLAS_CORETYPE of the other")
 PROGRAM.option("--rounds", type=int, default=5, help="with --against: how often processes start")
 PROGRAM.option("--pairs", type=int, default=20, help="with --against: pairs of steps in a round")
 
@@ -55,9 +59,15 @@ def against(options: argparse.Namespace) -> None:
         PROGRAM.error(f"--rounds {rounds} --pairs {pairs}: expected 1 or more")
     other = options.against.resolve()
     print(f"new: {ROOT}\nold: {other}", flush=True)
-    rows = list(compare.compare(other, options.cells, rounds=rounds, pairs=pairs, threads=threads))
+    rows = list(
+        compare.compare(
+            other, options.cells, options.particles, rounds=rounds, pairs=pairs, threads=threads,
+            kernels=options.old_kernels,
+        )
+    )  # fmt: skip
     print(
-        f"{rounds} x {pairs} pairs of steps, {threads} threads; low, high: quartiles of the ratio\n"
+        f"{rounds} x {pairs} pairs of steps (fewer of large scenes), {threads} threads; "
+        f"low, high: quartiles of the ratio; OpenBLAS of old: {options.old_kernels or 'as it is'}\n"
     )
     print(as_text(rows, compare.COLUMNS))
     PROGRAM.write("against.csv", as_csv(rows, compare.COLUMNS))

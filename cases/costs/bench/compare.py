@@ -28,7 +28,10 @@ from cases.costs.bench.setting import ROOT
 GROUPS = {
     "residual calls": ("law", "pack", "residual"),
     "tangent calls": ("pattern", "tangent", "reduction"),
+    "linear solver": ("scale", "factorise", "solve"),
 }
+#: Particles of a scene from which fewer pairs of steps are taken.
+LARGE = 4000
 #: Stages shorter than this are not reported, because the clock dominates them [s].
 SHORTEST = 5e-6
 
@@ -44,7 +47,7 @@ class Row:
     Attributes:
         scene: What was solved.
         stage: Stage of the step.
-        new_ms, old_ms: Milliseconds in a step, of this checkout and of the other.
+        new_ms, old_ms: Milliseconds of processor time in a step, of this checkout and of the other.
         ratio, low, high: New over old: median and quartiles.
     """
 
@@ -113,12 +116,14 @@ class Checkout:
 
 
 @contextmanager
-def started(path: Path, threads: int) -> Iterator[Checkout]:
-    """Start the process of a checkout; it ends with the block."""
+def started(path: Path, threads: int, kernels: str = "") -> Iterator[Checkout]:
+    """Start the process of a checkout, with kernels of OpenBLAS; it ends with the block."""
     environment = os.environ | {
         "PYTHONPATH": str(path / "python"),
         "RAYON_NUM_THREADS": str(threads),
     }
+    if kernels:
+        environment["OPENBLAS_CORETYPE"] = kernels
     command = [python_of(path), str(Path(__file__).with_name("timed.py"))]
     with (
         tempfile.TemporaryFile("w+") as errors,
@@ -131,25 +136,36 @@ def started(path: Path, threads: int) -> Iterator[Checkout]:
 
 
 def compare(
-    other: Path, cells: Sequence[int], *, rounds: int, pairs: int, threads: int
+    other: Path,
+    cells: Sequence[int],
+    particles: Sequence[int],
+    *,
+    rounds: int,
+    pairs: int,
+    threads: int,
+    kernels: str = "",
 ) -> Iterator[Row]:
     """Compare this checkout with another one.
 
     Args:
         other: Root of the other checkout.
         cells: Sizes of the beam, in cells over the height.
+        particles: Sizes of the pile, in particles.
         rounds: How often new processes start.
-        pairs: Pairs of steps of each scene in a round.
+        pairs: Pairs of steps of each scene in a round, fewer of a large one.
         threads: Threads of the Rust part.
+        kernels: Core type that the other checkout's OpenBLAS uses.
     """
     python_of(other)  # fails before anything is measured
-    scenes = [*(f"beam {n}" for n in cells), "collapse"]
+    sizes = {f"beam {n}": 8 * n**2 for n in cells} | {f"collapse {n}": n for n in particles}
+    scenes = {scene: max(1, pairs // max(1, size // LARGE)) for scene, size in sizes.items()}
     found: dict[str, list[tuple[Seconds, Seconds]]] = {scene: [] for scene in scenes}
     for _ in progress(range(rounds), desc="bench", unit="round"):
         with ExitStack() as stack:
-            new, old = (stack.enter_context(started(path, threads)) for path in (ROOT, other))
-            for scene in scenes:
-                found[scene] += [(new.step(scene), old.step(scene)) for _ in range(pairs)]
+            new = stack.enter_context(started(ROOT, threads))
+            old = stack.enter_context(started(other, threads, kernels))
+            for scene, number in scenes.items():
+                found[scene] += [(new.step(scene), old.step(scene)) for _ in range(number)]
     for scene, steps in found.items():
         yield from rows_of(scene, steps)
 

@@ -4,8 +4,8 @@
 `scene.stopwatch` only, so that it runs with older and newer packages. It repeats the two cases in short,
 because those in `cases/` belong to one version of the package.
 
-Reads requests, one per line: `beam N` for N cells over the height, or `collapse`. Answers each with one
-line of JSON: seconds by stage.
+Reads requests, one per line: `beam N` for N cells over the height, or `collapse N` for N particles.
+Answers each with one line of JSON: seconds of processor time by stage.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 import logging
 import sys
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -62,25 +62,33 @@ class Steps:
 
     def __init__(self) -> None:
         beam(2).solve()  # loads libraries and compiles the form
-        self.motion = pile()
-        for _ in range(WARM_UP):
-            self.motion.step(1e-3)
+        self.motions: dict[int, Any] = {}
 
     def beam(self, n: int) -> dict[str, float]:
         """Solve the beam: seconds of each stage and of the whole step."""
         scene = beam(n)
-        start = perf_counter()
+        start = process_time()
         scene.solve()
-        whole = perf_counter() - start
-        return dict(scene.stopwatch.seconds) | {"whole step": whole}
+        whole = process_time() - start
+        return dict(scene.stopwatch.cpu) | {"whole step": whole}
 
-    def collapse(self) -> dict[str, float]:
+    @staticmethod
+    def dt(particles: int) -> float:
+        """Size of a step [s], in proportion to that of the cells."""
+        return 1e-3 * float((800 / particles) ** 0.5)
+
+    def collapse(self, particles: int) -> dict[str, float]:
         """Take a step of the pile: seconds of each stage and of the whole step."""
-        watch = self.motion.scene.stopwatch
-        before, start = dict(watch.seconds), perf_counter()
-        self.motion.step(1e-3)
-        whole = perf_counter() - start
-        spent = {stage: s - before.get(stage, 0.0) for stage, s in watch.seconds.items()}
+        motion = self.motions.get(particles)
+        if motion is None:
+            motion = self.motions[particles] = pile(round((particles / 800) ** 0.5))
+            for _ in range(WARM_UP):
+                motion.step(self.dt(particles))
+        watch = motion.scene.stopwatch
+        before, start = dict(watch.cpu), process_time()
+        motion.step(self.dt(particles))
+        whole = process_time() - start
+        spent = {stage: s - before.get(stage, 0.0) for stage, s in watch.cpu.items()}
         return spent | {"whole step": whole}
 
 
@@ -90,8 +98,8 @@ def main() -> None:
     steps = Steps()
     print(json.dumps({"package": tawami.__file__}), flush=True)
     for line in sys.stdin:
-        scene, *number = line.split()
-        seconds = steps.beam(int(number[0])) if scene == "beam" else steps.collapse()
+        scene, number = line.split()
+        seconds = {"beam": steps.beam, "collapse": steps.collapse}[scene](int(number))
         print(json.dumps(seconds), flush=True)
 
 

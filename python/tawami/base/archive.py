@@ -104,6 +104,30 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     return identity, state
 
 
+def particles(path: Path) -> dict[str, Any]:
+    """Arrays of the particles in a checkpoint, by name, each particles x components.
+
+    Raises:
+        CheckpointError: As :func:`read`, or its content is not what tawami writes.
+    """
+    _, state = read(path)
+    try:
+        arrays: dict[str, Any] = state["scene"]["particles"]
+        check_particles(arrays)
+    except (LookupError, TypeError, ValueError) as error:
+        raise unusable(path, error) from error
+    return arrays
+
+
+def unusable(path: Path | None, error: Exception) -> CheckpointError:
+    """A checkpoint whose checksums are right and whose content is not."""
+    what = f"{error} is missing" if isinstance(error, KeyError) else reason(error)
+    return CheckpointError(
+        f"checkpoint '{path}' cannot be used ({what}): its content is not what tawami writes. Remove "
+        "it to resume from the one before it, or start anew with existing='replace'"
+    )
+
+
 def check_particles(arrays: Any) -> None:
     """Check the arrays of the particles in a state, each particles x components.
 

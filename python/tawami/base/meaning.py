@@ -123,9 +123,14 @@ def _of_object(value: Any, inside: tuple[int, ...]) -> Any:
     if isinstance(value, logging.Logger):
         return repr(value.name)
     facts: dict[str, Any] = {"type": f"{kind.__module__}.{kind.__qualname__}"}
+    package = kind.__module__.partition(".")[0]
+    if package == "mpi4py" or (package == "tawami" and hasattr(kind, "state")):
+        return facts  # the scene itself, whose facts are compared as those of the run
+    if package == "tawami" and hasattr(kind, "identity"):
+        return facts | {"identity": meaning(value.identity(), inside)}
     slots = [name for one in kind.__mro__ for name in _slots(one) if hasattr(value, name)]
-    of_python = kind.__module__.partition(".")[0] in sys.stdlib_module_names
-    if (hasattr(value, "__dict__") or slots) and not (of_python and kind.__module__ != "__main__"):
+    of_python = package in sys.stdlib_module_names and package != "__main__"
+    if (hasattr(value, "__dict__") or slots) and not of_python:
         own = {name: getattr(value, name) for name in slots} | getattr(value, "__dict__", {})
         facts |= {name: meaning(item, inside) for name, item in own.items()}
         if not _installed(kind):

@@ -56,6 +56,14 @@ class Assembly(Protocol):
         The next call overwrites it. It is the same object as long as the unknowns are the same.
         """
 
+    def follow(self, earlier: Assembly) -> None:
+        """Use what an earlier assembly made for its matrix, if the cells and unknowns are the same.
+
+        Args:
+            earlier: An assembly of the same form on the same grid. Its tangents are no longer valid
+                after the next tangent of this one.
+        """
+
     def unreduced_tangent(self, coefficients: Array, data: Mapping[Rule, Array]) -> sp.csr_matrix:
         """E^T K E, the tangent of :meth:`residual`, complete on every rank.
 

@@ -44,7 +44,8 @@ class Layout:
     def __init__(self, grid: Grid, basis: Basis, space: FunctionSpace, active: Mask) -> None:
         self.grid, self.basis, self._space = grid, basis, space
         self._bilinear = space.dofs.shape[1] > dolfinx.DISPLACEMENT_DOFS
-        self._of_cells = _rust.Active(grid.rust, np.flatnonzero(active).astype(np.uint32))
+        self._cells = np.flatnonzero(active).astype(np.uint32)
+        self._of_cells = _rust.Active(grid.rust, self._cells)
         self.num_parts, part = self._of_cells.parts(basis)
         self.part = np.repeat(part, grid.space.dim)
         self.num_displacement = len(self.part)
@@ -52,6 +53,13 @@ class Layout:
         self.owner = self._of_all(lambda b: self._of_cells.spread(b, grid.rank_of_cell))
         self.size = len(self.active)
         self.tied: Indices = np.empty((0, 2), dtype=np.int64)
+
+    def same_cells(self, other: Layout) -> bool:
+        """Whether another layout has the same functions and active cells."""
+        if self is other:
+            return True
+        same = self.grid is other.grid and self.basis == other.basis and self.size == other.size
+        return same and np.array_equal(self._cells, other._cells)
 
     def tie(self, sums: Array, least: float) -> None:
         """Tie weak displacement functions to their strongest neighbours.

@@ -230,7 +230,7 @@ class Reduction:
 
     def same_unknowns(self, other: Reduction | None) -> bool:
         """Whether another reduction has the same unknowns and S, so that matrices are alike."""
-        if other is None or other.layout is not self.layout or other.size != self.size:
+        if other is None or other.size != self.size or not self.layout.same_cells(other.layout):
             return False
         if self._places is not None and other._places is not None:
             return np.array_equal(self._number_of, other._number_of)

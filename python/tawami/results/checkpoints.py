@@ -14,7 +14,7 @@ from typing import Any
 
 from tawami.base import archive, checks
 from tawami.base.errors import CheckpointError, CheckpointWarning, OutputError, TawamiError
-from tawami.base.files import reason, writing
+from tawami.base.files import writing
 from tawami.base.identity import differences, not_compared
 from tawami.base.ranks import raise_together
 from tawami.motion.observer import Subject
@@ -129,7 +129,7 @@ class Checkpoints:
         except TawamiError:
             raise
         except Exception as error:
-            raise _unusable(self._source, error) from error
+            raise archive.unusable(self._source, error) from error
 
     def _read(self, path: Path, like: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
         """The state of a checkpoint of this run, and what cannot be compared to tell that it is."""
@@ -145,7 +145,7 @@ class Checkpoints:
             check_pace(state["pace"], state["steps"])
             archive.check_like(state["outputs"], {name: {} for name in state["outputs"]}, "outputs")
         except (AttributeError, LookupError, TypeError, ValueError) as error:
-            raise _unusable(path, error) from error
+            raise archive.unusable(path, error) from error
         return state, list(dict.fromkeys(not_compared(written, self._identity)))
 
     def restart(self, steps: int) -> None:
@@ -194,8 +194,8 @@ class Checkpoints:
             self._since = monotonic()
             last = self.last()
             kept = "there is none yet" if last is None else f"the last one is '{last}'"
-            goes_on = "" if ends else ". The run continues"
-            self._warn(f"no checkpoint: {error}; {kept}{goes_on}")
+            continues = "" if ends else ". The run continues"
+            self._warn(f"no checkpoint: {error}; {kept}{continues}")
 
     def last(self) -> Path | None:
         """The newest checkpoint of this phase in the folder; a call for all ranks."""
@@ -216,15 +216,6 @@ class Checkpoints:
         with raise_together(self._comm):
             if self._comm.rank == 0:
                 warnings.warn(text, CheckpointWarning, stacklevel=3)
-
-
-def _unusable(path: Path | None, error: Exception) -> CheckpointError:
-    """A checkpoint whose checksums are right and whose content is not."""
-    what = f"{error} is missing" if isinstance(error, KeyError) else reason(error)
-    return CheckpointError(
-        f"checkpoint '{path}' cannot be used ({what}): its content is not what tawami writes. Remove "
-        "it to resume from the one before it, or start anew with existing='replace'"
-    )
 
 
 def _short(value: Any) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import shlex
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -75,6 +76,14 @@ class RunFolder:
                 f"{self._what}: another tawami.Results of this script has opened the folder since: "
                 "expected one for all phases of a run, or a folder for each"
             )
+
+    @property
+    def advice(self) -> str:
+        """How the run in the folder is resumed, after a look into it."""
+        again = "run its script again, with existing='resume'"
+        if self._record().get("script") and os.path.isfile(self.path / SCRIPT):
+            again = f"resume it with: tawami resume {shlex.quote(str(self.path))}"
+        return again if self.checkpoints else f"it has no checkpoint; {again}"
 
     def _prepare(self) -> bool:
         """See :meth:`open`."""

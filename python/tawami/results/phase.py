@@ -242,7 +242,6 @@ class Phase:
         text = f"{self.name}: stopped by {self._interruption.signal.name} at {self._at}"
         log.warning(text)
         if self._writes:
-            advice = f"resume it with: tawami resume {self._folder.path}"
             with suppress(OSError, ValueError):  # the terminal was closed
-                print(f"{text}; {advice}", file=self._progress.line.stream, flush=True)
+                print(f"{text}; {self._folder.advice}", file=self._progress.line.stream, flush=True)
         self._interruption.end()

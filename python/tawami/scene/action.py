@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
 from tawami.base.errors import CheckpointError, InputError
+from tawami.base.identity import text
 from tawami.grid.edges import Profile
 from tawami.scene.activity import Activity
 from tawami.scene.course import Course, InTime
@@ -181,7 +182,11 @@ class Action:
     def identity(self) -> list[Any]:
         """What decides the results of a run, as JSON holds it."""
         return [
-            [*map(plain, term.values), *term.course.identity(), term.share.target]
+            [
+                *(text(value) if callable(value) else float(value) for value in term.values),
+                *term.course.identity(),
+                term.share.target,
+            ]
             for term in self.terms
         ]
 
@@ -192,8 +197,8 @@ class Action:
                 "number": term.number,
                 "since": term.since,
                 "share": term.share.state(),
-                "values": [*map(plain, term.values)],
-                "course": term.course.plain,
+                "values": [[] if callable(value) else [float(value)] for value in term.values],
+                "course": term.course.constant,
             }
             for term in self.terms
         ]
@@ -213,25 +218,20 @@ class Action:
         for stored in state["terms"]:
             number, since, values = stored["number"], stored["since"], stored["values"]
             course = courses.get(since)
-            if course is None and not isinstance(stored["course"], str):
-                course = Course(name, stored["course"])
+            if course is None and stored["course"]:
+                course = Course(name, *stored["course"])
             term = known.get(number)
-            if course is None or (term is None and any(isinstance(v, str) for v in values)):
+            if course is None or (term is None and not all(values)):
                 raise CheckpointError(
                     f"{name} was changed to a function or another velocity while the run went (each=): "
                     "expected such changes between two phases, or an amplitude"
                 )
-            term = term or Term(number, tuple(values), course, since)
+            term = term or Term(number, tuple(value for (value,) in values), course, since)
             term.share.restore(stored["share"])
             self.terms.append(term)
         if not self.terms:
             raise CheckpointError(f"{name} has no value in the checkpoint: expected one")
         self._made, self.released = state["made"], state["released"]
-
-
-def plain(value: Profile) -> float | str:
-    """A number, or the word for a function."""
-    return "a function" if callable(value) else float(value)
 
 
 def restored(what: str, actions: Sequence[Acts], stored: Sequence[Mapping[str, Any]]) -> list[Acts]:

@@ -95,7 +95,10 @@ class Configuration:
         self._small_strain, self._softens = not model.moves, False
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
-        self.domain = Domain.attach(self.model, particles, location, self.numerics, self.stopwatch)
+        earlier: Domain | None = getattr(self, "domain", None)
+        self.domain = Domain.attach(
+            self.model, particles, location, self.numerics, self.stopwatch, earlier
+        )
 
     @property
     def before(self) -> Array:
@@ -159,6 +162,8 @@ class Configuration:
         try:
             with leave_together():  # laws and other functions of the driver script are called here
                 accepted = self._solve(kind)
+            if not self.model.moves:
+                strain_limit.check_digits(self.domain, accepted.step, self.numerics.tolerance)
             moved = self._moved(accepted, kind.end)
             self._warn_of_strain(accepted)
             update = kind.accept(accepted)

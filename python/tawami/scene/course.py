@@ -91,9 +91,9 @@ class Course:
         return self.factor(end) - self.factor(start)
 
     @property
-    def plain(self) -> float | str:
-        """A constant amplitude; a word for a function or a velocity."""
-        return "a function" if self.moves else float(self._value(0.0))
+    def constant(self) -> list[float]:
+        """A constant amplitude, for checkpoints; nothing for a function or a velocity."""
+        return [] if self.moves else [self._value(0.0)]
 
     def identity(self) -> list[Any]:
         """What decides the results of a run, as JSON holds it."""

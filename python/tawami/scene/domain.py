@@ -68,8 +68,13 @@ class Domain:
         location: _rust.Location,
         numerics: Numerics,
         stopwatch: Stopwatch,
+        earlier: Domain | None = None,
     ) -> Domain:
-        """Attach the form and the laws to particles at their present location."""
+        """Attach the form and the laws to particles at their present location.
+
+        Args:
+            earlier: The domain of the same scene before its particles moved.
+        """
         with stopwatch("set-up"):
             attachment = Attachment(
                 model.grid, model.compiled, model.basis, location, particles.volume, model.values,
@@ -96,6 +101,9 @@ class Domain:
         stage = _stage(model, particles, location, model.form.kinematics)
         responses = responses_of(stage)
         newton = Newton(assembly, responses, numerics, stopwatch, elastic)
+        if earlier is not None:
+            assembly.follow(earlier.assembly)
+            newton.follow(earlier.newton)
         return cls(
             model, particles, location, assembly, Tractions(attachment), stage, responses, newton
         )

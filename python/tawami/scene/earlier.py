@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -110,8 +110,7 @@ def earlier(path: str | Path, *, outside: Outside = "stop") -> Earlier:
 
 def _checkpoint(file: Path) -> tuple[Any, dict[str, Any]]:
     """Positions and arrays of a checkpoint, the tensors with the names of their components."""
-    _, state = archive.read(file)
-    arrays: Mapping[str, Any] = state["scene"]["particles"]
+    arrays = archive.particles(file)
     labels = {"stress": f"stress {' '.join(PLANE.tensor)}"}
     return arrays["x"], {labels.get(k, k): values for k, values in arrays.items() if k != "x"}
 

@@ -82,6 +82,12 @@ class DirectSolver(LinearSolver):
         self._matrix, self._factorised = None, None
         self._rescale(matrix, scale)
 
+    def successor(self) -> LinearSolver:
+        """This solver without its factorisation. The analysis serves as long as the matrix is used."""
+        self._matrix, self._factorised, self._records = None, None, False
+        self.condition, self.symmetric, self.iterations = 1.0, True, 0
+        return self
+
     def record(self) -> None:
         """Copy each matrix that is factorised from now on, for :meth:`state`.
 

@@ -16,8 +16,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
+from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import SingularError
 from tawami.base.timing import Stopwatch
@@ -97,7 +99,8 @@ class IterativeSolver(LinearSolver):
         ksp.setGMRESRestart(RESTART)
         pc = self._handles["pc"] = ksp.getPC()
         rigid = blocks.rigid / self._scale[blocks.displacement, None]
-        if blocks.displacement.all():
+        # a rank may be without unknowns
+        if matrix.comm.tompi4py().allreduce(bool(blocks.displacement.all()), op=MPI.LAND):
             matrix.setNearNullSpace(self._near_null_space(rigid, matrix.comm))
             pc.setType("gamg")
             return
@@ -120,7 +123,7 @@ class IterativeSolver(LinearSolver):
             solver.destroy()
 
     def _near_null_space(self, rigid: Array, comm: Any) -> Any:
-        basis, _ = np.linalg.qr(rigid)
+        basis = _orthonormal(comm.tompi4py(), rigid)
         vectors = [PETSc.Vec().createWithArray(np.ascontiguousarray(c), comm=comm) for c in basis.T]
         space = self._handles["near null space"] = PETSc.NullSpace().create(
             vectors=vectors, comm=comm
@@ -128,3 +131,12 @@ class IterativeSolver(LinearSolver):
         for vector in vectors:
             vector.destroy()
         return space
+
+
+def _orthonormal(comm: Any, rows: Array) -> Array:
+    """Orthonormal basis of the columns that the rows of all ranks form; the rows of this rank."""
+    mine, factor = np.linalg.qr(rows)
+    others = comm.allgather(len(factor))
+    joint, _ = np.linalg.qr(ranks.allgathered(comm, factor))
+    start = sum(others[: comm.rank])
+    return np.asarray(mine @ joint[start : start + len(factor)])

@@ -57,6 +57,10 @@ class LinearSolver:
         """Free all that was made for a tangent; the next solve makes it anew."""
         self._handles.free()
 
+    def successor(self) -> LinearSolver | None:
+        """The solver of the same scene in other cells; None if nothing can be kept for it."""
+        return None
+
     def record(self) -> None:
         """Record from now on what :meth:`state` gives, independently of earlier solves."""
 

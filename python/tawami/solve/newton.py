@@ -103,6 +103,10 @@ class Newton:
             self._solver = DirectSolver(self._comm, stopwatch, always=always)
         self._stored: Mapping[str, Any] | None = None
 
+    def follow(self, earlier: Newton) -> None:
+        """Keep what the solver of an earlier problem has made that does not depend on its values."""
+        self._solver = earlier._solver.successor() or self._solver
+
     # -- checkpoints -------------------------------------------------------------
 
     def record(self) -> None:
