@@ -17,6 +17,7 @@ from __future__ import annotations
 import argparse
 import csv
 import io
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -24,7 +25,7 @@ from typing import Any
 
 from cases.common.program import Program, numbers
 from cases.common.table import as_csv, as_text
-from cases.costs.bench import compare, report
+from cases.costs.bench import compare, overheads, report
 from cases.costs.bench.measure import empty_cells
 from cases.costs.bench.setting import ROOT, in_own_process, settings
 
@@ -70,6 +71,8 @@ def against(options: argparse.Namespace) -> None:
     )
     print(as_text(rows, compare.COLUMNS))
     PROGRAM.write("against.csv", as_csv(rows, compare.COLUMNS))
+    checkouts = [(compare.python_of(path), path) for path in (ROOT, other)]
+    print("\n".join(overheads.lines(overheads.in_turns(checkouts, rounds))))
 
 
 def survey(
@@ -87,6 +90,8 @@ def survey(
     writer.writerows(rows)
     PROGRAM.write("bench.csv", file.getvalue())
     report.print_ratios(rows)
+    found = overheads.in_turns([(sys.executable, ROOT)], 3)
+    print("\n".join(overheads.lines(found)))
     for assembly in ("reference", "fast"):
         empty_cells(max(max(cells) // 4, 8), assembly)
 

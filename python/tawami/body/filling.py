@@ -137,13 +137,15 @@ class Filling:
         order = np.argsort(key, kind="stable")
         starts = np.flatnonzero(np.diff(key[order], prepend=-1))
         least = ROUND_OFF * min(1.0, full + float(points.weight.sum()))
-        parts = [points[order[:0]]]
-        for group in np.split(order, starts)[1:]:
-            x, weight = points.x[group], points.weight[group]
+        parts = [points[:0]]
+        ends = np.append(starts, len(order))[1:]
+        points = points[order]
+        for begin, end in zip(starts, ends, strict=True):
+            x, weight = points.x[begin:end], points.weight[begin:end]
             if weight.sum() <= least:
                 continue
             inside = np.ones(len(x), dtype=bool) if allowed is None else allowed(x)
             x, weight = fewer(x, weight, inside)
-            first = np.full(len(x), group[0])
+            first = np.full(len(x), begin)
             parts.append(Points(x, weight, points.cell[first], points.material[first]))
         return joined(parts)

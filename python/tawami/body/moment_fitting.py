@@ -64,14 +64,14 @@ def _of_some(x: Array, weight: Array) -> tuple[Array, Array]:
     """
     area, (along_x, along_y) = weight.sum(), _powers(x)
     i, j = EXPONENTS.T
-    sums = ((weight[:, None] * along_x).T @ along_y)[i, j]
+    sums = ((weight * along_x) @ along_y.T)[i, j]
     so_far = np.cumsum(weight)
     for number in (SOME, 4 * SOME, len(x)):
         # points at equal shares of the area lie all over the cell
         shares = (np.arange(number) + 0.5) / number * so_far[-1]
         some = np.unique(np.searchsorted(so_far, shares)) if number < len(x) else slice(None)
         root = np.sqrt(weight[some])
-        q, r = np.linalg.qr(root[:, None] * (along_x[some][:, i] * along_y[some][:, j]))
+        q, r = np.linalg.qr((root * along_x[:, some][i] * along_y[:, some][j]).T)
         moments = np.linalg.solve(r.T, sums)
         fitted = _fitted if number == len(x) else _least_squares
         found, error = fitted((q / root[:, None]).T, moments, weight[some])
@@ -83,15 +83,24 @@ def _of_some(x: Array, weight: Array) -> tuple[Array, Array]:
 
 def _monomials(x: Array) -> Array:
     """Monomials at points whose bounding box is scaled to [-1, 1], points x MOST."""
-    factors = (powers[:, e] for powers, e in zip(_powers(x), EXPONENTS.T, strict=True))
+    powers = _scaled(x.T).T[:, :, None] ** np.arange(DEGREE + 1)
+    factors = (powers[:, axis, e] for axis, e in enumerate(EXPONENTS.T))
     return np.ascontiguousarray(reduce(np.multiply, factors))
 
 
-def _powers(x: Array) -> list[Array]:
-    """Powers up to the degree of each coordinate, scaled to [-1, 1]: points x (DEGREE + 1) per axis."""
-    low, high = x.min(axis=0), x.max(axis=0)
-    t = (2 * x - low - high) / np.maximum(high - low, np.finfo(float).tiny)
-    return [np.vander(along, DEGREE + 1, increasing=True) for along in t.T]
+def _powers(x: Array) -> Array:
+    """Powers up to the degree of each scaled coordinate, axes x (DEGREE + 1) x points."""
+    t = _scaled(np.ascontiguousarray(x.T))
+    powers = np.ones((len(t), DEGREE + 1, len(x)))
+    for e in range(DEGREE):
+        np.multiply(powers[:, e], t, out=powers[:, e + 1])
+    return powers
+
+
+def _scaled(x: Array) -> Array:
+    """Points, axes x points, whose bounding box is scaled to [-1, 1]."""
+    low, high = x.min(axis=1, keepdims=True), x.max(axis=1, keepdims=True)
+    return np.asarray((2 * x - low - high) / np.maximum(high - low, np.finfo(float).tiny))
 
 
 def _least_squares(functions: Array, moments: Array, weight: Array) -> tuple[Array, float]:

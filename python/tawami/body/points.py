@@ -38,7 +38,7 @@ class Points:
     cell: Indices
     material: Indices
 
-    def __getitem__(self, chosen: Mask | Indices) -> Points:
+    def __getitem__(self, chosen: Mask | Indices | slice) -> Points:
         """Some of the points."""
         return Points(self.x[chosen], self.weight[chosen], self.cell[chosen], self.material[chosen])
 
