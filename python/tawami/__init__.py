@@ -41,6 +41,7 @@ from tawami.motion.path import follow
 from tawami.motion.stepping import ramp, settle
 from tawami.particles.laws import (
     drucker_prager,
+    law,
     linear_elastic,
     mohr_coulomb,
     neo_hookean,
@@ -100,6 +101,7 @@ __all__ = [
     "drucker_prager",
     "earlier",
     "follow",
+    "law",
     "level_set",
     "linear_elastic",
     "mesh",
