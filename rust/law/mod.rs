@@ -30,6 +30,9 @@ laws! {
     mohr_coulomb::MohrCoulomb,
 }
 
+/// A law, shared by the particles that have it.
+pub type Shared = Arc<dyn Law>;
+
 /// How a driver script makes a law.
 pub struct Maker {
     /// Name of the law in driver scripts.
@@ -37,7 +40,7 @@ pub struct Maker {
     /// Its parameters besides the elastic ones.
     pub parameters: &'static [Parameter],
     /// The law of its elastic part and the values of its parameters, in their order.
-    pub make: fn(LinearElastic, &[f64]) -> Result<Arc<dyn Law>>,
+    pub make: fn(LinearElastic, &[f64]) -> Result<Shared>,
 }
 
 /// A parameter of a law.
