@@ -37,6 +37,7 @@ from tawami.check.form_check import FormReport, check_form
 from tawami.form.form import Form
 from tawami.grid.grid import Grid
 from tawami.motion.dynamics import Dynamics
+from tawami.motion.modes import Modes, modes
 from tawami.motion.path import follow
 from tawami.motion.stepping import ramp, settle
 from tawami.particles.laws import (
@@ -76,6 +77,7 @@ __all__ = [
     "LockingWarning",
     "Material",
     "MissingDependencyError",
+    "Modes",
     "NotModelledError",
     "NumpyLaw",
     "OutputError",
@@ -105,6 +107,7 @@ __all__ = [
     "level_set",
     "linear_elastic",
     "mesh",
+    "modes",
     "mohr_coulomb",
     "neo_hookean",
     "polygon",
