@@ -114,15 +114,18 @@ $(STAMPS)/debian: $(STAMPS)/rust Makefile
 	@touch $@
 
 # The system's Python, because dolfinx lives in its dist-packages; NumPy and SciPy must stay the
-# ones that dolfinx was built with.
+# ones that dolfinx was built with, also when a user installs other packages into .venv.
 .venv/constraints.txt: $(STAMPS)/debian
 	/usr/bin/python3 -m venv --system-site-packages .venv
 	$(PYTHON) -c "import numpy, scipy; print(f'numpy=={numpy.__version__}\nscipy=={scipy.__version__}')" > $@.part
 	mv $@.part $@
 
-PIP = $(PYTHON) -m pip install --quiet --disable-pip-version-check --constraint .venv/constraints.txt
+.venv/pip.conf: .venv/constraints.txt
+	printf '[install]\nconstraint = %s\n' '$(CURDIR)/.venv/constraints.txt' > $@
 
-$(STAMPS)/python: .venv/constraints.txt pyproject.toml
+PIP = $(PYTHON) -m pip install --quiet --disable-pip-version-check
+
+$(STAMPS)/python: .venv/pip.conf pyproject.toml
 	$(PIP) 'maturin>=1.12.1,<2' 'filelock>=4.3' 'meshio>=5.3' 'shapely>=2.1' 'matplotlib>=3.7' 'tqdm>=4.60' 'hypothesis>=6.80' 'mypy>=1.10' 'pytest>=7.4' 'pytest-xdist>=3.7'
 	@mkdir -p $(STAMPS) && touch $@
 

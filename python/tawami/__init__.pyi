@@ -38,10 +38,12 @@ from tawami.check.form_check import FormReport, check_form
 from tawami.form.form import Form
 from tawami.grid.grid import Grid
 from tawami.motion.dynamics import Dynamics
+from tawami.motion.modes import Modes, modes
 from tawami.motion.path import follow
 from tawami.motion.stepping import ramp, settle
 from tawami.particles.laws import (
     drucker_prager,
+    law,
     linear_elastic,
     mohr_coulomb,
     neo_hookean,
@@ -77,6 +79,7 @@ __all__ = [
     "LockingWarning",
     "Material",
     "MissingDependencyError",
+    "Modes",
     "NotModelledError",
     "NumpyLaw",
     "OutputError",
@@ -103,9 +106,11 @@ __all__ = [
     "drucker_prager",
     "earlier",
     "follow",
+    "law",
     "level_set",
     "linear_elastic",
     "mesh",
+    "modes",
     "mohr_coulomb",
     "neo_hookean",
     "polygon",

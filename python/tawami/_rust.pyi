@@ -29,6 +29,7 @@ __all__ = [
     "gradients",
     "interpolate",
     "nodal_sums",
+    "parameters",
 ]
 
 _Floats = npt.NDArray[np.float64]
@@ -115,29 +116,7 @@ class Material:
     @staticmethod
     def linear_elastic_e_one_minus_2nu(e: float, one_minus_2nu: float) -> Material: ...
     @staticmethod
-    def linear_elastic_k_mu(k: float, mu: float) -> Material: ...
-    @staticmethod
-    def von_mises(k: float, mu: float, yield_stress: float, hardening: float) -> Material: ...
-    @staticmethod
-    def drucker_prager(
-        elastic: tuple[float, float],
-        phi: float,
-        c: float,
-        psi: float,
-        eps_v_max: float,
-        tiny: bool,
-    ) -> Material: ...
-    @staticmethod
-    def mohr_coulomb(
-        elastic: tuple[float, float],
-        phi: float,
-        c: float,
-        psi: float,
-        eps_v_max: float,
-        tiny: bool,
-    ) -> Material: ...
-    @staticmethod
-    def neo_hookean(k: float, mu: float) -> Material: ...
+    def of(name: str, elastic: tuple[float, float], parameters: Sequence[float]) -> Material: ...
     @property
     def name(self) -> str: ...
     @property
@@ -230,6 +209,7 @@ class Stage:
     def strains(self, u: _Floats, volumetric: _Floats | None) -> _Floats: ...
     def volume_strains(self, u: _Floats, volumetric: _Floats | None) -> _Floats: ...
 
+def parameters() -> dict[str, dict[str, float | None]]: ...
 def interpolate(
     location: Location, basis: str, components: int, coefficients: _Floats
 ) -> _Floats: ...

@@ -13,10 +13,18 @@
 //! At a given mean stress the return has K = 0 here, and the plastic volumetric strain is `Ab d_gamma`.
 //! Dilatancy ends at a plastic volumetric strain of `eps_v_max`; A and B stay those of psi.
 
-use super::{Elastic, Friction, Law, LinearElastic, ROUND_OFF, SOFT};
+use std::sync::Arc;
+
+use super::{Elastic, Friction, Law, LinearElastic, Maker, ROUND_OFF, SOFT};
 use crate::error::Result;
 use crate::space::COMPONENTS;
 use crate::tensor::{deviatoric_stiffness, norm, AtMean, Moduli, Strain, Stress, Sym, Tangent};
+
+pub(super) const MAKER: Maker = Maker {
+    name: "drucker_prager",
+    parameters: Friction::PARAMETERS,
+    make: |elastic, given| Ok(Arc::new(DruckerPrager::new(elastic, Friction::of(given))?)),
+};
 
 /// Drucker-Prager plasticity.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,7 +106,7 @@ impl Elastic for DruckerPrager {
 
 impl Law for DruckerPrager {
     fn name(&self) -> &'static str {
-        "drucker_prager"
+        MAKER.name
     }
 
     fn pressure_dependent(&self) -> bool {

@@ -1,5 +1,6 @@
 //! Parameters of frictional laws: angles and cohesion.
 
+use super::Parameter;
 use crate::error::{Error, Result};
 
 /// A friction angle below this is rejected, since it was probably given in radians.
@@ -21,6 +22,21 @@ pub struct Friction {
 }
 
 impl Friction {
+    /// The parameters of frictional laws.
+    pub(super) const PARAMETERS: &'static [Parameter] = &[
+        Parameter::Required("phi"),
+        Parameter::Optional("c", 0.0),
+        Parameter::Optional("psi", 0.0),
+        Parameter::Optional("eps_v_max", f64::INFINITY),
+        Parameter::Switch("tiny_angle"),
+    ];
+
+    /// From values in the order of [`Self::PARAMETERS`].
+    pub(super) fn of(given: &[f64]) -> Self {
+        let [phi, c, psi, eps_v_max, tiny] = std::array::from_fn(|i| given[i]);
+        Self { phi, c, psi, eps_v_max, tiny: tiny > 0.0 }
+    }
+
     /// Check that every parameter is in its range.
     ///
     /// # Errors

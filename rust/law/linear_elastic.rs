@@ -1,9 +1,17 @@
 //! Isotropic linear elasticity: `s += 2 mu dev(d_eps)`, `sigma_m += K d_eps_v`.
 
-use super::{Elastic, Law};
+use std::sync::Arc;
+
+use super::{Elastic, Law, Maker};
 use crate::error::{Error, Result};
 use crate::space::COMPONENTS;
 use crate::tensor::{deviatoric_stiffness, Moduli, Strain, Stress};
+
+pub(super) const MAKER: Maker = Maker {
+    name: "linear_elastic",
+    parameters: &[],
+    make: |elastic, _| Ok(Arc::new(elastic)),
+};
 
 /// Isotropic linear elasticity with shear modulus mu and bulk modulus K.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,7 +92,7 @@ impl Elastic for LinearElastic {
 
 impl Law for LinearElastic {
     fn name(&self) -> &'static str {
-        "linear_elastic"
+        MAKER.name
     }
 
     fn respond(

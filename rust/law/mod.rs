@@ -1,23 +1,57 @@
-//! Material laws. One law is one file here, and one `impl` of [`Elastic`] and [`Law`].
+//! Material laws. One law is one file here: its [`Maker`] and one `impl` of [`Elastic`] and [`Law`].
 //!
 //! A law is a pure function: strain increment, old stress and history in; new stress, history and
 //! consistent tangent out. It is three-dimensional, and its parameters are checked when it is made.
 
-mod drucker_prager;
-mod friction;
-mod linear_elastic;
-mod mohr_coulomb;
-mod neo_hookean;
-mod von_mises;
+use std::sync::Arc;
 
-pub use drucker_prager::DruckerPrager;
-pub use friction::Friction;
-pub use linear_elastic::LinearElastic;
-pub use mohr_coulomb::MohrCoulomb;
-pub use neo_hookean::NeoHookean;
-pub use von_mises::VonMises;
-
+use crate::error::Result;
 use crate::tensor::{deviatoric_stiffness, AtMean, Moduli, Strain, Stress, Sym};
+
+mod friction;
+
+pub use friction::Friction;
+
+/// The modules of the laws, and the list of their makers.
+macro_rules! laws {
+    ($($file:ident::$law:ident,)*) => {
+        $(mod $file; pub use $file::$law;)*
+
+        /// All laws.
+        pub const LAWS: &[Maker] = &[$($file::MAKER),*];
+    };
+}
+
+laws! {
+    linear_elastic::LinearElastic,
+    neo_hookean::NeoHookean,
+    von_mises::VonMises,
+    drucker_prager::DruckerPrager,
+    mohr_coulomb::MohrCoulomb,
+}
+
+/// A law, shared by the particles that have it.
+pub type Shared = Arc<dyn Law>;
+
+/// How a driver script makes a law.
+pub struct Maker {
+    /// Name of the law in driver scripts.
+    pub name: &'static str,
+    /// Its parameters besides the elastic ones.
+    pub parameters: &'static [Parameter],
+    /// The law of its elastic part and the values of its parameters, in their order.
+    pub make: fn(LinearElastic, &[f64]) -> Result<Shared>,
+}
+
+/// A parameter of a law.
+pub enum Parameter {
+    /// A number that must be given.
+    Required(&'static str),
+    /// A number, and its value where none is given.
+    Optional(&'static str, f64),
+    /// True (1) or False (0, where nothing is given).
+    Switch(&'static str),
+}
 
 /// A stress beyond the yield surface by no more than this share of its size counts as lying on it. A stored
 /// stress was returned to the surface; when it is unloaded, it starts elastic.
@@ -67,7 +101,7 @@ pub trait Elastic: std::fmt::Debug + Send + Sync {
 
 /// A material law.
 pub trait Law: Elastic {
-    /// Name of the law in driver scripts.
+    /// Name of the law in driver scripts: that of its [`Maker`].
     fn name(&self) -> &'static str;
 
     /// Whether the strength depends on the mean stress, so that plastic flow may change the volume.

@@ -16,11 +16,19 @@
 //! here, and the plastic volumetric strain is `2 sin psi d_gamma`.
 //! Dilatancy ends at a plastic volumetric strain of `eps_v_max`.
 
-use super::{Elastic, Friction, Law, LinearElastic, ROUND_OFF, SOFT};
+use std::sync::Arc;
+
+use super::{Elastic, Friction, Law, LinearElastic, Maker, ROUND_OFF, SOFT};
 use crate::error::Result;
 use crate::space::COMPONENTS;
 use crate::tensor::{
     deviatoric_stiffness, AtMean, Moduli, Principal, Strain, Stress, Sym, Tangent,
+};
+
+pub(super) const MAKER: Maker = Maker {
+    name: "mohr_coulomb",
+    parameters: Friction::PARAMETERS,
+    make: |elastic, given| Ok(Arc::new(MohrCoulomb::new(elastic, Friction::of(given))?)),
 };
 
 /// Mohr-Coulomb plasticity.
@@ -207,7 +215,7 @@ impl Elastic for MohrCoulomb {
 
 impl Law for MohrCoulomb {
     fn name(&self) -> &'static str {
-        "mohr_coulomb"
+        MAKER.name
     }
 
     fn pressure_dependent(&self) -> bool {

@@ -9,8 +9,16 @@
 //! (s_1 - s_2)/(e_1 - e_2) = 2 mu b_2 (exp(x) - 1)/x,  x = 2 (e_1 - e_2)
 //! ```
 
-use super::{volumetric_energy, Elastic, Law, LinearElastic};
+use std::sync::Arc;
+
+use super::{volumetric_energy, Elastic, Law, LinearElastic, Maker};
 use crate::tensor::{Moduli, Principal, Strain, Stress};
+
+pub(super) const MAKER: Maker = Maker {
+    name: "neo_hookean",
+    parameters: &[],
+    make: |elastic, _| Ok(Arc::new(NeoHookean::new(elastic))),
+};
 
 /// Neo-Hookean elasticity.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,7 +92,7 @@ impl Elastic for NeoHookean {
 
 impl Law for NeoHookean {
     fn name(&self) -> &'static str {
-        "neo_hookean"
+        MAKER.name
     }
 
     fn finite_only(&self) -> bool {

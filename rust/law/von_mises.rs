@@ -3,10 +3,18 @@
 //! Radial return (Simo and Hughes 1998, box 3.2): `d_kappa = (q_trial - sigma_y - H kappa) / (3 mu + H)`,
 //! `s = s_trial (1 - 3 mu d_kappa / q_trial)`; the volume stays elastic.
 
-use super::{Elastic, Law, LinearElastic, ROUND_OFF};
+use std::sync::Arc;
+
+use super::{Elastic, Law, LinearElastic, Maker, Parameter, ROUND_OFF};
 use crate::error::{Error, Result};
 use crate::space::COMPONENTS;
 use crate::tensor::{deviatoric_stiffness, norm, Moduli, Strain, Stress};
+
+pub(super) const MAKER: Maker = Maker {
+    name: "von_mises",
+    parameters: &[Parameter::Required("yield_stress"), Parameter::Optional("hardening", 0.0)],
+    make: |elastic, given| Ok(Arc::new(VonMises::new(elastic, given[0], given[1])?)),
+};
 
 /// Von Mises plasticity.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,7 +50,7 @@ impl Elastic for VonMises {
 
 impl Law for VonMises {
     fn name(&self) -> &'static str {
-        "von_mises"
+        MAKER.name
     }
 
     fn history(&self) -> &'static [&'static str] {

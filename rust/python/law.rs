@@ -3,20 +3,28 @@
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyDict, PyTuple};
 
-use crate::law::{DruckerPrager, Friction, Law, LinearElastic, MohrCoulomb, NeoHookean, VonMises};
+use super::{require, InputError};
+use crate::law::{Law, LinearElastic, Parameter, LAWS};
 
 #[pyclass(name = "Material", frozen, module = "tawami._rust")]
 pub(super) struct PyMaterial {
     law: Arc<dyn Law>,
-    /// The function that made it and its arguments, to copy and to pickle it.
-    made: (&'static str, Vec<f64>),
+    made: Made,
+}
+
+/// What a law was made of, to copy and to pickle it.
+enum Made {
+    /// A linear elastic law: the function, and its two arguments.
+    Elastic(&'static str, f64, f64),
+    /// Name, K and mu of the elastic part [Pa], and the values of the parameters.
+    Law(&'static str, (f64, f64), Vec<f64>),
 }
 
 impl PyMaterial {
-    fn new(law: impl Law + 'static, made: &'static str, given: &[f64]) -> Self {
-        Self { law: Arc::new(law), made: (made, given.to_vec()) }
+    fn elastic(law: LinearElastic, function: &'static str, first: f64, second: f64) -> Self {
+        Self { law: Arc::new(law), made: Made::Elastic(function, first, second) }
     }
 }
 
@@ -24,61 +32,26 @@ impl PyMaterial {
 impl PyMaterial {
     #[staticmethod]
     fn linear_elastic_e_nu(e: f64, nu: f64) -> PyResult<Self> {
-        Ok(Self::new(LinearElastic::from_e_nu(e, nu)?, "linear_elastic_e_nu", &[e, nu]))
+        Ok(Self::elastic(LinearElastic::from_e_nu(e, nu)?, "linear_elastic_e_nu", e, nu))
     }
 
     #[staticmethod]
     fn linear_elastic_e_one_minus_2nu(e: f64, one_minus_2nu: f64) -> PyResult<Self> {
         let law = LinearElastic::from_e_one_minus_2nu(e, one_minus_2nu)?;
-        Ok(Self::new(law, "linear_elastic_e_one_minus_2nu", &[e, one_minus_2nu]))
+        Ok(Self::elastic(law, "linear_elastic_e_one_minus_2nu", e, one_minus_2nu))
     }
 
+    /// The law of a name, with K and mu of its elastic part and all its parameters in their order.
     #[staticmethod]
-    fn linear_elastic_k_mu(k: f64, mu: f64) -> PyResult<Self> {
-        Ok(Self::new(LinearElastic::from_k_mu(k, mu)?, "linear_elastic_k_mu", &[k, mu]))
-    }
-
-    #[staticmethod]
-    fn von_mises(k: f64, mu: f64, yield_stress: f64, hardening: f64) -> PyResult<Self> {
-        let elastic = LinearElastic::from_k_mu(k, mu)?;
-        let law = VonMises::new(elastic, yield_stress, hardening)?;
-        Ok(Self::new(law, "von_mises", &[k, mu, yield_stress, hardening]))
-    }
-
-    #[staticmethod]
-    fn drucker_prager(
-        elastic: (f64, f64),
-        phi: f64,
-        c: f64,
-        psi: f64,
-        eps_v_max: f64,
-        tiny: bool,
-    ) -> PyResult<Self> {
-        let given = [elastic.0, elastic.1, phi, c, psi, eps_v_max, f64::from(u8::from(tiny))];
-        let elastic = LinearElastic::from_k_mu(elastic.0, elastic.1)?;
-        let friction = Friction { phi, c, psi, eps_v_max, tiny };
-        Ok(Self::new(DruckerPrager::new(elastic, friction)?, "drucker_prager", &given))
-    }
-
-    #[staticmethod]
-    fn mohr_coulomb(
-        elastic: (f64, f64),
-        phi: f64,
-        c: f64,
-        psi: f64,
-        eps_v_max: f64,
-        tiny: bool,
-    ) -> PyResult<Self> {
-        let given = [elastic.0, elastic.1, phi, c, psi, eps_v_max, f64::from(u8::from(tiny))];
-        let elastic = LinearElastic::from_k_mu(elastic.0, elastic.1)?;
-        let friction = Friction { phi, c, psi, eps_v_max, tiny };
-        Ok(Self::new(MohrCoulomb::new(elastic, friction)?, "mohr_coulomb", &given))
-    }
-
-    #[staticmethod]
-    fn neo_hookean(k: f64, mu: f64) -> PyResult<Self> {
-        let law = NeoHookean::new(LinearElastic::from_k_mu(k, mu)?);
-        Ok(Self::new(law, "neo_hookean", &[k, mu]))
+    fn of(name: &str, elastic: (f64, f64), parameters: Vec<f64>) -> PyResult<Self> {
+        let maker = LAWS.iter().find(|maker| maker.name == name);
+        let maker = maker.ok_or_else(|| InputError::new_err(format!("there is no law {name}")))?;
+        require(
+            parameters.len() == maker.parameters.len(),
+            "a law got too few or many parameters",
+        )?;
+        let law = (maker.make)(LinearElastic::from_k_mu(elastic.0, elastic.1)?, &parameters)?;
+        Ok(Self { law, made: Made::Law(maker.name, elastic, parameters) })
     }
 
     /// How to make a copy, here or in another process.
@@ -86,14 +59,15 @@ impl PyMaterial {
         &self,
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
-        let (name, given) = &self.made;
-        let arguments = match given[..] {
-            [k, mu, phi, c, psi, eps_v_max, tiny] => {
-                ((k, mu), phi, c, psi, eps_v_max, tiny > 0.0).into_pyobject(py)?
+        let (function, given) = match &self.made {
+            Made::Elastic(function, first, second) => {
+                (*function, (*first, *second).into_pyobject(py)?)
             }
-            _ => PyTuple::new(py, given)?,
+            Made::Law(name, elastic, parameters) => {
+                ("of", (*name, *elastic, parameters.clone()).into_pyobject(py)?)
+            }
         };
-        Ok((py.get_type::<Self>().getattr(*name)?, arguments))
+        Ok((py.get_type::<Self>().getattr(function)?, given))
     }
 
     /// The law with its parameters.
@@ -138,4 +112,23 @@ impl PyMaterial {
 
 pub(super) fn laws(materials: &[PyRef<PyMaterial>]) -> Vec<Arc<dyn Law>> {
     materials.iter().map(|m| Arc::clone(&m.law)).collect()
+}
+
+/// Names of all laws, each with name and default of its parameters: None where one must be given, False for
+/// a switch.
+#[pyfunction]
+pub(super) fn parameters(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let all = PyDict::new(py);
+    for maker in LAWS {
+        let own = PyDict::new(py);
+        for parameter in maker.parameters {
+            match *parameter {
+                Parameter::Required(name) => own.set_item(name, py.None())?,
+                Parameter::Optional(name, value) => own.set_item(name, value)?,
+                Parameter::Switch(name) => own.set_item(name, false)?,
+            }
+        }
+        all.set_item(maker.name, own)?;
+    }
+    Ok(all)
 }

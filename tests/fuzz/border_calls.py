@@ -33,7 +33,7 @@ class Sample:
         self.particles = _rust.Particles(self.x, self.volume, self.material)
         self.particles.carry("velocity", 2)
         self.location = self.grid.locate(self.x)
-        self.law = _rust.Material.von_mises(2.0, 1.0, 1e9, 0.0)
+        self.law = _rust.Material.of("von_mises", (2.0, 1.0), [1e9, 0.0])
         self.particles.add_history([self.law])
         self.active = _rust.Active(self.grid, self.location.active)
         self.stage = _rust.Stage(self.particles, self.location, [self.law], "mixed", False, BASIS)
@@ -82,15 +82,7 @@ CALLS: dict[str, Callable[[Sample], tuple[Any, ...]]] = {
     "Material.linear_elastic_e_one_minus_2nu": lambda s: (
         _rust.Material.linear_elastic_e_one_minus_2nu, 1.0, 0.3,
     ),
-    "Material.linear_elastic_k_mu": lambda s: (_rust.Material.linear_elastic_k_mu, 1.0, 0.3),
-    "Material.neo_hookean": lambda s: (_rust.Material.neo_hookean, 1.0, 0.3),
-    "Material.von_mises": lambda s: (_rust.Material.von_mises, 1.0, 0.3, 1.0, 0.0),
-    "Material.drucker_prager": lambda s: (
-        _rust.Material.drucker_prager, (1.0, 0.3), 30.0, 1.0, 0.0, np.inf, False,
-    ),
-    "Material.mohr_coulomb": lambda s: (
-        _rust.Material.mohr_coulomb, (1.0, 0.3), 30.0, 1.0, 0.0, np.inf, False,
-    ),
+    "Material.of": lambda s: (_rust.Material.of, "von_mises", (1.0, 0.3), [1.0, 0.0]),
     "Assembler": lambda s: (_rust.Assembler, s.location, BASIS, NODES, TERMS, True),
     "Assembler.vector": lambda s: (s.assembler.vector, s.none[0], [s.data], s.volume, s.all),
     "Assembler.pattern": lambda s: (s.assembler.pattern, s.selection),

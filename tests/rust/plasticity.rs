@@ -236,3 +236,14 @@ fn parameters_out_of_range_are_named() {
     assert_eq!(name(0.0, 0.0), "yield_stress");
     assert_eq!(name(1.0, -1.0), "hardening");
 }
+
+/// Every name leads to the law of that name.
+#[test]
+fn makers_have_the_names_of_their_laws() {
+    let elastic = tawami::law::LinearElastic::from_k_mu(2.0, 1.0).unwrap();
+    for maker in tawami::law::LAWS {
+        let law = (maker.make)(elastic, &[30.0, 1.0, 0.0, 1.0, 0.0]).unwrap();
+        assert_eq!(law.name(), maker.name);
+        assert_eq!(tawami::law::LAWS.iter().filter(|other| other.name == law.name()).count(), 1);
+    }
+}

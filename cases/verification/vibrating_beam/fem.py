@@ -38,11 +38,12 @@ class Modes:
     share: Array
 
 
-def solve(nu: float, n: int = 8, number: int = 3) -> Modes:
+def solve(nu: float, n: int = 8, number: int = 3, length: float = L) -> Modes:
     """Compute the lowest modes with n squares over the depth, on one rank."""
-    corners = [np.array([0.0, -D / 2]), np.array([L, D / 2])]
+    corners = [np.array([0.0, -D / 2]), np.array([length, D / 2])]
     squares = dolfinx.mesh.CellType.quadrilateral
-    mesh = dolfinx.mesh.create_rectangle(MPI.COMM_SELF, corners, [round(L / D * n), n], squares)
+    cells = [round(length / D * n), n]
+    mesh = dolfinx.mesh.create_rectangle(MPI.COMM_SELF, corners, cells, squares)
     V = function_space(mesh, lagrange(2, 2))
     u, w = ufl.TrialFunction(V), ufl.TestFunction(V)
     K, mu = lame(nu)

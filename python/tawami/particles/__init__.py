@@ -2,6 +2,7 @@
 
 from tawami.particles.laws import (
     drucker_prager,
+    law,
     linear_elastic,
     mohr_coulomb,
     neo_hookean,
@@ -14,6 +15,7 @@ __all__ = [
     "NumpyLaw",
     "Responses",
     "drucker_prager",
+    "law",
     "linear_elastic",
     "mohr_coulomb",
     "neo_hookean",

@@ -60,8 +60,7 @@ def neo_hookean(
         InputError: A parameter is out of its range, or the combination is another one.
     """
     name = "neo_hookean"
-    elastic = _elastic(name, E=E, nu=nu, K=K, mu=mu, one_minus_2nu=one_minus_2nu)
-    return _made(name, _rust.Material.neo_hookean, elastic.bulk_modulus, elastic.shear_modulus)
+    return law(name, _elastic(name, E=E, nu=nu, K=K, mu=mu, one_minus_2nu=one_minus_2nu))
 
 
 def von_mises(
@@ -79,10 +78,7 @@ def von_mises(
     Raises:
         InputError: A parameter is out of its range.
     """
-    K, mu = _moduli("von_mises", elastic)
-    yield_stress = checks.real("von_mises: yield_stress", yield_stress)
-    hardening = checks.real("von_mises: hardening", hardening)
-    return _made("von_mises", _rust.Material.von_mises, K, mu, yield_stress, hardening)
+    return law("von_mises", elastic, yield_stress=yield_stress, hardening=hardening)
 
 
 def drucker_prager(
@@ -110,8 +106,8 @@ def drucker_prager(
     Raises:
         InputError: A parameter is out of its range.
     """
-    make = _rust.Material.drucker_prager
-    return _frictional("drucker_prager", make, elastic, tiny_angle, phi, c, psi, eps_v_max)
+    angles = {"phi": phi, "psi": psi, "tiny_angle": tiny_angle}
+    return law("drucker_prager", elastic, c=c, eps_v_max=eps_v_max, **angles)
 
 
 def mohr_coulomb(
@@ -143,8 +139,38 @@ def mohr_coulomb(
     Raises:
         InputError: A parameter is out of its range.
     """
-    make = _rust.Material.mohr_coulomb
-    return _frictional("mohr_coulomb", make, elastic, tiny_angle, phi, c, psi, eps_v_max)
+    angles = {"phi": phi, "psi": psi, "tiny_angle": tiny_angle}
+    return law("mohr_coulomb", elastic, c=c, eps_v_max=eps_v_max, **angles)
+
+
+def law(name: str, elastic: _rust.Material, **parameters: float) -> _rust.Material:
+    """A law by its name: how a driver script uses a law that was added in Rust.
+
+    Args:
+        name: Name of the law, as in its `MAKER` in `rust/law`.
+        elastic: Elastic part, a material of linear_elastic(...) with nu < 0.5.
+        parameters: The parameters that the law declares, in SI units.
+
+    Raises:
+        InputError: There is no such law or parameter, a parameter without a default is missing, or a
+            value is out of its range.
+    """
+    laws = _rust.parameters()
+    expected = laws[checks.choice("law", name, laws)]
+    moduli = _moduli(name, elastic)
+    required = [own for own, default in expected.items() if default is None]
+    if parameters.keys() - expected.keys() or set(required) - parameters.keys():
+        names = [own if own in required else f"{own} (optional)" for own in expected]
+        raise InputError(
+            f"{name} got the parameters {', '.join(parameters) or 'none'}: expected "
+            f"{', '.join(names) or 'none'}"
+        )
+    given = expected | parameters
+    values = [
+        (checks.switch if default is False else checks.real)(f"{name}: {own}", given[own])
+        for own, default in expected.items()
+    ]
+    return _made(name, _rust.Material.of, name, moduli, values)
 
 
 def _elastic(law: str, **given: float | None) -> _rust.Material:
@@ -152,7 +178,7 @@ def _elastic(law: str, **given: float | None) -> _rust.Material:
     values = {name: value for name, value in given.items() if value is not None}
     makers: dict[tuple[str, ...], Callable[[float, float], _rust.Material]] = {
         ("E", "nu"): _rust.Material.linear_elastic_e_nu,
-        ("K", "mu"): _rust.Material.linear_elastic_k_mu,
+        ("K", "mu"): lambda K, mu: _rust.Material.of("linear_elastic", (K, mu), []),
         ("E", "one_minus_2nu"): _rust.Material.linear_elastic_e_one_minus_2nu,
     }
     if tuple(values) not in makers:
@@ -162,15 +188,6 @@ def _elastic(law: str, **given: float | None) -> _rust.Material:
         )
     first, second = (checks.real(f"{law}: {name}", value) for name, value in values.items())
     return _made(law, makers[tuple(values)], first, second)
-
-
-def _frictional(
-    law: str, make: Callable[..., _rust.Material], elastic: Any, tiny: Any, *given: Any
-) -> _rust.Material:
-    """A law of phi, c, psi and eps_v_max."""
-    moduli, names = _moduli(law, elastic), ("phi", "c", "psi", "eps_v_max")
-    values = [checks.real(f"{law}: {n}", v) for n, v in zip(names, given, strict=True)]
-    return _made(law, make, moduli, *values, checks.switch(f"{law}: tiny_angle", tiny))
 
 
 def _moduli(name: str, elastic: Any) -> tuple[float, float]:

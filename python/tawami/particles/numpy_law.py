@@ -63,7 +63,7 @@ class NumpyLaw:
         """The elastic law of K and mu, for uses that need only these."""
         try:
             K, mu = checks.real("K", self.K), checks.real("mu", self.mu)
-            return _rust.Material.linear_elastic_k_mu(K, mu)
+            return _rust.Material.of("linear_elastic", (K, mu), [])
         except InputError as error:
             raise InputError(f"NumpyLaw: {error}") from None
 

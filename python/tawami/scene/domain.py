@@ -91,7 +91,7 @@ class Domain:
         def elastic() -> Responses:
             """The same particles with the elastic parts of their laws."""
             laws = [  # an incompressible law is elastic already
-                _rust.Material.linear_elastic_k_mu(float(K), float(mu)) if np.isfinite(K) else given
+                _rust.Material.of("linear_elastic", (K, mu), []) if np.isfinite(K) else given
                 for given, (K, mu) in zip(model.materials, model.moduli, strict=True)
             ]
             return responses_of(
