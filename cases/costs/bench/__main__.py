@@ -1,6 +1,7 @@
 """Speed and memory of a Newton step, stage by stage.
 
-By default it measures the cantilever for sizes, particles per cell, threads, ranks and both assemblies.
+By default it measures the cantilever for sizes, particles per cell, threads, ranks and both assemblies,
+then the import, the Python part of a step and the particles of a level set.
 Every setting runs in a process of its own. One run gives a table, a CSV file and ratios.
 
 With --against it compares this checkout with another one that has been set up, interleaved, and prints
