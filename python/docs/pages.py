@@ -37,6 +37,7 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "spinning_disc": ("Spinning disc", "verification", ("disc",)),
     "collapse": ("Collapse", "showcase", ("pile",)),
     "projection": ("Nodal projection", "costs", ()),
+    "ordering": ("Orderings of MUMPS", "costs", ()),
     "writing": ("Writing results", "costs", ()),
 }
 TRADE = ("cantilever", "cook", "collapse", "self_weight", "spinning_disc")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 from collections.abc import Sequence
@@ -87,12 +88,20 @@ def _check_inside(home: Path) -> None:
     Raises:
         InputError: A link leads out of the folder.
     """
-    for path in (home / RUN, *(p for ending in ("pvd", "csv") for p in home.glob(f"*/*.{ending}"))):
-        if not path.resolve().is_relative_to(home.resolve()):
+    if not os.path.isdir(home):
+        return  # reading says why
+    for path in (home / RUN, *_indices(home)):
+        # of os.path, since those of pathlib raise errors for paths that cannot be read
+        if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(home)):
             raise InputError(
-                f"plot: '{path}' is a link to '{path.resolve()}', outside the folder: expected the "
-                "files of the run in its folder; copy them into it"
+                f"plot: '{path}' is a link to '{os.path.realpath(path)}', outside the folder: expected "
+                "the files of the run in its folder; copy them into it"
             )
+
+
+def _indices(home: Path) -> list[Path]:
+    """Series and tables of the phases."""
+    return [path for ending in ("pvd", "csv") for path in home.glob(f"*/*.{ending}")]
 
 
 def _corners(home: Path) -> Corners:
@@ -109,8 +118,9 @@ def _corners(home: Path) -> Corners:
 
 def _phases(home: Path) -> list[Path]:
     """Folders of the phases, in their order in time."""
-    files = [path for ending in ("pvd", "csv") for path in home.glob(f"*/*.{ending}")]
-    return sorted({path.parent for path in files}, key=lambda p: (p.stat().st_ctime_ns, p.name))
+    return sorted(
+        {path.parent for path in _indices(home)}, key=lambda p: (p.stat().st_ctime_ns, p.name)
+    )
 
 
 def _particles(phase: Path) -> Times:
