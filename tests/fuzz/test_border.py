@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from border_calls import BASIS, CALLS, N, Sample
+from border_calls import BASIS, CALLS, NODES, TERMS, N, Sample
 from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 from profiles import examples, seed_of
@@ -197,8 +197,10 @@ def test_the_stress_of_a_law_may_be_a_view_of_that_of_the_particles():
 
 
 def test_objects_of_other_particles_or_of_another_grid_raise_an_error():
-    s, other = Sample(), Sample()
+    s = Sample()
     few, elsewhere = s.location.select(s.few), _rust.Grid((-1, 0), 9.0, (2, 2)).locate(s.x)
+    other = _rust.Assembler(few, BASIS, NODES, TERMS, True)
+    pattern = other.pattern(s.selection)
     plain = _rust.Particles(s.x, s.volume, s.material)
     for call, message in (
         (lambda: _rust.Stage(s.particles, few, [s.law], "mixed", False, BASIS), "other particles"),
@@ -209,7 +211,7 @@ def test_objects_of_other_particles_or_of_another_grid_raise_an_error():
         ),
         (
             lambda: s.assembler.matrix(
-                s.none[1], s.none[0], [], s.volume, s.all, other.pattern, s.values
+                s.none[1], s.none[0], [], s.volume, s.all, pattern, s.values
             ),
             "another pattern",
         ),

@@ -1,6 +1,6 @@
 """Free vibrations compared with finite elements, and their properties."""
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -9,6 +9,7 @@ from mpi4py import MPI
 import tawami
 from cases.verification.vibrating_beam import fem
 from cases.verification.vibrating_beam.beam import RHO, E
+from tawami.motion import modes as module
 
 LENGTH = 4.0  # of a clamped beam of depth 1 [m]
 
@@ -107,6 +108,15 @@ def test_axial_stress_changes_the_frequency_as_in_timoshenkos_beam():
 def test_wrong_arguments_are_named(make, message):
     with pytest.raises(tawami.InputError, match=message):
         make()
+
+
+def test_vibrations_that_are_not_found_raise_an_error(monkeypatch):
+    scene = beam(0.3, 4)
+    monkeypatch.setattr(module, "eigsh", partial(module.eigsh, ncv=41, maxiter=1, tol=1e-300))
+    with pytest.raises(tawami.ConvergenceError, match="of 40 vibrations were found. Ask for fewer"):
+        tawami.modes(scene, 40)
+    monkeypatch.undo()
+    assert len(tawami.modes(scene, 4).frequencies) == 4
 
 
 def test_walls_are_rejected():

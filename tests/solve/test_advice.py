@@ -18,6 +18,7 @@ UNDER_IT = ((0.0, 2.0), "y")  # the footing
 ROOT = Path(tawami.__file__).parent
 #: Errors that are raised in each file, all of them with a test here or where the remark says.
 RAISED = {
+    "motion/modes.py": 1,  # tests/motion/test_modes.py
     "motion/stepping.py": 1,
     "solve/diagnosis.py": 3,
     "solve/direct.py": 2,  # no advice
