@@ -20,7 +20,7 @@ EXPONENTS = np.array([e for e in product(range(DEGREE + 1), repeat=PLANE.dim) if
 #: Largest number of points that is left: the number of moments.
 MOST = len(EXPONENTS)
 #: Number of points beyond which the ones that are left are looked for among SOME of them first.
-MANY, SOME = 300, 150
+MANY, SOME = 300, 100
 #: Largest error of the moments, relative to the area.
 MOMENT_ERROR = 1e-12
 
@@ -69,7 +69,9 @@ def _of_some(x: Array, weight: Array) -> tuple[Array, Array]:
     for number in (SOME, 4 * SOME, len(x)):
         # points at equal shares of the area lie all over the cell
         shares = (np.arange(number) + 0.5) / number * so_far[-1]
-        some = np.unique(np.searchsorted(so_far, shares)) if number < len(x) else slice(None)
+        some = np.unique(np.searchsorted(so_far, shares)) if number < len(x) else np.arange(len(x))
+        if len(some) < MOST:  # few of them have most of the area
+            continue
         root = np.sqrt(weight[some])
         q, r = np.linalg.qr((root * along_x[:, some][i] * along_y[:, some][j]).T)
         moments = np.linalg.solve(r.T, sums)
