@@ -177,7 +177,7 @@ def check_like(found: Any, own: Any, name: str) -> None:
         if not isinstance(found, Mapping) or (own and found.keys() != own.keys()):
             raise ValueError(f"{name or 'the state'} has not the entries {', '.join(own)}")
         for key, value in own.items():
-            if key == "course" and isinstance(found[key], str):
+            if key == "factor" and isinstance(found[key], str):
                 continue  # a number that became a function
             check_like(found[key], value, f"{name}.{key}" if name else key)
     elif isinstance(own, list | tuple):

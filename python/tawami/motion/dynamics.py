@@ -292,7 +292,7 @@ def _check_displacements(now: Configuration) -> None:
     for support in now.supports.all:
         for term in support.terms:
             missing = term.at(at) - term.share.applied
-            if not (term.course.has_velocity or term.is_zero) and abs(missing) > ALIKE:
+            if not (term.factor.has_velocity or term.is_zero) and abs(missing) > ALIKE:
                 raise InputError(
                     f"{support} prescribes a displacement that the body does not have yet: expected "
                     "fix(..., velocity=...) or an amplitude that is 0 at first for a motion, or "

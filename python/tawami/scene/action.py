@@ -14,7 +14,7 @@ from tawami.base.errors import CheckpointError, InputError
 from tawami.base.identity import text
 from tawami.grid.edges import Profile
 from tawami.scene.activity import Activity
-from tawami.scene.course import Course, InTime
+from tawami.scene.factor import Factor, InTime
 from tawami.scene.share import Moment, Share
 
 Acts = TypeVar("Acts", bound="Action")
@@ -27,20 +27,20 @@ class Term:
     Attributes:
         number: Number in its action, in the order in which the driver script gave them.
         values: Components of the value: numbers, or functions of position.
-        course: Its course in time.
-        since: Number of the term that the course came with.
+        factor: Its factor in time.
+        since: Number of the term that the factor came with.
         share: What of it the body carries.
     """
 
     number: int
     values: tuple[Profile, ...]
-    course: Course
+    factor: Factor
     since: int
     share: Share = field(default_factory=Share)
 
     def at(self, now: Moment) -> float:
         """Its factor."""
-        return self.share.at(now, self.course)
+        return self.share.at(now, self.factor)
 
     def apply(self, now: Moment) -> None:
         """The body is in equilibrium with it."""
@@ -52,11 +52,11 @@ class Term:
 
     def changed(self, now: Moment) -> float:
         """Change of the factor in a dynamic step."""
-        return self.share.target * self.course.changed(now.start, now.time)
+        return self.share.target * self.factor.changed(now.start, now.time)
 
     def rates(self, now: Moment) -> tuple[float, float]:
         """Rates of the factor at the ends of a dynamic step [1/s]."""
-        first, last = self.course.rates(now.start, now.time)
+        first, last = self.factor.rates(now.start, now.time)
         return self.share.target * first, self.share.target * last
 
     @property
@@ -86,16 +86,16 @@ class Action:
     Args:
         owner: The loads or the supports that it belongs to.
         value: As the driver script gave it.
-        course: Its course in time.
+        factor: Its factor in time.
     """
 
     __slots__ = ("_made", "_owner", "number", "released", "terms")
 
-    def __init__(self, owner: Owner, value: Any, course: Course) -> None:
+    def __init__(self, owner: Owner, value: Any, factor: Factor) -> None:
         self._owner, self._made, self.released = owner, 0, False
         self.number = owner.next_number()
         self.terms: list[Term] = []
-        self._begin(self._checked(value), course)
+        self._begin(self._checked(value), factor)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self}{', released' if self.released else ''})"
@@ -108,13 +108,13 @@ class Action:
         """
         raise NotImplementedError
 
-    def _begin(self, values: tuple[Profile, ...], course: Course) -> None:
+    def _begin(self, values: tuple[Profile, ...], factor: Factor) -> None:
         """Replace the last term by another one."""
-        kept = [term.since for term in self.terms if term.course is course]
+        kept = [term.since for term in self.terms if term.factor is factor]
         for term in self.terms:
             term.share.target = 0.0
         self.terms = [term for term in self.terms if not term.share.is_gone]
-        self.terms.append(Term(self._made, values, course, kept[-1] if kept else self._made))
+        self.terms.append(Term(self._made, values, factor, kept[-1] if kept else self._made))
         self._made += 1
         self._owner.changed()
 
@@ -143,13 +143,13 @@ class Action:
 
     def _changed(
         self, value: Any, amplitude: InTime | None, velocity: InTime | None
-    ) -> tuple[tuple[Profile, ...], Course]:
-        """Values and course after a change."""
+    ) -> tuple[tuple[Profile, ...], Factor]:
+        """Values and factor after a change."""
         last = self.terms[-1]
         values = last.values if value is None else self._checked(value)
         if amplitude is None and velocity is None:
-            return values, last.course
-        return values, Course(str(self), amplitude, velocity, time=self._owner.activity.time)
+            return values, last.factor
+        return values, Factor(str(self), amplitude, velocity, time=self._owner.activity.time)
 
     def release(self) -> None:
         """Take it away. In statics a load fades as a new one grows; a support is gone at once.
@@ -184,7 +184,7 @@ class Action:
         return [
             [
                 *(text(value) if callable(value) else float(value) for value in term.values),
-                *term.course.identity(),
+                *term.factor.identity(),
                 term.share.target,
             ]
             for term in self.terms
@@ -198,7 +198,7 @@ class Action:
                 "since": term.since,
                 "share": term.share.state(),
                 "values": [[] if callable(value) else [float(value)] for value in term.values],
-                "course": term.course.constant,
+                "factor": term.factor.constant,
             }
             for term in self.terms
         ]
@@ -213,20 +213,20 @@ class Action:
             CheckpointError: It was changed to a function while the run went.
         """
         known = {term.number: term for term in self.terms}
-        courses = {term.since: term.course for term in self.terms}
+        factors = {term.since: term.factor for term in self.terms}
         name, self.terms = f"{self}", []
         for stored in state["terms"]:
             number, since, values = stored["number"], stored["since"], stored["values"]
-            course = courses.get(since)
-            if course is None and stored["course"]:
-                course = Course(name, *stored["course"])
+            factor = factors.get(since)
+            if factor is None and stored["factor"]:
+                factor = Factor(name, *stored["factor"])
             term = known.get(number)
-            if course is None or (term is None and not all(values)):
+            if factor is None or (term is None and not all(values)):
                 raise CheckpointError(
                     f"{name} was changed to a function or another velocity while the run went (each=): "
                     "expected such changes between two phases, or an amplitude"
                 )
-            term = term or Term(number, tuple(value for (value,) in values), course, since)
+            term = term or Term(number, tuple(value for (value,) in values), factor, since)
             term.share.restore(stored["share"])
             self.terms.append(term)
         if not self.terms:

@@ -11,7 +11,7 @@ from tawami.base.errors import InputError
 from tawami.grid.edges import Component, Interval, Profile
 from tawami.grid.grid import Edge
 from tawami.scene.configuration import Configuration
-from tawami.scene.course import InTime
+from tawami.scene.factor import InTime
 from tawami.scene.loads import Load
 from tawami.scene.points import check_in_body
 from tawami.scene.support import Support

@@ -21,8 +21,8 @@ from tawami.grid.edges import Interval, Profile
 from tawami.grid.grid import Edge, Grid
 from tawami.scene.action import Action, Owner, Term, restored
 from tawami.scene.activity import Activity
-from tawami.scene.course import Course
 from tawami.scene.domain import Domain
+from tawami.scene.factor import Factor
 from tawami.scene.share import Moment
 
 Array = npt.NDArray[np.float64]
@@ -36,7 +36,7 @@ class Load(Action):
     @property
     def line(self) -> str:
         """The load in words, for the header of a run."""
-        return f"{self}{self.terms[-1].course}{' until it fades' if self.released else ''}"
+        return f"{self}{self.terms[-1].factor}{' until it fades' if self.released else ''}"
 
     def place(self) -> list[Any]:
         """Where it acts, as JSON holds it."""
@@ -67,10 +67,10 @@ class Traction(Load):
     __slots__ = ("between", "edge")
 
     def __init__(
-        self, owner: Owner, edge: Edge, value: Any, between: Interval | None, course: Course
+        self, owner: Owner, edge: Edge, value: Any, between: Interval | None, factor: Factor
     ) -> None:
         self.edge, self.between = edge, between
-        super().__init__(owner, value, course)
+        super().__init__(owner, value, factor)
 
     def _checked(self, value: Any) -> tuple[Profile, ...]:
         t_x, t_y = checks.pair(f"{self}", value, "components (t_x, t_y)")
@@ -93,9 +93,9 @@ class Forces(Load):
 
     __slots__ = ("shares",)
 
-    def __init__(self, owner: Owner, shares: Array, value: Any, course: Course) -> None:
+    def __init__(self, owner: Owner, shares: Array, value: Any, factor: Factor) -> None:
         self.shares = shares
-        super().__init__(owner, value, course)
+        super().__init__(owner, value, factor)
 
     def _checked(self, value: Any) -> tuple[Profile, ...]:
         return checks.point("load(...): force", value)
@@ -146,13 +146,13 @@ class Loads:
             if not load.released or any(not t.share.is_gone for t in load.terms)
         ]
 
-    def _course(self, where: str, amplitude: Any) -> Course:
+    def _factor(self, where: str, amplitude: Any) -> Factor:
         self.activity.check_between_steps(where)
-        return Course(where, amplitude, time=self.activity.time)
+        return Factor(where, amplitude, time=self.activity.time)
 
     def add_gravity(self, acceleration: Any, amplitude: Any) -> Load:
         """Load the body by its weight."""
-        weight = Weight(self, acceleration, self._course("gravity(...)", amplitude))
+        weight = Weight(self, acceleration, self._factor("gravity(...)", amplitude))
         self.all.append(weight)
         return weight
 
@@ -160,9 +160,9 @@ class Loads:
         self, edge: Edge, value: Any, between: Interval | None, amplitude: Any
     ) -> Load:
         """Load an edge of the grid with a traction [Pa]."""
-        course = self._course(f"traction(edge='{edge}')", amplitude)
+        factor = self._factor(f"traction(edge='{edge}')", amplitude)
         edges.cells_between(self.grid, edge, between)
-        traction = Traction(self, edge, value, between, course)
+        traction = Traction(self, edge, value, between, factor)
         self.all.append(traction)
         return traction
 
@@ -188,7 +188,7 @@ class Loads:
             raise InputError("load(...): no particle was chosen; the force would act on nothing")
         shares = np.zeros(n)
         shares[chosen] = self._volume[chosen] / self._volume[chosen].sum()
-        forces = Forces(self, shares, force, self._course("load(...)", amplitude))
+        forces = Forces(self, shares, force, self._factor("load(...)", amplitude))
         self.all.append(forces)
         return forces
 
@@ -201,7 +201,7 @@ class Loads:
     @property
     def vary(self) -> bool:
         """Whether any load follows an amplitude in time."""
-        return any(term.course.moves for load in self.all for term in load.terms)
+        return any(term.factor.moves for load in self.all for term in load.terms)
 
     # -- forces --------------------------------------------------------------
 

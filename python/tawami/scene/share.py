@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tawami.scene.course import Course
+from tawami.scene.factor import Factor
 
 
 @dataclass(frozen=True)
@@ -38,15 +38,15 @@ class Share:
     carried: float = 0.0
     applied: float = 0.0
 
-    def at(self, now: Moment, course: Course) -> float:
-        """The factor: the course, and what differs from it at the start, which fades."""
-        wanted = self._wanted(course, now.time)
+    def at(self, now: Moment, factor: Factor) -> float:
+        """The factor, and what differs from it at the start, which fades."""
+        wanted = self._wanted(factor, now.time)
         if now.part == 1.0:
             return wanted
-        return wanted - (1 - now.part) * (self._wanted(course, now.start) - self.carried)
+        return wanted - (1 - now.part) * (self._wanted(factor, now.start) - self.carried)
 
-    def _wanted(self, course: Course, time: float) -> float:
-        return self.target * course.factor(time) if self.target else 0.0
+    def _wanted(self, factor: Factor, time: float) -> float:
+        return self.target * factor.at(time) if self.target else 0.0
 
     @property
     def is_gone(self) -> bool:

@@ -9,7 +9,7 @@ from tawami.base.errors import InputError
 from tawami.grid.edges import Component, Interval, Profile
 from tawami.grid.grid import Edge
 from tawami.scene.action import Action, Owner
-from tawami.scene.course import Course, InTime
+from tawami.scene.factor import Factor, InTime
 
 Place = Edge | tuple[float, float]
 
@@ -36,13 +36,13 @@ class Support(Action):
         component: int,
         axis: Component,
         value: Profile,
-        course: Course,
+        factor: Factor,
         between: Interval | None = None,
     ) -> None:
         self.place = self.given = place
         self.component, self.axis = component, axis
         self.between, self.crossing = between, 0.0
-        super().__init__(owner, value, course)
+        super().__init__(owner, value, factor)
 
     def _checked(self, value: Any) -> tuple[Profile, ...]:
         check = checks.profile if isinstance(self.place, str) else checks.number
@@ -83,12 +83,12 @@ class Support(Action):
     @property
     def has_velocity(self) -> bool:
         """Whether it prescribes a velocity."""
-        return self.terms[-1].course.has_velocity
+        return self.terms[-1].factor.has_velocity
 
     @property
     def moves(self) -> bool:
         """Whether it prescribes a motion in time."""
-        return any(term.course.moves for term in self.terms)
+        return any(term.factor.moves for term in self.terms)
 
     @property
     def at_rest(self) -> bool:
@@ -102,6 +102,6 @@ class Support(Action):
     @property
     def line(self) -> str:
         """The support in words: place, component, and what it prescribes if that is not zero."""
-        (value,), course = self.terms[-1].values, self.terms[-1].course
+        (value,), factor = self.terms[-1].values, self.terms[-1].factor
         amount = " by a function" if callable(value) else f" = {value:g} m" if value else ""
-        return f"{self} {self.axis}{'' if course.has_velocity else amount}{course}"
+        return f"{self} {self.axis}{'' if factor.has_velocity else amount}{factor}"

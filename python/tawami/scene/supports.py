@@ -21,8 +21,8 @@ from tawami.grid.grid import Edge, Grid
 from tawami.scene.action import Term, restored
 from tawami.scene.activity import Activity
 from tawami.scene.contact import ActiveSet
-from tawami.scene.course import Course, InTime
 from tawami.scene.domain import Domain
+from tawami.scene.factor import Factor, InTime
 from tawami.scene.share import Moment
 from tawami.scene.support import Place, Support
 from tawami.scene.walls import Wall, checked_friction
@@ -110,8 +110,8 @@ class Supports:
             if callable(value) or value != 0:
                 raise InputError(f"{where}: expected a value or a velocity, not both")
             value = 1.0
-        course = Course(where, amplitude, velocity, time=self.activity.time)
-        support = Support(self, place, axis, component, value, course, between)
+        factor = Factor(where, amplitude, velocity, time=self.activity.time)
+        support = Support(self, place, axis, component, value, factor, between)
         self.all.append(support)
         return support
 

@@ -16,7 +16,7 @@ InTime = float | Callable[[float], float]
 KEPT = 32
 
 
-class Course:
+class Factor:
     """A factor that follows an amplitude, or the integral of a velocity.
 
     Args:
@@ -62,7 +62,7 @@ class Course:
         """Whether the factor may change in time."""
         return self.has_velocity or callable(self._given)
 
-    def factor(self, time: float) -> float:
+    def at(self, time: float) -> float:
         """The amplitude at a time; 0 with a velocity.
 
         Raises:
@@ -88,7 +88,7 @@ class Course:
         """Change of the factor in a step."""
         if self.has_velocity:
             return 0.5 * (end - start) * sum(self.rates(start, end))
-        return self.factor(end) - self.factor(start)
+        return self.at(end) - self.at(start)
 
     @property
     def constant(self) -> list[float]:
