@@ -23,6 +23,8 @@ from tawami.scene.scene import Scene
 
 #: Particles that a linear fit of displacements around a point uses at finite strain.
 NEIGHBOURS = 12
+#: Difference of distances that is round-off [cells].
+ROUND_OFF = 1e-6
 
 
 @dataclass(frozen=True)
@@ -186,6 +188,8 @@ def displacement_near(subject: Subject, point: tuple[float, float], what: str) -
             f"{what}: no particle was within a cell ({h:g} m) of it: expected a point of the body "
             "at the start"
         )
-    near = np.argsort(distance, kind="stable")[:NEIGHBOURS]
+    # all at the distance of the last one, lest round-off choose among them
+    last = np.sort(distance)[:NEIGHBOURS][-1]
+    near = np.flatnonzero(distance <= last + ROUND_OFF * h)
     basis = np.column_stack([np.ones(len(near)), offset[near]])
     return np.asarray(np.linalg.lstsq(basis, u[near], rcond=None)[0][0])

@@ -245,7 +245,7 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
                 if support.has_velocity:
                     raise InputError(
                         f"{support} has a velocity, which statics does not follow: expected a value, "
-                        "with an amplitude=... and until=... for loads that change in time, or Dynamics(scene)"
+                        "with amplitude=... and until=... if it changes in time, or Dynamics(scene)"
                     )
             self.configuration.check_coverage()
             return Solution(self, self.configuration.advance(kind))
