@@ -184,7 +184,8 @@ def _panel(axes: Axes, head: Sequence[str], numbers: Sequence[int], values: Arra
             axes.plot(rows[:, 1], rows[:, k], "." if of_steps else "-", markersize=3, label=own)
     axes.set_xlabel(head[1].replace("time [s]", "$t$ [s]"))
     if of_steps:
-        axes.set_ylim(0, 1.08 * axes.dataLim.y1)  # points on the frame would be cut
+        most = axes.dataLim.y1
+        axes.set_ylim(0, 1.08 * most if most > 0 else None)  # points on the frame would be cut
     if kind == "Newton":
         from matplotlib.ticker import MaxNLocator
 
