@@ -69,7 +69,7 @@ def test_the_benchmark_prints_its_ratios(capsys, tmp_path):
         assert words in printed
     with (tmp_path / "bench.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [(row["path"], row["ranks"]) for row in rows[:3]] == [
+    assert [(row["assembly"], row["ranks"]) for row in rows[:3]] == [
         ("fast", "1"), ("reference", "1"), ("fast", "2")
     ]  # fmt: skip
     deflections = [float(row["deflection_m"]) for row in rows[:3]]
