@@ -272,7 +272,7 @@ def test_a_form_that_locks_warns(form, nu, locks):
 
 
 @pytest.mark.parametrize("form", ["u", "u_bbar"])
-@pytest.mark.parametrize("one_minus_2nu", [1e-10, 1e-14])
+@pytest.mark.parametrize("one_minus_2nu", [1e-11, 1e-14])
 def test_the_error_of_a_stiffness_beyond_all_digits_names_k_over_mu(form, one_minus_2nu):
     grid = grid_of()
     law = tawami.linear_elastic(E=1.0, one_minus_2nu=one_minus_2nu)
@@ -282,5 +282,5 @@ def test_the_error_of_a_stiffness_beyond_all_digits_names_k_over_mu(form, one_mi
     scene.fix("left", "x")
     scene.fix("left", "y")
     scene.traction("right", (0.0, -1e-4))
-    with pytest.raises(tawami.TawamiError, match=r"K/mu is 1.0e\+1[04]: .* use form 'u_epsv'"):
+    with pytest.raises(tawami.TawamiError, match=r"K/mu is 1.0e\+1[14]: .* use form 'u_epsv'"):
         scene.solve()

@@ -221,3 +221,19 @@ def test_functions_of_position_give_real_numbers(values):
     with pytest.raises(tawami.InputError, match="level_set.*complex"):
         tawami.level_set(scene.grid, lambda x, y: values(x))
     scene.solve()
+
+
+def test_an_amplitude_is_continued_by_another_one_during_a_motion():
+    grid = tawami.Grid(MPI.COMM_SELF, origin=(0, 0), h=0.5, cells=(2, 2))
+    law = tawami.linear_elastic(E=1e6, nu=0.3)
+    scene = tawami.Scene(grid, tawami.box(grid, (0, 0), (1, 1)), law, density=1e3)
+    scene.fix("left", "x")
+    scene.fix("bottom", "y")
+    pull = scene.fix("right", "x", 1e-2, amplitude=np.sin)
+    motion = tawami.Dynamics(scene)
+    motion.run(0.1, 0.05)
+    start = motion.time
+    pull.change(amplitude=lambda t: np.sin(start) + (t - start))
+    motion.step(0.05)
+    edge = motion.step(0.05).displacement((1.0, 0.5))[0]
+    assert edge == pytest.approx(1e-2 * (np.sin(start) + 0.1), rel=1e-9)

@@ -15,6 +15,7 @@ import ctypes
 import os
 import time
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -121,9 +122,12 @@ def _passes(library: ctypes.CDLL, name: str) -> bool:
 
     They run in a child process, because an instruction that does not exist ends the process.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of threads: the child calls nothing but OpenBLAS
-        child = os.fork()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of threads: the child calls nothing but OpenBLAS
+            child = os.fork()
+    except OSError:  # a limit of processes
+        return False
     if not child:
         passed = False
         try:
@@ -132,15 +136,15 @@ def _passes(library: ctypes.CDLL, name: str) -> bool:
         finally:
             os._exit(0 if passed else 1)
     end = time.monotonic() + TRIAL
-    while True:
-        done, status = os.waitpid(child, os.WNOHANG)
-        if done:
-            return status == 0
-        if time.monotonic() > end:
-            os.kill(child, 9)
-            os.waitpid(child, 0)
-            return False
-        time.sleep(2e-4)
+    with suppress(ChildProcessError):  # a parent that ignores SIGCHLD never sees how it ended
+        while time.monotonic() < end:
+            done, status = os.waitpid(child, os.WNOHANG)
+            if done:
+                return status == 0
+            time.sleep(2e-4)
+        os.kill(child, 9)
+        os.waitpid(child, 0)
+    return False
 
 
 def multiplies(library: ctypes.CDLL) -> bool:

@@ -290,14 +290,18 @@ def _check_displacements(now: Configuration) -> None:
     """Check that the body has the displacements that supports prescribe at the present time."""
     at = now.moment()
     for support in now.supports.all:
+        # an old amplitude and the new one that continues it make up for each other
+        missing: dict[Any, float] = {}
         for term in support.terms:
-            missing = term.at(at) - term.share.applied
-            if not (term.factor.has_velocity or term.is_zero) and abs(missing) > ALIKE:
-                raise InputError(
-                    f"{support} prescribes a displacement that the body does not have yet: expected "
-                    "fix(..., velocity=...) or an amplitude that is 0 at first for a motion, or "
-                    "ramp(scene) before Dynamics"
-                )
+            if not (term.factor.has_velocity or term.is_zero):
+                change = term.at(at) - term.share.applied
+                missing[term.values] = missing.get(term.values, 0.0) + change
+        if any(abs(change) > ALIKE for change in missing.values()):
+            raise InputError(
+                f"{support} prescribes a displacement that the body does not have yet: expected "
+                "fix(..., velocity=...) or an amplitude that is 0 at first for a motion, or "
+                "ramp(scene) before Dynamics"
+            )
 
 
 def _check_scene(scene: Scene) -> None:
