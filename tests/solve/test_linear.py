@@ -126,8 +126,9 @@ def test_mumps_works_with_the_options_that_were_chosen(stabilisation, monkeypatc
     assert used == [[6, 0, 6, 0, direct.ROOM[0]]]
 
 
-def test_the_analysis_serves_all_factorisations_of_one_matrix(monkeypatch):
-    scenes = [beam(hardening(20.0), factorise="always") for _ in range(2)]
+@pytest.fixture
+def analyses(monkeypatch):
+    """The solvers of all analyses, in their order."""
     analyses = []
     analyse = direct.DirectSolver._analyse_next
 
@@ -136,6 +137,11 @@ def test_the_analysis_serves_all_factorisations_of_one_matrix(monkeypatch):
         analyse(self, *arguments)
 
     monkeypatch.setattr(direct.DirectSolver, "_analyse_next", counted)
+    return analyses
+
+
+def test_the_analysis_serves_all_factorisations_of_one_matrix(analyses, monkeypatch):
+    scenes = [beam(hardening(20.0), factorise="always") for _ in range(2)]
     once = scenes[0].solve()
     assert len(once.krylov) > 3
     assert len(analyses) == 1
@@ -168,16 +174,8 @@ def pile(steps):
     return scene.particles.rows(), matrices
 
 
-def test_pattern_and_analysis_are_kept_when_the_grid_is_reset(monkeypatch):
+def test_pattern_and_analysis_are_kept_when_the_grid_is_reset(analyses, monkeypatch):
     """As long as the unknowns are the same, and with the same bits as without."""
-    analyses = []
-    analyse = direct.DirectSolver._analyse_next
-
-    def counted(self, *arguments):
-        analyses.append(self)
-        analyse(self, *arguments)
-
-    monkeypatch.setattr(direct.DirectSolver, "_analyse_next", counted)
     kept, matrices = pile(10)
     changes = sum(a[1] != b[1] for a, b in pairwise(matrices))
     assert 1 <= changes < 8  # the pile enters other cells, and not in every step

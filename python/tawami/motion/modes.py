@@ -93,8 +93,7 @@ def _matrices(scene: Scene) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix
     domain = now.domain
     size, n = domain.layout.size, domain.layout.num_displacement
     mass = np.zeros(size)
-    sums = domain.sums(domain.mass, np.ones((len(domain.particles), 1)))[:, 0]
-    mass[:n] = np.repeat(sums, now.model.space.dim)
+    mass[:n] = np.repeat(domain.lumped_mass, now.model.space.dim)
     zero = np.zeros(size)
     reduction, _ = now.supports.constraints(domain, lambda support: 0.0, zero, zero, moving=True)
     selection = reduction.selection

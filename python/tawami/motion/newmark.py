@@ -90,7 +90,7 @@ class NewmarkStep:
         self._begin, self._finish = Moment(1.0, start, start), Moment(1.0, start, self.end)
         domain = configuration.domain
         self._loads = signature(configuration)
-        self._mass = domain.sums(domain.mass, np.ones((len(domain.particles), 1)))[:, 0]
+        self._mass = domain.lumped_mass
         self._masses = np.repeat(self._mass, configuration.model.space.dim)
         self._first = self._external = configuration.external(self._finish)
         if configuration.loads.vary:

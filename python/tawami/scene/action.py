@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 from tawami.base.errors import CheckpointError, InputError
 from tawami.base.identity import text
@@ -65,19 +65,40 @@ class Term:
         return not any(callable(value) or value for value in self.values)
 
 
-class Owner(Protocol):
-    """The loads or the supports of a scene."""
+class Owner(Generic[Acts]):
+    """The loads or the supports of a scene.
 
-    activity: Activity
+    Args:
+        activity: Time of the scene, and what it is doing.
+
+    Attributes:
+        all: Those of the driver script.
+        version: A number that changes with every change by the driver script.
+    """
+
+    def __init__(self, activity: Activity) -> None:
+        self.activity = activity
+        self.all: list[Acts] = []
+        self.version, self._made = 0, 0
 
     def next_number(self) -> int:
         """Number of the next of them, in the order in which the driver script makes them."""
+        self._made += 1
+        return self._made
 
     def changed(self) -> None:
-        """One of them was changed: what was computed for them is out of date."""
+        """One of them was added, changed or released: what was computed for them is out of date."""
+        self.version += 1
 
     def remove(self, action: Any) -> None:
-        """Take one of them away."""
+        """Take one of them away, which was released."""
+        self.all = [one for one in self.all if one is not action]
+        self.changed()
+
+    def accept(self, now: Moment) -> None:
+        """Later parts grow from this moment."""
+        for action in self.all:
+            action.accept(now)
 
 
 class Action:
@@ -91,7 +112,7 @@ class Action:
 
     __slots__ = ("_made", "_owner", "number", "released", "terms")
 
-    def __init__(self, owner: Owner, value: Any, factor: Factor) -> None:
+    def __init__(self, owner: Owner[Any], value: Any, factor: Factor) -> None:
         self._owner, self._made, self.released = owner, 0, False
         self.number = owner.next_number()
         self.terms: list[Term] = []
@@ -162,7 +183,6 @@ class Action:
         for term in self.terms:
             term.share.target = 0.0
         self._owner.remove(self)
-        self._owner.changed()
 
     # -- steps ---------------------------------------------------------------
 

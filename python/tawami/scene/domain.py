@@ -145,6 +145,15 @@ class Domain:
             raise InputError("mass needs Scene(..., density=...) [kg/m3]")
         return np.asarray(self.model.density[self.particles.material] * self.particles.volume)
 
+    @property
+    def lumped_mass(self) -> Array:
+        """Mass of each displacement function [kg per metre depth]; a call for all ranks.
+
+        Raises:
+            InputError: The scene has no density.
+        """
+        return self.sums(self.mass, np.ones((len(self.particles), 1)))[:, 0]
+
     def sums(self, weight: Array, data: Array, basis: Basis | None = None) -> Array:
         """Sums over all particles of the body, sum_p weight_p data_p N_i: functions x columns.
 

@@ -67,7 +67,7 @@ class Traction(Load):
     __slots__ = ("between", "edge")
 
     def __init__(
-        self, owner: Owner, edge: Edge, value: Any, between: Interval | None, factor: Factor
+        self, owner: Owner[Any], edge: Edge, value: Any, between: Interval | None, factor: Factor
     ) -> None:
         self.edge, self.between = edge, between
         super().__init__(owner, value, factor)
@@ -93,7 +93,7 @@ class Forces(Load):
 
     __slots__ = ("shares",)
 
-    def __init__(self, owner: Owner, shares: Array, value: Any, factor: Factor) -> None:
+    def __init__(self, owner: Owner[Any], shares: Array, value: Any, factor: Factor) -> None:
         self.shares = shares
         super().__init__(owner, value, factor)
 
@@ -108,7 +108,7 @@ class Forces(Load):
         return f"force on {np.count_nonzero(self.shares)} particles"
 
 
-class Loads:
+class Loads(Owner[Load]):
     """The loads of one scene.
 
     Args:
@@ -122,22 +122,13 @@ class Loads:
     """
 
     def __init__(self, grid: Grid, volume: Array, activity: Activity) -> None:
-        self.grid, self._volume, self.activity = grid, volume, activity
-        self.all: list[Load] = []
-        self.version, self._made = 0, 0
-
-    def next_number(self) -> int:
-        """Number of the next load."""
-        self._made += 1
-        return self._made
-
-    def changed(self) -> None:
-        """A load was added, changed or released."""
-        self.version += 1
+        super().__init__(activity)
+        self.grid, self._volume = grid, volume
 
     def remove(self, action: Load) -> None:
         """A released load stays until it has faded."""
         self._drop_faded()
+        self.changed()
 
     def _drop_faded(self) -> None:
         self.all = [
@@ -256,9 +247,8 @@ class Loads:
         return mask
 
     def accept(self, now: Moment) -> None:
-        """Later parts grow from this moment."""
-        for load in self.all:
-            load.accept(now)
+        """Later parts grow from this moment; what has faded is dropped."""
+        super().accept(now)
         self._drop_faded()
 
     # -- header, identity, checkpoints ---------------------------------------

@@ -11,6 +11,7 @@ from tawami.base.errors import ConvergenceError, SmallStrainWarning
 from tawami.base.warn import warn
 from tawami.scene.domain import Domain
 from tawami.solve.equations import STATIC
+from tawami.solve.inertia import EPSILON
 from tawami.solve.newton import Converged
 
 #: Largest displacement gradient (spectral norm) of a run of small strain: terms of second order, which
@@ -18,7 +19,6 @@ from tawami.solve.newton import Converged
 LARGEST = 0.2
 #: Deviatoric strain increment below which a law loses no digits that matter.
 HARMLESS = 1.0
-EPSILON = float(np.finfo(float).eps)
 
 
 def check_digits(domain: Domain, step: Converged, tolerance: float) -> None:

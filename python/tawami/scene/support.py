@@ -31,7 +31,7 @@ class Support(Action):
 
     def __init__(
         self,
-        owner: Owner,
+        owner: Owner[Any],
         place: Place,
         component: int,
         axis: Component,

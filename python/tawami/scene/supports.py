@@ -18,7 +18,7 @@ from tawami.grid import edges
 from tawami.grid.basis import Basis
 from tawami.grid.edges import Component, Interval, Profile
 from tawami.grid.grid import Edge, Grid
-from tawami.scene.action import Term, restored
+from tawami.scene.action import Owner, Term, restored
 from tawami.scene.activity import Activity
 from tawami.scene.contact import ActiveSet
 from tawami.scene.domain import Domain
@@ -30,7 +30,7 @@ from tawami.scene.walls import Wall, checked_friction
 Array = npt.NDArray[np.float64]
 
 
-class Supports:
+class Supports(Owner[Support]):
     """The supports of one scene.
 
     Args:
@@ -45,25 +45,14 @@ class Supports:
     """
 
     def __init__(self, grid: Grid, basis: Basis, activity: Activity) -> None:
-        self.grid, self.basis, self.activity = grid, basis, activity
-        self.all: list[Support] = []
+        super().__init__(activity)
+        self.grid, self.basis = grid, basis
         self.walls: list[Wall] = []
-        self.version, self._made = 0, 0
-
-    def next_number(self) -> int:
-        """Number of the next support."""
-        self._made += 1
-        return self._made
-
-    def changed(self) -> None:
-        """A support was added, changed or released."""
-        self.version += 1
 
     def remove(self, action: Support | Wall) -> None:
         """Take a support or a wall away."""
-        self.all = [support for support in self.all if support is not action]
         self.walls = [wall for wall in self.walls if wall is not action]
-        self.changed()
+        super().remove(action)
 
     def fix(
         self,
@@ -155,11 +144,6 @@ class Supports:
         """The body is in equilibrium with the supports at this moment."""
         for support in self.all:
             support.apply(now)
-
-    def accept(self, now: Moment) -> None:
-        """Later parts grow from this moment."""
-        for support in self.all:
-            support.accept(now)
 
     # -- what they prescribe in a step ---------------------------------------
 

@@ -83,7 +83,7 @@ class Wall:
     edge: Edge
     friction: float
     separates: bool
-    owner: Owner | None = None
+    owner: Owner[Any] | None = None
     functions: npt.NDArray[np.int64] = field(init=False)
     state: Contact = field(init=False)
     returns: npt.NDArray[np.int64] = field(init=False)
@@ -125,7 +125,7 @@ class Wall:
         self._owner("release()").remove(self)
         self.owner = None
 
-    def _owner(self, what: str) -> Owner:
+    def _owner(self, what: str) -> Owner[Any]:
         if self.owner is None:
             raise InputError(f"{self}.{what} was called after its release: expected a new one")
         self.owner.activity.check_between_steps(f"{self}.{what}")
