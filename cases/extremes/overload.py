@@ -132,7 +132,7 @@ def attempts(short: bool) -> Iterator[Attempt]:
     Perfectly plastic body: by the upper bound theorem of limit analysis it shears off at the wall at a
     mean traction of at most c, which is 50 times the load. Linear body: round-off times a condition
     number of 1e6. Hencky's bar by a ramp: a moved body is integrated over cells that it cuts anywhere;
-    this costs a spinning disc 0.11 of its mean stress (README, Motion) and B-bar 0.22 in plain tension
+    this costs a spinning disc 0.11 of its mean stress (docs: cases) and B-bar 0.22 in plain tension
     (`tests/field/test_patch.py`). The load reached may exceed M/e by the same share.
     """
     for form in FORMS[::2] if short else FORMS:

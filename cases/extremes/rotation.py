@@ -22,7 +22,7 @@ Array = npt.NDArray[np.float64]
 STEPS = 40  # per turn
 SPIN = float(np.sqrt(1e-3 * block.E / block.RHO) / (block.SIDE / 2))  # [rad/s]
 #: Bounds of the angular momentum: 1.2 % of the trapezoidal rule, and the loss of the transfer in a turn
-#: (README: 8e-5 in ten turns of a disc with 12 cells over its diameter; this block has four).
+#: (8e-5 in ten turns of a disc with 12 cells over its diameter; this block has four).
 MOMENTUM, TRANSFER = 0.012, 1e-4
 #: Bound of the energy, which should not grow at all.
 ENERGY = 0.0015

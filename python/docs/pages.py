@@ -28,6 +28,7 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "cantilever": ("Cantilever", "verification", ("beam",)),
     "cook": ("Cook's membrane", "verification", ("membrane",)),
     "cut_cells": ("Cut cells", "showcase", ()),
+    "one_line": ("One line of the weak form", "showcase", ()),
     "self_weight": ("Self-weight", "verification", ()),
     "elastica": ("Elastica", "verification", ("strip",)),
     "footing": ("Footing", "verification", ()),

@@ -135,7 +135,7 @@ def test_small_parts_of_cells_change_neither_condition_nor_deflection():
 
 
 def test_small_parts_of_cells_in_other_forms():
-    """The limits that README.md states; the numbers were measured with this code."""
+    """The limits that the documentation states; the numbers were measured with this code."""
     assert shelf("u_bbar", 1e-2).condition == pytest.approx(2e8, rel=0.5)
     with pytest.warns(tawami.InstabilityWarning, match=r"cell \(0, 4\) holds 0.01 of its area"):
         assert np.abs(shelf("u_epsv_residual_based", 1e-2).mean_stress).max() > 1.9

@@ -41,7 +41,7 @@ def test_b_bar_fails_the_loaded_patch_test_as_known():
     report = tawami.check_form("u_bbar")
     exact, miss = [line for line in report.lines if line.subject == "patch test, loaded"]
     assert (exact.verdict, miss.verdict) == ("ok", "note")
-    assert "README, Limits" in miss.words
+    assert "documentation, Limits" in miss.words
     assert "quadratic splines: 2.0e-01" in miss.words
 
 

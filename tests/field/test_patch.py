@@ -81,7 +81,7 @@ def test_plain_tension_gives_one_stress(form, basis):
 )
 def test_evenly_spaced_particles_under_integrate_the_end_splines(name, per_axis, largest, l2):
     """8 x 6 cells in plain tension: the largest error of the stress is in the cells of the border and
-    does not fall on finer grids; its L2 norm falls like h (README, Limits). The numbers are the
+    does not fall on finer grids; its L2 norm falls like h (documentation, Limits). The numbers are the
     code's own.
     """
     errors = tension_error(FORMS[name], per_axis=per_axis, gauss=False, cells=(8, 6))

@@ -102,7 +102,7 @@ def block(law, form):
     """2 m x 1 m, filling its grid, with particles at Gauss points."""
     grid = tawami.Grid(grid_of().comm, origin=(0, 0), h=0.5, cells=(4, 2))
     body = tawami.box(grid, (0, 0), (2, 1), per_axis=3, gauss=True)
-    # quadratic B-bar misses the patch test (README, Limits)
+    # quadratic B-bar misses the patch test (documentation, Limits)
     basis = "bilinear" if form["form"] == "u_bbar_finite" else "quadratic_spline"
     return tawami.Scene(grid, body, law, tolerance=1e-10, basis=basis, **form)
 

@@ -3,6 +3,7 @@
 python -m cases.showcase.collapse                     with each form, to 0.8 s
 python -m cases.showcase.collapse --aspects           run-out of piles 0.5 to 4 times as high as long
 python -m cases.showcase.collapse --incompressible    nu = 0.4999, alpha = 0.1, to 0.4 s
+python -m cases.showcase.collapse --movie             the mixed form alone, as a moving picture
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ PROGRAM.option("--dt", type=float, default=1e-3, help="size of a step [s]")
 PROGRAM.option("--cell", type=float, default=0.01, help="size of a cell [m]")
 PROGRAM.option("--aspects", action="store_true", help="compare piles of other shapes")
 PROGRAM.option("--incompressible", action="store_true", help="nu = 0.4999 to 0.4 s")
+PROGRAM.option("--movie", action="store_true", help="write a moving picture of the mean stress")
 
 COLUMNS = (
     "form", "end", "steps", "smallest_step", "mean_iterations", "most_iterations", "run_out",
@@ -85,7 +87,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         run = solve("u_epsv_finite", nu=0.4999, alpha=0.1, end=min(options.end, 0.4))
         print(as_text([row(run)], COLUMNS))
         return
-    if options.aspects:
+    if options.movie:
+        run = solve("u_epsv_finite", h=options.cell, dt=options.dt, end=options.end, every=10)
+        figures.movie(run, PROGRAM.folder / "collapse.gif")
+    elif options.aspects:
         compare_aspects()
     else:
         compare_forms(options.cell, options.dt, options.end)

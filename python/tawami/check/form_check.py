@@ -228,7 +228,7 @@ def _compressed(form: Form, given: Settings) -> Found:
     yield _judged(error, UNIFORM, f"error of the stress under a traction{basis}")
     if cell:
         error = scenes.compressed(form, given, "quadratic_spline")
-        known = "a limit of B-bar: div w at the centre of a cell is not its mean (README, Limits)"
+        known = "a limit of B-bar: div w at the centre of a cell is not its mean (documentation, Limits)"
         yield "note" if error > UNIFORM else "ok", f"quadratic splines: {error:.1e}, {known}"
 
 

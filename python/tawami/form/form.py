@@ -27,7 +27,7 @@ parameters, options       alpha, ... as declared
 ========================= ========================================================================
 
 Particle data enter as volume-weighted densities at the points of a fixed rule. Each `sum_p` contains
-exactly one of them, so that the integral equals the sum over the particles (README, The method). The
+exactly one of them, so that the integral equals the sum over the particles (docs: theory). The
 tangent is derived (`tawami.form.tangent`).
 """
 

@@ -1,6 +1,6 @@
 """Particle data that a form may name, and the densities through which they enter the field problem.
 
-At the points q of a fixed rule, particle data D become volume-weighted densities (README, The method):
+At the points q of a fixed rule, particle data D become volume-weighted densities (docs: theory):
 D_q = (sum_p V_p D_p l_q(x_p)) / (w_q |J|).
 """
 

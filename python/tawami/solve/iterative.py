@@ -1,7 +1,7 @@
 """The scaled linear systems of a step by FGMRES with a preconditioner for each field.
 
 Smoothed-aggregation multigrid with the rigid modes preconditions the displacement. eps_v or p, scaled
-as p/mu (README, The method), need no preconditioner: their Schur complement is near the identity. It is
+as p/mu (docs: theory), need no preconditioner: their Schur complement is near the identity. It is
 farther from the identity for small alpha: 20 to 50 iterations with alpha = 0.1, up to 130 with 0.01, for
 any Poisson's ratio.
 

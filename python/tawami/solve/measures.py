@@ -1,4 +1,4 @@
-"""The two measures that stop Newton's method (README, The method).
+"""The two measures that stop Newton's method (docs: theory).
 
 momentum   |R_u| / max(|f_int|, |f_ext|, |f_inertia|), norms over all displacement coefficients; a static
            step also takes |f_int| at its beginning, which a body that is unloaded does not end with

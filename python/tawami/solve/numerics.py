@@ -1,7 +1,7 @@
 """Numerical settings of a scene.
 
 Only Newton's tolerance changes the result. Tangent, factorisations and linear solver change the time
-(README, Speed against accuracy).
+(documentation, Speed against accuracy).
 """
 
 from __future__ import annotations

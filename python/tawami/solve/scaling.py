@@ -1,4 +1,4 @@
-"""Scaling of the unknowns: displacement by its stiffness, eps_v and p as p/mu (README, The method)."""
+"""Scaling of the unknowns: displacement by its stiffness, eps_v and p as p/mu (docs: theory)."""
 
 from __future__ import annotations
 

@@ -1,0 +1,89 @@
+"""One line of the weak form: a strip load on a nearly incompressible block, with and without it.
+
+        p = 1 kPa
+        |||||
+     ___vvvvv_____________
+    |                     |    2 m x 1 m, 32 x 16 cells, plane strain, E = 1 MPa, nu = 0.4999
+    |_____________________|    smooth sides and floor, bilinear functions
+
+The weak form stands here as in a driver script. Its last term, alpha h^2 (K/mu) lap(eps_v), is the
+stabilisation of the paper. Without it the mean stress oscillates from cell to cell.
+
+python -m cases.showcase.one_line
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib.pyplot as plt
+from mpi4py import MPI
+from ufl import div, dot, grad
+
+import tawami
+from cases.common.figure import save
+from cases.common.program import Program
+from cases.showcase.collapse.pile import roughness
+
+PROGRAM = Program("cases.showcase.one_line", __doc__)
+H, LOAD = 1 / 16, 1e3  # [m], [Pa]
+
+
+def unstable(u, eps_v, w, q, sigma, K, t, sum_p, ds):  # type: ignore[no-untyped-def]
+    """The equations of the paper without stabilisation."""
+    R_u = sum_p(sigma, grad(w)) - dot(t, w) * ds
+    R_q = sum_p(K, q * (div(u) - eps_v))
+    return R_u + R_q
+
+
+def stable(u, eps_v, w, q, sigma, K, mu, t, h, sum_p, ds):  # type: ignore[no-untyped-def]
+    """The same and one line."""
+    R_u = sum_p(sigma, grad(w)) - dot(t, w) * ds
+    R_q = sum_p(K, q * (div(u) - eps_v))
+    R_q -= sum_p(K**2 / mu, 0.01 * h**2 * dot(grad(q), grad(eps_v)))
+    return R_u + R_q
+
+
+def solve(residual) -> tawami.Solution:  # type: ignore[no-untyped-def]
+    """The block with a weak form."""
+    fields = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
+    form = tawami.Form(fields=fields, kinematics="mixed", residual=residual)
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(-1, 0), h=H, cells=(32, 16))
+    block = tawami.box(grid, (-1, 0), (1, 1), per_axis=3, gauss=True)
+    rubber = tawami.linear_elastic(E=1e6, nu=0.4999)
+    scene = tawami.Scene(grid, block, rubber, form=form, basis="bilinear")
+    for edge in ("left", "right", "bottom"):
+        scene.fix(edge, "x")
+    scene.fix("bottom", "y")
+    scene.traction("top", (0.0, -LOAD), between=(-0.25, 0.25))
+    return scene.solve()
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Solve with both forms, print how rough their mean stress is, draw it."""
+    PROGRAM.start(arguments)
+    figure, axes = plt.subplots(1, 2, figsize=(9, 2.9), layout="constrained", sharey=True)
+    for axis, residual in zip(axes, (unstable, stable), strict=True):
+        solution = solve(residual)
+        rough = roughness(solution.x, solution.mean_stress, H)
+        title = "without the line" if residual is unstable else "with it"
+        print(f"{title:16} roughness of the mean stress {rough:.4f}")
+        points = axis.scatter(
+            *solution.x.T,
+            c=solution.mean_stress / 1e3,
+            s=5,
+            marker="s",
+            linewidths=0,
+            cmap="viridis",
+            vmin=-1,
+            vmax=0,
+        )
+        axis.set(aspect="equal", title=title, xlabel="$x$ [m]")
+    axes[0].set_ylabel("$y$ [m]")
+    figure.colorbar(points, ax=axes, label="mean stress [kPa]", extend="both")
+    save(figure, PROGRAM.folder / "mean_stress.png")
+    PROGRAM.list_results()
+
+
+if __name__ == "__main__":
+    PROGRAM.run(main)
