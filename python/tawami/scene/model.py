@@ -109,8 +109,8 @@ class Model:
         """
         if list(texts) != self.texts:
             raise CheckpointError(
-                "laws were changed while the run went (each=): expected change_material(...) between two "
-                "phases"
+                "laws were changed while the run went (each=): expected change_material(...) between "
+                "two phases"
             )
 
     @property
