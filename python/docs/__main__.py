@@ -3,9 +3,10 @@
 python python/docs [--page NAME] [--links] [--thumbnails]
 
 Pages are copied, and names in double braces are replaced by generated text. MyST-NB runs the code of
-pages (`notebooks`). Warnings are errors, and so is a page that loads something from the web. With
---page only one page is built, in a folder of its own, and its links to other pages are not checked.
---thumbnails draws the pictures of README's gallery from the figures of the cases, and builds nothing.
+pages (`notebooks`). Warnings are errors, and so are problems that headless Chromium finds (`browser`),
+and pages that load something from the web. With --page only one page is built, in a folder of its own,
+and its links to other pages are not checked. --thumbnails draws the pictures of README's gallery from
+the figures of the cases, and builds nothing.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import sys
 from pathlib import Path
 from time import perf_counter
 
+import browser
 import executed
 import notebooks
 import pages
@@ -44,6 +46,7 @@ def build(page: str | None, links: bool) -> int:
         options += ["-D", f"root_doc={page}", "-D", "suppress_warnings=ref,myst.xref_missing,toc"]
     code = sphinx(["-b", "html", *options, str(source), str(html)])
     problems = [*pages.problems(html), *notebooks.problems(folder / "jupyter_execute")]
+    problems += browser.problems(html)
     for problem in problems:
         print(f"docs: {problem}", file=sys.stderr)
     code = int(bool(code or problems))

@@ -64,16 +64,21 @@ html_css_files = ["pages.css"]
 def src(
     _name: str, rawtext: str, text: str, line: int, inliner: Any, *_: Any
 ) -> tuple[list[nodes.Node], list[nodes.system_message]]:
-    """Role for a file of the repository and a symbol in it: {src}`forms/u.py residual`."""
+    """Role that links to a file of the repository and a symbol in it: {src}`forms/u.py residual`."""
     problem = sources.missing(text)
     if problem is not None:
         return [], [inliner.reporter.warning(problem, line=line)]
-    return [nodes.literal(rawtext, text.replace(" ", ": ", 1), classes=["src"])], []
+    env = inliner.document.settings.env
+    page = Path(env.app.outdir, env.docname).parent
+    target = sources.address(text, env.config.repository, page)
+    name = nodes.literal(rawtext, text.replace(" ", ": ", 1), classes=["src"])
+    return [nodes.reference(rawtext, "", name, refuri=target)], []
 
 
 def setup(app: Any) -> dict[str, bool]:
     """Register the role; draw equations as SVG, since browsers block fonts of local files."""
     app.add_role("src", src)
+    app.add_config_value("repository", sources.repository(), "env")
     app.config.mathjax_path = "mathjax/tex-svg.js"
     mathjax = app.extensions["sphinx-mathjax-offline"]  # it copies files at the end only
     mathjax.parallel_read_safe = mathjax.parallel_write_safe = True

@@ -1,23 +1,26 @@
 """Prepare the IPython kernel that runs the code of pages; a profile of `notebooks` runs it at the start.
 
-Errors and warnings are shown as one line, as `tawami.run` prints them, and without the paths of this
-machine.
+Errors and warnings are shown by their class and message, without the code and paths of this machine.
 """
 
 import logging
+import textwrap
 import warnings
 
 from IPython import get_ipython
 
 
 def _prepare():
-    def one_line(kind, error, *_, **__):
-        return [f"{kind.__name__}: {error}"]
+    def lines(kind, text):
+        return textwrap.fill(f"{kind.__name__}: {text}", 94, subsequent_indent="    ")
+
+    def brief(kind, error, *_, **__):
+        return [lines(kind, error)]
 
     def show(message, category, *_, **__):
-        print(f"{category.__name__}: {message}")
+        print(lines(category, message))
 
-    get_ipython().InteractiveTB.structured_traceback = one_line
+    get_ipython().InteractiveTB.structured_traceback = brief
     warnings.showwarning = show
     logging.disable(logging.INFO)  # compiling forms logs much
 

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import browser
 import compatibility
 import executed
 import messages
@@ -96,6 +97,23 @@ def test_files_and_symbols_that_pages_name_exist():
 )
 def test_references_to_missing_files_and_symbols(reference):
     assert reference.split()[-1].split(".")[-1].split("::")[-1] in sources.missing(reference)
+
+
+def test_references_become_links(tmp_path):
+    """To the public repository if pyproject.toml names one, else to the file of this checkout."""
+    project = tmp_path / "pyproject.toml"
+    project.write_text('[project]\nname = "x"\n')
+    assert sources.repository(project) == ""
+    project.write_text(
+        '[project]\nname = "x"\n[project.urls]\nRepository = "https://host.org/x/"\n'
+    )
+    base = sources.repository(project)
+    assert (
+        sources.address("forms/u.py residual", base, DOCS)
+        == "https://host.org/x/blob/HEAD/forms/u.py"
+    )
+    link = sources.address("forms/u.py residual", "", DOCS)
+    assert (DOCS / link).resolve() == (sources.ROOT / "forms" / "u.py").resolve()
 
 
 def test_every_section_of_the_theory_names_its_files():
@@ -291,6 +309,38 @@ def test_every_case_is_a_page_and_can_be_run():
         path.stem for room in rooms for path in room.glob("[!_]*") if path.suffix in ("", ".py")
     }
     assert there == set(pages.CASES) | {"bench", "trade"}
+
+
+def test_broken_links_are_found(tmp_path):
+    page, other = tmp_path / "page.html", tmp_path / "other.html"
+    page.touch()
+    other.touch()
+    targets = ["https://x.org/y", page.as_uri(), f"{other.as_uri()}#there"]
+    names = {page: {"here"}, other: {"there"}}
+    assert browser.broken({page: targets}, names) == []
+    targets += [f"{other.as_uri()}#nowhere", (tmp_path / "none.html").as_uri()]
+    said = [text for _, text in browser.broken({page: targets}, names)]
+    assert said == [
+        f"links to {tmp_path}/none.html, which does not exist",
+        "links to other.html#nowhere, and the page has no such place",
+    ]
+
+
+@pytest.mark.slow
+def test_one_page_is_built_and_opened_in_a_browser(tmp_path):
+    """A page is built without problems; those of a page with mistakes are found."""
+    for needed in ("sphinx", "playwright"):
+        pytest.importorskip(needed, reason="installed by make docs")
+    words = [sys.executable, str(DOCS), "--page", "start"]
+    built = subprocess.run(words, cwd=sources.ROOT, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr
+    wide = '<main><p style="width: 5000px">long</p><a href="none.html">x</a></main>'
+    (tmp_path / "page.html").write_text(f"{wide}<script>nothing()</script>")
+    said = browser.problems(tmp_path)
+    assert len(said) == 5
+    assert sum("is wider than" in text for text in said) == 3
+    assert "nothing is not defined" in said[0]
+    assert "none.html, which does not exist" in said[-1]
 
 
 @pytest.fixture(scope="module")
