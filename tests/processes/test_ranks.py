@@ -106,7 +106,7 @@ def test_files_hold_the_whole_body_once(alone, several):
 
 def test_the_header_describes_the_whole_body_on_every_rank(alone, several):
     (header,) = alone.results["output header"]
-    assert "particles     128, 88 bytes each" in header
+    assert "particles     128, 120 bytes each" in header
     expected = str(header).replace("1 rank", f"{several.number} ranks")
     assert list(several.results["output header"]) == [expected] * several.number
 

@@ -301,7 +301,7 @@ def test_only_the_arrays_that_a_scene_needs_exist():
         else:
             assert scene.particles.eps_v.shape == scene.particles.volume.shape
         assert scene.configuration.model.compiled.traction is not None
-    assert bytes_of == {"u": 80, "u_epsv": 88}
+    assert bytes_of == {"u": 112, "u_epsv": 120}
 
 
 @given(
