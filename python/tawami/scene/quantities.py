@@ -7,7 +7,7 @@ does not model gives an error that says how to model it; an unknown name gives t
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -204,7 +204,7 @@ def local_arrays(subject: Subject) -> Arrays:
 
 
 def _present(subject: Subject, name: str) -> npt.NDArray[Any]:
-    with _not_modelled():
+    with not_modelled():
         if name in CARRIED:
             _ = getattr(subject, name)  # or the error of the scene that has none
         return array_of(subject.scene.particles, name)
@@ -214,6 +214,11 @@ def body_arrays(subject: Subject) -> Arrays:
     """Arrays of the particles of all ranks in the order of their numbers; calls for all ranks."""
     gather = placement.in_order(subject.scene.grid.comm, _present(subject, "number"))
     return Arrays(lambda name: gather(_present(subject, name)))
+
+
+def named(histories: Iterable[str]) -> dict[str, Quantity]:
+    """Quantities by name, with those of history variables."""
+    return PARTICLES | {name: history(name) for name in histories}
 
 
 # -- by name -----------------------------------------------------------------
@@ -226,7 +231,7 @@ def of_particles(given: Iterable[Given], subject: Subject) -> list[Quantity]:
         NotModelledError: The scene does not have one; the message names the switch that adds it.
         InputError: An unknown name, or a function of the driver script that fails.
     """
-    known = PARTICLES | {name: history(name) for name in subject.scene.particles.history_names}
+    known = named(subject.scene.particles.history_names)
     found = []
     for one in given:
         if isinstance(one, Quantity):
@@ -259,15 +264,12 @@ def unknown(place: str, name: str, known: Iterable[str]) -> InputError:
 
 
 @contextmanager
-def _not_modelled() -> Iterator[None]:
+def not_modelled() -> Iterator[None]:
     """Raise InputError of the block as NotModelledError."""
     try:
         yield
     except InputError as error:
         raise NotModelledError(str(error)) from None
-
-
-# -- numbers -----------------------------------------------------------------
 
 
 def split(label: str) -> tuple[str, tuple[str, ...], str]:
@@ -276,39 +278,3 @@ def split(label: str) -> tuple[str, tuple[str, ...], str]:
     if name.endswith(f" {TENSOR}"):
         return name.removesuffix(f" {TENSOR}"), PLANE.tensor, unit
     return name, (), unit
-
-
-def scalars(fields: Mapping[str, Array], *, sizes: bool = True) -> dict[str, tuple[str, Array]]:
-    """The numbers of fields: name -> (unit, values), one value for each particle.
-
-    Args:
-        fields: Values by label. Vectors may have more components than the space.
-        sizes: Whether a vector has its size too, under its own name.
-    """
-    found: dict[str, tuple[str, Array]] = {}
-    for label, values in fields.items():
-        name, components, unit = split(label)
-        if values.ndim == 1:
-            found[name] = (unit, values)
-            continue
-        if not components and values.shape[1] in (PLANE.dim, 3):
-            components = PLANE.axes
-            if sizes:
-                found[name] = (unit, np.linalg.norm(values, axis=1))
-        if not components:
-            components = tuple(map(str, range(1, values.shape[1] + 1)))
-        found |= {f"{name} {c}": (unit, values[:, k]) for k, c in enumerate(components)}
-    return found
-
-
-def derived(fields: Mapping[str, Array]) -> dict[str, Array]:
-    """Fields by label, with the quantities that follow from them: the mean stress from the stress."""
-    by_name = {split(label)[0]: values for label, values in fields.items()}
-    found = dict(fields)
-    for quantity in PARTICLES.values():
-        if quantity.name not in by_name:
-            try:
-                found[quantity.label] = np.asarray(quantity.of(Arrays(by_name.__getitem__)))
-            except KeyError:
-                continue
-    return found
