@@ -12,7 +12,7 @@ from tawami.base.optional import optional
 from tawami.motion.observer import Motion
 from tawami.picture import film
 from tawami.picture.particles import scale_of
-from tawami.scene.presentation import checked_limits, corners_of, positions, sides
+from tawami.scene.presentation import checked_limits, corners_of, positions, shapes
 from tawami.scene.quantities import Given, body_arrays
 from tawami.scene.scalars import pick
 
@@ -47,9 +47,10 @@ class Camera:
             scene, arrays = self._motion.scene, body_arrays(self._motion)
             histories = scene.particles.history_names
             self.name, self.unit, values = pick(self._quantity, arrays, histories)
-            moved = scene.form.strain.finite
-            x = positions(arrays, moved=moved, deformed=self._deformed)
-            self.frames.append(film.Frame(f"$t$ = {time:.4g} s", x, sides(arrays), values))
+            moved, deformed = scene.form.strain.finite, self._deformed
+            x = positions(arrays, moved=moved, deformed=deformed)
+            shape = shapes(arrays, moved=moved, deformed=deformed)
+            self.frames.append(film.Frame(f"$t$ = {time:.4g} s", x, shape, values))
 
 
 def animate(

@@ -33,13 +33,13 @@ class Frame:
     Attributes:
         title: Of the picture.
         x: Positions [m], particles x 2.
-        side: Sides of the squares [m], one for all or one each.
+        shape: Of the particles; see `Squares.show`.
         values: What colours them.
     """
 
     title: str
     x: Array
-    side: Array | float
+    shape: Array | float
     values: Array
 
 
@@ -68,7 +68,7 @@ class Film:
     def show(self, number: int) -> None:
         """Draw a frame."""
         frame = self.frames[number]
-        self.squares.show(frame.x, frame.side, frame.values)
+        self.squares.show(frame.x, frame.shape, frame.values)
         self.axes.set_title(frame.title)
 
     def picture(self, path: Path) -> Path:

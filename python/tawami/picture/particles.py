@@ -93,17 +93,26 @@ class Squares:
         from matplotlib.collections import PolyCollection
 
         self._scale = scale
-        self.artist = PolyCollection([], cmap=scale.colours, edgecolors="face", linewidths=0.1)
+        self.artist = PolyCollection([], cmap=scale.colours, edgecolors="face", linewidths=0.3)
         self.artist.set_clim(scale.low, scale.high)
         self.artist.set_zorder(2)
         axes.add_collection(self.artist, autolim=False)
         if scale.colours == style.SIGNED:
             axes.set_facecolor(style.BEHIND)  # the middle of the map is white
 
-    def show(self, x: Array, side: Array | float, values: Array) -> None:
-        """Show particles at positions [m], particles x 2, with sides [m] and values."""
-        sides = np.broadcast_to(np.asarray(side, dtype=float), len(x))
-        self.artist.set_verts(x[:, None, :] + sides[:, None, None] * CORNERS)
+    def show(self, x: Array, shape: Array | float, values: Array) -> None:
+        """Show particles.
+
+        Args:
+            x: Positions [m], particles x 2.
+            shape: Sides of squares [m], one for all or one each, or edges of parallelograms as columns,
+                particles x 2 x 2.
+            values: Their values.
+        """
+        edges = np.asarray(shape, dtype=float)
+        if edges.ndim < 2:
+            edges = np.broadcast_to(edges, len(x))[:, None, None] * np.eye(2)
+        self.artist.set_verts(x[:, None, :] + CORNERS @ edges.transpose(0, 2, 1))
         self.artist.set_array(values / self._scale.factor)
 
     def add_bar(self, axes: Axes | Sequence[Axes], **where: Any) -> None:

@@ -15,11 +15,15 @@ from tawami.grid.grid import Grid
 from tawami.picture import style
 from tawami.picture.figure import shown_axes
 from tawami.picture.particles import Corners, Squares, draw_frame, scale_of, size_of, view
-from tawami.scene.quantities import Arrays, Given, Quantity, named
+from tawami.scene.quantities import GRADIENT, Arrays, Given, Quantity, named
 from tawami.scene.scalars import pick, scalars
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+
+#: Stretch beyond which a particle is drawn as a square, since its parallelogram would be a needle.
+MOST_STRETCH = 3.0
 
 
 def corners_of(grid: Grid) -> Corners:
@@ -35,12 +39,23 @@ def positions(arrays: Arrays, *, moved: bool, deformed: float) -> Array:
         moved: Whether their positions contain their displacements, as at finite strain.
         deformed: Factor on the displacements.
     """
-    return arrays["x"] + (deformed - moved) * arrays["displacement"]
+    return np.asarray(arrays["x"] + (deformed - moved) * arrays["displacement"])
 
 
-def sides(arrays: Arrays) -> Array:
-    """Sides of squares with the volumes of the particles [m]."""
-    return np.asarray(arrays["volume"] ** (1 / arrays["x"].shape[1]))
+def shapes(arrays: Arrays, *, moved: bool, deformed: float) -> Array:
+    """Sides of squares with the volumes of the particles [m]; at finite strain the edges of the
+    parallelograms that these have become, as columns.
+
+    Args:
+        arrays, moved, deformed: As in :func:`positions`.
+    """
+    dim = arrays["x"].shape[1]
+    side = np.asarray(arrays["volume"] ** (1 / dim))
+    if not moved:
+        return side
+    f = np.eye(dim) + deformed * arrays[GRADIENT]
+    f[np.linalg.norm(f, 2, axis=(1, 2)) > MOST_STRETCH] = np.eye(dim)
+    return np.asarray(side[:, None, None] * f)
 
 
 def checked_limits(limits: Any) -> tuple[float, float] | None:
@@ -83,7 +98,7 @@ def plot(
         beside = True
     draw_frame(axes, lower, upper, corners)
     squares = Squares(axes, scale_of(name, unit, [values], limits))
-    squares.show(x, sides(arrays), values)
+    squares.show(x, shapes(arrays, moved=moved, deformed=deformed), values)
     if beside:
         squares.add_bar_beside(axes)
     else:

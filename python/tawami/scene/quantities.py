@@ -24,15 +24,19 @@ from tawami.particles import placement
 
 #: Arrays of the particles that are carried by a motion.
 CARRIED = ("velocity", "acceleration")
+#: What particles store of F - I at finite strain.
+GRADIENT = "displacement_gradient"
 #: Components of a symmetric tensor, as labels have them.
 TENSOR = " ".join(PLANE.tensor)
 
 
 class Arrays:
-    """Arrays of particles by name, as `p.stress` or `p["plastic_strain"]`: `x`, `stress`, `strain`,
-    `displacement`, `volume`, `material`, `number`, `eps_v`, `velocity`, `acceleration` and history
-    variables, as far as the scene has them, `mean_stress` and `deviatoric_stress_q`. Their first index
-    is the particle.
+    """Arrays of particles by name, as `p.stress` or `p["plastic_strain"]`.
+
+    There are `x`, `stress`, `strain`, `displacement`, `volume`, `material` and `number`, and as far
+    as the scene has them `eps_v`, `velocity`, `acceleration`, history variables and, at finite strain,
+    `displacement_gradient`. `mean_stress` and `deviatoric_stress_q` are computed. The first index of
+    an array is the particle.
 
     Args:
         get: Function that returns the array of a name.
@@ -178,7 +182,7 @@ def history(name: str) -> Quantity:
 def arrays_of(particles: _rust.Particles) -> list[str]:
     """Names of the arrays that particles have, without those of a motion that are gradients."""
     stored = dict(particles.arrays)
-    names = [name for name in ("x", *PARTICLES) if name in stored or name == "strain"]
+    names = [name for name in ("x", *PARTICLES, GRADIENT) if name in stored or name == "strain"]
     return [*names, *particles.history_names]
 
 
@@ -188,12 +192,12 @@ def array_of(particles: _rust.Particles, name: str) -> npt.NDArray[Any]:
     Raises:
         InputError: The particles do not have it; the message names what models it.
     """
-    known = dict.fromkeys(["x", *PARTICLES, *HISTORY, *particles.history_names])
+    known = dict.fromkeys(["x", *PARTICLES, GRADIENT, *HISTORY, *particles.history_names])
     if name not in known:
         raise unknown("arrays of the particles", name, known)
     if name in CARRIED:
         return particles.carried(name)
-    if name not in PARTICLES and name != "x":
+    if name not in (*PARTICLES, GRADIENT, "x"):
         return particles.history(name)
     return np.asarray(getattr(particles, name))
 
