@@ -12,7 +12,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from tawami import _rust
-from tawami.base import checks
+from tawami.base import checks, html
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
 from tawami.base.sealed import Sealed
@@ -140,6 +140,9 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
             f"Scene({self.num_particles} particles on {nx} x {ny} cells of {self.grid.h:g} m, form "
             f"{self.form.name}, {', '.join(dict.fromkeys(self.configuration.model.laws))})"
         )
+
+    def _repr_html_(self) -> str:
+        return html.table(f"Scene at {self.time:g} s", description.lines(self.configuration))
 
     # -- the body ------------------------------------------------------------
 
