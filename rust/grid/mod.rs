@@ -10,7 +10,7 @@ mod rule;
 pub use active::Active;
 pub use basis::{Basis, Local};
 pub use extraction::{extraction, Extraction};
-pub(crate) use functions::sum;
+pub(crate) use functions::{products_of, sum};
 pub use functions::{products, CellFunctions, Functions};
 pub use location::Location;
 pub use rule::{Rule, MAX_POINTS};

@@ -67,7 +67,12 @@ class FastAssembly(Assembly):
             points, vertices = self.attachment.points[slot.source], slot.source == "vertex"
             slots.append((rules.index(slot.data), points, vertices, slot.columns))
         kernel, constants = integral.kernel, self.attachment.constants(integral).tolist()
-        return kernel.module, kernel.address, integral.rank, integral.width, slots, constants
+        point = None
+        if integral.points is not None:
+            place, entries = integral.points
+            point = (place, entries.fields, entries.test, entries.trial)
+        code = kernel.module, kernel.address
+        return *code, integral.rank, integral.width, slots, constants, point
 
     def _kernels(self, rank: int, integrals: Sequence[Integral]) -> _rust.Kernels:
         return _rust.Kernels(self._assembler, rank, list(map(self._kernel, integrals)))

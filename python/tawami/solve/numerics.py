@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from tawami.base import checks
-from tawami.fem.rules import TangentRule
+from tawami.form.symbols import Assembly
 
-Assembly = Literal["fast", "reference"]
 Factorise = Literal["when_it_pays", "always"]
 SolverName = Literal["direct", "iterative"]
 
@@ -26,8 +25,6 @@ class Numerics:
         max_iterations: Newton iterations after which the step fails.
         assembly: 'fast' calls the kernels from Rust, 'reference' is plain dolfinx and P^T K P. Both give
             the same numbers up to round-off.
-        tangent_rule: Points of the sums over particles in the tangent: 'full' (5 x 5, exact) or
-            'reduced' (3 x 3, an approximation: cheaper, with more iterations, and Newton may diverge).
         factorise: 'when_it_pays' uses a factorisation in later iterations and steps, 'always' factorises
             in each Newton iteration.
         linear_solver: 'direct' (MUMPS) or 'iterative' (FGMRES, with multigrid for the displacement).
@@ -39,7 +36,6 @@ class Numerics:
     tolerance: float = 1e-6
     max_iterations: int = 20
     assembly: Assembly = "fast"
-    tangent_rule: TangentRule = "full"
     factorise: Factorise = "when_it_pays"
     linear_solver: SolverName = "direct"
 
@@ -48,7 +44,6 @@ class Numerics:
         checks.whole_number("max_iterations", self.max_iterations, low=1)
         choices: dict[str, Any] = {
             "assembly": Assembly,
-            "tangent_rule": TangentRule,
             "factorise": Factorise,
             "linear_solver": SolverName,
         }
@@ -64,6 +59,6 @@ class Numerics:
             )
         return (
             f"Newton to {self.tolerance:g} in at most {self.max_iterations} iterations, "
-            f"{self.tangent_rule} tangent, {solver}, assembly {self.assembly}, "
+            f"{solver}, assembly {self.assembly}, "
             f"{ranks} rank{'s' if ranks > 1 else ''}"
         )
