@@ -5,7 +5,7 @@ use std::ffi::c_void;
 use ndarray::ArrayView2;
 
 use super::cell::{Cells, Local, Nodal, Vertices};
-use super::point::{PointKernel, Points};
+use super::point::{PointKernel, Points, Row};
 use crate::grid::Location;
 use crate::space::MAX_DOFS;
 use crate::transfer::cells::mean_of_cell;
@@ -151,16 +151,16 @@ impl<'a> State<'a> {
     }
 }
 
-/// Memory of one thread for cells with `M` coefficients, `W` functions of the displacement along each axis.
-pub(super) struct Work<const M: usize, const W: usize> {
+/// Memory of one thread as [`Points`].
+pub(super) struct Work<const M: usize, const P: usize, const W: usize> {
     packed: Vec<f64>,
-    points: Points<M, W>,
+    points: Points<M, P, W>,
     element: [f64; MAX_DOFS * MAX_DOFS],
     half: [f64; MAX_DOFS * MAX_DOFS],
     turned: [f64; MAX_DOFS * MAX_DOFS],
 }
 
-impl<const M: usize, const W: usize> Work<M, W> {
+impl<const M: usize, const P: usize, const W: usize> Work<M, P, W> {
     pub(super) fn new() -> Self {
         let zero = [0.0; MAX_DOFS * MAX_DOFS];
         let (packed, points) = (Vec::new(), Points::new());
@@ -187,7 +187,7 @@ impl<const M: usize, const W: usize> Work<M, W> {
             nodal.transposed(element, 1, &mut out);
         }
         // SAFETY: the caller's.
-        unsafe { self.points.add(&kernels.points, state, a, local, &mut out) };
+        unsafe { self.points.add_vectors(&kernels.points, state, a, local, &mut out) };
         out
     }
 
@@ -201,10 +201,9 @@ impl<const M: usize, const W: usize> Work<M, W> {
         form: &Bilinear,
         a: usize,
         local: &Local,
-        out: &mut [[f64; M]; M],
+        out: &mut [Row<P>; M],
     ) {
-        let flat = out.as_flattened_mut();
-        flat.fill(0.0);
+        out.fill(Row::ZERO);
         let n = state.cells.dofs();
         if !form.kernels.cells.is_empty() {
             let nodal = state.cells.nodal(state.location, a, local);
@@ -215,17 +214,19 @@ impl<const M: usize, const W: usize> Work<M, W> {
             nodal.transposed(element, n, &mut self.half);
             transpose(&self.half[..M * n], n, &mut self.turned);
             nodal.transposed(&self.turned[..n * M], M, &mut self.half);
-            transpose(&self.half[..M * M], M, flat);
+            for (i, row) in out.iter_mut().enumerate() {
+                (0..M).for_each(|j| row.0[j] = self.half[j * M + i]);
+            }
         }
         // SAFETY: the caller's.
-        unsafe { self.points.add(&form.kernels.points, state, a, local, flat) };
+        unsafe { self.points.add_matrices(&form.kernels.points, state, a, local, out) };
         for [left, right] in &form.couplings {
             // SAFETY: the caller's.
             let (left, right) = unsafe {
                 (self.vector(state, left, a, local), self.vector(state, right, a, local))
             };
             for (row, left) in out.iter_mut().zip(left) {
-                row.iter_mut().zip(right).for_each(|(e, right)| *e += left * right);
+                row.0.iter_mut().zip(right).for_each(|(e, right)| *e += left * right);
             }
         }
     }

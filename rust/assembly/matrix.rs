@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::kernel::{Bilinear, State, Work};
 use super::pattern::Pattern;
+use super::point::Row;
 use super::selection::{self, Entry, Selection};
 use super::{colours, Shared};
 use crate::space::{DIM, DISPLACEMENT_DOFS, FUNCTIONS_1D, MAX_DOFS, VERTICES};
@@ -27,12 +28,12 @@ pub unsafe fn matrix(
     // SAFETY: the caller's.
     unsafe {
         match state.cells.local_len() {
-            MAX_DOFS => matrix_of::<MAX_DOFS, FUNCTIONS_1D>(state, form, selection, pattern, values),
+            MAX_DOFS => matrix_of::<MAX_DOFS, 24, FUNCTIONS_1D>(state, form, selection, pattern, values),
             DISPLACEMENT_DOFS => {
-                matrix_of::<DISPLACEMENT_DOFS, FUNCTIONS_1D>(state, form, selection, pattern, values)
+                matrix_of::<DISPLACEMENT_DOFS, 24, FUNCTIONS_1D>(state, form, selection, pattern, values)
             }
-            MIXED_LINEAR => matrix_of::<MIXED_LINEAR, 2>(state, form, selection, pattern, values),
-            _ => matrix_of::<LINEAR, 2>(state, form, selection, pattern, values),
+            MIXED_LINEAR => matrix_of::<MIXED_LINEAR, 16, 2>(state, form, selection, pattern, values),
+            _ => matrix_of::<LINEAR, 8, 2>(state, form, selection, pattern, values),
         }
     }
 }
@@ -42,8 +43,8 @@ pub(super) const LINEAR: usize = DIM * VERTICES;
 pub(super) const MIXED_LINEAR: usize = LINEAR + VERTICES;
 
 /// Memory of one thread: the matrix of the cell and its unknowns.
-struct Scatter<const M: usize, const W: usize> {
-    work: Work<M, W>,
+struct Scatter<const M: usize, const P: usize, const W: usize> {
+    work: Work<M, P, W>,
     entries: Vec<Entry>,
     /// Entries whose unknowns follow one another.
     runs: Vec<Range<usize>>,
@@ -51,12 +52,12 @@ struct Scatter<const M: usize, const W: usize> {
     /// cells they hardly change.
     places: Vec<usize>,
     /// The matrix of the cell.
-    of_cell: [[f64; M]; M],
+    of_cell: [Row<P>; M],
 }
 
-impl<const M: usize, const W: usize> Scatter<M, W> {
+impl<const M: usize, const P: usize, const W: usize> Scatter<M, P, W> {
     fn new() -> Self {
-        let (entries, of_cell) = (Vec::with_capacity(M), [[0.0; M]; M]);
+        let (entries, of_cell) = (Vec::with_capacity(M), [Row::ZERO; M]);
         Self { work: Work::new(), entries, runs: Vec::new(), places: Vec::new(), of_cell }
     }
 }
@@ -65,7 +66,7 @@ impl<const M: usize, const W: usize> Scatter<M, W> {
 ///
 /// # Safety
 /// As [`matrix`].
-unsafe fn matrix_of<const M: usize, const W: usize>(
+unsafe fn matrix_of<const M: usize, const P: usize, const W: usize>(
     state: &State,
     form: &Bilinear,
     selection: &Selection,
@@ -78,7 +79,7 @@ unsafe fn matrix_of<const M: usize, const W: usize>(
         return false;
     };
     let shared = Shared::new(values);
-    let add = |a: usize, scatter: &mut Scatter<M, W>| {
+    let add = |a: usize, scatter: &mut Scatter<M, P, W>| {
         let Scatter { work, entries, runs, places, of_cell } = scatter;
         let local = state.cells.local(state.location, a);
         selection.of_cell(&local, entries);
@@ -106,7 +107,7 @@ unsafe fn matrix_of<const M: usize, const W: usize>(
                 // SAFETY: inside the row. Rows of the grid of one colour share no unknown; the cells
                 // whose unknowns reach further follow one after the other.
                 let values = unsafe { shared.part(row.start + latest, run.len()) };
-                let of_cell = &of_cell[k][l..];
+                let of_cell = &of_cell[k].0[l..];
                 values.iter_mut().zip(of_cell).for_each(|(v, a)| *v += wr * wc * a);
             }
         }

@@ -88,10 +88,10 @@ pub unsafe fn vector(state: &State, kernels: &Kernels) -> Vec<f64> {
     // SAFETY: the caller's.
     unsafe {
         match state.cells.local_len() {
-            MAX_DOFS => vector_of::<MAX_DOFS, FUNCTIONS_1D>(state, kernels),
-            DISPLACEMENT_DOFS => vector_of::<DISPLACEMENT_DOFS, FUNCTIONS_1D>(state, kernels),
-            MIXED_LINEAR => vector_of::<MIXED_LINEAR, 2>(state, kernels),
-            _ => vector_of::<LINEAR, 2>(state, kernels),
+            MAX_DOFS => vector_of::<MAX_DOFS, 24, FUNCTIONS_1D>(state, kernels),
+            DISPLACEMENT_DOFS => vector_of::<DISPLACEMENT_DOFS, 24, FUNCTIONS_1D>(state, kernels),
+            MIXED_LINEAR => vector_of::<MIXED_LINEAR, 16, 2>(state, kernels),
+            _ => vector_of::<LINEAR, 8, 2>(state, kernels),
         }
     }
 }
@@ -100,12 +100,12 @@ pub unsafe fn vector(state: &State, kernels: &Kernels) -> Vec<f64> {
 ///
 /// # Safety
 /// As [`vector`].
-unsafe fn vector_of<const M: usize, const W: usize>(state: &State, kernels: &Kernels) -> Vec<f64> {
+unsafe fn vector_of<const M: usize, const P: usize, const W: usize>(state: &State, kernels: &Kernels) -> Vec<f64> {
     let mut sums = vec![0.0; state.coefficients.len()];
     let shared = Shared::new(&mut sums);
     for rows in colours(state.location) {
         rows.into_par_iter().for_each(|row| {
-            let mut work = Work::<M, W>::new();
+            let mut work = Work::<M, P, W>::new();
             for a in row {
                 let local = state.cells.local(state.location, a);
                 // SAFETY: the caller's.

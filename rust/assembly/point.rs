@@ -15,6 +15,7 @@
 #![allow(clippy::inline_always)]
 
 use std::ffi::c_void;
+use std::ops::Range;
 
 use ndarray::ArrayView2;
 
@@ -87,6 +88,8 @@ pub struct Entries {
     test: Vec<usize>,
     /// Those of the changes of the fields: the columns; none for a kernel of rank 1.
     trial: Vec<usize>,
+    /// Rows of each component.
+    components: Vec<Range<usize>>,
     /// Whether there are second derivatives.
     second: bool,
 }
@@ -105,7 +108,16 @@ impl Entries {
         let [fields, test, trial] =
             [fields, test, trial].map(|entries| entries.iter().map(&mut place).collect());
         let second = distinct.iter().any(|entry| entry.derivative > DIM);
-        Self { distinct, fields, test, trial, second }
+        let [fields, test, trial]: [Vec<usize>; 3] = [fields, test, trial];
+        let component = |i: usize| distinct[test[i]].component;
+        let mut components: Vec<Range<usize>> = Vec::new();
+        for i in 0..test.len() {
+            match components.last_mut() {
+                Some(last) if component(last.start) == component(i) => last.end = i + 1,
+                _ => components.push(i..i + 1),
+            }
+        }
+        Self { distinct, fields, test, trial, components, second }
     }
 
     /// Rank of the kernel.
@@ -169,21 +181,38 @@ pub struct PointKernel<'a> {
 /// Values and derivatives [1/m, 1/m2] of the functions of a cell at a point.
 type Derivatives = [[f64; FUNCTIONS]; DERIVATIVES];
 
-/// Memory of one thread for a cell with `M` coefficients, `W` functions of the displacement along each axis.
-pub(super) struct Points<const M: usize, const W: usize> {
+/// A row of numbers, one for each coefficient of a cell, and zeros up to whole lines of the cache.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub(super) struct Row<const P: usize>(pub [f64; P]);
+
+impl<const P: usize> Row<P> {
+    pub(super) const ZERO: Self = Self([0.0; P]);
+
+    #[inline(always)]
+    fn add(&mut self, factor: f64, other: &Self) {
+        self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a += factor * b);
+    }
+}
+
+/// Memory of one thread for a cell with `M` coefficients in rows of `P` numbers, and with `W` functions of the
+/// displacement along each axis.
+pub(super) struct Points<const M: usize, const P: usize, const W: usize> {
     /// Coefficients of each component on the cell.
     coefficients: [[f64; FUNCTIONS]; COMPONENTS],
     displacement: Derivatives,
     /// Those of the linear field, in the order of the vertices.
     linear: Derivatives,
     /// `rows[e]`: entry e of the functions behind each coefficient, zero for other components.
-    rows: [[f64; M]; MAX_ENTRIES],
+    rows: [Row<P>; MAX_ENTRIES],
+    /// `D B`.
+    half: [Row<P>; MAX_ENTRIES],
     packed: Vec<f64>,
     /// r or D.
     result: [f64; MAX_ENTRIES * MAX_ENTRIES],
 }
 
-impl<const M: usize, const W: usize> Points<M, W> {
+impl<const M: usize, const P: usize, const W: usize> Points<M, P, W> {
     /// Functions of the displacement on a cell.
     const FUNCTIONS: usize = W.pow(DIM as u32);
 
@@ -192,23 +221,69 @@ impl<const M: usize, const W: usize> Points<M, W> {
             coefficients: [[0.0; FUNCTIONS]; COMPONENTS],
             displacement: [[0.0; FUNCTIONS]; DERIVATIVES],
             linear: [[0.0; FUNCTIONS]; DERIVATIVES],
-            rows: [[0.0; M]; MAX_ENTRIES],
+            rows: [Row::ZERO; MAX_ENTRIES],
+            half: [Row::ZERO; MAX_ENTRIES],
             packed: Vec::new(),
             result: [0.0; MAX_ENTRIES * MAX_ENTRIES],
         }
     }
 
-    /// Add kernels on the a-th active cell: rank 1 to a vector on its coefficients, rank 2 to a matrix.
+    /// Add kernels of rank 1 on the a-th active cell to a vector on its coefficients.
     ///
     /// # Safety
     /// As [`vector`](super::vector).
-    pub(super) unsafe fn add(
+    pub(super) unsafe fn add_vectors(
         &mut self,
         kernels: &[PointKernel],
         state: &State,
         a: usize,
         local: &Local,
-        out: &mut [f64],
+        out: &mut [f64; M],
+    ) {
+        // SAFETY: the caller's.
+        unsafe {
+            self.evaluate(kernels, state, a, local, |points, entries, weight| {
+                points.add_vector(entries, weight, out);
+            });
+        }
+    }
+
+    /// Add kernels of rank 2 on the a-th active cell to a matrix on its coefficients.
+    ///
+    /// # Safety
+    /// As [`vector`](super::vector).
+    pub(super) unsafe fn add_matrices(
+        &mut self,
+        kernels: &[PointKernel],
+        state: &State,
+        a: usize,
+        local: &Local,
+        out: &mut [Row<P>; M],
+    ) {
+        for kernel in kernels {
+            self.rows[..kernel.entries.distinct.len()].fill(Row::ZERO);
+            let kernel = std::slice::from_ref(kernel);
+            // SAFETY: the caller's.
+            unsafe {
+                self.evaluate(kernel, state, a, local, |points, entries, weight| {
+                    points.add_matrix(entries, weight, out);
+                });
+            }
+        }
+    }
+
+    /// Evaluate kernels at their points in a cell, and hand each result to `add` with its weight.
+    ///
+    /// # Safety
+    /// As [`vector`](super::vector).
+    #[inline(always)]
+    unsafe fn evaluate(
+        &mut self,
+        kernels: &[PointKernel],
+        state: &State,
+        a: usize,
+        local: &Local,
+        mut add: impl FnMut(&mut Self, &Entries, f64),
     ) {
         if kernels.is_empty() {
             return;
@@ -224,9 +299,6 @@ impl<const M: usize, const W: usize> Points<M, W> {
         }
         let location = state.location;
         for kernel in kernels {
-            if !kernel.entries.trial.is_empty() {
-                self.rows[..kernel.entries.distinct.len()].fill([0.0; M]);
-            }
             let at = |p: &u32| location.xi[*p as usize];
             let particles = location.particles_of(a);
             match kernel.place {
@@ -238,7 +310,8 @@ impl<const M: usize, const W: usize> Points<M, W> {
                         };
                         let weight = state.volume[*p as usize];
                         // SAFETY: the caller's.
-                        unsafe { self.add_at(kernel, state, a, at(p), weight, data, out) };
+                        unsafe { self.tabulate(kernel, state, a, at(p), data) };
+                        add(self, kernel.entries, weight);
                     }
                 }
                 Place::Centre => {
@@ -246,7 +319,8 @@ impl<const M: usize, const W: usize> Points<M, W> {
                         sum_of_cell(location, a, state.volume, *data, columns.iter().copied(), out);
                     };
                     // SAFETY: the caller's.
-                    unsafe { self.add_at(kernel, state, a, [0.5; DIM], 1.0, data, out) };
+                    unsafe { self.tabulate(kernel, state, a, [0.5; DIM], data) };
+                    add(self, kernel.entries, 1.0);
                 }
                 Place::Vertices => {
                     for &vertex in state.cells.vertices_of_cell() {
@@ -260,7 +334,8 @@ impl<const M: usize, const W: usize> Points<M, W> {
                         };
                         let xi = vertex.map(|i| i as f64);
                         // SAFETY: the caller's.
-                        unsafe { self.add_at(kernel, state, a, xi, 1.0, data, out) };
+                        unsafe { self.tabulate(kernel, state, a, xi, data) };
+                        add(self, kernel.entries, 1.0);
                     }
                 }
             }
@@ -287,21 +362,18 @@ impl<const M: usize, const W: usize> Points<M, W> {
         }
     }
 
-    /// Evaluate a kernel at a point and add its result.
+    /// Evaluate a kernel at a point: `result`, and the functions there.
     ///
     /// # Safety
-    /// As [`Points::add`].
-    #[allow(clippy::too_many_arguments)]
+    /// As [`vector`](super::vector).
     #[inline(always)]
-    unsafe fn add_at(
+    unsafe fn tabulate(
         &mut self,
         kernel: &PointKernel,
         state: &State,
         a: usize,
         xi: Point,
-        weight: f64,
         data_at: impl Fn(&[usize], &ArrayView2<f64>, &mut [f64]),
-        out: &mut [f64],
     ) {
         let (entries, grid, cells) = (kernel.entries, &state.location.grid, state.cells);
         let cell = state.location.active_index(a);
@@ -353,19 +425,24 @@ impl<const M: usize, const W: usize> Points<M, W> {
                 std::ptr::null_mut::<c_void>(),
             );
         }
-        if columns == 0 {
-            for (r, &e) in self.result.iter().zip(&entries.test) {
-                let entry = entries.distinct[e];
-                let (first, step) = Self::places(entry.component);
-                let r = weight * r;
-                let places = out[first..].iter_mut().step_by(step);
-                places.zip(self.functions(entry)).for_each(|(o, b)| *o += r * b);
-            }
-            return;
+    }
+
+    /// `out += weight B^T r`.
+    fn add_vector(&self, entries: &Entries, weight: f64, out: &mut [f64; M]) {
+        for (r, &e) in self.result.iter().zip(&entries.test) {
+            let entry = entries.distinct[e];
+            let (first, step) = Self::places(entry.component);
+            let r = weight * r;
+            let places = out[first..].iter_mut().step_by(step);
+            places.zip(self.functions(entry)).for_each(|(o, b)| *o += r * b);
         }
+    }
+
+    /// `out += weight B^T D B`.
+    fn add_matrix(&mut self, entries: &Entries, weight: f64, out: &mut [Row<P>; M]) {
         for (e, &entry) in entries.distinct.iter().enumerate() {
             let (first, step) = Self::places(entry.component);
-            let places = self.rows[e][first..].iter_mut().step_by(step);
+            let places = self.rows[e].0[first..].iter_mut().step_by(step);
             let functions = if entry.component < DIM {
                 &self.displacement[entry.derivative][..Self::FUNCTIONS]
             } else {
@@ -373,17 +450,29 @@ impl<const M: usize, const W: usize> Points<M, W> {
             };
             places.zip(functions).for_each(|(place, b)| *place = *b);
         }
-        for (&row, d) in entries.test.iter().zip(self.result.chunks_exact(columns)) {
-            let mut half = [0.0; M];
+        let lines = self.result.chunks_exact(entries.trial.len()).take(entries.test.len());
+        for (half, d) in self.half.iter_mut().zip(lines) {
+            let mut sum = Row::ZERO;
             for (d, &column) in d.iter().zip(&entries.trial).filter(|(d, _)| **d != 0.0) {
-                let d = weight * d;
-                half.iter_mut().zip(&self.rows[column]).for_each(|(h, b)| *h += d * b);
+                sum.add(weight * d, &self.rows[column]);
             }
-            let entry = entries.distinct[row];
-            let (first, step) = Self::places(entry.component);
-            let lines = out[first * M..].chunks_exact_mut(M).step_by(step);
-            for (out, b) in lines.zip(self.functions(entry)) {
-                out.iter_mut().zip(&half).for_each(|(o, h)| *o += b * h);
+            *half = sum;
+        }
+        for group in &entries.components {
+            let half = &self.half[group.clone()];
+            let mut functions: [&[f64]; DERIVATIVES] = [&[]; DERIVATIVES];
+            for (functions, &e) in functions.iter_mut().zip(&entries.test[group.clone()]) {
+                *functions = self.functions(entries.distinct[e]);
+            }
+            let component = entries.distinct[entries.test[group.start]].component;
+            let (first, step) = Self::places(component);
+            let lines = out[first..].iter_mut().step_by(step);
+            for (f, out) in (0..functions[0].len()).zip(lines) {
+                let mut sum = *out;
+                for (functions, half) in functions.iter().zip(half) {
+                    sum.add(functions[f], half);
+                }
+                *out = sum;
             }
         }
     }
