@@ -93,7 +93,10 @@ impl Cells {
 
     pub(super) fn nodal<'a>(&self, location: &Location, a: usize, local: &'a Local) -> Nodal<'a> {
         let displacement = self.displacement(location.grid.cells);
-        Nodal { local, extraction: extraction(&displacement, location.active_index(a), &self.nodes) }
+        Nodal {
+            local,
+            extraction: extraction(&displacement, location.active_index(a), &self.nodes),
+        }
     }
 
     /// Number of coefficients on a cell.

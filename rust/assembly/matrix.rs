@@ -28,11 +28,15 @@ pub unsafe fn matrix(
     // SAFETY: the caller's.
     unsafe {
         match state.cells.local_len() {
-            MAX_DOFS => matrix_of::<MAX_DOFS, 24, FUNCTIONS_1D>(state, form, selection, pattern, values),
-            DISPLACEMENT_DOFS => {
-                matrix_of::<DISPLACEMENT_DOFS, 24, FUNCTIONS_1D>(state, form, selection, pattern, values)
+            MAX_DOFS => {
+                matrix_of::<MAX_DOFS, 24, FUNCTIONS_1D>(state, form, selection, pattern, values)
             }
-            MIXED_LINEAR => matrix_of::<MIXED_LINEAR, 16, 2>(state, form, selection, pattern, values),
+            DISPLACEMENT_DOFS => matrix_of::<DISPLACEMENT_DOFS, 24, FUNCTIONS_1D>(
+                state, form, selection, pattern, values,
+            ),
+            MIXED_LINEAR => {
+                matrix_of::<MIXED_LINEAR, 16, 2>(state, form, selection, pattern, values)
+            }
             _ => matrix_of::<LINEAR, 8, 2>(state, form, selection, pattern, values),
         }
     }
@@ -125,4 +129,3 @@ unsafe fn matrix_of<const M: usize, const P: usize, const W: usize>(
     let mut scatter = Scatter::new();
     (0..pattern.reaching.len()).filter(|&a| pattern.reaching[a]).all(|a| add(a, &mut scatter))
 }
-

@@ -100,7 +100,10 @@ pub unsafe fn vector(state: &State, kernels: &Kernels) -> Vec<f64> {
 ///
 /// # Safety
 /// As [`vector`].
-unsafe fn vector_of<const M: usize, const P: usize, const W: usize>(state: &State, kernels: &Kernels) -> Vec<f64> {
+unsafe fn vector_of<const M: usize, const P: usize, const W: usize>(
+    state: &State,
+    kernels: &Kernels,
+) -> Vec<f64> {
     let mut sums = vec![0.0; state.coefficients.len()];
     let shared = Shared::new(&mut sums);
     for rows in colours(state.location) {

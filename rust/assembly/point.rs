@@ -53,9 +53,10 @@ impl Entry {
         let derivative = match *axes {
             [] => 0,
             [i] => 1 + i,
-            [i, j] => 1 + DIM + axes_of_second().iter().position(|&pair| {
-                pair == [i, j] || pair == [j, i]
-            })?,
+            [i, j] => {
+                1 + DIM
+                    + axes_of_second().iter().position(|&pair| pair == [i, j] || pair == [j, i])?
+            }
             _ => return None,
         };
         let inside = component < COMPONENTS && axes.iter().all(|&axis| axis < DIM);

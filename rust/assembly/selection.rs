@@ -24,6 +24,7 @@ pub(super) type Entry = (u32, usize, f64);
 
 /// The runs of entries whose unknowns and coefficients follow one another, each with weight 1; other entries
 /// are runs of their own.
+#[allow(clippy::float_cmp)] // the weight of an unknown itself is exactly 1
 pub(super) fn runs(entries: &[Entry], runs: &mut Vec<Range<usize>>) {
     runs.clear();
     let mut start = 0;

@@ -10,8 +10,8 @@ mod rule;
 pub use active::Active;
 pub use basis::{Basis, Local};
 pub use extraction::{extraction, Extraction};
-pub(crate) use functions::{products_of, sum};
-pub use functions::{products, CellFunctions, Functions};
+pub(crate) use functions::sum;
+pub use functions::{products, products_of, CellFunctions, Functions};
 pub use location::Location;
 pub use rule::{Rule, MAX_POINTS};
 

@@ -32,8 +32,7 @@ type PointOf = (String, Vec<EntryOf>, Vec<EntryOf>, Vec<EntryOf>);
 
 /// Owner of an FFCx kernel, its address, its rank, the number of its packed coefficients, these in packed
 /// order (none stands for the fields), its constants, and its points; without them it is one of cells.
-type KernelOf =
-    (Py<PyAny>, usize, usize, usize, Vec<Option<SlotOf>>, Vec<f64>, Option<PointOf>);
+type KernelOf = (Py<PyAny>, usize, usize, usize, Vec<Option<SlotOf>>, Vec<f64>, Option<PointOf>);
 
 /// A kernel and where its coefficients come from.
 struct Plan {

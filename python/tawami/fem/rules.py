@@ -12,7 +12,7 @@ from tawami.base.arrays import Array
 from tawami.base.space import PLANE
 from tawami.fem.dolfinx import basix, reference_nodes
 
-#: Rules of particle densities: the full rule, the centre of the cell, its vertices, or one mean per cell.
+#: Rules of particle densities: the full rule, the centre of the cell, its vertices; or cell means.
 Rule = Literal["particle", "centre", "vertex", "mean"]
 
 #: Quadrature degree of each rule. 5 x 5 points make the tangent of quadratic splines exact.

@@ -42,7 +42,7 @@ class CompiledForm:
     residual: tuple[Integral, ...]
     edges: Callable[[], Integral] | None
     tangent: tuple[Integral, ...]
-    couplings: tuple[tuple[Integral, Integral], ...]
+    couplings: tuple[tuple[Integral, ...], ...]
     ghost: Integral | None
     densities: Mapping[Rule, Mapping[Density, int]]
     used: frozenset[str]

@@ -111,7 +111,7 @@ class KernelBuilder:
             place: 'particle', or 'centre' or 'vertex' of the cell of each particle.
         """
         slots: dict[Any, Slot] = {}
-        data = {}
+        data: dict[Any, tuple[Any, int]] = {}
         for rule, densities, columns in self._used(form):
             vector = points.vector(len(columns), 1 + len(slots))
             slots[vector] = Slot(rule, len(columns), columns)
@@ -119,7 +119,7 @@ class KernelBuilder:
         with ufl_errors(self._symbols.form):
             found = points.at_point(form, self._symbols.increments, data)
         size = len(found.fields)
-        slots |= {points.vector(max(size, 1), 0): Slot("fields", size)}
+        slots |= {points.vector(size, 0): Slot("fields", size)}
         return replace(self._compiled(found.form, slots), points=(place, found))
 
     def _used(self, form: Any) -> Iterator[tuple[Rule, dict[Any, int], tuple[int, ...]]]:

@@ -31,9 +31,8 @@ class PointForm:
 
     Attributes:
         form: The form on a unit interval with one point.
-        fields, test, trial: Entries that the components of the coefficient of the fields, of the test
-            function and of the trial function stand for; no trial functions in a linear form.
-        data: Components of the particle data that the coefficients read: of each placeholder.
+        fields, test, trial: What the components of the coefficient of the fields, of the test function
+            and of the trial function are; none of the last in a linear form.
     """
 
     form: Any
@@ -53,7 +52,8 @@ def at_point(form: Any, increments: Any, data: Mapping[Any, tuple[Any, int]]) ->
     """
     (integrand, *more) = (part.integrand() for part in expand_derivatives(form).integrals())
     integrand = expand_indices(remove_complex_nodes(sum(more, integrand)))
-    used: dict[Any, set[Entry]] = {kind: set() for kind in ("fields", 0, 1)}
+    kinds: tuple[Any, ...] = ("fields", 0, 1)
+    used: dict[Any, set[Entry]] = {kind: set() for kind in kinds}
     for node in unique_pre_traversal(integrand):
         if isinstance(node, Indexed):
             kind, entry = _entry(node, increments)
@@ -61,10 +61,10 @@ def at_point(form: Any, increments: Any, data: Mapping[Any, tuple[Any, int]]) ->
                 used[kind].add(entry)
     entries = {kind: tuple(sorted(of_kind)) for kind, of_kind in used.items()}
     domain = dolfinx.interval()
-    vectors = {
-        "fields": vector(max(len(entries["fields"]), 1), 0, domain),
-        **{n: ufl.Argument(_space(max(len(entries[n]), 1), domain), n) for n in (0, 1)},
+    vectors: dict[Any, Any] = {
+        n: ufl.Argument(_space(len(entries[n]), domain), n) for n in (0, 1) if entries[n]
     }
+    vectors["fields"] = vector(len(entries["fields"]), 0, domain)
 
     def replaced(node: Any) -> Any | None:
         if isinstance(node, Constant):
@@ -81,16 +81,16 @@ def at_point(form: Any, increments: Any, data: Mapping[Any, tuple[Any, int]]) ->
         return None
 
     measure = ufl.dx(domain=domain, metadata={"quadrature_degree": 0})
-    return PointForm(_mapped(integrand, replaced) * measure, *(entries[k] for k in used))
+    return PointForm(_mapped(integrand, replaced) * measure, *(entries[k] for k in kinds))
 
 
 def vector(size: int, count: int, domain: Any = None) -> Any:
-    """A coefficient with `size` components on the unit interval."""
+    """A coefficient with `size` components, at least one, on the unit interval."""
     return ufl.Coefficient(_space(size, domain or dolfinx.interval()), count=count)
 
 
 def _space(size: int, domain: Any) -> Any:
-    return ufl.FunctionSpace(domain, dolfinx.on_interval(size))
+    return ufl.FunctionSpace(domain, dolfinx.on_interval(max(size, 1)))
 
 
 def _entry(node: Any, increments: Any) -> tuple[Any, Entry]:

@@ -103,9 +103,7 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
         **parameters: Any,
     ) -> None:
         check_process()
-        numerics = Numerics(
-            tolerance, max_iterations, assembly, factorise, linear_solver
-        )
+        numerics = Numerics(tolerance, max_iterations, assembly, factorise, linear_solver)
         model, particles = build(
             grid,
             body,
