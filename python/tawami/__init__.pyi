@@ -54,6 +54,7 @@ from tawami.results.outputs import GridOutput, ParticleOutput
 from tawami.results.results import Results
 from tawami.results.table import TableOutput
 from tawami.scene.earlier import earlier
+from tawami.scene.quantities import Quantity
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
 from tawami.scene.table import table
@@ -86,6 +87,7 @@ __all__ = [
     "ParameterWarning",
     "ParticleOutput",
     "QuadratureWarning",
+    "Quantity",
     "Results",
     "RotationWarning",
     "Scene",

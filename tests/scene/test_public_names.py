@@ -25,7 +25,8 @@ DYNAMICS = {
 }  # fmt: skip
 SOLUTION = {
     "scene", "u", "volumetric", "unknowns", "load", "iterations", "history", "krylov", "condition",
-    "symmetric", "number", "x", "volume", "stress", "mean_stress", "displacement_of_particles",
+    "symmetric", "arrays", "number", "x", "volume", "stress", "strain", "mean_stress",
+    "displacement_of_particles",
     "eps_v", "displacement", "reaction", "on_edges", "on_points",
 }  # fmt: skip
 

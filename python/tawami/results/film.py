@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import subprocess
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -15,10 +14,9 @@ import numpy.typing as npt
 from tawami.base.arrays import Array
 from tawami.base.errors import OutputError
 from tawami.base.files import atomic_file
-from tawami.base.space import PLANE
 from tawami.results.figure import new_figure, save
 from tawami.results.frame import Frame
-from tawami.results.quantities import PARTICLES
+from tawami.scene import quantities
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,8 +30,6 @@ MOST, RATE = 120, 12
 OUTLIERS = 0.01
 #: Colour map for values of both signs.
 DIVERGING = "RdBu_r"
-#: Numbers of a stress.
-INVARIANTS = ("mean stress", "deviatoric stress q")
 PREFIXES = (("G", 1e9), ("M", 1e6), ("k", 1e3))
 
 
@@ -47,26 +43,9 @@ class Corners:
 
 def scalars(frame: Frame) -> dict[str, tuple[str, Array]]:
     """What particles can be coloured by: name -> (unit, values). Of vectors these are the size and the
-    components, of tensors the components, of the stress its mean and q too.
+    components, of tensors the components, and what follows from them, as the mean stress.
     """
-    found: dict[str, tuple[str, Array]] = {}
-    for label, values in frame.on_points.items():
-        name, _, unit = label.removesuffix("]").rpartition(" [")
-        tensor = re.fullmatch(f"(.*) {' '.join(PLANE.tensor)}", name)
-        if values.ndim == 2 and values.shape[1] == 3:
-            found[name] = (unit, np.linalg.norm(values, axis=1))
-            found |= {f"{name} {axis}": (unit, values[:, k]) for k, axis in enumerate(PLANE.axes)}
-        elif tensor is not None:
-            for k, component in enumerate(PLANE.tensor):
-                found[f"{tensor[1]} {component}"] = (unit, values[:, k])
-            if tensor[1] == "stress":
-                found |= {
-                    of: (unit, PARTICLES[of].of({"stress": values}.__getitem__))
-                    for of in INVARIANTS
-                }
-        elif values.ndim == 1:
-            found[name] = (unit, values)
-    return found
+    return quantities.scalars(quantities.derived(frame.on_points))
 
 
 class Film:

@@ -50,6 +50,7 @@ class Model:
         law: The law in NumPy, if that is what the scene has; `materials` then holds the elastic law
             with the same moduli.
         density: Of each material [kg/m3]; None if the scene has no mass.
+        names: Name of the group of each material; empty if the body has no names.
         leaving: What happens to particles that leave the grid.
         num_particles: Particles of the body, on all ranks.
     """
@@ -64,6 +65,7 @@ class Model:
     materials: Sequence[_rust.Material]
     law: NumpyLaw | None
     density: Array | None
+    names: tuple[str, ...]
     leaving: Leaving
     num_particles: int
 
@@ -172,9 +174,14 @@ def build(
     model = Model(
         grid, loaded, compiled, basis, values,
         Settings(used, instead.format("alpha")), Settings(options, instead.format("stabilisation")),
-        materials, law, densities, leaving, len(particles),
+        materials, law, densities, _names(body, len(materials)), leaving, len(particles),
     )  # fmt: skip
     return model, particles
+
+
+def _names(body: Body, materials: int) -> tuple[str, ...]:
+    """Names of the groups of a body, if they are those of its materials."""
+    return tuple(body.names) if len(body.names) == materials else ()
 
 
 def _particles(

@@ -146,7 +146,8 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
 
         Their arrays are views of the storage, not copies: `x` [m], `material` and `number` (which of
         the body they are), which cannot be written, `volume` [m2], `stress` [Pa] (xx, yy, zz, xy;
-        tension positive), `displacement` [m], and `eps_v` with forms that have that field. Where
+        tension positive), `displacement` [m], and `eps_v` with forms that have that field. `strain`, as
+        in `Solution`, and at finite strain `displacement_gradient` (F - I) are read only. Where
         particles change rank or leave the grid this is another object after a step.
         """
         return self.configuration.domain.particles

@@ -10,15 +10,17 @@ import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks
-from tawami.base.errors import InputError
+from tawami.base.errors import InputError, NotModelledError
 from tawami.base.process import Unique
 from tawami.base.sealed import Sealed
 from tawami.field.constraints import LEAST_SHARE
 from tawami.form.kinematics import KINEMATICS
 from tawami.grid import edges
+from tawami.scene import quantities
 from tawami.scene.absent import Elsewhere
 from tawami.scene.configuration import Configuration, Outcome
 from tawami.scene.points import ROUND_OFF, outside
+from tawami.scene.quantities import Arrays
 
 Array = npt.NDArray[np.float64]
 
@@ -50,6 +52,9 @@ class Solution(Elsewhere, Sealed, Unique):
         x: Positions of the particles [m].
         volume: Their volumes [m2] at the start.
         stress: Their stress [Pa] (xx, yy, zz, xy) at the end of this step.
+        strain: Their strain (xx, yy, zz, xy) since the start, from the displacement: the small strain,
+            or at finite strain the logarithmic strain 1/2 ln(F F^T). xy is half the engineering shear
+            strain. Its volume is div u, not the field eps_v.
         displacement_of_particles: Their displacement [m] since the start.
         condition: Estimate of the condition number of the scaled tangent that was factorised last: its
             Frobenius norm over the square root of its size, times that of its inverse as random
@@ -72,11 +77,15 @@ class Solution(Elsewhere, Sealed, Unique):
         self._reactions = outcome.reactions
         self.on_edges = outcome.reactions.on_edges
         particles = outcome.particles
+        #: Arrays of the particles by name, for quantities.
+        self.arrays = Arrays(self._array)
         self.number = particles["number"]
         self.x, self.volume = particles["x"], particles["volume"]
         self.stress = particles["stress"]
         self.displacement_of_particles = particles["displacement"]
+        self.strain = particles["strain"]
         self._eps_v = particles.get("eps_v")
+        self._arrays = particles
         self._seal()
 
     def __repr__(self) -> str:
@@ -103,6 +112,15 @@ class Solution(Elsewhere, Sealed, Unique):
             InputError: The form does not have that field.
         """
         return self._of_form("eps_v", self._eps_v, "has_eps_v")
+
+    def _array(self, name: str) -> npt.NDArray[Any]:
+        """An array of the particles by its name."""
+        if name not in self._arrays:
+            quantities.array_of(
+                self.scene.particles, name
+            )  # or the error that says how to model it
+            raise NotModelledError(f"{name}: this solution was found before the scene had it")
+        return self._arrays[name]
 
     def _of_form(self, name: str, values: Array | None, having: str) -> Array:
         if values is None:
