@@ -228,7 +228,7 @@ def _compressed(form: Form, given: Settings) -> Found:
 
 
 def _paths(form: Form, given: Settings) -> Found:
-    words = "residual and tangent, fast and reference assembly"
+    words = "residual and tangent, assembled at the points and by dolfinx"
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", InexactSumWarning)
         error = scenes.path_difference(form, given)
@@ -271,7 +271,7 @@ CHECKS: tuple[tuple[str, Check, tuple[str, ...]], ...] = (
     ("symmetry", _symmetry, ("kernels",)),
     ("tangent", _differences, ("kernels",)),
     ("rigid motions", _rigid, ("kernels",)),
-    ("fast assembly", _paths, ("kernels",)),
+    ("dolfinx", _paths, ("kernels",)),
     ("patch test, displaced", _displaced, ("kernels", "tangent")),
     ("patch test, loaded", _compressed, ("kernels", "tangent")),
     ("stability", _stability, ("kernels", "tangent")),

@@ -73,7 +73,7 @@ def compile_form(
     comm: Any,
     form: Form,
     options: Mapping[str, str],
-    assembly: Assembly = "fast",
+    assembly: Assembly = "points",
     *,
     plastic_volume: bool = True,
 ) -> CompiledForm:
@@ -83,7 +83,7 @@ def compile_form(
         comm: Communicator.
         form: The form.
         options: One value for each of the form's options.
-        assembly: 'fast' for kernels at the particles, 'reference' for integrals over cells.
+        assembly: 'points' for kernels at the particles, 'dolfinx' for integrals over cells only.
         plastic_volume: Whether plastic flow may change the volume. Otherwise eps_p is zero, and its
             terms are left out.
 
@@ -109,7 +109,7 @@ def _compile(comm: Any, symbols: Symbols) -> CompiledForm:
     rule_of = {symbol: density.rule for density, symbol in symbols.placeholders.items()}
 
     def integrals(form: Any) -> tuple[Integral, ...]:
-        if symbols.assembly == "reference":
+        if symbols.assembly == "dolfinx":
             return tuple(map(integral, by_rule(form)))
         sums, rest = at_points(form, rule_of)
         kernels = [builder.at_points(part, rule) for rule, part in sums]

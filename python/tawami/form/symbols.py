@@ -32,7 +32,7 @@ PLACEHOLDERS = 1000
 #: Degree along x and along y up to which the densities of `sum_p` integrate exactly.
 EXACT_DEGREE = 4
 #: How a form is evaluated: by kernels at the particles, or by integrals over cells in plain dolfinx.
-Assembly = Literal["fast", "reference"]
+Assembly = Literal["points", "dolfinx"]
 
 
 class Symbols:
@@ -42,7 +42,7 @@ class Symbols:
         form: The form.
         options: The value of each of its options.
         plastic_volume: Whether plastic flow may change the volume; otherwise sums of eps_p are empty.
-        assembly: 'reference' for sums over particles as integrals over cells.
+        assembly: 'dolfinx' for sums over particles as integrals over cells.
 
     Attributes:
         names: Symbols by name.
@@ -57,7 +57,7 @@ class Symbols:
         options: Mapping[str, str],
         *,
         plastic_volume: bool = True,
-        assembly: Assembly = "fast",
+        assembly: Assembly = "points",
     ) -> None:
         self.form, self.assembly = form, assembly
         self._plastic_volume = plastic_volume
@@ -155,7 +155,7 @@ class Symbols:
         expression = ufl.as_ufl(arguments[-1])
         if isinstance(quantity, LawQuantity):
             self._check_place(rule, quantity, caller)
-        if rule == "particle" and self.assembly == "reference":
+        if rule == "particle" and self.assembly == "dolfinx":
             self._check_degree(expression)
         if _is_plastic_volume(quantity) and not self._plastic_volume:
             return ufl.Form([])

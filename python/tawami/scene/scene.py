@@ -95,7 +95,7 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
         basis: Basis = "quadratic_spline",
         tolerance: float = 1e-6,
         max_iterations: int = 20,
-        assembly: Assembly = "fast",
+        assembly: Assembly = "points",
         factorise: Factorise = "when_it_pays",
         linear_solver: SolverName = "direct",
         density: float | Sequence[float] | Mapping[str, float] | None = None,

@@ -23,8 +23,8 @@ class Numerics:
     Args:
         tolerance: Newton stops when both measures of `tawami.solve.measures` are below it, 1e-14 to 0.1.
         max_iterations: Newton iterations after which the step fails.
-        assembly: 'fast' calls the kernels from Rust, 'reference' is plain dolfinx and P^T K P. Both give
-            the same numbers up to round-off.
+        assembly: 'points' evaluates the form at the particles; 'dolfinx' integrates over cells and
+            computes P^T K P. They agree up to round-off, except for sums of expressions of a degree above 4.
         factorise: 'when_it_pays' uses a factorisation in later iterations and steps, 'always' factorises
             in each Newton iteration.
         linear_solver: 'direct' (MUMPS) or 'iterative' (FGMRES, with multigrid for the displacement).
@@ -35,7 +35,7 @@ class Numerics:
 
     tolerance: float = 1e-6
     max_iterations: int = 20
-    assembly: Assembly = "fast"
+    assembly: Assembly = "points"
     factorise: Factorise = "when_it_pays"
     linear_solver: SolverName = "direct"
 

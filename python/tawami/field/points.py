@@ -1,8 +1,9 @@
-"""The fast assembly: Rust calls the kernels cell by cell and fills the reduced matrix (`rust/assembly`).
+"""Assembly at the particles: Rust calls point kernels and fills the reduced matrix (`rust/assembly`).
 
-For each cell, on all threads: gather, kernel of FFCx, extraction, scatter into known entries of P^T K P.
-There is no matrix of the mesh. The numbers are those of the reference assembly up to round-off
-(`tests/field/test_fast_field.py`).
+For each cell, on all threads: the integrand and its derivative at each particle, B^T r and B^T D B with
+the functions there, and the sum into known entries of P^T K P. There is no matrix of the mesh. Integrals
+over cells (`dx`) are kernels of FFCx on the cell. The numbers are those of the reference assembly up to
+round-off (`tests/field/test_assemblies.py`).
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ from tawami.field.reduction import Reduction
 from tawami.form.integral import Integral
 
 
-class FastAssembly(Assembly):
-    """Residual and tangent by kernels that Rust calls.
+class PointAssembly(Assembly):
+    """Residual and tangent by kernels at the particles.
 
     Args:
         attachment: The form and the active cells.
@@ -40,7 +41,7 @@ class FastAssembly(Assembly):
 
     def follow(self, earlier: Assembly) -> None:
         """See `Assembly.follow`."""
-        if isinstance(earlier, FastAssembly):
+        if isinstance(earlier, PointAssembly):
             self._matrix = earlier._matrix
 
     @functools.cached_property

@@ -1,4 +1,4 @@
-"""The fast assembly agrees with plain dolfinx and P^T K P, to round-off; its bits do not depend on the
+"""The assembly at the particles agrees with dolfinx and P^T K P; its bits do not depend on the
 number of threads.
 """
 
@@ -31,7 +31,7 @@ SUPPORTS = {
 
 def both(make):
     """The same scene with both assemblies."""
-    return [make(assembly=path) for path in ("fast", "reference")]
+    return [make(assembly=path) for path in ("points", "dolfinx")]
 
 
 def close(a, b):
@@ -95,7 +95,7 @@ def test_any_cloud_of_particles_agrees(data):
 def test_the_deflections_of_the_beam_agree(support):
     from cases.verification.cantilever import mpm
 
-    rows = [mpm.solve("u_epsv", support, 8, 0.1, assembly=p)[0] for p in ("fast", "reference")]
+    rows = [mpm.solve("u_epsv", support, 8, 0.1, assembly=p)[0] for p in ("points", "dolfinx")]
     assert rows[0].deflection_m == pytest.approx(rows[1].deflection_m, rel=1e-12)
     assert rows[0].unknowns == rows[1].unknowns
 
@@ -110,7 +110,7 @@ def test_newton_reuses_the_pattern(random_scene):
 
     form = Form({"u": ("displacement", "w")}, "displacement", stiff)
     solutions = []
-    for path in ("fast", "reference"):
+    for path in ("points", "dolfinx"):
         grid = grid_of()
         body = tawami.box(grid, grid.origin, grid.upper, per_axis=3)
         material = tawami.linear_elastic(E=1e3, nu=0.2)
@@ -205,8 +205,8 @@ def test_the_solutions_after_a_change_of_supports_agree():
         scene.hold((1.0, 1.25), "y", -1e-3)
         return scene.solve()
 
-    fast, reference = run("fast"), run("reference")
-    assert np.abs(fast.u - reference.u).max() < 1e-10 * np.abs(reference.u).max()
+    points, reference = run("points"), run("dolfinx")
+    assert np.abs(points.u - reference.u).max() < 1e-10 * np.abs(reference.u).max()
 
 
 def test_arrays_that_do_not_fit_raise_an_error(random_scene):
@@ -238,6 +238,6 @@ def test_arrays_that_do_not_fit_raise_an_error(random_scene):
 
 def test_an_unknown_assembly_is_rejected(random_scene):
     with pytest.raises(
-        tawami.InputError, match="assembly = 'quick': expected 'fast' or 'reference'"
+        tawami.InputError, match="assembly = 'quick': expected 'points' or 'dolfinx'"
     ):
         random_scene(assembly="quick")
