@@ -26,7 +26,7 @@ t, h                      traction [Pa], cell size [m]
 parameters, options       alpha, ... as declared
 ========================= ========================================================================
 
-The integrand of `sum_p` is evaluated at the particles (`tawami.form.points`). With assembly='dolfinx' the
+The integrand of `sum_p` is evaluated at the particles (`tawami.form.points`). With assembly='dolfinx'
 particle data enter as densities at the points of a fixed rule, which is exact for f up to degree 4 along
 x and along y (docs: theory). The tangent is derived (`tawami.form.tangent`).
 """

@@ -8,7 +8,7 @@ particles (`rust/assembly/point.rs`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -66,22 +66,20 @@ def at_point(form: Any, increments: Any, data: Mapping[Any, tuple[Any, int]]) ->
     }
     vectors["fields"] = vector(len(entries["fields"]), 0, domain)
 
-    def replaced(node: Any) -> Any | None:
+    by_entry: dict[Any, Any] = {}
+    for node in unique_pre_traversal(integrand):
         if isinstance(node, Constant):
-            return ufl.Constant(domain, count=node.count())
-        if not isinstance(node, Indexed):
-            return None
-        kind, entry = _entry(node, increments)
-        if kind is not None:
-            return vectors[kind][entries[kind].index(entry)]
-        symbol, index = node.ufl_operands
-        if symbol in data:
-            to, first = data[symbol]
-            return to[first + int(index[0])]
-        return None
-
+            by_entry[node] = ufl.Constant(domain, count=node.count())
+        elif isinstance(node, Indexed):
+            kind, entry = _entry(node, increments)
+            symbol, index = node.ufl_operands
+            if kind is not None:
+                by_entry[node] = vectors[kind][entries[kind].index(entry)]
+            elif symbol in data:
+                to, first = data[symbol]
+                by_entry[node] = to[first + int(index[0])]
     measure = ufl.dx(domain=domain, metadata={"quadrature_degree": 0})
-    return PointForm(_mapped(integrand, replaced) * measure, *(entries[k] for k in kinds))
+    return PointForm(ufl.replace(integrand, by_entry) * measure, *(entries[k] for k in kinds))
 
 
 def vector(size: int, count: int, domain: Any = None) -> Any:
@@ -107,20 +105,3 @@ def _entry(node: Any, increments: Any) -> tuple[Any, Entry]:
         return None, (0, ())
     component, *axes = map(int, index)
     return kind, (component, tuple(sorted(axes)))
-
-
-def _mapped(expression: Any, replaced: Callable[[Any], Any | None]) -> Any:
-    """An expression with some of its nodes replaced; each node is visited once."""
-    known: dict[Any, Any] = {}
-
-    def visit(node: Any) -> Any:
-        if node not in known:
-            new = replaced(node)
-            if new is None:
-                operands = [visit(operand) for operand in node.ufl_operands]
-                same = all(a is b for a, b in zip(operands, node.ufl_operands, strict=True))
-                new = node if same else node._ufl_expr_reconstruct_(*operands)
-            known[node] = new
-        return known[node]
-
-    return visit(expression)

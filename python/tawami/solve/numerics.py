@@ -24,7 +24,7 @@ class Numerics:
         tolerance: Newton stops when both measures of `tawami.solve.measures` are below it, 1e-14 to 0.1.
         max_iterations: Newton iterations after which the step fails.
         assembly: 'points' evaluates the form at the particles; 'dolfinx' integrates over cells and
-            computes P^T K P. They agree up to round-off, except for sums of expressions of a degree above 4.
+            computes P^T K P. They agree up to round-off for sums of expressions up to degree 4.
         factorise: 'when_it_pays' uses a factorisation in later iterations and steps, 'always' factorises
             in each Newton iteration.
         linear_solver: 'direct' (MUMPS) or 'iterative' (FGMRES, with multigrid for the displacement).
