@@ -18,15 +18,15 @@ DRAWN = "async () => { if (window.MathJax?.startup?.promise) await MathJax.start
 LINKS = "() => [...document.querySelectorAll('a[href]')].map(a => a.href)"
 NAMES = "() => [...document.querySelectorAll('[id], a[name]')].map(e => e.id || e.name)"
 MISTAKES = "() => [...document.querySelectorAll('mjx-merror, [data-mjx-error]')].map(e => e.title)"
-#: Text of the elements that reach farthest to the right, if the page scrolls sideways.
+#: An element that is wider than the page, if the page scrolls sideways.
 WIDE = """() => {
     const width = document.documentElement.clientWidth;
     if (document.documentElement.scrollWidth <= width) return [];
     const scrolls = e => e && (getComputedStyle(e).overflowX != 'visible' || scrolls(e.parentElement));
-    return [...document.querySelectorAll('main *, article *')]
+    const parts = [...document.querySelectorAll('body *')]
         .filter(e => e.getBoundingClientRect().right > width + 1 && !scrolls(e.parentElement))
-        .map(e => `<${e.tagName.toLowerCase()} class="${e.className}"> ${e.textContent.slice(0, 60)}`)
-        .slice(0, 1);
+        .map(e => `<${e.tagName.toLowerCase()} class="${e.className}"> ${e.textContent.slice(0, 60)}`);
+    return [parts[0] || 'the page'];
 }"""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -75,9 +76,24 @@ def src(
     return [nodes.reference(rawtext, "", name, refuri=target)], []
 
 
+def plain_attributes(
+    _app: Any, what: str, _name: str, _thing: Any, _opt: Any, lines: list[str]
+) -> None:
+    """Prepare docstrings: text before a colon, and all but the last of a list of names, is no type."""
+    if what == "property":
+        lines[0] = lines[0].replace(": ", "; ", 1)
+    if "Attributes:" in lines:
+        for k in range(lines.index("Attributes:") + 1, len(lines)):
+            names, colon, text = lines[k].partition(": ")
+            if re.fullmatch(r" {4}\w+(, \w+)+", names):
+                lines[k] = names.replace(", ", ",\N{ZERO WIDTH SPACE}") + colon + text
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Register the role; draw equations as SVG, since browsers block fonts of local files."""
     app.add_role("src", src)
+    app.add_config_value("own_code", Path(__file__).read_text(), "env")  # its changes count
+    app.connect("autodoc-process-docstring", plain_attributes, priority=400)  # before napoleon
     app.add_config_value("repository", sources.repository(), "env")
     app.config.mathjax_path = "mathjax/tex-svg.js"
     mathjax = app.extensions["sphinx-mathjax-offline"]  # it copies files at the end only

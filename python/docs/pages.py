@@ -69,7 +69,10 @@ def assemble(target: Path, only: str | None = None) -> list[str]:
         raise executed.RunError(f"there is no page '{only}': expected one of {', '.join(names)}")
     chosen = names if only is None else [only]
     for name in chosen:
-        text = complete(sources[name].read_text()) if name in sources else case_page(name, target)
+        if name in sources:
+            text = complete(sources[name].read_text())
+        else:
+            text = case_page(name.removeprefix("cases/"), target)
         _check_links(name, text)
         if name in TUTORIALS:
             text = _with_download(name, text, target)

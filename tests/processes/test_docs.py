@@ -392,7 +392,7 @@ def test_different_results_on_several_ranks_are_an_error():
 def test_the_matrix_of_the_documentation_has_the_columns_of_make_matrix():
     script = (sources.ROOT / "tests" / "matrix.sh").read_text()
     (header,) = re.findall(r"echo '(\| Debian .*\|)'", script)
-    assert header in (sources.ROOT / "python/docs/start.md").read_text()
+    assert header in (sources.ROOT / "python/docs/install.md").read_text()
     assert "SUITES:-bookworm trixie sid}" in script
 
 
