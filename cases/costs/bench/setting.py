@@ -1,4 +1,4 @@
-"""What the benchmark measures: settings, and the stages of a Newton step."""
+"""Settings of the benchmark, and the stages of a Newton step."""
 
 from __future__ import annotations
 
