@@ -188,7 +188,7 @@ def case_page(name: str, target: Path) -> str:
     return (
         f"# {title}\n\n{about}\n\n{pictures}\n\n"
         f"## Output\n\n`{command}` took {_duration(output.seconds)}.{shorter}\n\n"
-        f"````text\n{output.text.strip()}\n````\n\n"
+        f"````{{code-block}} text\n:class: long\n\n{output.text.strip()}\n````\n\n"
         "## Code\n\n" + "\n".join(_listing(file, target / "cases") for file in files)
     )
 

@@ -232,6 +232,20 @@ def test_tutorials_can_be_downloaded_as_notebooks(name):
     assert notebooks.download(PAGES[name]) == notebooks.download(PAGES[name])
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", pages.TUTORIALS)
+def test_downloaded_notebooks_run_anywhere(name, tmp_path, monkeypatch):
+    """With the package alone, in a folder outside the repository."""
+    nbclient = pytest.importorskip("nbclient", reason="installed by make docs")
+    nbformat = pytest.importorskip("nbformat")
+    monkeypatch.setenv("PYTHONPATH", str(sources.ROOT / "python"))
+    notebook = nbformat.reads(notebooks.download(PAGES[name]), as_version=4)
+    folder = {"metadata": {"path": str(tmp_path)}}
+    nbclient.NotebookClient(notebook, timeout=300, resources=folder).execute()
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    assert any("image/png" in output.get("data", {}) for output in outputs)
+
+
 @pytest.mark.parametrize("name", pages.CASES)
 def test_docstrings_of_cases_become_text(name):
     folder = sources.ROOT / "cases" / pages.CASES[name][1] / name
