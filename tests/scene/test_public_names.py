@@ -19,7 +19,7 @@ SCENE = {
     "residual", "tangent", "reduction", "split", "num_coefficients",
 }  # fmt: skip
 DYNAMICS = {
-    "transfer", "damping", "gamma", "beta", "time", "steps", "step", "run",
+    "transfer", "damping", "gamma", "beta", "time", "steps", "step", "run", "animate",
     "velocity", "acceleration", "velocity_gradient", "mass", "on_grid",
     "energies", "kinetic_energy", "elastic_energy", "linear_momentum", "angular_momentum",
 }  # fmt: skip
@@ -27,7 +27,7 @@ SOLUTION = {
     "scene", "u", "volumetric", "unknowns", "load", "iterations", "history", "krylov", "condition",
     "symmetric", "arrays", "number", "x", "volume", "stress", "strain", "mean_stress",
     "displacement_of_particles",
-    "eps_v", "displacement", "reaction", "on_edges", "on_points",
+    "eps_v", "displacement", "reaction", "on_edges", "on_points", "plot", "to_pandas", "to_pyvista",
 }  # fmt: skip
 
 

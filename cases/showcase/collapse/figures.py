@@ -11,8 +11,8 @@ import numpy as np
 from cases.common.figure import save
 from cases.showcase.collapse.pile import HEIGHT, RHO, Array, G, Run
 from cases.showcase.collapse.runout import Runout
-from tawami.results.film import Corners, Film
-from tawami.results.frame import Frame, with_z
+from tawami.picture.film import Film, Frame
+from tawami.picture.particles import Corners, scale_of
 
 NAMES = {
     "u_epsv_finite": "mixed $u$-$\\varepsilon_v$",
@@ -58,13 +58,13 @@ def film(runs: Sequence[Run], path: Path) -> None:
 
 def movie(run: Run, path: Path) -> None:
     """Write the mean stress at the particles as a GIF."""
-    label = "mean Kirchhoff stress [Pa]"
-    times = [
-        (time, lambda x=x, stress=stress: Frame(with_z(x), "vertex", x, {label: stress}))
+    frames = [
+        Frame(f"$t$ = {time:.2f} s", x, np.sqrt(run.volume), stress)
         for time, x, stress in zip(run.time, run.x, run.mean_stress, strict=True)
     ]
+    scale = scale_of("mean Kirchhoff stress", "Pa", run.mean_stress)
     corners = Corners(np.zeros(2), np.array([0.45, 1.15 * HEIGHT]))
-    Film("run", times, "mean Kirchhoff stress", corners).movie(path, "gif")
+    Film(frames, scale, corners).movie(path, "gif")
 
 
 def surface(x: Array, h: float) -> tuple[Array, Array]:

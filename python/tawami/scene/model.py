@@ -19,9 +19,9 @@ from tawami.base.sealed import Settings
 from tawami.base.space import Space
 from tawami.base.warn import warn
 from tawami.body.body import Body
-from tawami.fem.rules import TangentRule
 from tawami.form.compilation import CompiledForm, check_used, compile_form
 from tawami.form.form import Form
+from tawami.form.symbols import Assembly
 from tawami.grid.basis import BASES, Basis
 from tawami.grid.grid import Grid
 from tawami.particles import assignment
@@ -135,7 +135,7 @@ def build(
     basis: Basis,
     density: float | Sequence[float] | Mapping[str, float] | None,
     leaving: Leaving,
-    tangent_rule: TangentRule,
+    assembly: Assembly,
     parameters: Mapping[str, Any],
 ) -> tuple[Model, _rust.Particles]:
     """The model of a scene and the particles of its whole body; the arguments are those of `Scene`.
@@ -166,7 +166,7 @@ def build(
     _warn_of_locking(grid, loaded, materials, particles)
     dilates = np.array([law is not None or one.pressure_dependent for one in materials])
     plastic_volume = bool(dilates.any())
-    compiled = compile_form(grid.comm, loaded, options, tangent_rule, plastic_volume=plastic_volume)
+    compiled = compile_form(grid.comm, loaded, options, assembly, plastic_volume=plastic_volume)
     check_used(compiled, options, parameters)
     _check_plastic_volume(compiled, dilates, law, particles)
     instead = "the form's parameters are fixed when a scene is made: Scene(..., {}=...)"

@@ -7,7 +7,7 @@ does not model gives an error that says how to model it; an unknown name gives t
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -24,15 +24,19 @@ from tawami.particles import placement
 
 #: Arrays of the particles that are carried by a motion.
 CARRIED = ("velocity", "acceleration")
+#: What particles store of F - I at finite strain.
+GRADIENT = "displacement_gradient"
 #: Components of a symmetric tensor, as labels have them.
 TENSOR = " ".join(PLANE.tensor)
 
 
 class Arrays:
-    """Arrays of particles by name, as `p.stress` or `p["plastic_strain"]`: `x`, `stress`, `strain`,
-    `displacement`, `volume`, `material`, `number`, `eps_v`, `velocity`, `acceleration` and history
-    variables, as far as the scene has them, `mean_stress` and `deviatoric_stress_q`. Their first index
-    is the particle.
+    """Arrays of particles by name, as `p.stress` or `p["plastic_strain"]`.
+
+    There are `x`, `stress`, `strain`, `displacement`, `volume`, `material` and `number`, and as far
+    as the scene has them `eps_v`, `velocity`, `acceleration`, history variables and, at finite strain,
+    `displacement_gradient`. `mean_stress` and `deviatoric_stress_q` are computed. The first index of
+    an array is the particle.
 
     Args:
         get: Function that returns the array of a name.
@@ -178,7 +182,7 @@ def history(name: str) -> Quantity:
 def arrays_of(particles: _rust.Particles) -> list[str]:
     """Names of the arrays that particles have, without those of a motion that are gradients."""
     stored = dict(particles.arrays)
-    names = [name for name in ("x", *PARTICLES) if name in stored or name == "strain"]
+    names = [name for name in ("x", *PARTICLES, GRADIENT) if name in stored or name == "strain"]
     return [*names, *particles.history_names]
 
 
@@ -188,12 +192,12 @@ def array_of(particles: _rust.Particles, name: str) -> npt.NDArray[Any]:
     Raises:
         InputError: The particles do not have it; the message names what models it.
     """
-    known = dict.fromkeys(["x", *PARTICLES, *HISTORY, *particles.history_names])
+    known = dict.fromkeys(["x", *PARTICLES, GRADIENT, *HISTORY, *particles.history_names])
     if name not in known:
         raise unknown("arrays of the particles", name, known)
     if name in CARRIED:
         return particles.carried(name)
-    if name not in PARTICLES and name != "x":
+    if name not in (*PARTICLES, GRADIENT, "x"):
         return particles.history(name)
     return np.asarray(getattr(particles, name))
 
@@ -204,7 +208,7 @@ def local_arrays(subject: Subject) -> Arrays:
 
 
 def _present(subject: Subject, name: str) -> npt.NDArray[Any]:
-    with _not_modelled():
+    with not_modelled():
         if name in CARRIED:
             _ = getattr(subject, name)  # or the error of the scene that has none
         return array_of(subject.scene.particles, name)
@@ -214,6 +218,11 @@ def body_arrays(subject: Subject) -> Arrays:
     """Arrays of the particles of all ranks in the order of their numbers; calls for all ranks."""
     gather = placement.in_order(subject.scene.grid.comm, _present(subject, "number"))
     return Arrays(lambda name: gather(_present(subject, name)))
+
+
+def named(histories: Iterable[str]) -> dict[str, Quantity]:
+    """Quantities by name, with those of history variables."""
+    return PARTICLES | {name: history(name) for name in histories}
 
 
 # -- by name -----------------------------------------------------------------
@@ -226,7 +235,7 @@ def of_particles(given: Iterable[Given], subject: Subject) -> list[Quantity]:
         NotModelledError: The scene does not have one; the message names the switch that adds it.
         InputError: An unknown name, or a function of the driver script that fails.
     """
-    known = PARTICLES | {name: history(name) for name in subject.scene.particles.history_names}
+    known = named(subject.scene.particles.history_names)
     found = []
     for one in given:
         if isinstance(one, Quantity):
@@ -259,15 +268,12 @@ def unknown(place: str, name: str, known: Iterable[str]) -> InputError:
 
 
 @contextmanager
-def _not_modelled() -> Iterator[None]:
+def not_modelled() -> Iterator[None]:
     """Raise InputError of the block as NotModelledError."""
     try:
         yield
     except InputError as error:
         raise NotModelledError(str(error)) from None
-
-
-# -- numbers -----------------------------------------------------------------
 
 
 def split(label: str) -> tuple[str, tuple[str, ...], str]:
@@ -276,39 +282,3 @@ def split(label: str) -> tuple[str, tuple[str, ...], str]:
     if name.endswith(f" {TENSOR}"):
         return name.removesuffix(f" {TENSOR}"), PLANE.tensor, unit
     return name, (), unit
-
-
-def scalars(fields: Mapping[str, Array], *, sizes: bool = True) -> dict[str, tuple[str, Array]]:
-    """The numbers of fields: name -> (unit, values), one value for each particle.
-
-    Args:
-        fields: Values by label. Vectors may have more components than the space.
-        sizes: Whether a vector has its size too, under its own name.
-    """
-    found: dict[str, tuple[str, Array]] = {}
-    for label, values in fields.items():
-        name, components, unit = split(label)
-        if values.ndim == 1:
-            found[name] = (unit, values)
-            continue
-        if not components and values.shape[1] in (PLANE.dim, 3):
-            components = PLANE.axes
-            if sizes:
-                found[name] = (unit, np.linalg.norm(values, axis=1))
-        if not components:
-            components = tuple(map(str, range(1, values.shape[1] + 1)))
-        found |= {f"{name} {c}": (unit, values[:, k]) for k, c in enumerate(components)}
-    return found
-
-
-def derived(fields: Mapping[str, Array]) -> dict[str, Array]:
-    """Fields by label, with the quantities that follow from them: the mean stress from the stress."""
-    by_name = {split(label)[0]: values for label, values in fields.items()}
-    found = dict(fields)
-    for quantity in PARTICLES.values():
-        if quantity.name not in by_name:
-            try:
-                found[quantity.label] = np.asarray(quantity.of(Arrays(by_name.__getitem__)))
-            except KeyError:
-                continue
-    return found
