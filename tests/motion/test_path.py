@@ -152,3 +152,22 @@ def test_wrong_input_of_a_path_raises_an_error():
     scene.fix("bottom", "y")
     with pytest.raises(tawami.InputError, match="there is no new load"):
         tawami.follow(scene, "arc length", size=0.1, to=1.0)
+
+
+def test_an_amplitude_that_continues_another_one_is_no_new_displacement():
+    """As in a motion, what the old amplitude gave and the new one gives make up for each other."""
+    grid = grid_of()
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1e3, nu=0.3))
+    scene.fix("bottom", "x")
+    held = scene.fix("bottom", "y", 0.01, amplitude=lambda t: t)
+    scene.solve(until=0.5)
+    held.change(amplitude=lambda t: 0.5 + (t - 0.5) ** 2)
+    scene.traction("top", (1.0, 0.0))
+    control = ((0.0, 2.0), "x")
+    steps = tawami.follow(scene, control, size=5e-4, to=1e-3)
+    assert steps.complete
+    held.change(amplitude=0.9)
+    scene.traction("top", (1.0, 0.0))
+    with pytest.raises(tawami.InputError, match="a displacement that the body does not have yet"):
+        tawami.follow(scene, control, size=5e-4, to=1e-3)

@@ -17,7 +17,7 @@ def line(header, label):
     return re.search(rf"^{label} +(.*)$", text, flags=re.MULTILINE).group(1)
 
 
-@pytest.mark.parametrize("assembly", ["fast", "reference"])
+@pytest.mark.parametrize("assembly", ["points", "dolfinx"])
 def test_the_header_counts_particles_bytes_and_unknowns(assembly):
     scene = scene_of(form="u_epsv", assembly=assembly)
     scene.hold((0.0, 1.7), "x", 0.01)

@@ -93,7 +93,7 @@ def survey(
     report.print_ratios(rows)
     found = overheads.in_turns([(sys.executable, ROOT)], 3)
     print("\n".join(overheads.lines(found)))
-    for assembly in ("reference", "fast"):
+    for assembly in ("dolfinx", "points"):
         empty_cells(max(max(cells) // 4, 8), assembly)
 
 

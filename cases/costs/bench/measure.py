@@ -47,7 +47,7 @@ def measure(setting: Setting) -> dict[str, Any]:
     Returns:
         Seconds, processor time, memory, by name.
     """
-    warnings.simplefilter("ignore", tawami.InexactSumWarning)  # of the additional stress
+    warnings.simplefilter("ignore", tawami.InexactSumWarning)  # of the additional stress, earlier
     forms = first_scene(setting)
     mpm.build("u_epsv", "paper", 2, alpha=0.1, assembly=setting.assembly).solve()  # loads libraries
     return {"forms_s": forms} | linear(setting) | nonlinear(setting)

@@ -2,32 +2,155 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from tawami.base import checks
 from tawami.base.arrays import Array
+from tawami.base.errors import InputError
+from tawami.base.space import PLANE, Counts, Position
+
+#: Share of a cell by which two bodies may overlap in it.
+ROUNDING = 1e-3
 
 
 @dataclass(frozen=True)
 class Body:
     """Positions and volumes of the particles of a body.
 
+    `one + other` is a body with the particles of both, in this order, and with the groups of both;
+    groups of the same name become one. `sum([...])` joins several.
+
     Attributes:
         x: Positions [m], particles x 2.
         volume: Volumes per metre depth [m2], one per particle.
         material_of: Number of the material of each particle. None: all have the first material.
         names: Names of the materials, in the order of their numbers. Empty: they have no names.
+        lattice: Origin [m], side of a cell [m] and numbers of cells of the grid that it was made for.
+            None: unknown.
     """
 
     x: Array
     volume: Array
     material_of: npt.NDArray[np.uint32] | None = None
     names: tuple[str, ...] = ()
+    lattice: tuple[Position, float, Counts] | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         materials = f", materials {', '.join(self.names)}" if self.names else ""
         return (
             f"Body({len(self.x)} particles, {np.sum(self.volume):g} m2 per metre depth{materials})"
         )
+
+    def named(self, name: str) -> Body:
+        """The same body as one group, to which a scene gives a material by this name.
+
+        Raises:
+            InputError: Not a name, or the body has several materials.
+        """
+        if not isinstance(name, str) or not name:
+            raise InputError(f"named({checks.shown(name)}): expected a name, as 'clay'")
+        if len(self.names) > 1 or (self.material_of is not None and np.any(self.material_of)):
+            groups = f"the groups {_listed(self.names)}" if self.names else "several materials"
+            raise InputError(
+                f"named('{name}'): the body has {groups}: expected a body with one; join bodies after "
+                "they got their names"
+            )
+        return replace(self, material_of=None, names=(name,))
+
+    def __add__(self, other: Body) -> Body:
+        """A body with the particles and groups of both.
+
+        Raises:
+            InputError: They overlap, were made for different grids, or one of them has names and the
+                other has none.
+        """
+        if not isinstance(other, Body):
+            return NotImplemented
+        one, others = _arrays(self), _arrays(other)
+        lattice = self.lattice or other.lattice
+        if self.lattice is not None and other.lattice is not None:
+            if self.lattice != other.lattice:
+                raise InputError(
+                    "Body + Body: they were made for different grids: expected the same origin, h and "
+                    "cells; make both with the grid of the scene"
+                )
+            _check_apart(one, others, *self.lattice)
+        names, number = _groups(self, other)
+        x, volume = (np.concatenate(arrays) for arrays in zip(one, others, strict=True))
+        return Body(x, volume, number, names, lattice)
+
+    def __radd__(self, other: Literal[0]) -> Body:
+        """So that `sum([...])` joins bodies: it begins with 0."""
+        return self if isinstance(other, int) and other == 0 else NotImplemented
+
+
+def _groups(one: Body, other: Body) -> tuple[tuple[str, ...], npt.NDArray[np.uint32] | None]:
+    """Names of the groups of both bodies, and the number of the group of each particle."""
+    parts = (one, other)
+    if bool(one.names) != bool(other.names):
+        raise InputError(
+            f"Body + Body: one has the groups {_listed(one.names or other.names)} and the other has no "
+            "names: expected names for both or none; body.named('sand') gives one"
+        )
+    names = tuple(dict.fromkeys(one.names + other.names))
+    if len(names) < 2 and all(part.material_of is None for part in parts):
+        return names, None
+    numbers = []
+    for part in parts:
+        own = np.zeros(len(part.x)) if part.material_of is None else part.material_of
+        number = checks.numbering("Body + Body: material_of", own, len(part.x))
+        if part.names:
+            if number.max(initial=0) >= len(part.names):
+                raise InputError(
+                    f"Body + Body: material_of has the number {number.max()} and names are "
+                    f"{_listed(part.names)}: expected a name for each number"
+                )
+            number = np.array([names.index(name) for name in part.names], dtype=np.uint32)[number]
+        numbers.append(number)
+    return names, np.concatenate(numbers)
+
+
+def _arrays(part: Body) -> tuple[Array, Array]:
+    """Positions and volumes of a body."""
+    x = checks.array("Body + Body: x", part.x, 2)
+    volume = checks.array("Body + Body: volume", part.volume, 1)
+    if x.shape != (len(volume), PLANE.dim):
+        raise InputError(
+            f"Body + Body: x of shape {x.shape} with {len(volume)} volumes: expected {PLANE.dim} "
+            "coordinates for each"
+        )
+    return x, volume
+
+
+def _check_apart(
+    one: tuple[Array, Array], other: tuple[Array, Array], origin: Position, h: float, cells: Counts
+) -> None:
+    """Check that no cell holds more than its volume, given positions and volumes of two bodies.
+
+    Raises:
+        InputError: They overlap.
+    """
+    strides, size = np.cumprod([1, *cells[:-1]]), h ** len(cells)
+    covered = []
+    for x, volume in (one, other):
+        index = np.clip(np.floor((x - origin) / h), 0, np.subtract(cells, 1)).astype(np.int64)
+        covered.append(np.bincount(index @ strides, volume, int(np.prod(cells))) / size)
+    excess = sum(covered) - np.maximum(1.0, np.maximum(*covered))
+    worst = int(np.argmax(excess))
+    if excess[worst] > ROUNDING:
+        place = origin + h * (np.array(np.unravel_index(worst, cells, order="F")) + 0.5)
+        where = ", ".join(f"{coordinate:g}" for coordinate in place)
+        raise InputError(
+            f"Body + Body: they overlap by at least {size * np.maximum(excess, 0.0).sum():.3g} m2, most "
+            f"in the cell at ({where}) m: expected bodies side by side; subtract one from the other, as "
+            "polygons of shapely or as functions of level_set"
+        )
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(map(repr, names))

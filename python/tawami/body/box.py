@@ -45,7 +45,8 @@ def box(
     filling.check_memory(math.prod(map(len, cells)))
     along = [(cell[:, None] + filling.points).ravel() for cell in cells]
     lengths = [np.tile(filling.weights * grid.h, len(cell)) for cell in cells]
-    return Body(grid.in_metres(lattice(along)), tensor_product(lengths))
+    volume = tensor_product(lengths)
+    return Body(grid.in_metres(lattice(along)), volume, lattice=grid.lattice)
 
 
 def _cells(grid: Grid, axis: int, low: float, high: float) -> Indices:

@@ -118,9 +118,8 @@ class Filling:
             self.grid.in_metres(parts.x),
             self.grid.space.measure(self.grid.h) * parts.weight,
         )
-        if names is None:
-            return Body(x, volume)
-        return Body(x, volume, parts.material.astype(np.uint32), names)
+        number = None if names is None else parts.material.astype(np.uint32)
+        return Body(x, volume, number, names or (), self.grid.lattice)
 
     def _thinned(
         self, points: Points, full: int, allowed: Callable[[Array], Mask] | None

@@ -101,6 +101,11 @@ class Grid(Unique):
         cells = " x ".join(map(str, self.cells))
         return f"Grid({cells} cells of {self.h:g} m, {self.extent} m)"
 
+    @property
+    def lattice(self) -> tuple[Position, float, Counts]:
+        """Origin [m], side of a cell [m] and numbers of cells."""
+        return self.origin, self.h, self.cells
+
     def identity(self) -> dict[str, Any]:
         """What distinguishes it from another grid, for checkpoints."""
         return {"grid": [list(self.origin), self.h, list(self.cells)]}

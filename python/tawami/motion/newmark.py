@@ -8,6 +8,7 @@ these; at the end of the step prescribed values replace v1 and a1.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -18,6 +19,7 @@ from tawami.field.reduction import Reduction
 from tawami.motion.carried import Carried, divided
 from tawami.motion.energy import Balance, Energies
 from tawami.motion.rotation import Rotation
+from tawami.scene import reactions
 from tawami.scene.action import Term
 from tawami.scene.configuration import Configuration
 from tawami.scene.contact import ActiveSet
@@ -133,11 +135,15 @@ class NewmarkStep:
             reduction, contact, self._external, inertia, self._guess(dt * v.ravel()), crossings
         )
 
+    @functools.cached_property
+    def _internal(self) -> Array:
+        """Internal forces at the start of the step, on all coefficients [N per metre depth]."""
+        domain = self._now.domain
+        return domain.newton.internal(np.zeros(domain.layout.size))
+
     def _first_acceleration(self, like: Array) -> Array:
         """Acceleration by the momentum equation: g in free fall, 0 at rest."""
-        domain = self._now.domain
-        internal = domain.newton.internal(np.zeros(domain.layout.size))
-        force = (self._first - internal)[: like.size].reshape(like.shape)
+        force = (self._first - self._internal)[: like.size].reshape(like.shape)
         return divided(force, self._mass[:, None])
 
     def _guess(self, u: Array) -> Array:
@@ -169,14 +175,24 @@ class NewmarkStep:
         given = float(start.inertia.impulse @ start.v.ravel()) * dt
         energies.external += given
         energies.impact += given
-        # loads that follow an amplitude do the work of their mean in the step
-        lag = 0.5 * (self._first - self._external)[: accepted.u.size]
-        energies.external += float(lag @ accepted.u.ravel())
+        energies.external += self._work_of_mean(accepted)
         clock = Clock(self._clock.steps + 1, self._loads)
         return NewmarkUpdate(
             self._now, self._carried, self._balance, self._clock, clock, self._finish, arrays,
             (v1, a1), energies, len(self._now.left),
         )  # fmt: skip
+
+    def _work_of_mean(self, accepted: Accepted) -> float:
+        """Work of the mean of the forces at both ends of the step, of loads that follow an amplitude and
+        of supports that move, less that of their forces at its end [J per metre depth].
+        """
+        start, u, reduction = self._start, accepted.u.ravel(), accepted.problem.reduction
+        first = self._first[: u.size]
+        work = float(0.5 * (first - self._external[: u.size]) @ u)
+        if not reduction.offset[: u.size].any():
+            return work
+        forces = self._internal[: u.size] + self._masses * start.a.ravel() - first
+        return work + reactions.work(reduction, 0.5 * (forces - accepted.forces_at_end.ravel()), u)
 
 
 @dataclass(frozen=True)

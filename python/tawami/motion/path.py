@@ -250,7 +250,7 @@ def follow(
     checks.choice("stop", stop, get_args(Stop))
     now = scene.configuration
     for support in now.supports.all:
-        if any(t.share.carried != t.at(now.moment()) and not t.is_zero for t in support.terms):
+        if support.is_ahead(now.moment()):
             raise InputError(
                 f"{support} prescribes a displacement that the body does not have yet, and follow(...) "
                 "changes loads only: expected scene.solve() or ramp(scene) before the loads are added"

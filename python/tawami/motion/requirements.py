@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from tawami.base import checks
@@ -12,21 +10,11 @@ from tawami.motion.transfer import Transfer
 from tawami.scene.configuration import Configuration
 from tawami.scene.scene import Scene
 
-#: Difference of two factors of a displacement that is round-off.
-ALIKE = 1e-9
-
 
 def check_displacements(now: Configuration) -> None:
     """Check that the body has the displacements that supports prescribe at the present time."""
-    at = now.moment()
     for support in now.supports.all:
-        # an old amplitude and the new one that continues it make up for each other
-        missing: dict[Any, float] = {}
-        for term in support.terms:
-            if not (term.factor.has_velocity or term.is_zero):
-                change = term.at(at) - term.share.applied
-                missing[term.values] = missing.get(term.values, 0.0) + change
-        if any(abs(change) > ALIKE for change in missing.values()):
+        if support.is_ahead(now.moment()):
             raise InputError(
                 f"{support} prescribes a displacement that the body does not have yet: expected "
                 "fix(..., velocity=...) or an amplitude that is 0 at first for a motion, or "

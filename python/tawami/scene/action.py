@@ -10,13 +10,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
+import numpy as np
+
 from tawami.base.errors import CheckpointError, InputError
 from tawami.base.identity import text
-from tawami.grid.edges import Profile
+from tawami.base.meaning import fingerprint
 from tawami.scene.activity import Activity
 from tawami.scene.factor import Factor, InTime
 from tawami.scene.share import Moment, Share
 
+#: A component of a value: a number, a function of position, or an array with a number for each particle.
+Value = Any
 Acts = TypeVar("Acts", bound="Action")
 
 
@@ -26,14 +30,14 @@ class Term:
 
     Attributes:
         number: Number in its action, in the order in which the driver script gave them.
-        values: Components of the value: numbers, or functions of position.
+        values: Components of the value.
         factor: Its factor in time.
         since: Number of the term that the factor came with.
         share: What of it the body carries.
     """
 
     number: int
-    values: tuple[Profile, ...]
+    values: tuple[Value, ...]
     factor: Factor
     since: int
     share: Share = field(default_factory=Share)
@@ -62,7 +66,7 @@ class Term:
     @property
     def is_zero(self) -> bool:
         """Whether its value is zero."""
-        return not any(callable(value) or value for value in self.values)
+        return not any(callable(value) or np.any(value) for value in self.values)
 
 
 class Owner(Generic[Acts]):
@@ -121,7 +125,7 @@ class Action:
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self}{', released' if self.released else ''})"
 
-    def _checked(self, value: Any) -> tuple[Profile, ...]:
+    def _checked(self, value: Any) -> tuple[Value, ...]:
         """The components of a value.
 
         Raises:
@@ -129,7 +133,7 @@ class Action:
         """
         raise NotImplementedError
 
-    def _begin(self, values: tuple[Profile, ...], factor: Factor) -> None:
+    def _begin(self, values: tuple[Value, ...], factor: Factor) -> None:
         """Replace the last term by another one."""
         kept = [term.since for term in self.terms if term.factor is factor]
         for term in self.terms:
@@ -164,7 +168,7 @@ class Action:
 
     def _changed(
         self, value: Any, amplitude: InTime | None, velocity: InTime | None
-    ) -> tuple[tuple[Profile, ...], Factor]:
+    ) -> tuple[tuple[Value, ...], Factor]:
         """Values and factor after a change."""
         last = self.terms[-1]
         values = last.values if value is None else self._checked(value)
@@ -203,7 +207,7 @@ class Action:
         """What decides the results of a run, as JSON holds it."""
         return [
             [
-                *(text(value) if callable(value) else float(value) for value in term.values),
+                *map(_fact, term.values),
                 *term.factor.identity(),
                 term.share.target,
             ]
@@ -217,7 +221,9 @@ class Action:
                 "number": term.number,
                 "since": term.since,
                 "share": term.share.state(),
-                "values": [[] if callable(value) else [float(value)] for value in term.values],
+                "values": [
+                    [] if callable(value) else np.ravel(value).tolist() for value in term.values
+                ],
                 "factor": term.factor.constant,
             }
             for term in self.terms
@@ -246,12 +252,20 @@ class Action:
                     f"{name} was changed to a function or another velocity while the run went (each=): "
                     "expected such changes between two phases, or an amplitude"
                 )
-            term = term or Term(number, tuple(value for (value,) in values), factor, since)
+            given = (value[0] if len(value) == 1 else np.array(value) for value in values)
+            term = term or Term(number, tuple(given), factor, since)
             term.share.restore(stored["share"])
             self.terms.append(term)
         if not self.terms:
             raise CheckpointError(f"{name} has no value in the checkpoint: expected one")
         self._made, self.released = state["made"], state["released"]
+
+
+def _fact(value: Value) -> Any:
+    """A value as JSON holds it, to compare it."""
+    if isinstance(value, np.ndarray):
+        return fingerprint(value, float(np.abs(value).max(initial=0.0)))
+    return text(value) if callable(value) else float(value)
 
 
 def restored(what: str, actions: Sequence[Acts], stored: Sequence[Mapping[str, Any]]) -> list[Acts]:

@@ -10,10 +10,12 @@ from tawami.base import checks
 from tawami.base.errors import InputError
 from tawami.grid.edges import Component, Interval, Profile
 from tawami.grid.grid import Edge
+from tawami.scene import selection
 from tawami.scene.configuration import Configuration
 from tawami.scene.factor import InTime
 from tawami.scene.loads import Load
 from tawami.scene.points import check_in_body
+from tawami.scene.selection import Where
 from tawami.scene.support import Support
 from tawami.scene.walls import Wall
 
@@ -141,24 +143,29 @@ class Conditions:
 
     def load(
         self,
-        particles: npt.ArrayLike,
-        force: Sequence[float],
+        particles: Where,
+        force: npt.ArrayLike,
         *,
         amplitude: InTime | None = None,
     ) -> Load:
         """Load particles of the body, wherever they move: a traction on a surface that is not an edge
-        of the grid. Its direction is fixed.
+        of the grid. Its direction is fixed. A call for all ranks.
 
         Args:
-            particles: A mask of the particles of the body, or their numbers.
-            force: (f_x, f_y) [N per metre depth], shared out by the volumes of the particles.
+            particles: A mask of the particles of the body, or their numbers; a function f(x, y) on
+                arrays that returns a mask; or the name of a group of the body.
+            force: (f_x, f_y) [N per metre depth], shared by the particles by their volumes; or an array
+                n x 2 with the force on each of the n particles, in the order of their numbers or as
+                these were given.
             amplitude: Factor of the force, a number or a function of time [s].
 
         Raises:
-            InputError: No particle, others than those of the body, or an amplitude that is not a finite
-                number at the present time.
+            InputError: No particle, others than those of the body, another shape of the force, or an
+                amplitude that is not a finite number at the present time.
         """
-        return self.configuration.loads.add_forces(particles, force, amplitude)
+        now = self.configuration
+        chosen = selection.numbers(now.domain, "load(...): particles", particles)
+        return now.loads.add_forces(chosen, force, amplitude)
 
     def gravity(self, acceleration: Sequence[float], *, amplitude: InTime | None = None) -> Load:
         """Load the body by its weight. As all loads, a second call adds to the first.

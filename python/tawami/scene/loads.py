@@ -13,19 +13,20 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami.base import checks
+from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import InputError, SupportError
 from tawami.base.identity import text
 from tawami.base.text import listed
 from tawami.grid import edges
-from tawami.grid.edges import Interval, Profile
+from tawami.grid.edges import Interval
 from tawami.grid.grid import Edge, Grid
-from tawami.scene.action import Action, Owner, Term, restored
+from tawami.scene.action import Action, Owner, Term, Value, restored
 from tawami.scene.activity import Activity
 from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor
 from tawami.scene.share import Moment
 
-Array = npt.NDArray[np.float64]
+Numbers = npt.NDArray[np.integer[Any]]
 
 
 class Load(Action):
@@ -48,7 +49,7 @@ class Weight(Load):
 
     __slots__ = ()
 
-    def _checked(self, value: Any) -> tuple[Profile, ...]:
+    def _checked(self, value: Any) -> tuple[Value, ...]:
         return checks.point("gravity", value)
 
     @property
@@ -72,7 +73,7 @@ class Traction(Load):
         self.edge, self.between = edge, between
         super().__init__(owner, value, factor)
 
-    def _checked(self, value: Any) -> tuple[Profile, ...]:
+    def _checked(self, value: Any) -> tuple[Value, ...]:
         t_x, t_y = checks.pair(f"{self}", value, "components (t_x, t_y)")
         return checks.profile(f"{self}: t_x", t_x), checks.profile(f"{self}: t_y", t_y)
 
@@ -85,20 +86,54 @@ class Traction(Load):
 
 
 class Forces(Load):
-    """A force on particles of the body; its values are components [N per metre depth].
+    """Forces on particles of the body [N per metre depth]; its values are the components of one force
+    that they share by volume, or arrays of the components on each particle of the body.
 
     Attributes:
-        shares: Share of each particle of the body.
+        chosen: Numbers of the particles.
+        shares: Share of each particle of the body in one force.
     """
 
-    __slots__ = ("shares",)
+    __slots__ = ("_dim", "chosen", "shares")
 
-    def __init__(self, owner: Owner[Any], shares: Array, value: Any, factor: Factor) -> None:
-        self.shares = shares
+    def __init__(
+        self, owner: Loads, chosen: Indices, volume: Array, value: Any, factor: Factor
+    ) -> None:
+        self._dim = owner.grid.space.dim
+        self.chosen, self.shares = chosen, np.zeros(len(volume))
+        self.shares[chosen] = volume[chosen] / volume[np.unique(chosen)].sum()
         super().__init__(owner, value, factor)
 
-    def _checked(self, value: Any) -> tuple[Profile, ...]:
-        return checks.point("load(...): force", value)
+    def _checked(self, value: Any) -> tuple[Value, ...]:
+        given = checks.any_array("load(...): force", value)
+        if given.ndim != 2:
+            return checks.point("load(...): force", value)
+        forces = checks.array("load(...): force", given, 2)
+        n, dim = len(self.chosen), self._dim
+        if forces.shape != (n, dim):
+            raise InputError(
+                f"load(...): force has shape {forces.shape}: expected ({n}, {dim}), one row for each of "
+                f"the {n} particles in their order, or {dim} components of a force that they share"
+            )
+        if not np.isfinite(forces).all():
+            k = int(np.flatnonzero(~np.isfinite(forces).all(axis=1))[0])
+            raise InputError(f"load(...): force[{k}] = {forces[k]}: expected finite numbers")
+        if len(np.unique(self.chosen)) < n:
+            raise InputError(
+                "load(...): a particle is given twice, with a force for each: expected each once"
+            )
+        on_body = np.zeros((dim, len(self.shares)))
+        on_body[:, self.chosen] = forces.T
+        return tuple(on_body)
+
+    def on(self, term: Term, number: Numbers) -> Array:
+        """Forces of a term on the particles of these numbers, particles x dim."""
+        return np.column_stack(
+            [
+                v[number] if isinstance(v, np.ndarray) else v * self.shares[number]
+                for v in term.values
+            ]
+        )
 
     def place(self) -> list[Any]:
         """A hash of the shares."""
@@ -157,29 +192,10 @@ class Loads(Owner[Load]):
         self.all.append(traction)
         return traction
 
-    def add_forces(self, particles: npt.ArrayLike, force: Any, amplitude: Any) -> Load:
-        """Share a force [N per metre depth] out among particles of the body by volume.
-
-        Args:
-            particles: A mask of the particles of the body, or their numbers.
-            force: Components.
-            amplitude: In time.
-        """
-        n, chosen = len(self._volume), checks.any_array("load(...): particles", particles)
-        if chosen.dtype == bool and chosen.shape == (n,):
-            chosen = np.flatnonzero(chosen)
-        inside = chosen.dtype.kind in "iu" and chosen.ndim == 1
-        if not (inside and ((chosen >= 0) & (chosen < n)).all()):
-            raise InputError(
-                f"load(particles={checks.shown(particles)}): expected a mask of the "
-                f"{n} particles of the body, or their numbers"
-            )
-        chosen = np.unique(chosen)
-        if chosen.size == 0:
-            raise InputError("load(...): no particle was chosen; the force would act on nothing")
-        shares = np.zeros(n)
-        shares[chosen] = self._volume[chosen] / self._volume[chosen].sum()
-        forces = Forces(self, shares, force, self._factor("load(...)", amplitude))
+    def add_forces(self, particles: Indices, force: Any, amplitude: Any) -> Load:
+        """Load particles of the body, given by their numbers."""
+        factor = self._factor("load(...)", amplitude)
+        forces = Forces(self, particles, self._volume, force, factor)
         self.all.append(forces)
         return forces
 
@@ -209,9 +225,10 @@ class Loads(Owner[Load]):
             if isinstance(load, Traction):
                 external += factor * self._on_edge(domain, load, term)
                 continue
-            values = factor * np.array(term.values, dtype=float)
-            weight = load.shares[particles.number] if isinstance(load, Forces) else domain.mass
-            on_particles += weight[:, None] * values
+            if isinstance(load, Forces):
+                on_particles += factor * load.on(term, particles.number)
+            else:
+                on_particles += domain.mass[:, None] * (factor * np.array(term.values, dtype=float))
             any_on_particles = True
         if any_on_particles:
             sums = domain.sums(np.ones(len(particles)), on_particles)
@@ -240,10 +257,10 @@ class Loads(Owner[Load]):
         at_nodes = np.stack(values, axis=-1).reshape(nodes.shape)
         return domain.tractions.forces(edge, np.where(loaded[:, None, None], at_nodes, 0.0))
 
-    def _cells(self, domain: Domain, traction: Traction) -> npt.NDArray[np.bool_]:
+    def _cells(self, domain: Domain, traction: Traction) -> Mask:
         """Which cells with particles along its edge a traction loads."""
         part = edges.cells_between(self.grid, traction.edge, traction.between)
-        mask: npt.NDArray[np.bool_] = part[domain.tractions.cells(traction.edge)]
+        mask: Mask = part[domain.tractions.cells(traction.edge)]
         return mask
 
     def accept(self, now: Moment) -> None:

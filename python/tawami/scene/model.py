@@ -19,9 +19,9 @@ from tawami.base.sealed import Settings
 from tawami.base.space import Space
 from tawami.base.warn import warn
 from tawami.body.body import Body
-from tawami.fem.rules import TangentRule
 from tawami.form.compilation import CompiledForm, check_used, compile_form
 from tawami.form.form import Form
+from tawami.form.symbols import Assembly
 from tawami.grid.basis import BASES, Basis
 from tawami.grid.grid import Grid
 from tawami.particles import assignment
@@ -50,6 +50,7 @@ class Model:
         law: The law in NumPy, if that is what the scene has; `materials` then holds the elastic law
             with the same moduli.
         density: Of each material [kg/m3]; None if the scene has no mass.
+        names: Name of the group of each material; empty if the body has no names.
         leaving: What happens to particles that leave the grid.
         num_particles: Particles of the body, on all ranks.
     """
@@ -64,6 +65,7 @@ class Model:
     materials: Sequence[_rust.Material]
     law: NumpyLaw | None
     density: Array | None
+    names: tuple[str, ...]
     leaving: Leaving
     num_particles: int
 
@@ -133,7 +135,7 @@ def build(
     basis: Basis,
     density: float | Sequence[float] | Mapping[str, float] | None,
     leaving: Leaving,
-    tangent_rule: TangentRule,
+    assembly: Assembly,
     parameters: Mapping[str, Any],
 ) -> tuple[Model, _rust.Particles]:
     """The model of a scene and the particles of its whole body; the arguments are those of `Scene`.
@@ -164,7 +166,7 @@ def build(
     _warn_of_locking(grid, loaded, materials, particles)
     dilates = np.array([law is not None or one.pressure_dependent for one in materials])
     plastic_volume = bool(dilates.any())
-    compiled = compile_form(grid.comm, loaded, options, tangent_rule, plastic_volume=plastic_volume)
+    compiled = compile_form(grid.comm, loaded, options, assembly, plastic_volume=plastic_volume)
     check_used(compiled, options, parameters)
     _check_plastic_volume(compiled, dilates, law, particles)
     instead = "the form's parameters are fixed when a scene is made: Scene(..., {}=...)"
@@ -172,9 +174,14 @@ def build(
     model = Model(
         grid, loaded, compiled, basis, values,
         Settings(used, instead.format("alpha")), Settings(options, instead.format("stabilisation")),
-        materials, law, densities, leaving, len(particles),
+        materials, law, densities, _names(body, len(materials)), leaving, len(particles),
     )  # fmt: skip
     return model, particles
+
+
+def _names(body: Body, materials: int) -> tuple[str, ...]:
+    """Names of the groups of a body, if they are those of its materials."""
+    return tuple(body.names) if len(body.names) == materials else ()
 
 
 def _particles(

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from tawami.base import checks
 from tawami.base.errors import InputError
+from tawami.field.reduction import Reduction
 from tawami.grid import edges
 from tawami.grid.grid import EDGES, Edge
 from tawami.scene.model import Model
@@ -35,6 +36,37 @@ def supported_edge(place: str, supported: set[str]) -> Edge:
             f"{', '.join(sorted(supported)) or 'none'}, or fix('{place}', ...) or wall('{place}') before"
         )
     return place
+
+
+def divided(reduction: Reduction, forces: Array) -> tuple[Array, Array]:
+    """Forces of supports: those of edges and walls on all displacement coefficients, and the multipliers
+    of points, which take what they can.
+
+    Args:
+        reduction: The supports.
+        forces: Of all supports on the displacement coefficients [N per metre depth].
+    """
+    fixed, points, rest = reduction.fixed[: len(forces)], reduction.points, forces
+    multipliers = np.zeros(len(points))
+    if points:
+        weights = np.zeros((len(forces), len(points)))
+        for k, point in enumerate(points):
+            weights[point.indices, k] = point.weights
+        multipliers = np.linalg.lstsq(weights[~fixed], forces[~fixed], rcond=None)[0]
+        rest = forces - weights @ multipliers
+    return np.where(fixed, rest, 0.0), multipliers
+
+
+def work(reduction: Reduction, forces: Array, u: Array) -> float:
+    """Work of forces of supports on increments of the displacement [J per metre depth].
+
+    Args:
+        reduction: The supports.
+        forces, u: On all displacement coefficients [N per metre depth], [m].
+    """
+    held, multipliers = divided(reduction, forces)
+    moved = [point.weights @ u[point.indices] for point in reduction.points]
+    return float(held @ u + multipliers @ np.array(moved))
 
 
 @dataclass(frozen=True)
@@ -75,23 +107,16 @@ class Reactions:
             accepted: The step.
             supports: The supports it was solved with.
         """
-        reduction = accepted.problem.reduction
-        forces = accepted.forces.ravel()
-        n, points, rest, at_points = len(forces), reduction.points, forces.copy(), list[AtPoint]()
-        if points:
-            weights = np.zeros((n, len(points)))
-            for k, point in enumerate(points):
-                weights[point.indices, k] = point.weights
-            loose = ~reduction.fixed[:n]
-            multipliers = np.linalg.lstsq(weights[loose], rest[loose], rcond=None)[0]
-            rest -= weights @ multipliers
-            for point, support, force in zip(points, supports.at_points, multipliers, strict=True):
-                assert not isinstance(support.given, str)
-                assert not isinstance(support.place, str)
-                places = (support.given, support.place, point.place)
-                at_points.append(AtPoint(places, support.component, float(force)))
-        held = np.where(reduction.fixed[:n], rest, 0.0).reshape(accepted.u.shape)
-        return cls(held + accepted.friction, at_points, supports.supported_edges)
+        reduction, at_points = accepted.problem.reduction, list[AtPoint]()
+        held, multipliers = divided(reduction, accepted.forces.ravel())
+        points = zip(reduction.points, supports.at_points, multipliers, strict=True)
+        for point, support, force in points:
+            assert not isinstance(support.given, str)
+            assert not isinstance(support.place, str)
+            places = (support.given, support.place, point.place)
+            at_points.append(AtPoint(places, support.component, float(force)))
+        on_edges = held.reshape(accepted.u.shape) + accepted.friction
+        return cls(on_edges, at_points, supports.supported_edges)
 
     def at(self, model: Model, place: str | Sequence[float]) -> Array:
         """Force (x, y) [N per metre depth] of an edge or a point; see `Solution.reaction`."""

@@ -18,9 +18,9 @@ from tawami.base.process import Unique, check_process
 from tawami.base.sealed import Sealed
 from tawami.base.timing import Stopwatch
 from tawami.body.body import Body
-from tawami.fem.rules import TangentRule
 from tawami.field.reduction import Reduction
 from tawami.form.form import Form
+from tawami.form.symbols import Assembly
 from tawami.grid.basis import Basis
 from tawami.grid.grid import Grid
 from tawami.particles import assignment
@@ -33,7 +33,7 @@ from tawami.scene.solution import Solution
 from tawami.scene.sources import Source
 from tawami.scene.statics import StaticStep
 from tawami.scene.step import StepKind
-from tawami.solve.numerics import Assembly, Factorise, Numerics, SolverName
+from tawami.solve.numerics import Factorise, Numerics, SolverName
 
 Array = npt.NDArray[np.float64]
 
@@ -55,7 +55,7 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
         form: Weak form: the name of a shipped one ('u_epsv', 'u_p', 'u_bbar', 'u'), the path of a
             file, a module, or a `Form`.
         basis: Basis of the displacement: 'quadratic_spline', 'bilinear' or 'biquadratic'.
-        tolerance, max_iterations, assembly, tangent_rule, factorise, linear_solver: How a step is
+        tolerance, max_iterations, assembly, factorise, linear_solver: How a step is
             solved; see `tawami.solve.numerics.Numerics`.
         density: Mass density at the start [kg/m3], one for all materials or one each (a list or a
             dictionary as for the materials); gravity needs it.
@@ -95,8 +95,7 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
         basis: Basis = "quadratic_spline",
         tolerance: float = 1e-6,
         max_iterations: int = 20,
-        assembly: Assembly = "fast",
-        tangent_rule: TangentRule = "full",
+        assembly: Assembly = "points",
         factorise: Factorise = "when_it_pays",
         linear_solver: SolverName = "direct",
         density: float | Sequence[float] | Mapping[str, float] | None = None,
@@ -104,9 +103,7 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
         **parameters: Any,
     ) -> None:
         check_process()
-        numerics = Numerics(
-            tolerance, max_iterations, assembly, tangent_rule, factorise, linear_solver
-        )
+        numerics = Numerics(tolerance, max_iterations, assembly, factorise, linear_solver)
         model, particles = build(
             grid,
             body,
@@ -116,7 +113,7 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
             basis,
             density,
             leaving,
-            tangent_rule,
+            assembly,
             parameters,
         )
         self.configuration = Configuration(model, particles, numerics)

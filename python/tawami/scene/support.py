@@ -10,7 +10,10 @@ from tawami.grid.edges import Component, Interval, Profile
 from tawami.grid.grid import Edge
 from tawami.scene.action import Action, Owner
 from tawami.scene.factor import Factor, InTime
+from tawami.scene.share import Moment
 
+#: Difference of two factors of a displacement that is round-off.
+ALIKE = 1e-9
 Place = Edge | tuple[float, float]
 
 
@@ -94,6 +97,18 @@ class Support(Action):
     def at_rest(self) -> bool:
         """Whether it prescribes a displacement of zero."""
         return not self.has_velocity and all(term.is_zero for term in self.terms)
+
+    def is_ahead(self, now: Moment) -> bool:
+        """Whether it prescribes a displacement that the body does not have at this moment.
+
+        An old amplitude and the new one that continues it make up for each other.
+        """
+        missing = dict[tuple[Profile, ...], float]()
+        for term in self.terms:
+            if not (term.factor.has_velocity or term.is_zero):
+                change = term.at(now) - term.share.applied
+                missing[term.values] = missing.get(term.values, 0.0) + change
+        return any(abs(change) > ALIKE for change in missing.values())
 
     def __str__(self) -> str:
         where = f"edge='{self.place}'" if isinstance(self.place, str) else f"point={self.place}"
