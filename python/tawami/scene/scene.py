@@ -28,6 +28,7 @@ from tawami.scene import description, initial
 from tawami.scene.absent import Elsewhere
 from tawami.scene.conditions import Conditions
 from tawami.scene.configuration import Configuration
+from tawami.scene.construction import Construction
 from tawami.scene.model import build
 from tawami.scene.solution import Solution
 from tawami.scene.sources import Source
@@ -38,7 +39,7 @@ from tawami.solve.numerics import Factorise, Numerics, SolverName
 Array = npt.NDArray[np.float64]
 
 
-class Scene(Conditions, Elsewhere, Sealed, Unique):
+class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
     """Particles on a grid with a weak form, supports and loads.
 
     By itself it is static; `ramp` applies its loads in steps, `Dynamics` sets it in motion. With a
@@ -151,13 +152,16 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
         the body they are), which cannot be written, `volume` [m2], `stress` [Pa] (xx, yy, zz, xy;
         tension positive), `displacement` [m], and `eps_v` with forms that have that field. `strain`, as
         in `Solution`, and at finite strain `displacement_gradient` (F - I) are read only. Where
-        particles change rank or leave the grid this is another object after a step.
+        particles change rank or leave the grid this is another object after a step, and always after
+        `remove` and `change_material`.
         """
         return self.configuration.domain.particles
 
     @property
     def left(self) -> list[tuple[int, tuple[float, float], float]]:
-        """Number, position [m] and time [s] (NaN in a static scene) of the particles that left."""
+        """Number, position [m] and time [s] (NaN in a static scene) of the particles that left the grid
+        or were removed.
+        """
         return self.configuration.left
 
     @property
