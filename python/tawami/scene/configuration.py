@@ -99,9 +99,8 @@ class Configuration:
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
         earlier: Domain | None = getattr(self, "domain", None)
-        self.domain = Domain.attach(
-            self.model, particles, location, self.numerics, self.stopwatch, earlier
-        )
+        of = self.model, particles, location, self.numerics, self.stopwatch
+        self.domain = Domain.attach(*of, earlier)
 
     @property
     def before(self) -> Array:
