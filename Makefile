@@ -3,7 +3,8 @@
 # make quick        those of them that start no ranks
 # make test-all     all tests, the slow ones too: extremes, studies, endurance, large cases
 # make fuzz         look for arguments that fail, at random (SEED=... again with that seed)
-# make docs         the documentation as HTML, every script and case in it run; LINKS=1 checks the web's links
+# make docs         the documentation as HTML, every script and case in it run (PAGE=start one page,
+#                   LINKS=1 checks the web's links, THUMBNAILS=1 draws the pictures of README's gallery)
 # make matrix       make test-all on Debian 12, 13 and sid, each in a throw-away root (see tests/matrix.sh)
 # make extremes     try the method at its limits, print what survives and what is rejected
 # make bench        speed and memory, stage by stage (AGAINST=../checkout compares with another checkout)
@@ -44,7 +45,7 @@ quick: setup $(STAMPS)/cargo-tests
 	cargo test --locked --quiet
 	$(PYTEST) -m 'not slow and not mpi' $(TESTS)
 
-test-all: setup $(STAMPS)/cargo-tests
+test-all: setup $(STAMPS)/cargo-tests $(STAMPS)/docs
 	cargo test --locked --quiet
 	$(PYTEST) $(TESTS)
 
@@ -55,7 +56,7 @@ fuzz: setup $(STAMPS)/cargo-tests
 	HYPOTHESIS_PROFILE=fuzz SEED=$(SEED) $(PYTEST) -m 'fuzz or hypothesis' --hypothesis-seed=$(SEED) $(TESTS)
 
 docs: setup $(STAMPS)/docs
-	$(PYTHON) python/docs $(if $(LINKS),--links)
+	$(PYTHON) python/docs $(if $(PAGE),--page $(PAGE)) $(if $(LINKS),--links) $(if $(THUMBNAILS),--thumbnails)
 
 matrix:
 	tests/matrix.sh
@@ -98,9 +99,10 @@ $(STAMPS)/rust:
 	fi
 	@mkdir -p $(STAMPS) && touch $@
 
-$(STAMPS)/debian: $(STAMPS)/rust Makefile
-	@command -v apt-get >/dev/null || { echo "tawami takes dolfinx from Debian's packages, and apt-get was not found: expected Debian 12, 13 or sid" >&2; exit 1; }
-	@missing=; for package in $(DEBIAN); do \
+# Installs those of the packages $(1) that are missing.
+define from_debian
+	@command -v apt-get >/dev/null || { echo "tawami takes packages from Debian, and apt-get was not found: expected Debian 12, 13 or sid" >&2; exit 1; }
+	@missing=; for package in $(1); do \
 		dpkg-query -W -f '$${Status}' $$package 2>/dev/null | grep -q 'ok installed' || missing="$$missing $$package"; \
 	done; \
 	if [ -n "$$missing" ]; then \
@@ -111,6 +113,10 @@ $(STAMPS)/debian: $(STAMPS)/rust Makefile
 		$$root env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends $$missing </dev/null >/dev/null || \
 		{ echo "Debian's packages could not be installed: see the message of apt-get above" >&2; exit 1; }; \
 	fi
+endef
+
+$(STAMPS)/debian: $(STAMPS)/rust Makefile
+	$(call from_debian,$(DEBIAN))
 	@touch $@
 
 # The system's Python, because dolfinx lives in its dist-packages; NumPy and SciPy must stay the
@@ -133,8 +139,9 @@ $(STAMPS)/lint: $(STAMPS)/python
 	$(PIP) 'ruff>=0.6'
 	@mkdir -p $(STAMPS) && touch $@
 
-$(STAMPS)/docs: $(STAMPS)/python
-	$(PIP) 'sphinx>=7.2' 'myst-parser>=3' 'furo>=2024.1.29' 'sphinx-mathjax-offline>=0.0.2'
+$(STAMPS)/docs: $(STAMPS)/python Makefile
+	$(call from_debian,chromium)
+	$(PIP) 'sphinx>=7.2' 'myst-nb>=1.1' 'ipykernel>=6.25' 'furo>=2024.1.29' 'sphinx-design>=0.6' 'sphinx-mathjax-offline>=0.0.2' 'playwright>=1.40'
 	@mkdir -p $(STAMPS) && touch $@
 
 # Built for the processor it runs on, and again where that is another one.

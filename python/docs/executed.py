@@ -1,4 +1,4 @@
-"""Run the cases and the code marked `{run}` that pages show, unless nothing has changed.
+"""Run the cases, unless nothing has changed, and name what the code of pages depends on.
 
 A record holds the fingerprint of all files that a run read; it is written last. A run that fails is an
 error of `make docs`.
@@ -8,52 +8,50 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import importlib
-import io
 import json
 import os
-import re
 import shutil
 import subprocess
 import sys
-import textwrap
-import traceback
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 from sources import ROOT
 
 RESULTS = ROOT / "results" / "docs"
-#: A block of code that is run; after `{run}` the class of the error that it must raise, if any.
-BLOCK = re.compile(r"^```\{run\} *(\w*)\n(.*?)^```\n", flags=re.DOTALL | re.MULTILINE)
 #: Files that every run reads.
 SHARED = ("python/tawami/**/*.py", "forms/*.py", "rust/**/*.rs", "Cargo.lock")
 MINUTES = 60
 #: Cases that only print.
 WITHOUT_FILES = ("self_weight", "projection", "writing")
-#: Options of cases that would run for more than three minutes.
+#: Options of cases that would take more than two minutes of one core.
 SHORTER = {
-    "elastica": ("--steps", "40"),
+    "elastica": ("--steps", "20", "--cells", "4"),
     "footing": ("--cells", "8"),
     "bearing_capacity": ("--cells", "2"),
+    "ordering": ("--cells", "4,8,16,32,64"),
 }
 
 
 class RunError(Exception):
-    """A run that failed, or did not raise the expected error."""
+    """A run that failed."""
 
 
 @dataclass(frozen=True)
 class Output:
-    """Printed text, pictures and duration [s] of a run."""
+    """Printed text, folder, pictures and duration [s] of a run."""
 
     text: str
-    pictures: list[Path]
+    folder: Path
     seconds: float
+
+    @property
+    def pictures(self) -> list[Path]:
+        """The figures that the run drew."""
+        return sorted(self.folder.glob("*.png"))
 
 
 def fingerprint(patterns: Iterable[str], *more: str) -> str:
@@ -71,14 +69,14 @@ def cached(folder: Path, mark: str, work: Callable[[], str]) -> Output:
     with contextlib.suppress(OSError, ValueError):
         old = json.loads(record.read_text())
         if old["fingerprint"] == mark:
-            return Output(old["text"], sorted(folder.glob("*.png")), old["seconds"])
+            return Output(old["text"], folder, old["seconds"])
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     start = perf_counter()
     text = work()
     seconds = perf_counter() - start
     record.write_text(json.dumps({"fingerprint": mark, "text": text, "seconds": seconds}))
-    return Output(text, sorted(folder.glob("*.png")), seconds)
+    return Output(text, folder, seconds)
 
 
 def command(
@@ -89,7 +87,7 @@ def command(
     Raises:
         RunError: Its exit code is not 0, or it does not end.
     """
-    own = {**environment, "MPLBACKEND": "Agg", "PYTHONPATH": str(ROOT)}
+    own = {**environment, "MPLBACKEND": "Agg", "PYTHONPATH": search_path()}
     print(f"docs: {what}", file=sys.stderr, flush=True)
     try:
         run = subprocess.run(
@@ -103,79 +101,37 @@ def command(
     return run.stdout
 
 
+def search_path() -> str:
+    """Value of PYTHONPATH with which code finds `cases`."""
+    return os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
+
+
 def case(room: str, name: str) -> Output:
     """Run a case as `python -m cases.ROOM.NAME` does."""
-    folder, module = RESULTS / "cases" / name, f"cases.{room}.{name}"
+    folder, module = RESULTS / "executed" / name, f"cases.{room}.{name}"
     own = (f"cases/{room}/{name}.py", f"cases/{room}/{name}/*.py", "cases/common/*.py")
     options = [] if name in WITHOUT_FILES else ["--results", str(folder)]
     words = [sys.executable, "-m", module, *SHORTER.get(name, ()), *options]
     mark = fingerprint((*SHARED, *own), *SHORTER.get(name, ()))
     output = cached(folder, mark, lambda: command(words, ROOT, f"python -m {module}"))
-    return Output(output.text.replace(f"{ROOT}/", ""), output.pictures, output.seconds)
+    return Output(output.text.replace(f"{ROOT}/", ""), folder, output.seconds)
 
 
-def blocks(page: str, text: str) -> str:
-    """A page with its `{run}` blocks replaced by code and output; pictures are in `executed/PAGE`."""
-    found = BLOCK.findall(text)
-    if not found:
-        return text
-    folder = RESULTS / "executed" / page
+def all_cases(rooms: Mapping[str, str]) -> None:
+    """Run the cases that have no valid record, as many at a time as there are free cores.
 
-    def work() -> str:
-        (folder / "blocks.json").write_text(json.dumps(found))
-        return command([sys.executable, __file__, "blocks.json"], folder, f"the code of {page}.md")
-
-    output = cached(folder, fingerprint(SHARED, *map("\0".join, found)), work)
-    printed = iter(json.loads(output.text.splitlines()[-1]))
-
-    def shown(match: re.Match[str]) -> str:
-        says = next(printed)
-        code = f"```python\n{match[2]}```\n"
-        return code + (f"\n```text\n{_wrapped(says.rstrip())}\n```\n" if says.strip() else "")
-
-    return BLOCK.sub(shown, text)
-
-
-def _wrapped(text: str) -> str:
-    """Messages of errors and warnings in short lines."""
-    lines = text.splitlines()
-    sentence = re.compile(r"\w+(Error|Warning): ")
-    return "\n".join(
-        textwrap.fill(line, 92, subsequent_indent="    ") if sentence.match(line) else line
-        for line in lines
-    )
-
-
-def run_blocks(found: Sequence[tuple[str, str]]) -> list[str]:
-    """Output of each block, run one after another in one namespace.
-
-    Raises:
-        RunError: A block raised another error than expected, or none.
+    Args:
+        rooms: Folder of `cases/` of each case. Those of `costs` measure times and run one by one.
     """
-    names: dict[str, Any] = {"__name__": "__page__"}
-    return [_printed(code, expected, names) for expected, code in found]
+    costs = [name for name, room in rooms.items() if room == "costs"]
+    others = [name for name in rooms if name not in costs]
+    with ThreadPoolExecutor(workers()) as pool:
+        list(pool.map(lambda name: case(rooms[name], name), others))
+    for name in costs:
+        case(rooms[name], name)
 
 
-def _printed(code: str, expected: str, names: dict[str, Any]) -> str:
-    raised = ""
-    with (
-        contextlib.redirect_stdout(io.StringIO()) as out,
-        warnings.catch_warnings(record=True) as w,
-    ):
-        warnings.simplefilter("default", UserWarning)
-        try:
-            exec(compile(code, "<page>", "exec"), names)
-        except Exception as error:
-            raised = type(error).__name__
-            if raised != expected:
-                raise RunError(f"{code}\n{traceback.format_exc()}") from error
-            out.write(f"{raised}: {error}\n")
-    if raised != expected:
-        raise RunError(f"{code}\nexpected {expected}, but nothing was raised")
-    said = [f"{m.category.__name__}: {m.message}" for m in w if issubclass(m.category, UserWarning)]
-    return "\n".join([*said, out.getvalue()])
-
-
-if __name__ == "__main__":
-    importlib.import_module("logging").disable(20)  # compiling forms logs much
-    print(json.dumps(run_blocks(json.loads(Path(sys.argv[1]).read_text()))))
+def workers() -> int:
+    """Number of processes that the cores of this machine can run at a time."""
+    threads = int(os.environ.get("OMP_NUM_THREADS") or 1)
+    return max(1, len(os.sched_getaffinity(0)) // threads)

@@ -1,4 +1,4 @@
-"""Pages of the site: copies of the Markdown files, with code run and generated parts inserted."""
+"""Pages of the site: copies of the Markdown files with generated parts, and a page for each case."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Callable
+import textwrap
+from collections.abc import Callable, Iterable
+from itertools import groupby
 from pathlib import Path
 from time import perf_counter
 from urllib.parse import urlsplit
@@ -18,6 +20,8 @@ from urllib.parse import urlsplit
 import compatibility
 import executed
 import messages
+import notebooks
+import thumbnails
 from sources import ROOT
 
 from tawami.base import errors, program
@@ -41,6 +45,8 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "ordering": ("Orderings of MUMPS", "costs", ()),
     "writing": ("Writing results", "costs", ()),
 }
+#: Pages that can be downloaded as notebooks.
+TUTORIALS = ("start", "slope", "collapse", "edit_a_form", "add_a_law", "ranks")
 TRADE = ("cantilever", "cook", "collapse", "self_weight", "spinning_disc")
 LINK = re.compile(r"https?://[^\s)>\"'`]+")
 #: Elements of HTML that a browser loads with the page.
@@ -49,27 +55,67 @@ LOADED = re.compile(
 )
 
 
-def assemble(target: Path) -> list[str]:
-    """Write all pages to a folder.
+def assemble(target: Path, only: str | None = None) -> list[str]:
+    """Write all pages, or one, to a folder; return their names.
 
     Raises:
-        executed.RunError: Code or a case on a page failed, or a link is not well-formed.
+        executed.RunError: A case failed, a link is not well-formed, or there is no page of that name.
     """
-    texts = {f"cases/{name}": case_page(name) for name in CASES}
-    for path in sorted(SOURCE.rglob("*.md")):
-        name = str(path.relative_to(SOURCE).with_suffix(""))
-        texts[name] = complete(name, path.read_text())
-    for name, text in texts.items():
+    sources = {str(p.relative_to(SOURCE).with_suffix("")): p for p in sorted(SOURCE.rglob("*.md"))}
+    names = [*sources, *(f"cases/{name}" for name in CASES)]
+    if only is None:
+        executed.all_cases({name: room for name, (_, room, _) in CASES.items()})
+    elif only not in names:
+        raise executed.RunError(f"there is no page '{only}': expected one of {', '.join(names)}")
+    chosen = names if only is None else [only]
+    for name in chosen:
+        if name in sources:
+            text = complete(sources[name].read_text())
+            text = _with_files(text, sources[name].parent, (target / name).parent)
+        else:
+            text = case_page(name.removeprefix("cases/"), target)
         _check_links(name, text)
+        if name in TUTORIALS:
+            text = _with_download(name, text, target)
         _write(target / f"{name}.md", text)
-    for old in [*target.glob("*.md"), *target.glob("cases/*.md")]:
-        if str(old.relative_to(target).with_suffix("")) not in texts:
+    for old in [*target.glob("*.md"), *target.glob("*/*.md")]:
+        if str(old.relative_to(target).with_suffix("")) not in chosen:
             old.unlink()
     for picture in [*ROOT.glob("cases/costs/trade/*.png"), ROOT / "cases/extremes/map.png"]:
-        copy = target / picture.parent.name / picture.name
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(picture, copy)
-    return list(texts)
+        _copy(picture, target / picture.parent.name)
+    for picture in (SOURCE / "pictures").glob("*.*"):
+        _copy(picture, target / "pictures")
+    if only in (None, "cases/index", "index"):
+        draw_thumbnails(target / "cases" / "thumbnails")
+    return chosen
+
+
+def draw_thumbnails(target: Path, names: Iterable[str] = thumbnails.PARTS) -> None:
+    """Write the thumbnails of cases, which are run if necessary, to a folder as NAME.png."""
+    for name in names:
+        thumbnails.draw(name, executed.case(CASES[name][1], name).folder, target / f"{name}.png")
+
+
+def _with_files(text: str, source: Path, target: Path) -> str:
+    """A page whose files to include are named from another folder."""
+    return re.sub(
+        r"^(```\{(?:literal)?include\}) (\S+)$",
+        lambda match: f"{match[1]} {os.path.relpath(source / match[2], target)}",
+        text,
+        flags=re.MULTILINE,
+    )
+
+
+def _copy(file: Path, folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copy2(file, folder)
+
+
+def _with_download(name: str, text: str, target: Path) -> str:
+    """The page of a tutorial with a link to its notebook below the title."""
+    _write(target / "notebooks" / f"{name}.ipynb", notebooks.download(text))
+    link = f"{{download}}`Download this page as a notebook <notebooks/{name}.ipynb>`"
+    return re.sub(r"^(# .+\n)", rf"\1\n{link}\n", text, count=1, flags=re.MULTILINE)
 
 
 def _write(path: Path, text: str) -> None:
@@ -86,18 +132,21 @@ def _check_links(name: str, text: str) -> None:
             raise executed.RunError(f"{name}.md: the link {link} is not well-formed")
 
 
-def loaded_from_web(html: Path) -> list[str]:
-    """Addresses that pages would load from the web when they are viewed, with the page."""
-    return [
-        f"{page.name}: {address}"
-        for page in sorted(html.rglob("*.html"))
-        for address in LOADED.findall(page.read_text())
-    ]
+def problems(html: Path) -> list[str]:
+    """Addresses that pages would load from the web, and paths of this machine, with the page."""
+    found = []
+    for page in sorted(html.rglob("*.html")):
+        text = page.read_text()
+        name = page.relative_to(html)
+        found += [
+            f"{name}: {address} would be loaded from the web" for address in LOADED.findall(text)
+        ]
+        found += [f"{name}: shows the path {ROOT} of this machine"] * (str(ROOT) in text)
+    return found
 
 
-def complete(name: str, text: str) -> str:
-    """A page with its code run and its generated parts inserted."""
-    text = executed.blocks(name, text)
+def complete(text: str) -> str:
+    """A page with its generated parts inserted."""
     return re.sub(r"^\{\{(.+)\}\}$|\{\{(.+?)\}\}", _generated, text, flags=re.MULTILINE)
 
 
@@ -128,28 +177,62 @@ def exists(dotted: str) -> bool:
 # -- cases -------------------------------------------------------------------
 
 
-def case_page(name: str) -> str:
-    """Page of a case: its description, its pictures and its output."""
+def case_page(name: str, target: Path) -> str:
+    """Page of a case: its description, its figures, its code and its output."""
     title, room, beside = CASES[name]
     output = executed.case(room, name)
+    for picture in output.pictures:
+        _copy(picture, target / "cases" / name)
     folder = ROOT / "cases" / room / name
     if folder.is_dir():
         files = [*(folder / f"{module}.py" for module in beside), folder / "__main__.py"]
     else:
         files = [folder.with_suffix(".py")]
-    about = "\n\n".join(_docstring(file) for file in files)
-    named = ", ".join(f"{{src}}`{file.relative_to(ROOT)}`" for file in files)
     options = executed.SHORTER.get(name, ())
-    command = " ".join(["python -m", f"cases.{room}.{name}", *options])
-    shorter = " Without the option it takes a few times as long." if options else ""
+    module = f"cases.{room}.{name}"
+    about = "\n\n".join(markdown(_docstring(file)) for file in files)
+    command = " ".join(["python -m", module, *options])
+    shorter = f" The whole study is `python -m {module}`." if options else ""
     pictures = "\n\n".join(
         f"![{title}: {path.stem.replace('_', ' ')}]({name}/{path.name})" for path in output.pictures
     )
     return (
-        f"# {title}\n\n`{command}`, {_duration(output.seconds)}; {named}.{shorter}\n\n"
-        f"````text\n{about}\n````\n\n{pictures}\n\n"
-        f"## Output\n\n````text\n{output.text.strip()}\n````\n"
+        f"# {title}\n\n{about}\n\n{pictures}\n\n"
+        f"## Output\n\n`{command}` took {_duration(output.seconds)}.{shorter}\n\n"
+        f"````{{code-block}} text\n:class: long\n\n{output.text.strip()}\n````\n\n"
+        "## Code\n\n" + "\n".join(_listing(file, target / "cases") for file in files)
     )
+
+
+def _listing(file: Path, page: Path) -> str:
+    """Source of a file, folded up, for a page in a folder."""
+    name = file.relative_to(ROOT)
+    return (
+        f":::{{dropdown}} {name}\n```{{literalinclude}} {os.path.relpath(file, page)}\n"
+        ":language: python\n```\n:::\n"
+    )
+
+
+def markdown(text: str) -> str:
+    """A docstring as Markdown: indented parts and commands are blocks of code, the rest is text."""
+    found = []
+    for kind, group in groupby(re.split(r"\n(?:[ ]*\n)+", text), _block):
+        if kind:
+            found.append("````text\n" + textwrap.dedent("\n\n".join(group)) + "\n````")
+        else:
+            found.extend(map(_escaped, group))
+    return "\n\n".join(found)
+
+
+def _block(part: str) -> str:
+    """Kind of a block of code; empty for text."""
+    return "indented" if part[0] == " " else "command" if part.startswith("python ") else ""
+
+
+def _escaped(part: str) -> str:
+    """A paragraph with the special characters of Markdown escaped outside of code."""
+    pieces = re.split(r"(`[^`]*`)", part.replace("\n", " "))
+    return "".join(piece if piece[:1] == "`" else messages.plain(piece) for piece in pieces)
 
 
 def _docstring(file: Path) -> str:
@@ -205,7 +288,8 @@ def _try_all() -> str:
 
 def _peers() -> str:
     """Errors of deflection and mean stress of the cantilever, by formulation."""
-    with open(executed.RESULTS / "cases" / "cantilever" / "cantilever.csv") as file:
+    study = executed.case("verification", "cantilever").folder
+    with open(study / "cantilever.csv") as file:
         rows = [row for row in csv.DictReader(file) if row["support"] == "exact"]
     methods = {
         "displacement only": ("u", ""),
@@ -248,6 +332,23 @@ def _classes() -> str:
     return "\n".join(lines)
 
 
+def _names() -> str:
+    """Table of the public names by page of the API."""
+    lines = ["| to | names |", "| --- | --- |"]
+    for name in re.findall(r"^\w+$", (SOURCE / "api" / "index.md").read_text(), re.MULTILINE):
+        text = (SOURCE / "api" / f"{name}.md").read_text()
+        names = [f"{{py:obj}}`{n} <tawami.{n}>`" for n in documented(text) if "." not in n]
+        lines.append(f"| {{doc}}`{name}` | {', '.join(names)} |")
+    return "\n".join(lines)
+
+
+def documented(text: str) -> list[str]:
+    """Names below `tawami` that a page of the API documents."""
+    return re.findall(
+        r"^\.\. auto(?:class|function|exception):: tawami\.(\S+)$", text, re.MULTILINE
+    )
+
+
 GENERATED: dict[str, Callable[[], str]] = {
     "trade": _trade,
     "compatibility": _compatibility,
@@ -255,4 +356,5 @@ GENERATED: dict[str, Callable[[], str]] = {
     "form sizes": _sizes,
     "classes": _classes,
     "messages": messages.listing,
+    "names": _names,
 }

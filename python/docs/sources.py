@@ -3,13 +3,34 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 #: A reference in a page.
 ROLE = re.compile(r"\{src\}`([^`]+)`")
+
+
+def repository(project: Path = ROOT / "pyproject.toml") -> str:
+    """Address of the files of the repository: `repository` of the table [project.urls], or nothing."""
+    urls = tomllib.loads(project.read_text())["project"].get("urls", {})
+    found = {name.lower(): address for name, address in urls.items()}.get("repository", "")
+    return f"{found.rstrip('/')}/blob/HEAD" if found else ""
+
+
+def address(reference: str, base: str, page: Path) -> str:
+    """Link to the file of a reference.
+
+    Args:
+        reference: As for `missing`.
+        base: Address of the files; without one the link leads to the file in this checkout.
+        page: Folder of the page with the link.
+    """
+    path = reference.partition(" ")[0]
+    return f"{base}/{path}" if base else os.path.relpath(ROOT / path, page)
 
 
 def missing(reference: str) -> str | None:

@@ -51,9 +51,11 @@ from tawami.particles.laws import (
 )
 from tawami.particles.numpy_law import NumpyLaw
 from tawami.results.outputs import GridOutput, ParticleOutput
+from tawami.results.plot import plot
 from tawami.results.results import Results
 from tawami.results.table import TableOutput
 from tawami.scene.earlier import earlier
+from tawami.scene.quantities import Quantity
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
 from tawami.scene.table import table
@@ -86,6 +88,7 @@ __all__ = [
     "ParameterWarning",
     "ParticleOutput",
     "QuadratureWarning",
+    "Quantity",
     "Results",
     "RotationWarning",
     "Scene",
@@ -113,6 +116,7 @@ __all__ = [
     "modes",
     "mohr_coulomb",
     "neo_hookean",
+    "plot",
     "polygon",
     "ramp",
     "recommend",

@@ -22,12 +22,17 @@ pub struct Cells {
     linear: bool,
 }
 
-/// Coefficients of the fields on one cell, and the extraction that gives the nodal values.
+/// Coefficients of the fields on one cell.
 pub(super) struct Local {
     /// Number of each coefficient on the cell: function by function and component by component, then the
     /// vertices.
     numbers: [usize; MAX_DOFS],
     len: usize,
+}
+
+/// The nodal values on one cell as combinations of its coefficients.
+pub(super) struct Nodal<'a> {
+    local: &'a Local,
     extraction: Extraction<NODES>,
 }
 
@@ -72,9 +77,8 @@ impl Cells {
     pub(super) fn local(&self, location: &Location, a: usize) -> Local {
         let (cells, cell) = (location.grid.cells, location.active_index(a));
         let displacement = self.displacement(cells);
-        let extraction = extraction(&displacement, cell, &self.nodes);
-        let mut local = Local { numbers: [0; MAX_DOFS], len: 0, extraction };
-        for &function in extraction.functions.iter() {
+        let mut local = Local { numbers: [0; MAX_DOFS], len: 0 };
+        for &function in displacement.on_cell(cell).iter() {
             (0..DIM).for_each(|k| local.push(DIM * function + k));
         }
         if let Some(linear) = self.linear(cells) {
@@ -85,6 +89,32 @@ impl Cells {
             }
         }
         local
+    }
+
+    pub(super) fn nodal<'a>(&self, location: &Location, a: usize, local: &'a Local) -> Nodal<'a> {
+        let displacement = self.displacement(location.grid.cells);
+        Nodal {
+            local,
+            extraction: extraction(&displacement, location.active_index(a), &self.nodes),
+        }
+    }
+
+    /// Number of coefficients on a cell.
+    #[must_use]
+    pub fn local_len(&self) -> usize {
+        let displacement = DIM * self.basis.per_cell().pow(DIM as u32);
+        displacement + if self.linear { VERTICES } else { 0 }
+    }
+
+    /// Whether there is a linear field besides the displacement.
+    #[must_use]
+    pub fn has_linear(&self) -> bool {
+        self.linear
+    }
+
+    /// Position 0 or 1 along each axis of each vertex, in the order of the coefficients.
+    pub(super) fn vertices_of_cell(&self) -> &[Index; VERTICES] {
+        &self.vertices
     }
 
     /// Vertices of a cell relative to its corner. No form names the position, and far from the origin the
@@ -108,14 +138,16 @@ impl Local {
     pub fn numbers(&self) -> &[usize] {
         &self.numbers[..self.len]
     }
+}
 
+impl Nodal<'_> {
     fn functions(&self) -> usize {
         self.extraction.functions.len()
     }
 
     /// Values at the degrees of freedom: `T c`.
-    pub fn nodal(&self, coefficients: &[f64], out: &mut [f64]) {
-        let (functions, numbers) = (self.functions(), self.numbers());
+    pub fn values(&self, coefficients: &[f64], out: &mut [f64]) {
+        let (functions, numbers) = (self.functions(), self.local.numbers());
         for (value, out) in self.extraction.values.iter().zip(out.chunks_exact_mut(DIM)) {
             for (k, o) in out.iter_mut().enumerate() {
                 let term = |f: usize| value[f] * coefficients[numbers[DIM * f + k]];

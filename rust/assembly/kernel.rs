@@ -4,7 +4,8 @@ use std::ffi::c_void;
 
 use ndarray::ArrayView2;
 
-use super::cell::{Cells, Local, Vertices};
+use super::cell::{Cells, Local, Nodal, Vertices};
+use super::point::{PointKernel, Points, Row};
 use crate::grid::Location;
 use crate::space::MAX_DOFS;
 use crate::transfer::cells::mean_of_cell;
@@ -46,13 +47,22 @@ pub struct Kernel<'a> {
     pub constants: &'a [f64],
 }
 
+/// Kernels whose results are added.
+#[derive(Default)]
+pub struct Kernels<'a> {
+    /// Integrals over a cell.
+    pub cells: Vec<Kernel<'a>>,
+    /// Integrands at points.
+    pub points: Vec<PointKernel<'a>>,
+}
+
 /// The matrix of a cell: `sum kernels + sum left right^T`.
 pub struct Bilinear<'a> {
     /// Kernels of rank 2.
-    pub kernels: Vec<Kernel<'a>>,
-    /// Pairs of kernels of rank 1. Their products couple terms at the particles with terms at the centre
-    /// of the cell (B-bar).
-    pub couplings: Vec<[Kernel<'a>; 2]>,
+    pub kernels: Kernels<'a>,
+    /// Pairs of sums of kernels of rank 1. Their products couple terms at the particles with terms at the
+    /// centre of the cell (B-bar).
+    pub couplings: Vec<[Kernels<'a>; 2]>,
 }
 
 /// The state of an assembly that all cells share.
@@ -99,11 +109,11 @@ impl<'a> State<'a> {
     /// # Safety
     /// As [`vector`](super::vector) and [`matrix`](super::matrix); `element` has the length that the kernels
     /// write.
-    pub(super) unsafe fn tabulate(
+    unsafe fn tabulate(
         &self,
         kernels: &[Kernel],
         a: usize,
-        local: &Local,
+        nodal: &Nodal,
         packed: &mut Vec<f64>,
         element: &mut [f64],
     ) {
@@ -115,7 +125,7 @@ impl<'a> State<'a> {
                 packed.resize(start + slot.len(self.cells), 0.0);
                 let out = &mut packed[start..];
                 match slot {
-                    Slot::Fields => local.nodal(self.coefficients, out),
+                    Slot::Fields => nodal.values(self.coefficients, out),
                     Slot::Densities(densities, data) => {
                         densities.of_cell(self.location, a, self.volume, *data, out);
                     }
@@ -139,32 +149,95 @@ impl<'a> State<'a> {
             }
         }
     }
+}
 
-    /// Matrix of the a-th active cell, into `element`.
+/// Memory of one thread as [`Points`].
+pub(super) struct Work<const M: usize, const P: usize, const W: usize> {
+    packed: Vec<f64>,
+    points: Points<M, P, W>,
+    element: [f64; MAX_DOFS * MAX_DOFS],
+    half: [f64; MAX_DOFS * MAX_DOFS],
+    turned: [f64; MAX_DOFS * MAX_DOFS],
+}
+
+impl<const M: usize, const P: usize, const W: usize> Work<M, P, W> {
+    pub(super) fn new() -> Self {
+        let zero = [0.0; MAX_DOFS * MAX_DOFS];
+        let (packed, points) = (Vec::new(), Points::new());
+        Self { packed, points, element: zero, half: zero, turned: zero }
+    }
+
+    /// Vector of the a-th active cell on its coefficients.
+    ///
+    /// # Safety
+    /// As [`vector`](super::vector).
+    pub(super) unsafe fn vector(
+        &mut self,
+        state: &State,
+        kernels: &Kernels,
+        a: usize,
+        local: &Local,
+    ) -> [f64; M] {
+        let mut out = [0.0; M];
+        if !kernels.cells.is_empty() {
+            let nodal = state.cells.nodal(state.location, a, local);
+            let element = &mut self.element[..state.cells.dofs()];
+            // SAFETY: the caller's; kernels of rank 1 write `dofs` numbers.
+            unsafe { state.tabulate(&kernels.cells, a, &nodal, &mut self.packed, element) };
+            nodal.transposed(element, 1, &mut out);
+        }
+        // SAFETY: the caller's.
+        unsafe { self.points.add_vectors(&kernels.points, state, a, local, &mut out) };
+        out
+    }
+
+    /// Matrix of the a-th active cell on its coefficients.
     ///
     /// # Safety
     /// As [`matrix`](super::matrix).
-    pub(super) unsafe fn tabulate_matrix(
-        &self,
+    pub(super) unsafe fn matrix(
+        &mut self,
+        state: &State,
         form: &Bilinear,
         a: usize,
         local: &Local,
-        packed: &mut Vec<f64>,
-        element: &mut [f64],
+        out: &mut [Row<P>; M],
     ) {
-        // SAFETY: the caller's; kernels of rank 2 write `dofs x dofs` numbers.
-        unsafe { self.tabulate(&form.kernels, a, local, packed, element) };
-        let n = self.cells.dofs();
-        for pair in &form.couplings {
-            let mut sides = [[0.0; MAX_DOFS]; 2];
-            for (kernel, side) in pair.iter().zip(&mut sides) {
-                let kernel = std::slice::from_ref(kernel);
-                // SAFETY: the caller's; kernels of rank 1 write `dofs` numbers.
-                unsafe { self.tabulate(kernel, a, local, packed, &mut side[..n]) };
+        out.fill(Row::ZERO);
+        let n = state.cells.dofs();
+        if !form.kernels.cells.is_empty() {
+            let nodal = state.cells.nodal(state.location, a, local);
+            let element = &mut self.element[..n * n];
+            // SAFETY: the caller's; kernels of rank 2 write `dofs x dofs` numbers.
+            unsafe { state.tabulate(&form.kernels.cells, a, &nodal, &mut self.packed, element) };
+            // T^T A, then (T^T (T^T A)^T)^T = T^T A T
+            nodal.transposed(element, n, &mut self.half);
+            transpose(&self.half[..M * n], n, &mut self.turned);
+            nodal.transposed(&self.turned[..n * M], M, &mut self.half);
+            for (i, row) in out.iter_mut().enumerate() {
+                (0..M).for_each(|j| row.0[j] = self.half[j * M + i]);
             }
-            for (row, left) in element.chunks_exact_mut(n).zip(&sides[0]) {
-                row.iter_mut().zip(&sides[1]).for_each(|(e, right)| *e += left * right);
+        }
+        // SAFETY: the caller's.
+        unsafe { self.points.add_matrices(&form.kernels.points, state, a, local, out) };
+        for [left, right] in &form.couplings {
+            // SAFETY: the caller's.
+            let (left, right) = unsafe {
+                (self.vector(state, left, a, local), self.vector(state, right, a, local))
+            };
+            for (row, left) in out.iter_mut().zip(left) {
+                row.0.iter_mut().zip(right).for_each(|(e, right)| *e += left * right);
             }
+        }
+    }
+}
+
+/// `a` is rows x columns; `out` becomes its transpose.
+fn transpose(a: &[f64], columns: usize, out: &mut [f64]) {
+    let rows = a.len() / columns;
+    for (i, row) in a.chunks_exact(columns).enumerate() {
+        for (j, value) in row.iter().enumerate() {
+            out[j * rows + i] = *value;
         }
     }
 }

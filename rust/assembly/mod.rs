@@ -13,6 +13,7 @@ mod cell;
 mod kernel;
 mod matrix;
 mod pattern;
+mod point;
 mod selection;
 
 use std::ops::Range;
@@ -20,12 +21,15 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::grid::Location;
-use crate::space::{number_of, DIM, FUNCTIONS_1D, MAX_DOFS, ROWS};
+use crate::space::{number_of, DIM, DISPLACEMENT_DOFS, FUNCTIONS_1D, MAX_DOFS, ROWS};
+use kernel::Work;
+use matrix::{LINEAR, MIXED_LINEAR};
 
 pub use cell::Cells;
-pub use kernel::{Bilinear, Kernel, Slot, State, TabulateTensor};
+pub use kernel::{Bilinear, Kernel, Kernels, Slot, State, TabulateTensor};
 pub use matrix::matrix;
 pub use pattern::{pattern, Pattern};
+pub use point::{Entries, Entry, Place, PointKernel, PointSlot};
 pub use selection::Selection;
 
 /// Active cells in rows along x, in colours: within a colour no two rows share a function, since a function
@@ -56,6 +60,16 @@ impl Shared {
         Self { start: values.as_mut_ptr(), len: values.len() }
     }
 
+    /// Part of the slice.
+    ///
+    /// # Safety
+    /// The part is inside the slice, and no other thread uses it at the same time.
+    unsafe fn part<'a>(self, start: usize, len: usize) -> &'a mut [f64] {
+        debug_assert!(start + len <= self.len, "part outside the shared slice");
+        // SAFETY: inside the slice, and the caller is alone with this part.
+        unsafe { std::slice::from_raw_parts_mut(self.start.add(start), len) }
+    }
+
     /// # Safety
     /// The index is inside the slice, and no other thread uses it at the same time.
     unsafe fn add(self, index: usize, value: f64) {
@@ -70,20 +84,36 @@ impl Shared {
 /// # Safety
 /// Each kernel is a loaded FFCx kernel of rank 1 of these cells. It reads as many coefficients as its slots
 /// have and as many constants as it has. The coefficients are those of all fields.
-pub unsafe fn vector(state: &State, kernels: &[Kernel]) -> Vec<f64> {
+pub unsafe fn vector(state: &State, kernels: &Kernels) -> Vec<f64> {
+    // SAFETY: the caller's.
+    unsafe {
+        match state.cells.local_len() {
+            MAX_DOFS => vector_of::<MAX_DOFS, 24, FUNCTIONS_1D>(state, kernels),
+            DISPLACEMENT_DOFS => vector_of::<DISPLACEMENT_DOFS, 24, FUNCTIONS_1D>(state, kernels),
+            MIXED_LINEAR => vector_of::<MIXED_LINEAR, 16, 2>(state, kernels),
+            _ => vector_of::<LINEAR, 8, 2>(state, kernels),
+        }
+    }
+}
+
+/// [`vector`] for cells with `M` coefficients.
+///
+/// # Safety
+/// As [`vector`].
+unsafe fn vector_of<const M: usize, const P: usize, const W: usize>(
+    state: &State,
+    kernels: &Kernels,
+) -> Vec<f64> {
     let mut sums = vec![0.0; state.coefficients.len()];
     let shared = Shared::new(&mut sums);
     for rows in colours(state.location) {
         rows.into_par_iter().for_each(|row| {
-            let (mut packed, mut element) = (Vec::new(), [0.0; MAX_DOFS]);
-            let mut reduced = [0.0; MAX_DOFS];
-            let element = &mut element[..state.cells.dofs()];
+            let mut work = Work::<M, P, W>::new();
             for a in row {
                 let local = state.cells.local(state.location, a);
-                // SAFETY: the caller's; kernels of rank 1 write `dofs` numbers.
-                unsafe { state.tabulate(kernels, a, &local, &mut packed, element) };
-                local.transposed(element, 1, &mut reduced);
-                for (&c, &value) in local.numbers().iter().zip(&reduced) {
+                // SAFETY: the caller's.
+                let of_cell = unsafe { work.vector(state, kernels, a, &local) };
+                for (&c, &value) in local.numbers().iter().zip(&of_cell) {
                     // SAFETY: the coefficient is one of all; rows of one colour share none.
                     unsafe { shared.add(c, value) };
                 }

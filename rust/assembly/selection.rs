@@ -1,5 +1,7 @@
 //! S: the unknowns behind each coefficient.
 
+use std::ops::Range;
+
 use super::cell::Local;
 
 /// S as compressed rows: the unknowns behind each coefficient and their weights.
@@ -19,6 +21,24 @@ pub struct Selection {
 
 /// An unknown of a cell: its number, the coefficient of the cell that it is behind, its weight.
 pub(super) type Entry = (u32, usize, f64);
+
+/// The runs of entries whose unknowns and coefficients follow one another, each with weight 1; other entries
+/// are runs of their own.
+#[allow(clippy::float_cmp)] // the weight of an unknown itself is exactly 1
+pub(super) fn runs(entries: &[Entry], runs: &mut Vec<Range<usize>>) {
+    runs.clear();
+    let mut start = 0;
+    for e in 1..=entries.len() {
+        let follows = e < entries.len() && {
+            let ((u, k, w), (v, l, x)) = (entries[e - 1], entries[e]);
+            v == u + 1 && l == k + 1 && w == 1.0 && x == 1.0
+        };
+        if !follows {
+            runs.push(start..e);
+            start = e;
+        }
+    }
+}
 
 impl Selection {
     /// From the compressed rows and the coefficient that each unknown is; `None` if they do not belong to

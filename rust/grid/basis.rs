@@ -26,6 +26,8 @@ pub struct Local {
     pub value: [f64; FUNCTIONS_1D],
     /// Derivatives with respect to the position in the cell (0 to 1); divide by h for those per metre.
     pub derivative: [f64; FUNCTIONS_1D],
+    /// Second derivatives, likewise; divide by h^2.
+    pub second: [f64; FUNCTIONS_1D],
 }
 
 impl Basis {
@@ -94,20 +96,22 @@ impl Basis {
     #[inline]
     pub fn at(self, n: usize, cell: usize, t: f64) -> Local {
         let s = 1.0 - t;
-        let (value, derivative) = match self {
+        let (value, derivative, second) = match self {
             Self::QuadraticSpline => {
                 let l = if cell == 0 { 1.0 } else { 0.5 };
                 let r = if cell + 1 == n { 1.0 } else { 0.5 };
                 let (a, b) = (l * s * s, r * t * t);
                 let (da, db) = (-2.0 * l * s, 2.0 * r * t);
-                ([a, 1.0 - a - b, b], [da, -da - db, db])
+                ([a, 1.0 - a - b, b], [da, -da - db, db], [2.0 * l, -2.0 * (l + r), 2.0 * r])
             }
-            Self::Bilinear => ([s, t, 0.0], [-1.0, 1.0, 0.0]),
-            Self::Biquadratic => {
-                ([s * (s - t), 4.0 * s * t, t * (t - s)], [t - 3.0 * s, 4.0 * (s - t), 3.0 * t - s])
-            }
+            Self::Bilinear => ([s, t, 0.0], [-1.0, 1.0, 0.0], [0.0; FUNCTIONS_1D]),
+            Self::Biquadratic => (
+                [s * (s - t), 4.0 * s * t, t * (t - s)],
+                [t - 3.0 * s, 4.0 * (s - t), 3.0 * t - s],
+                [4.0, -8.0, 4.0],
+            ),
         };
-        Local { first: self.first(cell), value, derivative }
+        Local { first: self.first(cell), value, derivative, second }
     }
 }
 

@@ -167,7 +167,8 @@ pub fn products(factors: [&[f64; FUNCTIONS_1D]; DIM], width: usize) -> [f64; FUN
 
 /// A constant width, so that the loops are unrolled.
 #[inline(always)]
-fn products_of<const W: usize>(factors: [&[f64; FUNCTIONS_1D]; DIM]) -> [f64; FUNCTIONS] {
+#[must_use]
+pub fn products_of<const W: usize>(factors: [&[f64; FUNCTIONS_1D]; DIM]) -> [f64; FUNCTIONS] {
     let mut products = [0.0; FUNCTIONS];
     products[..W].copy_from_slice(&factors[0][..W]);
     let mut inner = W;

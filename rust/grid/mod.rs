@@ -11,7 +11,7 @@ pub use active::Active;
 pub use basis::{Basis, Local};
 pub use extraction::{extraction, Extraction};
 pub(crate) use functions::sum;
-pub use functions::{products, CellFunctions, Functions};
+pub use functions::{products, products_of, CellFunctions, Functions};
 pub use location::Location;
 pub use rule::{Rule, MAX_POINTS};
 

@@ -14,7 +14,10 @@ pub use column::{Column, Role, Values};
 use ndarray::{s, Array1, Array2, ArrayView2, Axis};
 
 use crate::error::{Error, Result};
-use crate::space::{COMPONENTS, DIM};
+use crate::space::{self, COMPONENTS, DIM};
+
+/// Name of the column with the displacement gradient F - I since the start, row by row.
+pub const GRADIENT: &str = "displacement_gradient";
 
 /// The particles of a scene. Volumes are per metre depth.
 ///
@@ -26,6 +29,8 @@ use crate::space::{COMPONENTS, DIM};
 /// | `number`       | number of the particle in the body, used in messages  | n       |
 /// | `stress`       | stress [Pa], order of [`crate::tensor`]               | n x 4   |
 /// | `displacement` | displacement since the start [m]                      | n x 2   |
+/// | `strain`       | strain since the start, at small strain               | n x 4   |
+/// | [`GRADIENT`]   | F - I since the start, at finite strain               | n x 4   |
 /// | `eps_v`        | volumetric strain, with forms that have this field    | n       |
 /// | history        | one column per history variable of the laws           | n       |
 /// | carried        | arrays of a time integration (velocity, ...)          | n x any |
@@ -220,6 +225,15 @@ impl Particles {
             let behind = self.columns.iter().position(|column| column.role > role);
             let column = Column::new(name, role, Values::zeros(self.len(), width));
             self.columns.insert(behind.unwrap_or(self.columns.len()), column);
+        }
+    }
+
+    /// Add what the strain since the start follows from, zero at first.
+    pub fn add_strain(&mut self, finite: bool) {
+        if finite {
+            self.add(Role::State, GRADIENT, Some(space::GRADIENT));
+        } else {
+            self.add(Role::State, "strain", Some(COMPONENTS));
         }
     }
 

@@ -7,14 +7,14 @@ use rayon::prelude::*;
 
 use super::kinematics::{Increments, Kinematics};
 use super::request::Request;
-use super::{finite, small, Particles, Role};
+use super::{finite, small, Particles, Role, GRADIENT};
 use crate::error::{Error, Result};
 use crate::grid::Location;
 use crate::law::{Law, MAX_HISTORY};
-use crate::space::{COMPONENTS, DIM};
+use crate::space::{self, COMPONENTS, DIM};
 use crate::tensor::hencky::Trial;
-use crate::tensor::matrix::{det_minus_one, trace};
-use crate::tensor::{dot, mean, AtMean, Moduli, Strain, Stress, Sym, UNIT};
+use crate::tensor::matrix::{det_minus_one, flat, matrix, multiply, trace};
+use crate::tensor::{dot, mean, symmetric_part, AtMean, Moduli, Strain, Stress, Sym, UNIT};
 
 /// Where stress and tangent come from.
 #[derive(Clone, Copy)]
@@ -391,6 +391,7 @@ impl Stage<'_> {
         for (displacement, new) in displacement.zip(new.iter().flatten()) {
             displacement.iter_mut().zip(new.u).for_each(|(d, u)| *d += u);
         }
+        self.store_strain(particles);
         if let Some(eps_v) = particles.place(Role::State, "eps_v") {
             let eps_v = particles.reals_mut(eps_v).iter_mut();
             eps_v.zip(new.iter().flatten()).for_each(|(e, new)| *e += new.volume);
@@ -405,6 +406,26 @@ impl Stage<'_> {
                     }
                 }
             }
+        }
+    }
+
+    /// Add the increment to the strain since the start, where particles store it.
+    fn store_strain(&self, particles: &mut Particles) {
+        let grad_u = |p| self.increments.grad_u(self.location, p);
+        if let Some(strain) = particles.place(Role::State, "strain") {
+            let strain = particles.reals_mut(strain).par_chunks_exact_mut(COMPONENTS);
+            strain.enumerate().for_each(|(p, strain)| {
+                strain.iter_mut().zip(symmetric_part(&grad_u(p))).for_each(|(e, new)| *e += new);
+            });
+        }
+        if let Some(gradient) = particles.place(Role::State, GRADIENT) {
+            let gradient = particles.reals_mut(gradient).par_chunks_exact_mut(space::GRADIENT);
+            gradient.enumerate().for_each(|(p, h)| {
+                // f F - I = g + h + g h
+                let g = grad_u(p);
+                let product = flat(&multiply(&g, &matrix(h)));
+                h.iter_mut().zip(flat(&g)).zip(product).for_each(|((h, g), gh)| *h += g + gh);
+            });
         }
     }
 }

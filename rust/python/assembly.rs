@@ -13,7 +13,8 @@ use super::threads::detached;
 use super::transfer::{check_data, points_per_axis};
 use super::{require, view, InputError};
 use crate::assembly::{
-    self, Bilinear, Cells, Kernel, Pattern, Selection, Slot, State, TabulateTensor,
+    self, Bilinear, Cells, Entries, Entry, Kernel, Kernels, Pattern, Place, PointKernel, PointSlot,
+    Selection, Slot, State, TabulateTensor,
 };
 use crate::grid::{Grid, Location, Rule};
 use crate::space::{Index, NODES, NODES_1D, VERTICES};
@@ -23,9 +24,15 @@ use crate::transfer::densities::Densities;
 /// cells), whether these are the vertices rather than Gauss points, and columns.
 type SlotOf = (usize, Vec<Index>, bool, Vec<usize>);
 
+/// Component of the fields and axes of its derivatives.
+type EntryOf = (usize, Vec<usize>);
+
+/// Place of a point kernel, and the entries of the fields, of the rows and of the columns.
+type PointOf = (String, Vec<EntryOf>, Vec<EntryOf>, Vec<EntryOf>);
+
 /// Owner of an FFCx kernel, its address, its rank, the number of its packed coefficients, these in packed
-/// order (none stands for the fields), and its constants.
-type KernelOf = (Py<PyAny>, usize, usize, usize, Vec<Option<SlotOf>>, Vec<f64>);
+/// order (none stands for the fields), its constants, and its points; without them it is one of cells.
+type KernelOf = (Py<PyAny>, usize, usize, usize, Vec<Option<SlotOf>>, Vec<f64>, Option<PointOf>);
 
 /// A kernel and where its coefficients come from.
 struct Plan {
@@ -34,6 +41,7 @@ struct Plan {
     tabulate: TabulateTensor,
     slots: Vec<Option<Source>>,
     constants: Vec<f64>,
+    point: Option<(Place, Entries)>,
 }
 
 /// Densities or means of some columns of an array of particle data.
@@ -69,12 +77,33 @@ impl Source {
         self.points.len().max(1) * self.columns.len()
     }
 
-    fn slot<'a>(&'a self, location: &Location, data: &'a [Read2<f64>]) -> PyResult<Slot<'a>> {
+    fn data<'a>(
+        &self,
+        location: &Location,
+        data: &'a [Read2<f64>],
+    ) -> PyResult<ArrayView2<'a, f64>> {
         let Some(data) = data.get(self.array) else {
             return Err(PyRuntimeError::new_err("internal: kernels of other data"));
         };
         let data: ArrayView2<f64> = data.as_array();
         check_data(location, &data, &self.columns)?;
+        Ok(data)
+    }
+
+    fn at_points<'a>(
+        &'a self,
+        location: &Location,
+        data: &'a [Read2<f64>],
+    ) -> PyResult<PointSlot<'a>> {
+        let data = self.data(location, data)?;
+        Ok(match self.rule {
+            None => PointSlot::Means(&self.columns, data),
+            Some(_) => PointSlot::Data(&self.columns, data),
+        })
+    }
+
+    fn slot<'a>(&'a self, location: &Location, data: &'a [Read2<f64>]) -> PyResult<Slot<'a>> {
+        let data = self.data(location, data)?;
         Ok(match &self.rule {
             None => Slot::Means(&self.columns, data),
             Some(rule) => {
@@ -89,43 +118,105 @@ impl Source {
 impl PyKernels {
     #[new]
     fn new(assembler: &PyAssembler, rank: usize, kernels: Vec<KernelOf>) -> PyResult<Self> {
-        let dofs = assembler.cells.dofs();
-        let plan = |(owner, address, its_rank, width, slots, constants): KernelOf| {
+        let (dofs, linear) = (assembler.cells.dofs(), assembler.cells.has_linear());
+        let plan = |(owner, address, its_rank, width, slots, constants, point): KernelOf| {
             require(address != 0 && its_rank == rank, "a kernel of another rank")?;
+            let point = point.map(|point| entries(point, rank, linear)).transpose()?;
+            let fields = point.as_ref().map_or(dofs, |(_, entries)| entries.num_fields());
             let source = |slot: Option<SlotOf>| slot.map(Source::new).transpose();
             let slots: Vec<_> = slots.into_iter().map(source).collect::<PyResult<_>>()?;
-            let packed: usize =
-                slots.iter().map(|slot| slot.as_ref().map_or(dofs, Source::len)).sum();
+            let len = |source: &Source| {
+                if point.is_some() {
+                    source.columns.len()
+                } else {
+                    source.len()
+                }
+            };
+            let packed: usize = slots.iter().map(|slot| slot.as_ref().map_or(fields, len)).sum();
             require(packed == width, "a kernel of other coefficients")?;
             // SAFETY: the address is that of an FFCx kernel, which its owner keeps loaded. Rank and
             // number of coefficients are checked against what the caller says of it.
             let tabulate =
                 unsafe { std::mem::transmute::<*const (), TabulateTensor>(address as *const ()) };
-            Ok(Plan { _owner: owner, tabulate, slots, constants })
+            Ok(Plan { _owner: owner, tabulate, slots, constants, point })
         };
         let plans = kernels.into_iter().map(plan).collect::<PyResult<_>>()?;
         Ok(Self { plans, rank, dofs })
     }
 }
 
+/// Place and entries of a point kernel.
+fn entries(
+    (place, fields, test, trial): PointOf,
+    rank: usize,
+    linear: bool,
+) -> PyResult<(Place, Entries)> {
+    let place = match place.as_str() {
+        "particle" => Place::Particles,
+        "centre" => Place::Centre,
+        _ => Place::Vertices,
+    };
+    let read = |of: Vec<EntryOf>| -> PyResult<Vec<Entry>> {
+        of.into_iter()
+            .map(|(component, axes)| {
+                Entry::new(component, &axes)
+                    .ok_or_else(|| PyRuntimeError::new_err("internal: an entry of other fields"))
+            })
+            .collect()
+    };
+    let entries = Entries::new(&read(fields)?, &read(test)?, &read(trial)?);
+    require(entries.rank() == rank && entries.fit(linear), "entries of other fields")?;
+    Ok((place, entries))
+}
+
 impl PyKernels {
+    /// The kernels one by one, with their arguments.
+    fn each<'a>(
+        &'a self,
+        assembler: &PyAssembler,
+        rank: usize,
+        data: &'a [Read2<f64>],
+    ) -> PyResult<Vec<Kernels<'a>>> {
+        require(self.rank == rank, "kernels of another rank")?;
+        require(self.dofs == assembler.cells.dofs(), "kernels of other fields")?;
+        let location = &assembler.location;
+        let kernel = |plan: &'a Plan| {
+            let (tabulate, constants) = (plan.tabulate, plan.constants.as_slice());
+            let mut kernels = Kernels::default();
+            if let Some((place, entries)) = &plan.point {
+                let slot = |source: &'a Option<Source>| match source {
+                    None => Ok(PointSlot::Fields),
+                    Some(source) => source.at_points(location, data),
+                };
+                let slots = plan.slots.iter().map(slot).collect::<PyResult<_>>()?;
+                let place = *place;
+                kernels.points.push(PointKernel { tabulate, place, entries, slots, constants });
+            } else {
+                let slot = |source: &'a Option<Source>| match source {
+                    None => Ok(Slot::Fields),
+                    Some(source) => source.slot(location, data),
+                };
+                let slots = plan.slots.iter().map(slot).collect::<PyResult<_>>()?;
+                kernels.cells.push(Kernel { tabulate, slots, constants });
+            }
+            Ok(kernels)
+        };
+        self.plans.iter().map(kernel).collect()
+    }
+
+    /// The sum of the kernels.
     fn with<'a>(
         &'a self,
         assembler: &PyAssembler,
         rank: usize,
         data: &'a [Read2<f64>],
-    ) -> PyResult<Vec<Kernel<'a>>> {
-        require(self.rank == rank, "kernels of another rank")?;
-        require(self.dofs == assembler.cells.dofs(), "kernels of other fields")?;
-        let slot = |source: &'a Option<Source>| match source {
-            None => Ok(Slot::Fields),
-            Some(source) => source.slot(&assembler.location, data),
-        };
-        let kernel = |plan: &'a Plan| {
-            let slots = plan.slots.iter().map(slot).collect::<PyResult<_>>()?;
-            Ok(Kernel { tabulate: plan.tabulate, slots, constants: &plan.constants })
-        };
-        self.plans.iter().map(kernel).collect()
+    ) -> PyResult<Kernels<'a>> {
+        let mut sum = Kernels::default();
+        for one in self.each(assembler, rank, data)? {
+            sum.cells.extend(one.cells);
+            sum.points.extend(one.points);
+        }
+        Ok(sum)
     }
 }
 
@@ -223,7 +314,7 @@ impl PyAssembler {
         let values = values.as_slice_mut()?;
         let mine = pattern.grid == self.location.grid && pattern.active == self.location.active;
         require(mine && values.len() == pattern.pattern.columns.len(), "another pattern")?;
-        let mut sides = couplings.with(self, 1, &data)?.into_iter();
+        let mut sides = couplings.each(self, 1, &data)?.into_iter();
         let mut pairs = Vec::new();
         while let Some(left) = sides.next() {
             let Some(right) = sides.next() else {

@@ -1,6 +1,6 @@
 //! Particles, as views of their storage.
 
-use numpy::{PyArray, PyArray2, ToPyArray};
+use numpy::{PyArray, PyArray2, PyArrayMethods, ToPyArray};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
@@ -8,7 +8,10 @@ use super::array::{Read1, Read2};
 use super::law::{laws, PyMaterial};
 use super::{require, InputError};
 use crate::particles::stage::check_materials;
-use crate::particles::{Particles, Role, Values};
+use crate::particles::{Particles, Role, Values, GRADIENT};
+use crate::space::{self, COMPONENTS, DIM};
+use crate::tensor::hencky::logarithmic;
+use crate::tensor::matrix::matrix;
 
 /// Most columns of an array of a time integration.
 const MAX_WIDTH: usize = 64;
@@ -134,10 +137,7 @@ impl PyParticles {
     fn move_to(&mut self, x: Read2<f64>) -> PyResult<()> {
         let mine = self.0.reals_mut(Particles::X);
         let x = x.as_array();
-        require(
-            x.ncols() == crate::space::DIM && x.len() == mine.len(),
-            "positions of other particles",
-        )?;
+        require(x.ncols() == DIM && x.len() == mine.len(), "positions of other particles")?;
         // a copy: the positions may be a view of these particles' own, in another order
         let x: Vec<f64> = x.iter().copied().collect();
         mine.copy_from_slice(&x);
@@ -166,6 +166,11 @@ impl PyParticles {
     /// Add the volumetric strain, zero at first.
     fn add_eps_v(&mut self) {
         self.0.add(Role::State, "eps_v", None);
+    }
+
+    /// Add what the strain since the start follows from.
+    fn add_strain(&mut self, finite: bool) {
+        self.0.add_strain(finite);
     }
 
     /// Name of each array, and bytes that one particle takes in it.
@@ -211,6 +216,37 @@ impl PyParticles {
     #[getter]
     fn displacement<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         column(slf, Particles::DISPLACEMENT)
+    }
+
+    /// Strain since the start: small, or logarithmic.
+    #[getter]
+    fn strain<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let (small, gradient) = {
+            let particles = &slf.try_borrow()?.0;
+            (particles.place(Role::State, "strain"), particles.place(Role::State, GRADIENT))
+        };
+        match (small, gradient) {
+            (Some(place), _) => read_only(slf, place),
+            (None, Some(place)) => {
+                let particles = &slf.try_borrow()?.0;
+                let gradients = particles.reals(place).chunks_exact(space::GRADIENT);
+                let rows: Vec<_> = gradients.map(|h| logarithmic(&matrix(h))).collect();
+                let strain = rows.as_flattened().to_pyarray(slf.py());
+                Ok(strain.reshape([particles.len(), COMPONENTS])?.into_any())
+            }
+            (None, None) => Err(InputError::new_err("internal: particles without a scene")),
+        }
+    }
+
+    /// F - I since the start.
+    #[getter]
+    fn displacement_gradient<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let view = optional(slf, Role::State, GRADIENT, |_| {
+            "displacement_gradient: particles store it at finite strain only: expected \
+             scene.particles.strain, or Scene(..., form='u_epsv_finite')"
+                .to_owned()
+        })?;
+        view.call_method1("reshape", (slf.try_borrow()?.0.len(), DIM, DIM))
     }
 
     #[getter]

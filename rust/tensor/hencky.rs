@@ -14,7 +14,7 @@ use super::matrix::{
     det_minus_one, diagonal, eigen, flat, inverse, multiply, rotated, trace, transposed, unit_plus,
     Matrix,
 };
-use super::symmetric::{deviator, dot, in_space, Sym};
+use super::symmetric::{deviator, dot, in_space, symmetric_part, Sym};
 use super::{Moduli, Strain, Stress};
 use crate::space::GRADIENT;
 
@@ -49,6 +49,17 @@ fn be_of(deviator: &Sym) -> Matrix {
     let (e, v) = eigen(&[[deviator[0], shear], [shear, deviator[1]]]);
     let b = e.map(|e| (2.0 * e).exp());
     rotated(&diagonal(b), &v)
+}
+
+/// Logarithmic strain `1/2 ln(F F^T)` of a displacement gradient `h = F - I`, the shear as eps_xy. It keeps
+/// its digits where h is small.
+#[must_use]
+pub fn logarithmic(h: &Matrix) -> Sym {
+    let square = multiply(h, &transposed(h));
+    let stretch: Matrix =
+        std::array::from_fn(|i| std::array::from_fn(|j| h[i][j] + h[j][i] + square[i][j]));
+    let (lambda, vectors) = eigen(&stretch);
+    symmetric_part(&rotated(&diagonal(lambda.map(|l| 0.5 * l.ln_1p())), &vectors))
 }
 
 impl Trial {

@@ -46,6 +46,12 @@ pub(crate) fn flat(a: &Matrix) -> [f64; GRADIENT] {
     std::array::from_fn(|k| a[k / DIM][k % DIM])
 }
 
+/// The tensor with these components, row by row.
+#[must_use]
+pub fn matrix(components: &[f64]) -> Matrix {
+    std::array::from_fn(|i| std::array::from_fn(|j| components[DIM * i + j]))
+}
+
 /// Eigenvalues, the larger first, and eigenvectors (columns) of a symmetric tensor.
 pub(crate) fn eigen(a: &Matrix) -> ([f64; DIM], Matrix) {
     let (middle, half) = (0.5 * (a[0][0] + a[1][1]), 0.5 * (a[0][0] - a[1][1]));

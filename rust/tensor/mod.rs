@@ -16,5 +16,6 @@ mod symmetric;
 pub use matrix::Matrix;
 pub use parts::{AtMean, Moduli, Strain, Stress};
 pub(crate) use principal::Principal;
+pub(crate) use symmetric::symmetric_part;
 pub use symmetric::{deviator, dot, mean, trace, Sym, Tangent, IN_SPACE, UNIT};
 pub(crate) use symmetric::{deviatoric_stiffness, norm, small_strain, UNIT_DEVIATORS};

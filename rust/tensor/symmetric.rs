@@ -64,6 +64,11 @@ pub(crate) fn small_strain(g: &Matrix) -> Strain {
     Strain { deviator: [g[0][0] - third, g[1][1] - third, -third, g[0][1] + g[1][0]], volume }
 }
 
+/// Symmetric part of a displacement gradient, the shear as eps_xy.
+pub(crate) fn symmetric_part(g: &Matrix) -> Sym {
+    [g[0][0], g[1][1], 0.0, 0.5 * (g[0][1] + g[1][0])]
+}
+
 /// Stress in space from its deviator and its mean.
 pub(crate) fn in_space(s: &Sym, mean: f64) -> Matrix {
     [[s[0] + mean, s[3]], [s[3], s[1] + mean]]

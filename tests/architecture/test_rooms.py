@@ -15,7 +15,7 @@ PACKAGE = Path(tawami.__file__).parent
 #: Rooms from the lowest to the highest; rooms on one line do not know each other.
 LEVELS = (
     ("base",),
-    ("fem",),
+    ("fem", "picture"),
     ("grid", "form"),
     ("body",),
     ("particles",),

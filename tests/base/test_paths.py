@@ -16,8 +16,8 @@ from mpi4py import MPI
 import tawami
 from tawami.base.files import append_line, atomic_file, readable_file, result_folder
 from tawami.command.main import main
+from tawami.picture.figure import new_figure, save
 from tawami.results import write_grid, write_particles
-from tawami.results.figure import new_figure, save
 from tawami.results.plot import plot
 from tawami.study.figure import picture
 from tawami.study.row import COSTS, Row

@@ -21,7 +21,7 @@ def compare(scene: tawami.Scene, options: dict[str, object]) -> None:
     assert np.abs(mine - reference).max() < 1e-12 * np.abs(reference).max()
 
 
-@pytest.mark.parametrize("assembly", ["reference", "fast"])
+@pytest.mark.parametrize("assembly", ["dolfinx", "points"])
 def test_the_tangent_of_random_particles_of_two_materials(random_scene, form, basis, assembly):
     compare(random_scene(basis=basis, assembly=assembly, **form), form)
 
@@ -47,7 +47,7 @@ def test_the_tangent_of_any_cloud_of_particles(data):
     numbers = data.draw(st.lists(st.integers(0, 1), min_size=len(x), max_size=len(x)))
     volumes = np.linspace(0.01, 0.2, len(x))
     body = tawami.Body(x, volumes)
-    for assembly in ("reference", "fast"):
+    for assembly in ("dolfinx", "points"):
         scene = tawami.Scene(
             grid, body, laws, material_of=numbers, basis=basis, alpha=0.3, assembly=assembly
         )

@@ -37,7 +37,6 @@ def test_wrong_declarations_are_rejected(make, message):
         make()
 
 
-@pytest.mark.filterwarnings("ignore::tawami.base.errors.InexactSumWarning")
 @pytest.mark.parametrize(
     ("function", "message"),
     [

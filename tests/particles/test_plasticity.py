@@ -40,7 +40,7 @@ def test_wrong_parameters_of_von_mises_are_rejected():
         tawami.von_mises(tawami.linear_elastic(E=1.0, nu=0.5), yield_stress=1.0)
 
 
-@pytest.mark.parametrize("path", ["fast", "reference"])
+@pytest.mark.parametrize("path", ["points", "dolfinx"])
 @pytest.mark.parametrize(
     "options", [FORMS["u"], FORMS["u_epsv"], FORMS["u_bbar"], *FINITE.values()]
 )

@@ -30,7 +30,7 @@ def beams() -> dict[str, float | np.ndarray]:
     found: dict[str, float | np.ndarray] = {}
     for support in ("paper", "exact", "clamped"):
         for method, alpha in (("u", None), ("u_bbar", None), ("u_epsv", 0.1), ("u_p", 0.1)):
-            for path in ("fast", "reference"):
+            for path in ("points", "dolfinx"):
                 row, solution = mpm.solve(method, support, 4, alpha, assembly=path)
                 name = f"beam {support} {method} {path}"
                 found[f"{name} deflection"] = row.deflection_m
@@ -52,7 +52,7 @@ def random_clouds() -> dict[str, np.ndarray]:
     found = {}
     for name, options in FORMS.items():
         for basis in BASES:
-            for path in ("fast", "reference"):
+            for path in ("points", "dolfinx"):
                 grid, random = grid_of((6, 5)), np.random.default_rng(0)
                 x = grid.origin + grid.h * np.array([3.0, 2.5]) * random.random((40, 2))
                 body = tawami.Body(x, random.uniform(0.01, 0.1, len(x)))
@@ -77,7 +77,7 @@ def nonlinear() -> dict[str, np.ndarray]:
 
     form = Form({"u": ("displacement", "w")}, "displacement", stiff)
     found = {}
-    for path in ("fast", "reference"):
+    for path in ("points", "dolfinx"):
         grid = grid_of()
         body = tawami.box(grid, grid.origin, grid.upper, per_axis=3)
         material = tawami.linear_elastic(E=1e3, nu=0.2)

@@ -6,14 +6,19 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
+import browser
 import compatibility
 import executed
 import messages
+import notebooks
 import pages
 import pytest
 import sources
+import thumbnails
+from PIL import Image
 
 import tawami
 from tawami.base import errors
@@ -47,8 +52,8 @@ def test_links_have_targets():
     for name, text in PAGES.items():
         for label in re.findall(r"\{eq\}`(\w+)`", text):
             assert label in labels, (name, label)
-        for page in re.findall(r"\{doc\}`([\w/]+)`", text):
-            beside = f"{name.rpartition('/')[0]}/{page}".lstrip("/")
+        for page in re.findall(r"\{doc\}`(?:[^`]*<)?([\w/.]+)>?`", text):
+            beside = os.path.normpath(Path(name).parent / page)
             assert beside in set(PAGES) | GENERATED, (name, page)
         for target in re.findall(r"^```\{(?:literal)?include\} (\S+)$", text, re.MULTILINE):
             assert (DOCS / target).is_file(), (name, target)
@@ -64,12 +69,15 @@ def test_a_malformed_link_is_rejected():
         pages._check_links("page", "see [it](https://nowhere)")
 
 
-def test_pages_that_would_load_something_from_the_web(tmp_path):
+def test_pages_that_would_load_something_from_the_web_or_show_paths(tmp_path):
     head = '<link rel="stylesheet" href="{0}"><script defer src="{0}"></script><a href="https://x.org">x</a>'
     (tmp_path / "local.html").write_text(head.format("_static/mathjax/tex-svg.js"))
-    assert pages.loaded_from_web(tmp_path) == []
+    assert pages.problems(tmp_path) == []
     (tmp_path / "remote.html").write_text(head.format("//cdn.net/mathjax.js"))
-    assert pages.loaded_from_web(tmp_path) == ["remote.html: //cdn.net/mathjax.js"] * 2
+    said = "remote.html: //cdn.net/mathjax.js would be loaded from the web"
+    assert pages.problems(tmp_path) == [said] * 2
+    (tmp_path / "remote.html").write_text(f"File {sources.ROOT}/script.py")
+    assert "of this machine" in pages.problems(tmp_path)[0]
 
 
 def test_files_and_symbols_that_pages_name_exist():
@@ -91,6 +99,23 @@ def test_references_to_missing_files_and_symbols(reference):
     assert reference.split()[-1].split(".")[-1].split("::")[-1] in sources.missing(reference)
 
 
+def test_references_become_links(tmp_path):
+    """To the public repository if pyproject.toml names one, else to the file of this checkout."""
+    project = tmp_path / "pyproject.toml"
+    project.write_text('[project]\nname = "x"\n')
+    assert sources.repository(project) == ""
+    project.write_text(
+        '[project]\nname = "x"\n[project.urls]\nRepository = "https://host.org/x/"\n'
+    )
+    base = sources.repository(project)
+    assert (
+        sources.address("forms/u.py residual", base, DOCS)
+        == "https://host.org/x/blob/HEAD/forms/u.py"
+    )
+    link = sources.address("forms/u.py residual", "", DOCS)
+    assert (DOCS / link).resolve() == (sources.ROOT / "forms" / "u.py").resolve()
+
+
 def test_every_section_of_the_theory_names_its_files():
     """Each section with equations has a reference to a file."""
     for section in re.split(r"^##+ ", PAGES["theory"], flags=re.MULTILINE)[2:]:
@@ -107,11 +132,14 @@ def test_every_form_and_law_is_in_the_theory():
     assert forms | laws <= named
 
 
-def test_every_public_name_is_in_the_api():
-    api = PAGES["api"]
-    named = set(re.findall(r"^\.\. auto(?:class|function|exception):: tawami\.(\w+)$", api, re.M))
-    assert set(tawami.__all__) - named == set()
-    assert named <= set(tawami.__all__)
+def test_every_public_name_is_on_one_page_of_the_api():
+    documented = [
+        name
+        for page, text in PAGES.items() if page.startswith("api/")
+        for name in pages.documented(text)
+    ]  # fmt: skip
+    assert len(documented) == len(set(documented))
+    assert {name for name in documented if "." not in name} == set(tawami.__all__)
 
 
 def test_names_in_pages_exist():
@@ -160,14 +188,106 @@ def test_messages_are_collected():
         assert (kind, says) in found
 
 
-def test_code_of_a_page_must_raise_the_expected_error():
-    printed = executed.run_blocks([("", "x = 2"), ("", "print(x + 1)"), ("ValueError", "int('x')")])
-    assert printed[1] == "3\n"
-    assert printed[2].startswith("ValueError: invalid literal")
-    with pytest.raises(executed.RunError, match="ZeroDivisionError"):
-        executed.run_blocks([("", "1 / 0")])
-    with pytest.raises(executed.RunError, match="but nothing was raised"):
-        executed.run_blocks([("ValueError", "1 + 1")])
+def executed_notebook(folder, *tags, raised=()):
+    """Problems of a notebook whose cell has tags and raised errors."""
+    nbformat = pytest.importorskip("nbformat", reason="installed by make docs")
+    outputs = [nbformat.v4.new_output("error", ename=name, evalue="no") for name in raised]
+    cell = nbformat.v4.new_code_cell("1 + 1", metadata={"tags": list(tags)}, outputs=outputs)
+    nbformat.write(nbformat.v4.new_notebook(cells=[cell]), folder / "page.ipynb")
+    return notebooks.problems(folder)
+
+
+def test_code_of_a_page_must_raise_the_expected_error(tmp_path):
+    assert executed_notebook(tmp_path) == []
+    expected = ("raises-exception", "ValueError")
+    assert executed_notebook(tmp_path, *expected, raised=["ValueError"]) == []
+    (said,) = executed_notebook(tmp_path, *expected, raised=["TypeError"])
+    assert said.startswith("page: a cell raised TypeError")
+    (said,) = executed_notebook(tmp_path, *expected)
+    assert said.startswith("page: a cell raised nothing")
+    assert executed_notebook(tmp_path, "raises-exception", raised=["ValueError"])
+
+
+def test_every_page_with_code_is_a_notebook():
+    for name, text in PAGES.items():
+        assert ("{code-cell}" in text) == text.startswith("---\nfile_format: mystnb\n"), name
+        for tags in re.findall(r"^:tags: \[(.*)\]$", text, flags=re.MULTILINE):
+            assert re.fullmatch(r"raises-exception, \w+Error", tags), (name, tags)
+
+
+@pytest.mark.parametrize("name", pages.TUTORIALS)
+def test_tutorials_can_be_downloaded_as_notebooks(name):
+    """Text and code only, which imports nothing of the repository but the package."""
+    pytest.importorskip("myst_nb", reason="installed by make docs")
+    nbformat = pytest.importorskip("nbformat")
+    notebook = nbformat.reads(notebooks.download(PAGES[name]), as_version=4)
+    code = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
+    text = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
+    assert len(code) >= 3
+    assert not re.search(r"\{\w+\}`|eval-rst", text)
+    imported = set(re.findall(r"^(?:import|from) (\w+)", "\n".join(code), flags=re.MULTILINE))
+    assert imported <= sys.stdlib_module_names | {"tawami", "numpy", "matplotlib", "mpi4py", "ufl"}
+    assert any("subplots" in source for source in code)
+    assert any("print(" in source for source in code)
+    assert notebooks.download(PAGES[name]) == notebooks.download(PAGES[name])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in PAGES if "{code-cell}" in PAGES[name]])
+def test_code_of_pages_runs_anywhere(name, tmp_path, monkeypatch):
+    """In a folder outside the repository, that of tutorials with the package alone."""
+    nbclient = pytest.importorskip("nbclient", reason="installed by make docs")
+    nbformat = pytest.importorskip("nbformat")
+    folders = [sources.ROOT / "python"] + [sources.ROOT] * (name not in pages.TUTORIALS)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(map(str, folders)))
+    monkeypatch.setenv("MPLBACKEND", "module://matplotlib_inline.backend_inline")
+    notebook = nbformat.reads(notebooks.download(PAGES[name]), as_version=4)
+    folder = {"metadata": {"path": str(tmp_path)}}
+    nbclient.NotebookClient(notebook, timeout=300, resources=folder).execute()
+    nbformat.write(notebook, tmp_path / "page.ipynb")
+    assert notebooks.problems(tmp_path) == []
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    drawn = any("image/png" in output.get("data", {}) for output in outputs)
+    assert drawn or name not in pages.TUTORIALS
+
+
+@pytest.mark.parametrize("name", pages.CASES)
+def test_docstrings_of_cases_become_text(name):
+    folder = sources.ROOT / "cases" / pages.CASES[name][1] / name
+    file = folder / "__main__.py" if folder.is_dir() else folder.with_suffix(".py")
+    shown = pages.markdown(pages._docstring(file))
+    assert shown.count("````") % 2 == 0
+    assert not re.match("`| ", shown)
+
+
+def test_a_docstring_as_markdown():
+    text = (
+        "A *beam*, `E_1`\nof rubber.\n\n    -->  P\n\n      2 m\n\npython -m cases.x\npython -m y"
+    )
+    assert pages.markdown(text) == (
+        "A \\*beam\\*, `E_1` of rubber\\.\n\n````text\n-->  P\n\n  2 m\n````\n\n"
+        "````text\npython -m cases.x\npython -m y\n````"
+    )
+
+
+def test_thumbnails(tmp_path):
+    """README's are in the repository, small, and a thumbnail is cut from the part of a figure."""
+    assert set(thumbnails.README) <= set(thumbnails.PARTS) <= set(pages.CASES)
+    files = [DOCS / "pictures" / "thumbnails" / f"{name}.png" for name in thumbnails.README]
+    assert len(files) == 8
+    assert sum(file.stat().st_size for file in files) < 400_000
+    figure, part = thumbnails.PARTS["cut_cells"]
+    whole = Image.new("RGB", (1000, 600), "white")
+    whole.paste("red", (100, 100, 400, 500))
+    whole.paste("blue", (600, 100, 900, 500))
+    whole.save(tmp_path / figure)
+    thumbnails.draw("cut_cells", tmp_path, tmp_path / "small.png")
+    with Image.open(tmp_path / "small.png") as small:
+        assert small.size == thumbnails.SIZE
+        colours = {colour for _, colour in small.convert("RGB").getcolors()}
+    assert part == (0.0, 0.0, 0.5, 1.0)
+    assert (255, 0, 0) in colours
+    assert (0, 0, 255) not in colours
 
 
 def test_a_run_is_repeated_only_if_its_sources_changed(tmp_path):
@@ -208,6 +328,38 @@ def test_every_case_is_a_page_and_can_be_run():
         path.stem for room in rooms for path in room.glob("[!_]*") if path.suffix in ("", ".py")
     }
     assert there == set(pages.CASES) | {"bench", "trade"}
+
+
+def test_broken_links_are_found(tmp_path):
+    page, other = tmp_path / "page.html", tmp_path / "other.html"
+    page.touch()
+    other.touch()
+    targets = ["https://x.org/y", page.as_uri(), f"{other.as_uri()}#there"]
+    names = {page: {"here"}, other: {"there"}}
+    assert browser.broken({page: targets}, names) == []
+    targets += [f"{other.as_uri()}#nowhere", (tmp_path / "none.html").as_uri()]
+    said = [text for _, text in browser.broken({page: targets}, names)]
+    assert said == [
+        f"links to {tmp_path}/none.html, which does not exist",
+        "links to other.html#nowhere, and the page has no such place",
+    ]
+
+
+@pytest.mark.slow
+def test_one_page_is_built_and_opened_in_a_browser(tmp_path):
+    """A page is built without problems; those of a page with mistakes are found."""
+    for needed in ("sphinx", "playwright"):
+        pytest.importorskip(needed, reason="installed by make docs")
+    words = [sys.executable, str(DOCS), "--page", "start"]
+    built = subprocess.run(words, cwd=sources.ROOT, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr
+    wide = '<main><p style="width: 5000px">long</p><a href="none.html">x</a></main>'
+    (tmp_path / "page.html").write_text(f"{wide}<script>nothing()</script>")
+    said = browser.problems(tmp_path)
+    assert len(said) == 5
+    assert sum("is wider than" in text for text in said) == 3
+    assert "nothing is not defined" in said[0]
+    assert "none.html, which does not exist" in said[-1]
 
 
 @pytest.fixture(scope="module")
@@ -259,7 +411,7 @@ def test_different_results_on_several_ranks_are_an_error():
 def test_the_matrix_of_the_documentation_has_the_columns_of_make_matrix():
     script = (sources.ROOT / "tests" / "matrix.sh").read_text()
     (header,) = re.findall(r"echo '(\| Debian .*\|)'", script)
-    assert header in (sources.ROOT / "python/docs/start.md").read_text()
+    assert header in (sources.ROOT / "python/docs/install.md").read_text()
     assert "SUITES:-bookworm trixie sid}" in script
 
 

@@ -11,6 +11,7 @@ import pytest
 from runs import Kill, Killed, run
 
 import tawami
+from tawami.base import line
 from tawami.results import progress
 
 
@@ -56,7 +57,7 @@ class Terminal(io.StringIO):
 def test_a_terminal_shows_one_line(tmp_path, monkeypatch):
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
-    monkeypatch.setattr(progress, "INTERVAL", 0.0)
+    monkeypatch.setattr(line, "INTERVAL", 0.0)
     monkeypatch.setenv("COLUMNS", "120")
     run(tmp_path / "run")
     text = terminal.getvalue()

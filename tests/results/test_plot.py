@@ -12,6 +12,7 @@ from programs import python
 from runs import look
 
 import tawami
+from tawami.picture.style import scaled
 from tawami.results import film as pictures
 from tawami.results import provenance
 from tawami.results.frame import Frame
@@ -121,10 +122,10 @@ def test_a_run_without_particles_has_its_tables_drawn(scene, tmp_path):
 
 
 def test_large_stresses_are_shown_in_kpa_or_mpa():
-    assert pictures._scaled("Pa", 2.5e4) == ("kPa", 1e3)
-    assert pictures._scaled("Pa", 2.5e6) == ("MPa", 1e6)
-    assert pictures._scaled("Pa", 20.0) == ("Pa", 1.0)
-    assert pictures._scaled("m/s", 2e4) == ("m/s", 1.0)
+    assert scaled("Pa", 2.5e4) == ("kPa", 1e3)
+    assert scaled("Pa", 2.5e6) == ("MPa", 1e6)
+    assert scaled("Pa", 20.0) == ("Pa", 1.0)
+    assert scaled("m/s", 2e4) == ("m/s", 1.0)
 
 
 def test_a_folder_that_cannot_be_drawn_is_rejected(scene, tmp_path):

@@ -25,7 +25,7 @@ def views(particles, names):
     for name in names:
         if name in particles.history_names:
             yield particles.history(name)
-        elif name in ("x", "eps_v", *STATIC):
+        elif name in ("x", "eps_v", "strain", "displacement_gradient", *STATIC):
             yield getattr(particles, name)
         else:
             yield particles.carried(name)
@@ -38,9 +38,9 @@ def views(particles, names):
 def test_a_static_elastic_scene_stores_only_the_arrays_of_its_form(name):
     scene = scene_of(**(FORMS | FINITE)[name])
     for _ in range(2):
-        assert [array for array, _ in scene.particles.arrays] == STATIC + ["eps_v"] * (
-            name in MIXED
-        )
+        expected = STATIC + ["eps_v"] * (name in MIXED)
+        expected += ["displacement_gradient" if name in FINITE else "strain"]
+        assert [array for array, _ in scene.particles.arrays] == expected
         assert scene.particles.history_names == []
         scene.traction("top", (0.0, -0.01))
         scene.solve()
@@ -64,12 +64,12 @@ def test_the_bytes_are_those_of_the_arrays(name, kind):
 
 
 def test_bytes_of_a_static_and_of_a_moving_scene():
-    """Doubles but for two numbers of 4 bytes: x 2, V 1, stress 4, displacement 2; in motion also
-    eps_v 1, history 2, v and a 2 each, their gradients 4 each.
+    """Doubles but for two numbers of 4 bytes: x 2, V 1, stress 4, displacement 2, strain 4; in motion
+    also eps_v 1, history 2, v and a 2 each, their gradients 4 each.
     """
-    assert scene_of(form="u").particles.bytes_per_particle == 8 * 9 + 2 * 4
+    assert scene_of(form="u").particles.bytes_per_particle == 8 * 13 + 2 * 4
     motion = moving(law=plastic(), form="u_epsv_finite")
-    assert motion.scene.particles.bytes_per_particle == 8 * (9 + 1 + 2 + 4 + 8) + 2 * 4
+    assert motion.scene.particles.bytes_per_particle == 8 * (13 + 1 + 2 + 4 + 8) + 2 * 4
 
 
 # -- kernels, mass, imports ----------------------------------------------------
@@ -96,10 +96,10 @@ def compiled(monkeypatch):
         ({"form": "u"}, 2),  # residual and tangent
         ({"form": "u_epsv"}, 2),
         ({"form": "u_p"}, 2),
-        ({"form": "u_epsv", "stabilisation": "projection"}, 4),  # each by two rules
+        ({"form": "u_epsv", "stabilisation": "projection"}, 6),  # each at particles, by two rules
         ({"form": "u_bbar"}, 8),  # as well, and two products of two integrals
         ({"form": "u_finite", "ghost_penalty": "off"}, 2),
-        # the lumped term has a rule of its own
+        # the lumped term is evaluated at the vertices
         ({"form": "u_epsv_finite", "ghost_penalty": "off"}, 4),
     ],
 )
@@ -192,7 +192,7 @@ print(*[name for name in others if name in sys.modules])
         ),
         (
             lambda s: s.deformation_gradient,
-            r"deformation_gradient: no form stores it.*u_epsv_finite",
+            r"deformation_gradient: expected .*displacement_gradient, .*u_epsv_finite",
         ),
         (lambda s: s.particles.eps_v, r"eps_v: .*expected one with.*form='u_epsv'"),
         (lambda s: s.solve().eps_v, r"eps_v: form 'u' does not have it.*form='u_epsv'"),

@@ -17,7 +17,7 @@ def line(header, label):
     return re.search(rf"^{label} +(.*)$", text, flags=re.MULTILINE).group(1)
 
 
-@pytest.mark.parametrize("assembly", ["fast", "reference"])
+@pytest.mark.parametrize("assembly", ["points", "dolfinx"])
 def test_the_header_counts_particles_bytes_and_unknowns(assembly):
     scene = scene_of(form="u_epsv", assembly=assembly)
     scene.hold((0.0, 1.7), "x", 0.01)
@@ -26,8 +26,8 @@ def test_the_header_counts_particles_bytes_and_unknowns(assembly):
     assert line(header, "unknowns").startswith("67: 60 of u, 20 of eps_v, less 13 that")
     assert scene.solve().unknowns == 67
     assert scene.header() == header
-    assert line(header, "particles").startswith("48, 88 bytes each (x 16, volume 8,")
-    assert "4.22 kB in all" in header
+    assert line(header, "particles").startswith("48, 120 bytes each (x 16, volume 8,")
+    assert "5.76 kB in all" in header
     assert line(header, "solver").endswith(f"assembly {assembly}, 1 rank")
     assert line(header, "supports") == (
         "fix(edge='bottom') x, fix(edge='bottom') y, hold(point=(0.0, 1.7)) x = 0.01 m"

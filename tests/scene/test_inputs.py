@@ -13,7 +13,6 @@ from scenes import grid_of
 
 import tawami
 from tawami import _rust
-from tawami.base.errors import InexactSumWarning
 
 ELASTIC = {"E": 1e6, "nu": 0.3}
 
@@ -261,8 +260,7 @@ def test_an_error_of_newton_holds_its_history_and_changes_nothing():
     grid = grid_of()
     body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     material = tawami.linear_elastic(**ELASTIC)
-    with pytest.warns(InexactSumWarning):
-        scene = tawami.Scene(grid, body, material, form=form, max_iterations=3)
+    scene = tawami.Scene(grid, body, material, form=form, max_iterations=3)
     scene.fix("left", "x")
     scene.fix("left", "y")
     scene.traction("right", (5e5, 0.0))
@@ -301,7 +299,7 @@ def test_only_the_arrays_that_a_scene_needs_exist():
         else:
             assert scene.particles.eps_v.shape == scene.particles.volume.shape
         assert scene.configuration.model.compiled.traction is not None
-    assert bytes_of == {"u": 80, "u_epsv": 88}
+    assert bytes_of == {"u": 112, "u_epsv": 120}
 
 
 @given(

@@ -14,20 +14,22 @@ OF_A_RUN = {"scene", "motion", "state", "restore", "identity", "header"}
 SCENE = {
     "grid", "form", "basis", "parameters", "options", "numerics", "particles", "num_particles",
     "laws", "mass", "particles_per_cell", "left", "stopwatch", "configuration",
+    "remove", "change_material",
     "initial", "fix", "hold", "wall", "release", "traction", "load", "gravity",
     "remove", "change_material",
     "time", "solve", "solve_part", "advanced",
     "residual", "tangent", "reduction", "split", "num_coefficients",
 }  # fmt: skip
 DYNAMICS = {
-    "transfer", "damping", "gamma", "beta", "time", "steps", "step", "run",
+    "transfer", "damping", "gamma", "beta", "time", "steps", "step", "run", "animate",
     "velocity", "acceleration", "velocity_gradient", "mass", "on_grid",
     "energies", "kinetic_energy", "elastic_energy", "linear_momentum", "angular_momentum",
 }  # fmt: skip
 SOLUTION = {
     "scene", "u", "volumetric", "unknowns", "load", "iterations", "history", "krylov", "condition",
-    "symmetric", "number", "x", "volume", "stress", "mean_stress", "displacement_of_particles",
-    "eps_v", "displacement", "reaction", "on_edges", "on_points",
+    "symmetric", "arrays", "number", "x", "volume", "stress", "strain", "mean_stress",
+    "displacement_of_particles",
+    "eps_v", "displacement", "reaction", "on_edges", "on_points", "plot", "to_pandas", "to_pyvista",
 }  # fmt: skip
 
 

@@ -46,28 +46,6 @@ def test_fgmres_iterations_of_the_mixed_form_are_bounded():
     assert max(most(n, nu) for n in (8, 32) for nu in (0.3, 0.4999, 0.4999999)) < 60
 
 
-@pytest.mark.parametrize("assembly", ["fast", "reference"])
-def test_a_reduced_tangent_takes_more_iterations_to_the_same_solution(assembly):
-    full, reduced = (
-        pushed(tangent_rule=rule, assembly=assembly, tolerance=1e-10).solve()
-        for rule in ("full", "reduced")
-    )
-    assert np.allclose(reduced.u, full.u, rtol=0, atol=1e-7 * np.abs(full.u).max())
-    assert reduced.iterations > full.iterations
-
-
-def test_both_assemblies_have_the_same_reduced_tangent():
-    full, fast, reference = (
-        mpm.build("u_epsv", "exact", 4, tangent_rule=rule, assembly=assembly)
-        for rule, assembly in (("full", "fast"), ("reduced", "fast"), ("reduced", "reference"))
-    )
-    zero, n = np.zeros(full.num_coefficients), full.configuration.domain.layout.num_displacement
-    exact, one, other = (scene.tangent(zero).toarray() for scene in (full, fast, reference))
-    assert np.allclose(one, other, rtol=0, atol=1e-12 * np.abs(exact).max())
-    exact, one = exact[:n, :n], one[:n, :n]
-    assert np.abs(one - exact).max() > 1e-3 * np.abs(exact).max()
-
-
 def test_a_factorisation_in_every_iteration_gives_the_same_solution():
     seldom, always = (pushed(factorise=when).solve() for when in ("when_it_pays", "always"))
     assert always.krylov == (0,) * always.iterations
@@ -95,7 +73,6 @@ def test_fgmres_reports_a_system_that_it_cannot_solve():
     [
         ({"linear_solver": "cg"}, "linear_solver = 'cg': expected 'direct' or 'iterative'"),
         ({"factorise": "never"}, "factorise = 'never': expected 'when_it_pays' or 'always'"),
-        ({"tangent_rule": 3}, "tangent_rule = 3: expected 'full' or 'reduced'"),
         ({"tolerance": 0.5}, "tolerance = 0.5: expected a finite number"),
     ],
 )

@@ -23,7 +23,7 @@ from tawami.fem.environment import peak_memory
 
 
 def stiffening(u, eps_v, w, q, sigma, K, mu, t, h, sum_p, ds, alpha):  # type: ignore[no-untyped-def]
-    """The form of the paper with the additional stress 2 mu grad(u)^T grad(u), to iterate on."""
+    """The form of the paper with the additional stress 2 mu grad(u)^T grad(u): Newton iterates."""
     R_u = sum_p(sigma, grad(w)) - dot(t, w) * ds
     R_u += sum_p(2 * mu, inner(dot(grad(u).T, grad(u)), grad(w)))
     R_q = sum_p(K, q * (div(u) - eps_v))
@@ -47,7 +47,7 @@ def measure(setting: Setting) -> dict[str, Any]:
     Returns:
         Seconds, processor time, memory, by name.
     """
-    warnings.simplefilter("ignore", tawami.InexactSumWarning)  # of the additional stress
+    warnings.simplefilter("ignore", tawami.InexactSumWarning)  # of the additional stress, earlier
     forms = first_scene(setting)
     mpm.build("u_epsv", "paper", 2, alpha=0.1, assembly=setting.assembly).solve()  # loads libraries
     return {"forms_s": forms} | linear(setting) | nonlinear(setting)

@@ -48,16 +48,16 @@ def print_ratios(rows: Sequence[Row]) -> None:
     few, many = (of(row["per_axis"] for row in rows) for of in (min, max))
     threads = max(row["threads"] for row in rows)
 
-    def of(assembly: str = "fast", **wanted: int) -> list[Row]:
+    def of(assembly: str = "points", **wanted: int) -> list[Row]:
         wanted = {"n": sizes[-1], "per_axis": few, "ranks": 1} | wanted
         mine = [row for row in rows if row["assembly"] == assembly]
         return [row for row in mine if all(row[name] == value for name, value in wanted.items())]
 
-    [fast], [reference] = of(threads=threads), of("reference")
-    for row in (fast, reference):
+    [points], [reference] = of(threads=threads), of("dolfinx")
+    for row in (points, reference):
         print_step(row)
-    ratio = outside_the_solver(reference) / outside_the_solver(fast)
-    print(f"\nall but the linear solver, reference over fast: {ratio:.2f}")
+    ratio = outside_the_solver(reference) / outside_the_solver(points)
+    print(f"\nall but the linear solver, dolfinx over points: {ratio:.2f}")
     first = np.median([row["forms_s"] for row in rows])
     print(f"first scene of a process, with form and kernels: {first:.3f} s (aim: 0.1)")
     for row in of(n=64):
@@ -132,7 +132,7 @@ def print_ranks(rows: Sequence[Row], serial: Row) -> None:
 def print_growth(rows: Sequence[Row]) -> None:
     """Print fitted exponents of the growth with the number of particles."""
     particles = np.log([row["particles"] for row in rows])
-    print("\ngrowth, seconds ~ particles^x (fast assembly):")
+    print("\ngrowth, seconds ~ particles^x (assembly at the points):")
     for stage in (*STAGES, "step_s", "peak_MB"):
         values = [row[stage] for row in rows]
         if min(values) > 0:

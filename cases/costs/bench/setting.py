@@ -1,4 +1,4 @@
-"""What the benchmark measures: settings, and the stages of a Newton step."""
+"""Settings of the benchmark, and the stages of a Newton step."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ STAGES = {
     "residual": "residual, before and after the solve",
     "measures": "measures of convergence",
     "pattern": "pattern of the reduced matrix",
-    "tangent": "tangent (fast assembly: with densities and reduction)",
+    "tangent": "tangent (at the points: with reduction)",
     "reduction": "P^T K P, or the sum over ranks",
     "scale": "scaling and test of symmetry",
     "factorise": "factorisation (MUMPS)",
@@ -36,7 +36,7 @@ class Setting:
     """A beam to measure.
 
     Attributes:
-        assembly: 'fast' or 'reference'.
+        assembly: 'points' or 'dolfinx'.
         n: Cells over the height.
         per_axis: Particles per cell and axis.
         threads: Threads of the Rust part.
@@ -56,9 +56,9 @@ def settings(
     """All settings: threads on one rank, and several ranks with one thread each."""
     for n in cells:
         for m in per_axis:
-            yield from (Setting("fast", n, m, t, 1) for t in threads)
-            yield Setting("reference", n, m, max(threads), 1)
-        yield from (Setting("fast", n, min(per_axis), 1, r) for r in ranks if r > 1)
+            yield from (Setting("points", n, m, t, 1) for t in threads)
+            yield Setting("dolfinx", n, m, max(threads), 1)
+        yield from (Setting("points", n, min(per_axis), 1, r) for r in ranks if r > 1)
 
 
 def in_own_process(setting: Setting) -> dict[str, Any]:

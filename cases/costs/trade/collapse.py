@@ -44,7 +44,7 @@ GRIDS = [
     MIXED | {"alpha": (0.0, 0.003, 0.01, 0.03, 0.1)},
     MIXED | {"per_axis": (1, 2, 3, 4)},
     MIXED | {"tolerance": (1e-2, 1e-3, 1e-4, 1e-6, 1e-8)},
-    MIXED | {"factorise": ("when_it_pays", "always"), "tangent_rule": ("full", "reduced")},
+    MIXED | {"factorise": ("when_it_pays", "always")},
     MIXED | {"linear_solver": ("direct", "iterative")},
     MIXED | {"ghost_penalty": ("off", "on")},
     MIXED | {"threads": (1, 2)},

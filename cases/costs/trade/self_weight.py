@@ -36,8 +36,7 @@ GRIDS = [
     {"form": ("u_epsv_finite", "u_finite", "u_bbar_finite"), "inertia": INERTIA,
      "increments": (5, 10, 20, 40), "h": SIZES},
     {"form": ("u_epsv_finite",), "inertia": ("none",), "increments": (10, 20), "h": (1.0,),
-     "tolerance": (1e-2, 1e-4, 1e-6, 1e-8), "factorise": ("when_it_pays", "always"),
-     "tangent_rule": ("full", "reduced")},
+     "tolerance": (1e-2, 1e-4, 1e-6, 1e-8), "factorise": ("when_it_pays", "always")},
 ]  # fmt: skip
 
 STUDY = tawami.Study(

@@ -35,16 +35,17 @@ STUDY: dict[str, list[dict[str, Any]]] = {
 
 PROGRAM = Program("cases.verification.elastica", __doc__)
 PROGRAM.option("--steps", type=int, default=160, help="leave out the runs with more steps")
+PROGRAM.option("--cells", type=int, default=8, help="leave out the runs with more cells")
 
 
-def study(most_steps: int) -> dict[str, list[Run]]:
+def study(most_steps: int, most_cells: int) -> dict[str, list[Run]]:
     """Run the parts of the study, and print why a run ended early."""
     work = [
         (name, load, change)
         for name in STUDY
         for load in LOADS
         for change in STUDY[name]
-        if change.get("steps", 0) <= most_steps
+        if change.get("steps", 0) <= most_steps and change.get("n", 0) <= most_cells
     ]
     runs: dict[str, list[Run]] = {name: [] for name in STUDY}
     for name, load, change in progress(work, desc="elastica"):
@@ -62,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for load in LOADS:
         x, y = tip(load)
         print(f"elastica, PL^2/EI = {load:g}: the tip moves ({x:.4f}, {y:.4f}) L")
-    runs = study(options.steps)
+    runs = study(options.steps, options.cells)
     rows = [run for name in STUDY for run in runs[name]]
     print(as_text(rows, COLUMNS))
     PROGRAM.write("table.csv", as_csv(rows, COLUMNS))

@@ -2,6 +2,6 @@
 
 from tawami.fem.kernels import Kernel
 from tawami.fem.mesh import FunctionSpace, Rectangle
-from tawami.fem.rules import Rule, TangentRule
+from tawami.fem.rules import Rule
 
-__all__ = ["FunctionSpace", "Kernel", "Rectangle", "Rule", "TangentRule"]
+__all__ = ["FunctionSpace", "Kernel", "Rectangle", "Rule"]

@@ -20,8 +20,8 @@ from tawami.base.space import PLANE
 
 __all__ = [
     "BILINEAR_DOFS", "DISPLACEMENT_DOFS", "OLD", "IntegralType", "at_points", "at_vertices",
-    "basix", "cpp", "dolfinx", "domain", "ffcx", "function_space", "jit", "lagrange", "mixed",
-    "per_cell", "reference_nodes", "version",
+    "basix", "cpp", "dolfinx", "domain", "ffcx", "function_space", "interval", "jit", "lagrange",
+    "mixed", "on_interval", "per_cell", "reference_nodes", "version",
 ]  # fmt: skip
 
 _showwarning = warnings.showwarning
@@ -71,6 +71,15 @@ if OLD:
         """Element of vectors given at the vertices."""
         return ufl.VectorElement("Lagrange", CELL, 1, dim=components)
 
+    def on_interval(components: int) -> Any:
+        """Element of constant vectors on an interval."""
+        return ufl.VectorElement("DG", "interval", 0, dim=components)
+
+    @functools.cache
+    def interval() -> Any:
+        """A UFL mesh of intervals, to write forms of one point on."""
+        return ufl.Mesh(ufl.VectorElement("Lagrange", "interval", 1, dim=1))
+
     def function_space(mesh: Any, element: Any, compiled: Any) -> Any:
         """Function space on a dolfinx mesh; this version compiles the element, with these settings."""
         return dolfinx.fem.FunctionSpace(mesh, element, jit_params=compiled)
@@ -102,6 +111,15 @@ else:
     def at_vertices(components: int) -> Any:
         """Element of vectors given at the vertices."""
         return basix.ufl.element("Lagrange", CELL, 1, shape=(components,))
+
+    def on_interval(components: int) -> Any:
+        """Element of constant vectors on an interval."""
+        return basix.ufl.element("DG", "interval", 0, shape=(components,))
+
+    @functools.cache
+    def interval() -> Any:
+        """A UFL mesh of intervals, to write forms of one point on."""
+        return ufl.Mesh(basix.ufl.element("Lagrange", "interval", 1, shape=(1,)))
 
     def function_space(mesh: Any, element: Any, compiled: Any) -> Any:
         """Function space on a dolfinx mesh."""

@@ -12,17 +12,13 @@ from tawami.base.arrays import Array
 from tawami.base.space import PLANE
 from tawami.fem.dolfinx import basix, reference_nodes
 
-#: Rules of particle densities: the full rule, a smaller one for tangents, the centre of the cell, its
-#: vertices, or one mean per cell.
-Rule = Literal["particle", "reduced", "centre", "vertex", "mean"]
+#: Rules of particle densities: the full rule, the centre of the cell, its vertices; or cell means.
+Rule = Literal["particle", "centre", "vertex", "mean"]
 
-#: Quadrature degree of each rule. 5 x 5 points make the tangent of quadratic splines exact. The 3 x 3
-#: points of the reduced rule do not: they are exact up to degree 2 along each axis.
-DEGREE: Mapping[Rule, int] = {"particle": 8, "reduced": 4, "centre": 1, "vertex": 1}
+#: Quadrature degree of each rule. 5 x 5 points make the tangent of quadratic splines exact.
+DEGREE: Mapping[Rule, int] = {"particle": 8, "centre": 1, "vertex": 1}
 #: Family of each rule; the points of the smallest Gauss-Lobatto-Legendre rule are the vertices.
 FAMILY: Mapping[Rule, str] = {**dict.fromkeys(DEGREE, "default"), "vertex": "GLL"}
-#: Rule of the tangent: the full one, or the smaller one, with which Newton may not converge.
-TangentRule = Literal["full", "reduced"]
 
 
 @functools.cache

@@ -2,8 +2,8 @@
 
 from tawami.field.assembly import Assembly
 from tawami.field.attachment import Attachment
-from tawami.field.fast import FastAssembly
 from tawami.field.layout import Layout
+from tawami.field.points import PointAssembly
 from tawami.field.reduction import Reduction
 from tawami.field.reference import ReferenceAssembly
 from tawami.field.tractions import Tractions
@@ -11,8 +11,8 @@ from tawami.field.tractions import Tractions
 __all__ = [
     "Assembly",
     "Attachment",
-    "FastAssembly",
     "Layout",
+    "PointAssembly",
     "Reduction",
     "ReferenceAssembly",
     "Tractions",

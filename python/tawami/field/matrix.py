@@ -1,4 +1,4 @@
-"""The reduced matrix of the fast assembly: its pattern, its values, and its PETSc objects."""
+"""The reduced matrix of the assembly at the particles: pattern, values and PETSc objects."""
 
 from __future__ import annotations
 

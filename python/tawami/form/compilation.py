@@ -12,13 +12,13 @@ from typing import Any
 
 from tawami.base.errors import InputError
 from tawami.base.timing import tally
-from tawami.fem.rules import Rule, TangentRule
+from tawami.fem.rules import Rule
 from tawami.form.form import Form
 from tawami.form.integral import Integral, KernelBuilder, ufl_errors
 from tawami.form.quantities import Density, LawQuantity
-from tawami.form.symbols import Symbols
+from tawami.form.symbols import Assembly, Symbols
 from tawami.form.tangent import Linearisation
-from tawami.form.terms import by_rule, reduced, terms_of
+from tawami.form.terms import at_points, by_rule, terms_of
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class CompiledForm:
     residual: tuple[Integral, ...]
     edges: Callable[[], Integral] | None
     tangent: tuple[Integral, ...]
-    couplings: tuple[tuple[Integral, Integral], ...]
+    couplings: tuple[tuple[Integral, ...], ...]
     ghost: Integral | None
     densities: Mapping[Rule, Mapping[Density, int]]
     used: frozenset[str]
@@ -66,14 +66,14 @@ class CompiledForm:
         )
 
 
-_compiled: dict[tuple[Form, TangentRule, bool, tuple[tuple[str, str], ...]], CompiledForm] = {}
+_compiled: dict[tuple[Form, Assembly, bool, tuple[tuple[str, str], ...]], CompiledForm] = {}
 
 
 def compile_form(
     comm: Any,
     form: Form,
     options: Mapping[str, str],
-    tangent_rule: TangentRule = "full",
+    assembly: Assembly = "points",
     *,
     plastic_volume: bool = True,
 ) -> CompiledForm:
@@ -83,40 +83,46 @@ def compile_form(
         comm: Communicator.
         form: The form.
         options: One value for each of the form's options.
-        tangent_rule: Points of the sums over particles in the tangent: 'full', or 'reduced'.
+        assembly: 'points' for kernels at the particles, 'dolfinx' for integrals over cells only.
         plastic_volume: Whether plastic flow may change the volume. Otherwise eps_p is zero, and its
             terms are left out.
 
     Raises:
         FormError: A name is unknown, a test function is missing, or UFL or FFCx rejects the form.
     """
-    key = (form, tangent_rule, plastic_volume, tuple(sorted(options.items())))
+    key = (form, assembly, plastic_volume, tuple(sorted(options.items())))
     if key not in _compiled:
-        symbols = Symbols(form, options, plastic_volume=plastic_volume)
+        symbols = Symbols(form, options, plastic_volume=plastic_volume, assembly=assembly)
         with tally.compiling():
-            _compiled[key] = _compile(comm, symbols, tangent_rule)
+            _compiled[key] = _compile(comm, symbols)
     return _compiled[key]
 
 
-def _compile(comm: Any, symbols: Symbols, tangent_rule: TangentRule) -> CompiledForm:
+def _compile(comm: Any, symbols: Symbols) -> CompiledForm:
     form, residual = symbols.form, symbols.residual()
     terms = terms_of(symbols, residual)
     with ufl_errors(form):
         linearisation = Linearisation(symbols, terms.cells)
         tangent, couplings = linearisation.tangent(), linearisation.couplings()
-    at_particles: Rule = "particle"
-    if tangent_rule == "reduced":
-        tangent, at_particles = reduced(tangent), "reduced"
     builder = KernelBuilder(comm, symbols)
     integral, edges, ghost = builder.integral, terms.edges, terms.ghost
+    rule_of = {symbol: density.rule for density, symbol in symbols.placeholders.items()}
+
+    def integrals(form: Any) -> tuple[Integral, ...]:
+        if symbols.assembly == "dolfinx":
+            return tuple(map(integral, by_rule(form)))
+        sums, rest = at_points(form, rule_of)
+        kernels = [builder.at_points(part, rule) for rule, part in sums]
+        return (*kernels, *map(integral, by_rule(rest)))
+
     return CompiledForm(
         form=form,
         element=symbols.element,
-        residual=tuple(integral(part) for part in by_rule(terms.cells)),
+        residual=integrals(terms.cells),
         edges=None if edges is None else lambda: integral(edges, "exterior_facet"),
-        tangent=tuple(integral(part, at_particles=at_particles) for part in by_rule(tangent)),
+        tangent=integrals(tangent),
         ghost=None if ghost is None else integral(ghost, "interior_facet"),
-        couplings=tuple((integral(left), integral(right)) for left, right in couplings),
+        couplings=tuple((*integrals(left), *integrals(right)) for left, right in couplings),
         densities=builder.densities,
         used=_named(symbols, residual),
     )

@@ -12,8 +12,8 @@ P, P_s, tau_m, ln_J       with `strain = "finite"`, instead of these: tau f^-T, 
 eps_p                     plastic volumetric strain of the step, with the kinematics 'mixed' and
                           'deviatoric': the field is elastic, div u (ln_J) = eps_v + eps_p
 K, mu                     bulk and shear modulus of the particle, also in K**2 / mu, 1 / K, K * ln_J
-sum_p(D, f), sum_p(f)     sum over particles of V_p D_p : f(x_p), and of V_p f(x_p); exact for f up
-                          to degree 4 along x and along y (a warning reports a higher degree)
+sum_p(D, f), sum_p(f)     sum over particles of V_p D_p : f(x_p), and of V_p f(x_p), for any f of the
+                          fields, their first and their second derivatives
 sum_c(D, f), sum_c(f)     the same, with f at the centre of the particle's cell
 sum_v(D, f), sum_v(f)     the same, with f at the vertices of the particle's cell, interpolated by the
                           bilinear functions: q eps_v is row-sum lumped
@@ -26,9 +26,9 @@ t, h                      traction [Pa], cell size [m]
 parameters, options       alpha, ... as declared
 ========================= ========================================================================
 
-Particle data enter as volume-weighted densities at the points of a fixed rule. Each `sum_p` contains
-exactly one of them, so that the integral equals the sum over the particles (docs: theory). The
-tangent is derived (`tawami.form.tangent`).
+The integrand of `sum_p` is evaluated at the particles (`tawami.form.points`). With assembly='dolfinx'
+particle data enter as densities at the points of a fixed rule, which is exact for f up to degree 4 along
+x and along y (docs: theory). The tangent is derived (`tawami.form.tangent`).
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import ufl
@@ -14,7 +14,9 @@ from tawami.base.errors import FormError, TawamiError
 from tawami.fem import dolfinx, kernels
 from tawami.fem.kernels import Kernel, Kind
 from tawami.fem.rules import DEGREE, Rule, rule_points
+from tawami.form import points
 from tawami.form.form import Form
+from tawami.form.points import PointForm
 from tawami.form.quantities import Density
 from tawami.form.symbols import Symbols
 
@@ -38,7 +40,7 @@ class Slot:
         """The rule of its particle data (densities only)."""
         assert self.source != "fields"
         assert self.source != "traction"
-        return "particle" if self.source == "reduced" else self.source
+        return self.source
 
 
 @dataclass(frozen=True)
@@ -50,12 +52,14 @@ class Integral:
         kernel: The compiled kernel.
         slots: Coefficients that the kernel reads.
         constants: Names of the constants that it reads.
+        points: Place of its points and what its numbers stand for; None for an integral over cells.
     """
 
     rank: int
     kernel: Kernel
     slots: tuple[Slot, ...]
     constants: tuple[str, ...]
+    points: tuple[Rule, PointForm] | None = None
 
     @property
     def width(self) -> int:
@@ -82,46 +86,70 @@ class KernelBuilder:
             self.densities[density.rule][density] = width[density.rule]
             width[density.rule] += density.size
 
-    def integral(self, form: Any, kind: Kind = "cell", at_particles: Rule = "particle") -> Integral:
+    def integral(self, form: Any, kind: Kind = "cell") -> Integral:
         """Compile a UFL form with integrals of one kind and rule.
 
         Args:
             form: The form.
             kind: What it integrates over.
-            at_particles: Rule at whose points the densities of sums over particles are given.
         """
         symbols, slots, packed = self._symbols, self._field_slots(), {}
+        for rule, densities, columns in self._used(form):
+            vector = ufl.Coefficient(symbols.space(rule, len(columns)), count=2 + len(slots))
+            for symbol, first in densities.items():
+                size = symbol.ufl_shape[0]
+                packed[symbol] = ufl.as_vector([vector[first + k] for k in range(size)])
+            num_points = max(len(rule_points(rule)), 1)
+            slots[vector] = Slot(rule, num_points * len(columns), columns)
+        return self._compiled(ufl.replace(form, packed), slots, kind)
+
+    def at_points(self, form: Any, place: Rule) -> Integral:
+        """Compile sums over particles with the fields at points of one kind.
+
+        Args:
+            form: The form.
+            place: 'particle', or 'centre' or 'vertex' of the cell of each particle.
+        """
+        slots: dict[Any, Slot] = {}
+        data: dict[Any, tuple[Any, int]] = {}
+        for rule, densities, columns in self._used(form):
+            vector = points.vector(len(columns), 1 + len(slots))
+            slots[vector] = Slot(rule, len(columns), columns)
+            data |= {symbol: (vector, first) for symbol, first in densities.items()}
+        with ufl_errors(self._symbols.form):
+            found = points.at_point(form, self._symbols.increments, data)
+        size = len(found.fields)
+        slots |= {points.vector(size, 0): Slot("fields", size)}
+        return replace(self._compiled(found.form, slots), points=(place, found))
+
+    def _used(self, form: Any) -> Iterator[tuple[Rule, dict[Any, int], tuple[int, ...]]]:
+        """Of each rule of a form: its placeholders, each with its first place among the columns, and the
+        columns of the particle data.
+        """
         used = set(form.coefficients())
         for rule, columns in self.densities.items():
-            symbol_of = {
-                density: symbol
-                for density, symbol in symbols.placeholders.items()
-                if density.rule == rule and symbol in used
-            }
-            if not symbol_of:
-                continue
-            points = at_particles if rule == "particle" else rule
-            size = sum(density.size for density in symbol_of)
-            vector = ufl.Coefficient(symbols.space(points, size), count=2 + len(slots))
-            numbers: list[int] = []
-            for density, symbol in symbol_of.items():
-                first, start = len(numbers), columns[density]
-                packed[symbol] = ufl.as_vector([vector[first + k] for k in range(density.size)])
-                numbers += range(start, start + density.size)
-            num_points = max(len(rule_points(points)), 1)
-            slots[vector] = Slot(points, num_points * size, tuple(numbers))
-        form = ufl.replace(form, packed)
+            first, numbers = {}, list[int]()
+            for density, symbol in self._symbols.placeholders.items():
+                if density.rule == rule and symbol in used:
+                    first[symbol], start = len(numbers), columns[density]
+                    numbers += range(start, start + density.size)
+            if first:
+                yield rule, first, tuple(numbers)
+
+    def _compiled(self, form: Any, slots: Mapping[Any, Slot], kind: Kind = "cell") -> Integral:
+        """Compile a form whose coefficients are those of the slots."""
+        symbols = self._symbols
         with ufl_errors(symbols.form):
             # newer versions of FFCx leave their cache locked if they find the error themselves
             check_form_arity(ufl.algorithms.expand_derivatives(form), form.arguments())
             kernel = kernels.compile_kernel(self._comm, form, kind)
         order = form.coefficients()
-        names = {constant: name for name, constant in symbols.constants.items()}
+        names = {constant.count(): name for name, constant in symbols.constants.items()}
         return Integral(
             len(form.arguments()),
             kernel,
             tuple(slots[order[i]] for i in kernel.coefficients),
-            tuple(names[constant] for constant in form.constants()),
+            tuple(names[constant.count()] for constant in form.constants()),
         )
 
     def _field_slots(self) -> dict[Any, Slot]:

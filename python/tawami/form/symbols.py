@@ -6,7 +6,7 @@ import functools
 import inspect
 import warnings
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 import ufl
 
@@ -31,6 +31,8 @@ from tawami.form.quantities import (
 PLACEHOLDERS = 1000
 #: Degree along x and along y up to which the densities of `sum_p` integrate exactly.
 EXACT_DEGREE = 4
+#: How a form is evaluated: by kernels at the particles, or by integrals over cells in plain dolfinx.
+Assembly = Literal["points", "dolfinx"]
 
 
 class Symbols:
@@ -40,6 +42,7 @@ class Symbols:
         form: The form.
         options: The value of each of its options.
         plastic_volume: Whether plastic flow may change the volume; otherwise sums of eps_p are empty.
+        assembly: 'dolfinx' for sums over particles as integrals over cells.
 
     Attributes:
         names: Symbols by name.
@@ -49,9 +52,14 @@ class Symbols:
     """
 
     def __init__(
-        self, form: Form, options: Mapping[str, str], *, plastic_volume: bool = True
+        self,
+        form: Form,
+        options: Mapping[str, str],
+        *,
+        plastic_volume: bool = True,
+        assembly: Assembly = "points",
     ) -> None:
-        self.form = form
+        self.form, self.assembly = form, assembly
         self._plastic_volume = plastic_volume
         domain = dolfinx.domain()
         elements = [dolfinx.lagrange(2, PLANE.dim)] + [dolfinx.lagrange(1)] * (len(form.fields) - 1)
@@ -147,7 +155,7 @@ class Symbols:
         expression = ufl.as_ufl(arguments[-1])
         if isinstance(quantity, LawQuantity):
             self._check_place(rule, quantity, caller)
-        if rule == "particle":
+        if rule == "particle" and self.assembly == "dolfinx":
             self._check_degree(expression)
         if _is_plastic_volume(quantity) and not self._plastic_volume:
             return ufl.Form([])

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import ufl
 from ufl import SpatialCoordinate
-from ufl.algorithms.analysis import has_type
+from ufl.algorithms.analysis import extract_coefficients, has_type
 from ufl.algorithms.check_arities import ArityMismatch, check_form_arity
 
 from tawami.base.errors import FormError
-from tawami.fem.rules import DEGREE
+from tawami.fem.rules import Rule
 from tawami.form.symbols import PLACEHOLDERS, Symbols
 
 
@@ -82,16 +83,23 @@ def by_rule(form: Any) -> list[Any]:
     return [ufl.Form(rules[rule]) for rule in sorted(rules, reverse=True)]
 
 
-def reduced(tangent: Any) -> Any:
-    """A tangent with the reduced rule in place of the full one."""
-    full, smaller = (DEGREE[rule] for rule in ("particle", "reduced"))
-    parts = []
-    for part in tangent.integrals():
-        metadata = part.metadata()
-        if metadata["quadrature_degree"] == full:
-            part = part.reconstruct(metadata={**metadata, "quadrature_degree": smaller})
-        parts.append(part)
-    return ufl.Form(parts)
+def at_points(form: Any, rule_of: Mapping[Any, Rule]) -> tuple[list[tuple[Rule, Any]], Any]:
+    """The sums over particles of a form, by the place of their points, and its integrals over cells.
+
+    Args:
+        form: Integrals over cells.
+        rule_of: The rule of each placeholder of particle data.
+    """
+    sums: dict[Rule, list[Any]] = {}
+    rest = []
+    for integral in form.integrals():
+        rules = {rule_of[c] for c in extract_coefficients(integral) if c in rule_of} - {"mean"}
+        if rules:
+            (rule,) = rules
+            sums.setdefault(rule, []).append(integral)
+        else:
+            rest.append(integral)
+    return [(rule, ufl.Form(parts)) for rule, parts in sums.items()], ufl.Form(rest)
 
 
 def _of_type(form: Any, kind: str) -> Any | None:

@@ -3,29 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tawami.base import checks, ranks
+from tawami.base import checks, html, ranks
 from tawami.base.errors import InputError
 from tawami.base.identity import text
 from tawami.base.process import Unique
 from tawami.base.sealed import Sealed
+from tawami.motion.animation import animate
 from tawami.motion.carried import Carried
 from tawami.motion.energy import Balance, Energies
 from tawami.motion.newmark import Clock, NewmarkStep, signature
 from tawami.motion.observer import Recorder, observed
 from tawami.motion.pace import Pace, Step
+from tawami.motion.requirements import check_displacements, check_scene, checked_damping
 from tawami.motion.rotation import Rotation
 from tawami.motion.stepping import march
-from tawami.motion.transfer import TRANSFERS, Transfer, TransferName
+from tawami.motion.transfer import TRANSFERS, TransferName
 from tawami.scene import description, sources
-from tawami.scene.configuration import Configuration
+from tawami.scene.quantities import Given
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
 from tawami.scene.sources import Source
+
+if TYPE_CHECKING:
+    from matplotlib.animation import FuncAnimation
 
 Array = npt.NDArray[np.float64]
 #: Steps [s] whose squares, and quotients by these, are finite numbers.
@@ -69,13 +74,13 @@ class Dynamics(Sealed, Unique):
     ) -> None:
         checks.instance("Dynamics: scene", scene, Scene, "a tawami.Scene")
         scene.configuration.activity.check_idle("Dynamics(...)")
-        _check_scene(scene)
+        check_scene(scene)
         if not checks.one_of(transfer, TRANSFERS):
             raise InputError(
                 f"transfer = {checks.shown(transfer)}: expected one of {', '.join(TRANSFERS)}"
             )
         self.scene, self.transfer = scene, TRANSFERS[transfer]
-        self.damping = _damping(damping, self.transfer, moves=scene.form.strain.finite)
+        self.damping = checked_damping(damping, self.transfer, moves=scene.form.strain.finite)
         self.gamma = checks.number("gamma", gamma, low=0.5, high=1.0)
         self.beta = (self.gamma + 0.5) ** 2 / 4
         self._now = scene.configuration
@@ -101,6 +106,10 @@ class Dynamics(Sealed, Unique):
             f"Dynamics({self.scene!r}, {self.transfer}, gamma {self.gamma:g}, at {self.time:g} s after "
             f"{self.steps} steps)"
         )
+
+    def _repr_html_(self) -> str:
+        title = f"Dynamics at {self.time:g} s after {self.steps} steps"
+        return html.table(title, description.lines(self._now, self._line))
 
     # -- what the particles carry --------------------------------------------
 
@@ -153,7 +162,7 @@ class Dynamics(Sealed, Unique):
         with now.activity.step("step(...)"):
             with ranks.raise_together(now.model.grid.comm):
                 now.domain.particles.check()
-            _check_displacements(now)
+            check_displacements(now)
             self._balance.begin()
             kind = NewmarkStep(
                 now,
@@ -210,6 +219,44 @@ class Dynamics(Sealed, Unique):
                 self._now.activity, each,
             )  # fmt: skip
 
+    def animate(
+        self,
+        end: float,
+        dt: float,
+        quantity: Given = "mean stress",
+        *,
+        every: float | None = None,
+        deformed: float = 1.0,
+        limits: tuple[float, float] | None = None,
+        each: Callable[[Solution], None] | None = None,
+        results: Recorder | None = None,
+    ) -> FuncAnimation:
+        """Take steps until `end`, as :meth:`run`, and return an animation of the particles. A notebook
+        plays it; `animation.save("pile.gif")` or `.save("pile.mp4")` writes it. A call for all ranks.
+
+        Args:
+            end, dt, each, results: As in :meth:`run`.
+            quantity, deformed, limits: As in `Solution.plot`; one range of colours for all frames.
+            every: Time between two frames [s]; by default there are about 48.
+
+        Raises:
+            ConvergenceError, SingularError, InputError: As :meth:`run`, and as `Solution.plot`.
+            MissingDependencyError: matplotlib is not installed.
+        """
+        given = checks.function("each", each, "of a solution")
+
+        def run(take: Callable[[Solution], None]) -> None:
+            def both(solution: Solution) -> None:
+                take(solution)
+                if given is not None:
+                    given(solution)
+
+            self.run(end, dt, each=both, results=results)
+
+        times = (self.time, checks.number("end", end))
+        shown = None if results is None else False
+        return animate(run, self, times, quantity, every, deformed, limits, shown=shown)
+
     # -- as the subject of a run ---------------------------------------------
 
     @property
@@ -219,13 +266,18 @@ class Dynamics(Sealed, Unique):
 
     def header(self) -> str:
         """As `Scene.header`, with the motion."""
+        return description.header(self._now, self._line)
+
+    @property
+    def _line(self) -> str:
+        """The line of the header about the motion."""
         line = f"Newmark gamma {self.gamma:g}, beta {self.beta:g}, from {self.time:g} s"
         if self._now.model.moves:
             damping = f"{self.damping:g} s" if np.isfinite(self.damping) else "none"
             line += f", transfer {self.transfer}, damping {damping}"
         else:
             line += ", velocities stay on the grid"
-        return description.header(self._now, line)
+        return line
 
     def identity(self) -> dict[str, Any]:
         """As `Scene.identity`, with the motion."""
@@ -282,42 +334,3 @@ class Dynamics(Sealed, Unique):
     def elastic_energy(self) -> float:
         """Energy that the laws store [J per metre depth]."""
         return self._balance.elastic
-
-
-def _check_displacements(now: Configuration) -> None:
-    """Check that the body has the displacements that supports prescribe at the present time."""
-    for support in now.supports.all:
-        if support.is_ahead(now.moment()):
-            raise InputError(
-                f"{support} prescribes a displacement that the body does not have yet: expected "
-                "fix(..., velocity=...) or an amplitude that is 0 at first for a motion, or "
-                "ramp(scene) before Dynamics"
-            )
-
-
-def _check_scene(scene: Scene) -> None:
-    """Check that a scene can be set in motion."""
-    model = scene.configuration.model
-    if model.density is None:
-        raise InputError("Dynamics needs Scene(..., density=...) [kg/m3]")
-    if scene.basis == "biquadratic":
-        raise InputError(
-            "Dynamics with the basis 'biquadratic': its lumped masses are not all positive; use "
-            "'quadratic_spline'"
-        )
-    if not model.least_density > 0:
-        raise InputError("Dynamics: a density of 0: expected more than 0 kg/m3 for every material")
-
-
-def _damping(damping: float, transfer: Transfer, *, moves: bool) -> float:
-    """The time of damping, checked."""
-    expected = "a time in s, more than 0"
-    damping = checks.real("damping", damping, expected)
-    if not damping > 0:
-        raise InputError(f"damping = {damping!r}: expected {expected}")
-    if damping != np.inf and not (transfer.flip and moves):
-        raise InputError(
-            f"damping = {damping:g} s relaxes the velocities of FLIP: expected transfer 'affine_flip' "
-            "or 'flip' and a form of finite strain; gamma > 0.5 damps too"
-        )
-    return damping

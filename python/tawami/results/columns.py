@@ -16,8 +16,8 @@ from tawami.base.errors import InputError, NotModelledError
 from tawami.grid import edges
 from tawami.motion.energy import Energies
 from tawami.motion.observer import Motion, Snapshot, Subject
-from tawami.results.quantities import body_view
 from tawami.scene.points import check_in_body
+from tawami.scene.quantities import body_arrays
 from tawami.scene.reactions import supported_edge
 from tawami.scene.scene import Scene
 
@@ -179,9 +179,9 @@ def displacement_near(subject: Subject, point: tuple[float, float], what: str) -
     Raises:
         InputError: No particle was within a cell of it.
     """
-    view, h = body_view(subject), subject.scene.grid.h
-    u = view("displacement")
-    offset = view("x") - u - np.asarray(point)
+    arrays, h = body_arrays(subject), subject.scene.grid.h
+    u = arrays["displacement"]
+    offset = arrays["x"] - u - np.asarray(point)
     distance = np.linalg.norm(offset, axis=1)
     if not distance.min(initial=np.inf) <= h:
         raise InputError(

@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami.motion.observer import Snapshot
+from tawami.results.grid_quantities import GridQuantity
 from tawami.results.projection import vertices
-from tawami.results.quantities import GridQuantity, Quantity, View
+from tawami.scene.quantities import Arrays, Quantity
 
 Array = npt.NDArray[Any]
 
@@ -35,10 +36,10 @@ class Frame:
     on_cells: dict[str, Array] = field(default_factory=dict)
 
 
-def particle_frame(quantities: Sequence[Quantity], view: View) -> Frame:
+def particle_frame(quantities: Sequence[Quantity], arrays: Arrays) -> Frame:
     """Particles as vertices."""
-    x = view("x")
-    data = {quantity.label: _spatial(quantity.of(view)) for quantity in quantities}
+    x = arrays["x"]
+    data = {quantity.label: _spatial(quantity.values(arrays)) for quantity in quantities}
     return Frame(with_z(x), "vertex", np.arange(len(x))[:, None], data)
 
 

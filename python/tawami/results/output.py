@@ -4,7 +4,8 @@
     tawami.GridOutput("displacement", "mean stress", every=0.05)
     tawami.TableOutput("energies", "reaction left")
 
-Names and units of quantities: `tawami.results.quantities`, `tawami.results.columns`.
+Names and units of quantities: `tawami.scene.quantities`, `tawami.results.grid_quantities`,
+`tawami.results.columns`.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from tawami.base import archive, checks
 from tawami.base.errors import CheckpointError, InputError
 from tawami.base.ranks import raise_together
 from tawami.motion.observer import Snapshot, Subject
+from tawami.scene.quantities import Given, Quantity
 
 #: Kinds of phases of a run.
 PHASES = ("ramp", "settle", "motion")
@@ -34,22 +36,33 @@ class Output:
         name: Of the files.
         phases: Kinds of phases that are observed: 'ramp', 'settle', 'motion'; all by default.
 
+    Attributes:
+        takes_quantities: Whether a name can be a :class:`tawami.Quantity`.
+
     Raises:
         InputError: Not names, both a time and a number of steps, or one of them out of its range.
     """
 
+    takes_quantities = True
+
     def __init__(
         self,
-        names: Sequence[str],
+        names: Sequence[Given],
         every: float | None,
         every_steps: int | None,
         name: str,
         phases: Sequence[str] | None = None,
     ) -> None:
-        if not all(isinstance(given, str) for given in names):
-            raise InputError(
-                f"{type(self).__name__}{checks.shown(names)}: expected names of quantities"
-            )
+        kinds = "names of quantities" + (
+            " or tawami.Quantity(...)" if self.takes_quantities else ""
+        )
+        for given in names:
+            if not (
+                isinstance(given, str) or (self.takes_quantities and isinstance(given, Quantity))
+            ):
+                raise InputError(
+                    f"{type(self).__name__}(..., {checks.shown(given)}, ...): expected {kinds}"
+                )
         if every is not None and every_steps is not None:
             raise InputError("every and every_steps are both given: expected one of them")
         if not isinstance(name, str) or checks.path("name", name).name != name or not name:

@@ -13,16 +13,11 @@ from pathlib import Path
 from tawami.base.ranks import raise_together
 from tawami.motion.observer import Snapshot, Subject
 from tawami.results.frame import Frame, grid_frame, particle_frame
+from tawami.results.grid_quantities import on_grid, usual_on_grid
 from tawami.results.output import Output
 from tawami.results.projection import Projection, check_projection
-from tawami.results.quantities import (
-    body_view,
-    of_particles,
-    on_grid,
-    usual_of_particles,
-    usual_on_grid,
-)
 from tawami.results.series import Series
+from tawami.scene.quantities import Given, body_arrays, of_particles, usual_of_particles
 
 
 class _SeriesOutput(Output):
@@ -47,8 +42,9 @@ class ParticleOutput(_SeriesOutput):
 
     Args:
         names: 'displacement', 'stress', 'mean stress', 'deviatoric stress q' (Kirchhoff's at finite
-            strain), 'volume' (at the start), 'eps_v', 'velocity', 'acceleration', 'material',
-            'number', or a history variable of the laws; by default the usual quantities of the scene.
+            strain), 'strain' (as in `Solution`), 'volume' (at the start), 'eps_v', 'velocity',
+            'acceleration', 'material', 'number', a history variable of the laws, or a
+            :class:`Quantity` of your own; by default the usual quantities of the scene.
         every, every_steps: When; see `Output`. Every step by default.
         name: Of index and folder.
         phases: As in `Output`.
@@ -56,7 +52,7 @@ class ParticleOutput(_SeriesOutput):
 
     def __init__(
         self,
-        *names: str,
+        *names: Given,
         every: float | None = None,
         every_steps: int | None = None,
         name: str = "particles",
@@ -68,7 +64,7 @@ class ParticleOutput(_SeriesOutput):
         self._quantities = of_particles(self.names or usual_of_particles(subject), subject)
 
     def _frame(self, snapshot: Snapshot) -> Frame:
-        return particle_frame(self._quantities, body_view(snapshot.subject))
+        return particle_frame(self._quantities, body_arrays(snapshot.subject))
 
 
 class GridOutput(_SeriesOutput):
@@ -78,15 +74,15 @@ class GridOutput(_SeriesOutput):
         names: 'displacement' (of the last step at finite strain), 'velocity', 'eps_v' or 'p' (since
             the start, without an initial stress), 'particles' (in each cell), 'reaction' (of supports
             and walls, distributed to the vertices with the same sum and moment), or, projected from
-            the particles, 'stress', 'mean stress', 'deviatoric stress q', a history variable, and at
-            finite strain 'eps_v'.
+            the particles, 'stress', 'mean stress', 'deviatoric stress q', 'strain', a history variable,
+            at finite strain 'eps_v', or a :class:`Quantity` of your own.
         every, every_steps, name, phases: As in `ParticleOutput`.
         projection: 'lumped' or 'consistent'; see `tawami.results.projection`.
     """
 
     def __init__(
         self,
-        *names: str,
+        *names: Given,
         every: float | None = None,
         every_steps: int | None = None,
         name: str = "grid",

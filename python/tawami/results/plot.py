@@ -16,8 +16,11 @@ from tawami.base import checks, csv_file
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError, MissingDependencyError, OutputError
 from tawami.base.files import readable_file, reason, result_folder
-from tawami.results.figure import new_figure, save
-from tawami.results.film import Corners, Film, Movie, Times, scalars
+from tawami.picture import style
+from tawami.picture.figure import new_figure, save
+from tawami.picture.film import Movie
+from tawami.picture.particles import Corners
+from tawami.results.film import Times, film_of, scalars
 from tawami.results.provenance import RUN
 from tawami.results.series import frames
 
@@ -73,7 +76,7 @@ def plot(
     written = []
     for phase, times in series:
         if quantity in scalars(times[-1][1]()):
-            film = Film(phase, times, quantity, grid)
+            film = film_of(phase, times, quantity, grid)
             written.append(film.picture(pictures / f"{phase}-{stem}.png"))
             if movie is not None and len(times) > 1:
                 written.append(film.movie(pictures / f"{phase}-{stem}.{movie}", movie))
@@ -135,6 +138,7 @@ def _particles(phase: Path) -> Times:
 # -- tables ------------------------------------------------------------------
 
 
+@style.used()
 def _table(table: Path, path: Path) -> list[Path]:
     """Draw columns over time, one panel for each kind; a table needs at least two rows."""
     try:
@@ -181,7 +185,7 @@ def _panel(axes: Axes, head: Sequence[str], numbers: Sequence[int], values: Arra
         if k in drawn:
             rows = values[values[:, 0] > 0] if of_steps else values
             own = name.removeprefix(kind).strip() or name
-            axes.plot(rows[:, 1], rows[:, k], "." if of_steps else "-", markersize=3, label=own)
+            axes.plot(rows[:, 1], rows[:, k], "." if of_steps else "-", label=own)
     axes.set_xlabel(head[1].replace("time [s]", "$t$ [s]"))
     if of_steps:
         most = axes.dataLim.y1
@@ -194,5 +198,5 @@ def _panel(axes: Axes, head: Sequence[str], numbers: Sequence[int], values: Arra
         axes.set_ylabel(labels[0])
     else:
         axes.set_ylabel(f"{kind} {unit}")
-        axes.legend(fontsize=7, ncols=2 if len(numbers) > 4 else 1)
-    axes.grid(alpha=0.3)
+        axes.legend(ncols=2 if len(numbers) > 4 else 1)
+    axes.grid()

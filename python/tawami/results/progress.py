@@ -1,20 +1,19 @@
-"""Progress of a run: a live line at a terminal, and a log file with the whole history."""
+"""Progress of a run: a live line at a terminal or in a notebook, and a log file of all steps."""
 
 from __future__ import annotations
 
 import logging
 import os
-import shutil
-import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic
-from typing import Any, TextIO
+from typing import Any
 
 from tawami.base.errors import InputError
 from tawami.base.files import check_regular, writing
+from tawami.base.line import Line
 from tawami.motion.pace import Step
 
 log = logging.getLogger("tawami")
@@ -24,42 +23,6 @@ LOG = "log.txt"
 LOG_LEVEL = "TAWAMI_LOG_LEVEL"
 LEVELS = ("DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL")
 FORMAT = logging.Formatter("%(asctime)s %(levelname)s %(message)s")
-#: Seconds between two updates of the live line.
-INTERVAL = 0.1
-
-
-class Line:
-    """A line of a terminal that is written over and over.
-
-    Args:
-        shown: Whether it appears; None: only if standard error is a terminal.
-    """
-
-    def __init__(self, shown: bool | None) -> None:
-        self.stream: TextIO = sys.stderr
-        self._shown = self.stream.isatty() if shown is None else shown
-        self._last, self._written = -INTERVAL, False
-
-    def show(self, text: str, *, now: bool = False) -> None:
-        """Update the line, unless the last update was just before."""
-        if not self._shown or (not now and monotonic() - self._last < INTERVAL):
-            return
-        self._last, self._written = monotonic(), True
-        width = shutil.get_terminal_size().columns - 1
-        self._write(f"\r{text[:width]:{width}}")
-
-    def end(self) -> None:
-        """Leave the line as it is; later output begins below it."""
-        if self._written:
-            self._write("\n")
-        self._written = False
-
-    def _write(self, text: str) -> None:
-        try:
-            self.stream.write(text)
-            self.stream.flush()
-        except (OSError, ValueError):  # the terminal was closed
-            self._shown = False
 
 
 class Progress:
@@ -100,7 +63,8 @@ class Progress:
             f"{particles} particles",
             self._remaining(at),
         )
-        self.line.show(" | ".join(part for part in parts if part), now=last)
+        share = 1.0 if last else (at - self._start) / (self.end - self._start)
+        self.line.show(" | ".join(part for part in parts if part), share, now=last)
 
     def _remaining(self, at: float) -> str:
         """Estimate of the time to the end; empty before the first step."""

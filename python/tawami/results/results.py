@@ -38,7 +38,8 @@ class Results:
         keep: Checkpoints of a phase that are kept.
         existing: What to do with a run in the folder: 'stop' with an error, 'replace' it, or 'resume'
             it. The environment variable TAWAMI_EXISTING takes precedence.
-        progress: Show a live line on standard error; by default if that is a terminal.
+        progress: Show a live line on standard error, or a bar in a notebook; by default if there is
+            a terminal or a notebook.
 
     Raises:
         InputError: A parameter out of its range.

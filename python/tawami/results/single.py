@@ -9,8 +9,9 @@ from tawami.base import checks
 from tawami.base.ranks import raise_together
 from tawami.motion.observer import Snapshot
 from tawami.results.frame import Frame, grid_frame, particle_frame
-from tawami.results.quantities import of_particles, on_grid, solution_view, usual_on_grid
+from tawami.results.grid_quantities import on_grid, usual_on_grid
 from tawami.results.series import write_vtu
+from tawami.scene.quantities import of_particles
 from tawami.scene.solution import Solution
 
 SOLVED = "a tawami.Solution, as scene.solve() returns it"
@@ -31,7 +32,7 @@ def write_particles(path: str | Path, solution: Solution) -> None:
     scene = solution.scene
     names = ["displacement", "stress", "mean stress", "volume"]
     names += ["eps_v"] if scene.form.kinematics.has_eps_v else []
-    frame = particle_frame(of_particles(names, scene), solution_view(solution))
+    frame = particle_frame(of_particles(names, scene), solution.arrays)
     _write(path, frame, scene.grid.comm)
 
 

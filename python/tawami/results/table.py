@@ -30,6 +30,8 @@ class TableOutput(Output):
         phases: As in `Output`.
     """
 
+    takes_quantities = False
+
     def __init__(
         self,
         *names: str,
@@ -41,7 +43,9 @@ class TableOutput(Output):
         super().__init__(names, every, every_steps, name, phases)
 
     def _resolve(self, subject: Subject) -> None:
-        self._columns: list[Columns] = columns(self.names or usual_columns(subject), subject)
+        self._columns: list[Columns] = columns(
+            [str(name) for name in self.names] or usual_columns(subject), subject
+        )
 
     def _open(self, folder: Path, last: int | None, subject: Subject) -> None:
         self.path = result_folder(folder) / f"{self.name}.csv"

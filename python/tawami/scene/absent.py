@@ -15,8 +15,8 @@ HISTORY = (
     "expected scene.particles.history('plastic_strain')"
 )
 GRADIENT = (
-    "no form stores it. At finite strain, as with form='u_epsv_finite', the stress tells the elastic "
-    "part of it, and positions and displacements the motion"
+    "expected the unit tensor plus scene.particles.displacement_gradient, which particles have at "
+    "finite strain, as with form='u_epsv_finite'"
 )
 
 

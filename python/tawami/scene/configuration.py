@@ -22,7 +22,7 @@ from tawami.base.process import check_process
 from tawami.base.program import leave_together
 from tawami.base.timing import Stopwatch
 from tawami.particles import placement
-from tawami.scene import coverage, mean_stress, softening, strain_limit
+from tawami.scene import coverage, mean_stress, quantities, softening, strain_limit
 from tawami.scene.activity import Activity
 from tawami.scene.domain import Domain
 from tawami.scene.loads import Loads
@@ -85,6 +85,7 @@ class Configuration:
         mine, location = placement.distributed(model.grid, particles, moving=model.moves)
         if model.form.kinematics.has_eps_v:
             mine.add_eps_v()
+        mine.add_strain(finite=model.moves)
         self._attach(mine, location)
         self.activity = Activity()
         self.supports = Supports(model.grid, model.basis, self.activity)
@@ -98,9 +99,8 @@ class Configuration:
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
         earlier: Domain | None = getattr(self, "domain", None)
-        self.domain = Domain.attach(
-            self.model, particles, location, self.numerics, self.stopwatch, earlier
-        )
+        of = self.model, particles, location, self.numerics, self.stopwatch
+        self.domain = Domain.attach(*of, earlier)
 
     @property
     def before(self) -> Array:
@@ -282,10 +282,11 @@ class Configuration:
 
     def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:
         particles, comm = self.domain.particles, self.model.grid.comm
-        names = ["number", "x", "volume", "stress", "displacement"]
-        names += ["eps_v"] if self.model.form.kinematics.has_eps_v else []
         in_order = placement.in_order(comm, particles.number)
-        arrays = {name: in_order(getattr(particles, name)) for name in names}
+        arrays = {
+            name: in_order(quantities.array_of(particles, name))
+            for name in quantities.arrays_of(particles)
+        }
         reactions = Reactions.of(accepted, self.supports)
         return Outcome(accepted, coefficients, reactions, arrays)
 

@@ -185,7 +185,7 @@ def _change_material(
         )
     materials, of, numbers = _renumbered(model, np.asarray(particles.material), mask, new)
     changed = _with_numbers(model, particles, numbers, mask, new)
-    other = with_laws(model, changed, materials, of, law, now.numerics.tangent_rule)
+    other = with_laws(model, changed, materials, of, law, now.numerics.assembly)
     after = Domain.attach(other, changed, now.domain.location, now.numerics, now.stopwatch)
     warn_of_locking(model.grid, model.form, new.bulk_modulus / new.shear_modulus, number)
     _replace(now, after)

@@ -19,7 +19,12 @@ def header(now: Configuration, motion: str = "") -> str:
         now: The scene's configuration.
         motion: The line of its motion, if it has one.
     """
-    lines = {
+    return "\n".join(labelled(label, text) for label, text in lines(now, motion).items())
+
+
+def lines(now: Configuration, motion: str = "") -> dict[str, str]:
+    """Texts of :func:`header` by their labels."""
+    found = {
         "grid": _grid(now),
         "particles": _particles(now),
         "unknowns": _unknowns(now),
@@ -31,7 +36,7 @@ def header(now: Configuration, motion: str = "") -> str:
         "solver": now.numerics.line(now.model.grid.comm.size),
         "not modelled": "; ".join(_not_modelled(now, motion)),
     }
-    return "\n".join(labelled(label, text) for label, text in lines.items() if text)
+    return {label: text for label, text in found.items() if text}
 
 
 def _grid(now: Configuration) -> str:

@@ -15,8 +15,8 @@ from tawami.base.timing import Stopwatch
 from tawami.base.warn import warn
 from tawami.field.assembly import Assembly
 from tawami.field.attachment import Attachment
-from tawami.field.fast import FastAssembly
 from tawami.field.layout import Layout
+from tawami.field.points import PointAssembly
 from tawami.field.reference import ReferenceAssembly
 from tawami.field.tractions import Tractions
 from tawami.form.kinematics import KINEMATICS, Kinematics
@@ -28,9 +28,9 @@ from tawami.solve.newton import Newton
 from tawami.solve.numerics import Numerics
 
 Array = npt.NDArray[np.float64]
-ASSEMBLIES: dict[str, type[FastAssembly | ReferenceAssembly]] = {
-    "fast": FastAssembly,
-    "reference": ReferenceAssembly,
+ASSEMBLIES: dict[str, type[PointAssembly | ReferenceAssembly]] = {
+    "points": PointAssembly,
+    "dolfinx": ReferenceAssembly,
 }
 #: Share of a cell that a form which needs whole cells takes for a whole one.
 WHOLE = 0.5

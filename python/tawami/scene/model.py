@@ -18,9 +18,9 @@ from tawami.base.sealed import Settings
 from tawami.base.space import Space
 from tawami.base.warn import warn
 from tawami.body.body import Body
-from tawami.fem.rules import TangentRule
 from tawami.form.compilation import CompiledForm, check_used, compile_form
 from tawami.form.form import Form
+from tawami.form.symbols import Assembly
 from tawami.grid.basis import BASES, Basis
 from tawami.grid.grid import Grid
 from tawami.particles import assignment
@@ -109,7 +109,7 @@ class Model:
         """
         if list(texts) != self.texts:
             raise CheckpointError(
-                "laws were changed while the run went (each=): expected change_material(...) between "
+                "laws were changed during the run (each=): expected change_material(...) between "
                 "two phases"
             )
 
@@ -151,7 +151,7 @@ def build(
     basis: Basis,
     density: float | Sequence[float] | Mapping[str, float] | None,
     leaving: Leaving,
-    tangent_rule: TangentRule,
+    assembly: Assembly,
     parameters: Mapping[str, Any],
 ) -> tuple[Model, _rust.Particles]:
     """The model of a scene and the particles of its whole body; the arguments are those of `Scene`.
@@ -181,7 +181,7 @@ def build(
         )
     ratios = np.array([m.bulk_modulus / m.shear_modulus for m in materials])[particles.material]
     warn_of_locking(grid, loaded, float(ratios.max()), int(ratios.argmax()))
-    compiled = _compiled(grid, loaded, options, tangent_rule, materials, law)
+    compiled = _compiled(grid, loaded, options, assembly, materials, law)
     check_used(compiled, options, parameters)
     _check_plastic_volume(compiled, materials, law, particles)
     instead = "the form's parameters are fixed when a scene is made: Scene(..., {}=...)"
@@ -198,13 +198,13 @@ def _compiled(
     grid: Grid,
     form: Form,
     options: Mapping[str, str],
-    tangent_rule: TangentRule,
+    assembly: Assembly,
     materials: Sequence[_rust.Material],
     law: NumpyLaw | None,
 ) -> CompiledForm:
     """The form, with the plastic volume of the laws if any of them may have one."""
     plastic_volume = law is not None or any(one.pressure_dependent for one in materials)
-    return compile_form(grid.comm, form, options, tangent_rule, plastic_volume=plastic_volume)
+    return compile_form(grid.comm, form, options, assembly, plastic_volume=plastic_volume)
 
 
 def with_laws(
@@ -213,7 +213,7 @@ def with_laws(
     materials: Sequence[_rust.Material],
     of: Sequence[int],
     law: NumpyLaw | None,
-    tangent_rule: TangentRule,
+    assembly: Assembly,
 ) -> Model:
     """A model with other laws; a call for all ranks.
 
@@ -223,7 +223,7 @@ def with_laws(
         materials: The new laws.
         of: Number of the old material of each, whose density and name it has.
         law: The law in NumPy.
-        tangent_rule: As of `Scene`.
+        assembly: As of `Scene`.
 
     Raises:
         InputError: A law that does not fit the form.
@@ -231,7 +231,7 @@ def with_laws(
     form = model.form
     with ranks.raise_together(model.grid.comm):
         particles.check_materials(materials, form.kinematics.name, form.strain.finite)
-    compiled = _compiled(model.grid, form, model.options, tangent_rule, materials, law)
+    compiled = _compiled(model.grid, form, model.options, assembly, materials, law)
     with ranks.raise_together(model.grid.comm):
         _check_plastic_volume(compiled, materials, law, particles)
     return replace(

@@ -12,15 +12,15 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from tawami import _rust
-from tawami.base import checks
+from tawami.base import checks, html
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
 from tawami.base.sealed import Sealed
 from tawami.base.timing import Stopwatch
 from tawami.body.body import Body
-from tawami.fem.rules import TangentRule
 from tawami.field.reduction import Reduction
 from tawami.form.form import Form
+from tawami.form.symbols import Assembly
 from tawami.grid.basis import Basis
 from tawami.grid.grid import Grid
 from tawami.particles import assignment
@@ -34,7 +34,7 @@ from tawami.scene.solution import Solution
 from tawami.scene.sources import Source
 from tawami.scene.statics import StaticStep
 from tawami.scene.step import StepKind
-from tawami.solve.numerics import Assembly, Factorise, Numerics, SolverName
+from tawami.solve.numerics import Factorise, Numerics, SolverName
 
 Array = npt.NDArray[np.float64]
 
@@ -56,7 +56,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         form: Weak form: the name of a shipped one ('u_epsv', 'u_p', 'u_bbar', 'u'), the path of a
             file, a module, or a `Form`.
         basis: Basis of the displacement: 'quadratic_spline', 'bilinear' or 'biquadratic'.
-        tolerance, max_iterations, assembly, tangent_rule, factorise, linear_solver: How a step is
+        tolerance, max_iterations, assembly, factorise, linear_solver: How a step is
             solved; see `tawami.solve.numerics.Numerics`.
         density: Mass density at the start [kg/m3], one for all materials or one each (a list or a
             dictionary as for the materials); gravity needs it.
@@ -96,8 +96,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         basis: Basis = "quadratic_spline",
         tolerance: float = 1e-6,
         max_iterations: int = 20,
-        assembly: Assembly = "fast",
-        tangent_rule: TangentRule = "full",
+        assembly: Assembly = "points",
         factorise: Factorise = "when_it_pays",
         linear_solver: SolverName = "direct",
         density: float | Sequence[float] | Mapping[str, float] | None = None,
@@ -105,9 +104,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         **parameters: Any,
     ) -> None:
         check_process()
-        numerics = Numerics(
-            tolerance, max_iterations, assembly, tangent_rule, factorise, linear_solver
-        )
+        numerics = Numerics(tolerance, max_iterations, assembly, factorise, linear_solver)
         model, particles = build(
             grid,
             body,
@@ -117,7 +114,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
             basis,
             density,
             leaving,
-            tangent_rule,
+            assembly,
             parameters,
         )
         self.configuration = Configuration(model, particles, numerics)
@@ -142,6 +139,9 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
             f"{self.form.name}, {', '.join(dict.fromkeys(self.configuration.model.laws))})"
         )
 
+    def _repr_html_(self) -> str:
+        return html.table(f"Scene at {self.time:g} s", description.lines(self.configuration))
+
     # -- the body ------------------------------------------------------------
 
     @property
@@ -150,7 +150,8 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
 
         Their arrays are views of the storage, not copies: `x` [m], `material` and `number` (which of
         the body they are), which cannot be written, `volume` [m2], `stress` [Pa] (xx, yy, zz, xy;
-        tension positive), `displacement` [m], and `eps_v` with forms that have that field. Where
+        tension positive), `displacement` [m], and `eps_v` with forms that have that field. `strain`, as
+        in `Solution`, and at finite strain `displacement_gradient` (F - I) are read only. Where
         particles change rank or leave the grid this is another object after a step, and always after
         `remove` and `change_material`.
         """

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from tawami import _rust
-from tawami.base import checks
-from tawami.base.errors import InputError
+from tawami.base import checks, html
+from tawami.base.errors import InputError, NotModelledError
 from tawami.base.process import Unique
 from tawami.base.sealed import Sealed
 from tawami.field.constraints import LEAST_SHARE
 from tawami.form.kinematics import KINEMATICS
 from tawami.grid import edges
+from tawami.scene import presentation, quantities
 from tawami.scene.absent import Elsewhere
 from tawami.scene.configuration import Configuration, Outcome
 from tawami.scene.points import ROUND_OFF, outside
+from tawami.scene.quantities import Arrays, Given
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Array = npt.NDArray[np.float64]
 
@@ -50,6 +55,9 @@ class Solution(Elsewhere, Sealed, Unique):
         x: Positions of the particles [m].
         volume: Their volumes [m2] at the start.
         stress: Their stress [Pa] (xx, yy, zz, xy) at the end of this step.
+        strain: Their strain (xx, yy, zz, xy) since the start, from the displacement: the small strain,
+            or at finite strain the logarithmic strain 1/2 ln(F F^T). xy is half the engineering shear
+            strain. Its volume is div u, not the field eps_v.
         displacement_of_particles: Their displacement [m] since the start.
         condition: Estimate of the condition number of the scaled tangent that was factorised last: its
             Frobenius norm over the square root of its size, times that of its inverse as random
@@ -72,11 +80,15 @@ class Solution(Elsewhere, Sealed, Unique):
         self._reactions = outcome.reactions
         self.on_edges = outcome.reactions.on_edges
         particles = outcome.particles
+        #: Arrays of the particles by name, for quantities.
+        self.arrays = Arrays(self._array)
         self.number = particles["number"]
         self.x, self.volume = particles["x"], particles["volume"]
         self.stress = particles["stress"]
         self.displacement_of_particles = particles["displacement"]
+        self.strain = particles["strain"]
         self._eps_v = particles.get("eps_v")
+        self._arrays = particles
         self._seal()
 
     def __repr__(self) -> str:
@@ -103,6 +115,14 @@ class Solution(Elsewhere, Sealed, Unique):
             InputError: The form does not have that field.
         """
         return self._of_form("eps_v", self._eps_v, "has_eps_v")
+
+    def _array(self, name: str) -> npt.NDArray[Any]:
+        """An array of the particles by its name."""
+        if name not in self._arrays:
+            with quantities.not_modelled():  # the error says how to model it
+                quantities.array_of(self.scene.particles, name)
+            raise NotModelledError(f"{name}: this solution was found before the scene had it")
+        return self._arrays[name]
 
     def _of_form(self, name: str, values: Array | None, having: str) -> Array:
         if values is None:
@@ -139,6 +159,90 @@ class Solution(Elsewhere, Sealed, Unique):
             distance = np.linalg.norm(self.x - np.asarray(point), axis=1).min(initial=np.inf)
             raise outside(what, float(distance))
         return value if reached > 1 - ROUND_OFF else value / reached
+
+    # -- in a notebook -------------------------------------------------------
+
+    def plot(
+        self,
+        quantity: Given = "mean stress",
+        axes: Axes | None = None,
+        *,
+        deformed: float = 1.0,
+        limits: tuple[float, float] | None = None,
+    ) -> Axes:
+        """Draw the particles as squares, coloured by a quantity, with the border of the grid.
+
+        On several ranks each rank that calls it draws all particles in a figure of its own.
+
+        Args:
+            quantity: 'mean stress', 'deviatoric stress q', 'stress xx', 'strain xy', 'displacement' (its
+                size), 'displacement y', a history variable, ..., or a `Quantity`.
+            axes: Of matplotlib; in a new figure of pyplot by default.
+            deformed: Factor on the displacements: 0 draws the body as it was at the start.
+            limits: Ends of the range of colours, in the unit of the quantity (Pa); by default those of
+                the values without the outermost 1 %.
+
+        Returns:
+            The axes; `axes.figure.savefig(...)` writes the picture.
+
+        Raises:
+            NotModelledError, InputError: A quantity that the scene does not have, or an unknown one.
+            MissingDependencyError: matplotlib is not installed.
+        """
+        return presentation.plot(
+            self.arrays, self._model.grid, quantity, axes, moved=self._model.moves, deformed=deformed,
+            limits=limits, histories=self.scene.particles.history_names,
+        )  # fmt: skip
+
+    def to_pandas(self, *names: Given) -> Any:
+        """The particles as a `pandas.DataFrame`, with columns "x [m]", "stress xx [Pa]", ... and the
+        numbers of the particles as index.
+
+        Args:
+            names: Quantities, as in :class:`ParticleOutput`; all that the solution has by default.
+
+        Raises:
+            NotModelledError, InputError: As :meth:`plot`.
+            MissingDependencyError: pandas is not installed.
+        """
+        table = presentation.columns(self.arrays, names, *self._usual())
+        return presentation.to_pandas(table, self.number)
+
+    def to_pyvista(self, *names: Given) -> Any:
+        """The particles as a `pyvista.PolyData` of points, with fields "stress xx yy zz xy [Pa]", ...
+
+        Args:
+            names: As in :meth:`to_pandas`.
+
+        Raises:
+            NotModelledError, InputError: As :meth:`plot`.
+            MissingDependencyError: pyvista is not installed.
+        """
+        data = presentation.fields(self.arrays, names, *self._usual())
+        return presentation.to_pyvista(presentation.in_space(self.x), data)
+
+    def _usual(self) -> tuple[list[str], list[str]]:
+        """Quantities of a table without names, and the history variables among them."""
+        histories = self.scene.particles.history_names
+        stored = [
+            name for name in quantities.PARTICLES if name in self._arrays and name != "number"
+        ]
+        return [*stored, *quantities.DERIVED, *histories], histories
+
+    def _repr_html_(self) -> str:
+        momentum, volume = zip(*self.history, strict=True)
+        rows = {
+            "form": self._model.form_line,
+            "particles": str(len(self.number)),
+            "unknowns": str(self.unknowns),
+            "load": "" if np.isnan(self.load) else f"{100 * self.load:g} %",
+            "Newton": f"{self.iterations} iterations",
+            "momentum": ", ".join(f"{measure:.1e}" for measure in momentum),
+            "volume": ", ".join(f"{measure:.1e}" for measure in volume if measure is not None),
+        }
+        return html.table("Solution", rows)
+
+    # -- forces --------------------------------------------------------------
 
     def reaction(self, place: str | Sequence[float]) -> Array:
         """Force (x, y) [N per metre depth] that a support or wall exerts on the body.

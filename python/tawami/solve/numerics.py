@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from tawami.base import checks
-from tawami.fem.rules import TangentRule
+from tawami.form.symbols import Assembly
 
-Assembly = Literal["fast", "reference"]
 Factorise = Literal["when_it_pays", "always"]
 SolverName = Literal["direct", "iterative"]
 
@@ -24,10 +23,8 @@ class Numerics:
     Args:
         tolerance: Newton stops when both measures of `tawami.solve.measures` are below it, 1e-14 to 0.1.
         max_iterations: Newton iterations after which the step fails.
-        assembly: 'fast' calls the kernels from Rust, 'reference' is plain dolfinx and P^T K P. Both give
-            the same numbers up to round-off.
-        tangent_rule: Points of the sums over particles in the tangent: 'full' (5 x 5, exact) or
-            'reduced' (3 x 3, an approximation: cheaper, with more iterations, and Newton may diverge).
+        assembly: 'points' evaluates the form at the particles; 'dolfinx' integrates over cells and
+            computes P^T K P. They agree up to round-off for sums of expressions up to degree 4.
         factorise: 'when_it_pays' uses a factorisation in later iterations and steps, 'always' factorises
             in each Newton iteration.
         linear_solver: 'direct' (MUMPS) or 'iterative' (FGMRES, with multigrid for the displacement).
@@ -38,8 +35,7 @@ class Numerics:
 
     tolerance: float = 1e-6
     max_iterations: int = 20
-    assembly: Assembly = "fast"
-    tangent_rule: TangentRule = "full"
+    assembly: Assembly = "points"
     factorise: Factorise = "when_it_pays"
     linear_solver: SolverName = "direct"
 
@@ -48,7 +44,6 @@ class Numerics:
         checks.whole_number("max_iterations", self.max_iterations, low=1)
         choices: dict[str, Any] = {
             "assembly": Assembly,
-            "tangent_rule": TangentRule,
             "factorise": Factorise,
             "linear_solver": SolverName,
         }
@@ -64,6 +59,6 @@ class Numerics:
             )
         return (
             f"Newton to {self.tolerance:g} in at most {self.max_iterations} iterations, "
-            f"{self.tangent_rule} tangent, {solver}, assembly {self.assembly}, "
+            f"{solver}, assembly {self.assembly}, "
             f"{ranks} rank{'s' if ranks > 1 else ''}"
         )

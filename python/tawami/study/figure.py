@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tawami.results.figure import new_figure, save
+from tawami.picture import style
+from tawami.picture.figure import new_figure, save
 from tawami.study.row import Row, text_of
 from tawami.study.table import Table
 
@@ -24,6 +25,7 @@ LABELS = {
 MARKERS = "os^Dvp*X"
 
 
+@style.used()
 def picture(
     table: Table,
     path: str | Path,
@@ -58,11 +60,11 @@ def picture(
     values = list(
         dict.fromkeys(row.knobs.get(colour or "", "") for row in table.of(table.series[0]))
     )
-    colours = {value: f"C{k % 10}" for k, value in enumerate(values)}
+    colours = {value: style.LINES[k % len(style.LINES)] for k, value in enumerate(values)}
     for axes, quantity in zip(panels, quantities, strict=True):
         _panel(axes, table, quantity, cost, colour, colours)
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=9)
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
     figure.suptitle(title or table.name)
     save(figure, path, dpi=150)
 
@@ -98,12 +100,12 @@ def _panel(
         ((x,), (y,)) = place([row])
         axes.annotate(str(number), (x, y), textcoords="offset points", xytext=(-9, -13),
                       fontsize=10, fontweight="bold")  # fmt: skip
-        axes.plot([x], [y], "o", markersize=11, fillstyle="none", color="tab:red",
+        axes.plot([x], [y], "o", markersize=11, fillstyle="none", color=style.VERMILION,
                   markeredgewidth=2.2 if row is best else 1.0,
                   label="corners of the front" if number == 1 else None)  # fmt: skip
         lines.append(f"{number}{' (knee)' if row is best else ''}: {text_of(row.knobs)}")
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_xlabel(LABELS[cost] + "\n\n" + "\n".join(lines), fontsize=9, loc="left")
+    axes.set_xlabel(LABELS[cost] + "\n\n" + "\n".join(lines), loc="left")
     axes.set_ylabel(f"error of {quantity} [-]")
-    axes.grid(alpha=0.3, which="both")
+    axes.grid(which="both")

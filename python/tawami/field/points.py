@@ -1,8 +1,9 @@
-"""The fast assembly: Rust calls the kernels cell by cell and fills the reduced matrix (`rust/assembly`).
+"""Assembly at the particles: Rust calls point kernels and fills the reduced matrix (`rust/assembly`).
 
-For each cell, on all threads: gather, kernel of FFCx, extraction, scatter into known entries of P^T K P.
-There is no matrix of the mesh. The numbers are those of the reference assembly up to round-off
-(`tests/field/test_fast_field.py`).
+For each cell, on all threads: the integrand and its derivative at each particle, B^T r and B^T D B with
+the functions there, and the sum into known entries of P^T K P. There is no matrix of the mesh. Integrals
+over cells (`dx`) are kernels of FFCx on the cell. The numbers are those of the reference assembly up to
+round-off (`tests/field/test_assemblies.py`).
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ from tawami.field.reduction import Reduction
 from tawami.form.integral import Integral
 
 
-class FastAssembly(Assembly):
-    """Residual and tangent by kernels that Rust calls.
+class PointAssembly(Assembly):
+    """Residual and tangent by kernels at the particles.
 
     Args:
         attachment: The form and the active cells.
@@ -40,7 +41,7 @@ class FastAssembly(Assembly):
 
     def follow(self, earlier: Assembly) -> None:
         """See `Assembly.follow`."""
-        if isinstance(earlier, FastAssembly):
+        if isinstance(earlier, PointAssembly):
             self._matrix = earlier._matrix
 
     @functools.cached_property
@@ -67,7 +68,12 @@ class FastAssembly(Assembly):
             points, vertices = self.attachment.points[slot.source], slot.source == "vertex"
             slots.append((rules.index(slot.data), points, vertices, slot.columns))
         kernel, constants = integral.kernel, self.attachment.constants(integral).tolist()
-        return kernel.module, kernel.address, integral.rank, integral.width, slots, constants
+        point = None
+        if integral.points is not None:
+            place, entries = integral.points
+            point = (place, entries.fields, entries.test, entries.trial)
+        code = kernel.module, kernel.address
+        return *code, integral.rank, integral.width, slots, constants, point
 
     def _kernels(self, rank: int, integrals: Sequence[Integral]) -> _rust.Kernels:
         return _rust.Kernels(self._assembler, rank, list(map(self._kernel, integrals)))

@@ -1,0 +1,107 @@
+"""Point kernels: the integrand of a form at one point, as a function of a few numbers.
+
+Values and derivatives of the fields at the point become the components of one vector coefficient, those
+of the test functions and of the changes of the fields the components of the arguments. FFCx compiles the
+result without basis functions and without a loop over points; Rust multiplies it by the functions at the
+particles (`rust/assembly/point.rs`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import ufl
+from ufl.algorithms import expand_derivatives
+from ufl.algorithms.expand_indices import expand_indices
+from ufl.algorithms.remove_complex_nodes import remove_complex_nodes
+from ufl.classes import Argument, Coefficient, Constant, Grad, Indexed
+from ufl.corealg.traversal import unique_pre_traversal
+
+from tawami.fem import dolfinx
+
+#: Component of the fields and axes of its derivatives: (0, ()) is u_x, (1, (0,)) is du_y/dx.
+Entry = tuple[int, tuple[int, ...]]
+
+
+@dataclass(frozen=True)
+class PointForm:
+    """An integrand at a point.
+
+    Attributes:
+        form: The form on a unit interval with one point.
+        fields, test, trial: What the components of the coefficient of the fields, of the test function
+            and of the trial function are; none of the last in a linear form.
+    """
+
+    form: Any
+    fields: tuple[Entry, ...]
+    test: tuple[Entry, ...]
+    trial: tuple[Entry, ...]
+
+
+def at_point(form: Any, increments: Any, data: Mapping[Any, tuple[Any, int]]) -> PointForm:
+    """The integrand of a form as a function of the fields at a point.
+
+    Args:
+        form: Integrals over cells with one quadrature rule.
+        increments: Coefficient of the fields.
+        data: Of each other coefficient, the vector coefficient on the interval that replaces it (see
+            :func:`vector`), and its first component there.
+    """
+    (integrand, *more) = (part.integrand() for part in expand_derivatives(form).integrals())
+    integrand = expand_indices(remove_complex_nodes(sum(more, integrand)))
+    kinds: tuple[Any, ...] = ("fields", 0, 1)
+    used: dict[Any, set[Entry]] = {kind: set() for kind in kinds}
+    for node in unique_pre_traversal(integrand):
+        if isinstance(node, Indexed):
+            kind, entry = _entry(node, increments)
+            if kind is not None:
+                used[kind].add(entry)
+    entries = {kind: tuple(sorted(of_kind)) for kind, of_kind in used.items()}
+    domain = dolfinx.interval()
+    vectors: dict[Any, Any] = {
+        n: ufl.Argument(_space(len(entries[n]), domain), n) for n in (0, 1) if entries[n]
+    }
+    vectors["fields"] = vector(len(entries["fields"]), 0, domain)
+
+    by_entry: dict[Any, Any] = {}
+    for node in unique_pre_traversal(integrand):
+        if isinstance(node, Constant):
+            by_entry[node] = ufl.Constant(domain, count=node.count())
+        elif isinstance(node, Indexed):
+            kind, entry = _entry(node, increments)
+            symbol, index = node.ufl_operands
+            if kind is not None:
+                by_entry[node] = vectors[kind][entries[kind].index(entry)]
+            elif symbol in data:
+                to, first = data[symbol]
+                by_entry[node] = to[first + int(index[0])]
+    measure = ufl.dx(domain=domain, metadata={"quadrature_degree": 0})
+    return PointForm(ufl.replace(integrand, by_entry) * measure, *(entries[k] for k in kinds))
+
+
+def vector(size: int, count: int, domain: Any = None) -> Any:
+    """A coefficient with `size` components, at least one, on the unit interval."""
+    return ufl.Coefficient(_space(size, domain or dolfinx.interval()), count=count)
+
+
+def _space(size: int, domain: Any) -> Any:
+    return ufl.FunctionSpace(domain, dolfinx.on_interval(max(size, 1)))
+
+
+def _entry(node: Any, increments: Any) -> tuple[Any, Entry]:
+    """What a component is: of the fields, of argument 0 or 1, or (None, ...) of anything else."""
+    symbol, index = node.ufl_operands
+    while isinstance(symbol, Grad):
+        (symbol,) = symbol.ufl_operands
+    kind = None
+    if isinstance(symbol, Argument):
+        kind = symbol.number()
+    elif isinstance(symbol, Coefficient) and symbol == increments:
+        kind = "fields"
+    if kind is None:
+        return None, (0, ())
+    component, *axes = map(int, index)
+    return kind, (component, tuple(sorted(axes)))

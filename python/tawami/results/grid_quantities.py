@@ -1,0 +1,174 @@
+"""Quantities of the grid by name: its own, and quantities of the particles that are projected on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from tawami import _rust
+from tawami.base.arrays import Array
+from tawami.base.errors import InputError, NotModelledError
+from tawami.form.kinematics import FIELD_UNITS
+from tawami.grid import edges
+from tawami.grid.basis import extraction, greville_1d, values_1d
+from tawami.motion.observer import Snapshot, Subject
+from tawami.motion.transfer import to_grid
+from tawami.results.projection import Projection, nodal, vertices
+from tawami.scene.quantities import (
+    HISTORY,
+    PARTICLES,
+    Given,
+    Quantity,
+    body_arrays,
+    history,
+    local_arrays,
+    of_particles,
+    unknown,
+)
+from tawami.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class GridQuantity:
+    """A field of the grid.
+
+    Attributes:
+        label: Its name in files.
+        of: Its values at the vertices or in the cells, x fastest; a call for all ranks.
+        cells: Whether it has one value per cell.
+    """
+
+    label: str
+    of: Callable[[Snapshot], Array]
+    cells: bool = False
+
+
+def on_grid(
+    names: Iterable[Given], subject: Subject, projection: Projection = "lumped"
+) -> list[GridQuantity]:
+    """Fields of the grid by their names: its own, or projected fields of the particles.
+
+    Raises:
+        NotModelledError, InputError: As `of_particles`.
+    """
+    scene = subject.scene
+    own = _of_grid(scene)
+    histories = {name: history(name) for name in scene.particles.history_names}
+    projected = [name for name, quantity in (PARTICLES | histories).items() if quantity.nodal]
+    found = []
+    for name in names:
+        if isinstance(name, Quantity):
+            found.append(_projected_own(of_particles([name], subject)[0], projection))
+        elif name == "p" and name not in own:
+            raise NotModelledError(
+                f"p: form {scene.form.name} has no pressure: expected form='u_p'"
+            )
+        elif name in own:
+            if name == "velocity":
+                of_particles([name], subject)
+            found.append(own[name])
+        elif name in projected or name in HISTORY:
+            found.append(_projected(of_particles([name], subject)[0], projection))
+        else:
+            raise InputError(unknown("grid", name, dict.fromkeys([*own, *projected])))
+    return found
+
+
+def usual_on_grid(scene: Scene) -> tuple[str, ...]:
+    """Quantities of an output without names."""
+    return ("displacement", *list(scene.form.fields)[1:], "particles")
+
+
+def _of_grid(scene: Scene) -> dict[str, GridQuantity]:
+    found = {
+        "displacement": GridQuantity("displacement [m]", _displacement),
+        "velocity": GridQuantity("velocity [m/s]", _velocity),
+        "reaction": GridQuantity("reaction [N/m]", _reaction),
+        "particles": GridQuantity(
+            "particles [-]", lambda now: now.scene.particles_per_cell.astype(float), cells=True
+        ),
+    }
+    if not scene.form.strain.finite:  # else the grid has only that of the last step
+        for name, (kind, _) in list(scene.form.fields.items())[1:]:
+            found[name] = GridQuantity(f"{name} [{FIELD_UNITS[kind]}]", _bilinear)
+    return found
+
+
+def _projected(quantity: Quantity, projection: Projection) -> GridQuantity:
+    def of(now: Snapshot) -> Array:
+        return nodal(now.scene, quantity.of(local_arrays(now.subject)), projection)
+
+    return GridQuantity(quantity.label, of)
+
+
+def _projected_own(quantity: Quantity, projection: Projection) -> GridQuantity:
+    """The projection of a quantity of the driver script, whose function sees the whole body."""
+    if not quantity.nodal:
+        raise InputError(
+            f"grid: quantity '{quantity.label}' has nodal=False: expected one that can be projected, or "
+            "ParticleOutput"
+        )
+
+    def of(now: Snapshot) -> Array:
+        arrays = body_arrays(now.subject)
+        values = quantity.values(arrays)
+        mine = np.searchsorted(arrays["number"], np.asarray(now.scene.particles.number))
+        return nodal(now.scene, values[mine], projection)
+
+    return GridQuantity(quantity.label, of)
+
+
+def _at_vertices(scene: Scene, coefficients: Array) -> Array:
+    matrix = extraction(scene.basis, scene.grid.cells, 1)
+    return np.asarray(matrix @ scene.grid.space.vectors(coefficients))
+
+
+def _displacement(now: Snapshot) -> Array:
+    """Displacement since the start; at finite strain, of the last step."""
+    scene, solution = now.scene, now.solution
+    u = scene.split(scene.configuration.before)[0] if solution is None else solution.u
+    return _at_vertices(scene, u)
+
+
+def _bilinear(now: Snapshot) -> Array:
+    scene, solution = now.scene, now.solution
+    values = scene.split(scene.configuration.before)[1] if solution is None else solution.volumetric
+    return np.asarray(values)
+
+
+def _velocity(now: Snapshot) -> Array:
+    """Velocity of the particles, weighted by mass, with its gradient; NaN without particles around."""
+    motion, attached = now.subject.motion, now.scene.configuration.domain
+    assert motion is not None
+    kept = motion.on_grid
+    if kept is not None:  # a grid that is not reset has its own velocity
+        return _at_vertices(now.scene, kept[0])
+    fields = [(motion.velocity, motion.velocity_gradient)]
+    (momentum,) = to_grid(attached, motion.mass, fields)
+    mass = attached.sums(motion.mass, np.ones((len(motion.mass), 1)))
+    v = np.divide(momentum, mass, out=np.zeros_like(momentum), where=mass > 0)
+    near = attached.sums(motion.mass, np.ones((len(motion.mass), 1)), "bilinear") > 0
+    return np.where(near, _at_vertices(now.scene, v), np.nan)
+
+
+def _reaction(now: Snapshot) -> Array:
+    """Forces of supports and walls [N per metre depth], distributed to the vertices of their cells with
+    the same sum and moment; NaN before the first solution.
+    """
+    scene, grid = now.scene, now.scene.grid
+    if now.solution is None:
+        return np.full((len(vertices(scene)), grid.space.dim), np.nan)
+    along = []
+    for n in grid.cells:
+        place = greville_1d(scene.basis, n)
+        cell = np.minimum(place.astype(np.int64), n - 1)
+        along.append(values_1d("bilinear", n, cell, place - cell))
+    share = sp.kron(along[1], along[0], format="csr")
+    forces = np.asarray(share.T @ now.solution.on_edges)
+    for point, force in now.solution.on_points:
+        location = edges.locate_point(grid, point, "reaction")
+        forces += _rust.nodal_sums(location, np.ones(1), force[None], "bilinear")
+    return forces

@@ -1,0 +1,284 @@
+"""Quantities of the particles, by name.
+
+Files and tables label them "name [unit]", tensors "stress xx yy zz xy [Pa]". A quantity that the scene
+does not model gives an error that says how to model it; an unknown name gives the list of names.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami import _rust
+from tawami.base import checks
+from tawami.base.arrays import Array
+from tawami.base.errors import InputError, NotModelledError
+from tawami.base.space import PLANE
+from tawami.particles import placement
+
+#: Arrays of the particles that are carried by a motion.
+CARRIED = ("velocity", "acceleration")
+#: What particles store of F - I at finite strain.
+GRADIENT = "displacement_gradient"
+#: Components of a symmetric tensor, as labels have them.
+TENSOR = " ".join(PLANE.tensor)
+
+
+class Arrays:
+    """Arrays of particles by name, as `p.stress` or `p["plastic_strain"]`.
+
+    There are `x`, `stress`, `strain`, `displacement`, `volume`, `material` and `number`, and as far
+    as the scene has them `eps_v`, `velocity`, `acceleration`, history variables and, at finite strain,
+    `displacement_gradient`. `mean_stress` and `deviatoric_stress_q` are computed. The first index of
+    an array is the particle.
+
+    Args:
+        get: Function that returns the array of a name.
+    """
+
+    def __init__(self, get: Callable[[str], npt.ArrayLike]) -> None:
+        self._get, self._known = get, dict[str, Array]()
+
+    def __getitem__(self, name: str) -> Array:
+        if (plain := name.replace("_", " ")) in DERIVED:
+            return DERIVED[plain](self)
+        if name not in self._known:
+            self._known[name] = np.asarray(self._get(name))
+        return self._known[name]
+
+    def __getattr__(self, name: str) -> Array:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return self[name]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity of the particles, for outputs and pictures.
+
+    Args:
+        label: Its name and unit, as "largest shear stress [Pa]".
+        of: Function that returns its values, particles or particles x components, from the arrays of the
+            particles, :class:`Arrays`: `lambda p: p.stress[:, 0] - p.stress[:, 1]`.
+        nodal: Whether it can be projected on the grid.
+
+    Raises:
+        InputError: A label without a unit in brackets, or something that is not a function.
+    """
+
+    label: str
+    of: Callable[[Arrays], Any]
+    nodal: bool = True
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.label, str) or not re.fullmatch(r".*\S \[[^\[\]]+\]", self.label):
+            raise InputError(
+                f"Quantity({checks.shown(self.label)}, ...): expected a name with its unit in brackets, "
+                "as 'largest shear stress [Pa]' or 'ratio [-]'"
+            )
+        if not callable(self.of):
+            raise InputError(
+                f"Quantity('{self.label}', {checks.shown(self.of)}): expected a function of the arrays "
+                "of the particles, as lambda p: p.stress[:, 0]"
+            )
+
+    @property
+    def name(self) -> str:
+        """Its name without unit and components."""
+        return split(self.label)[0]
+
+    def values(self, arrays: Arrays) -> Array:
+        """Its values.
+
+        Raises:
+            NotModelledError: The scene does not have an array that it needs.
+            InputError: The function failed, or returned another shape, NaN or infinity.
+        """
+        what = f"quantity '{self.label}'"
+        try:
+            found = np.asarray(self.of(arrays), dtype=float)
+        except NotModelledError as error:
+            raise NotModelledError(f"{what}: {error}") from None
+        except Exception as error:
+            raise InputError(
+                f"{what}: its function raised {type(error).__name__}: {error}"
+            ) from error
+        n = len(arrays["number"])
+        if found.ndim not in (1, 2) or len(found) != n:
+            raise InputError(
+                f"{what}: its function returned an array of shape {found.shape}: expected ({n},) or "
+                f"({n}, components), one row for each particle"
+            )
+        wrong = np.flatnonzero(~np.isfinite(found.reshape(n, -1)).all(axis=1))
+        if len(wrong):
+            p = wrong[0]
+            raise InputError(
+                f"{what}: its function returned {found[p]} for particle {int(arrays['number'][p])} and "
+                f"NaN or infinity for {len(wrong)} of {n} particles: expected finite numbers, "
+                "also at the start, where the stress may be 0 (np.divide(a, b, out=..., where=b != 0))"
+            )
+        return found
+
+
+def _stored(name: str) -> Callable[[Arrays], Array]:
+    return lambda p: p[name]
+
+
+def _mean_stress(p: Arrays) -> Array:
+    return np.asarray(p["stress"][:, :3].mean(axis=1))
+
+
+def _deviatoric_stress(p: Arrays) -> Array:
+    """q = sqrt(3/2 s : s), three-dimensional."""
+    stress = p["stress"]
+    s = stress[:, :3] - _mean_stress(p)[:, None]
+    return np.asarray(np.sqrt(1.5 * ((s**2).sum(axis=1) + 2 * (stress[:, 3:] ** 2).sum(axis=1))))
+
+
+#: Quantities that follow from arrays of the particles.
+DERIVED = {"mean stress": _mean_stress, "deviatoric stress q": _deviatoric_stress}
+#: Quantities of the particles. History variables of the laws, which are strains, are added to them.
+PARTICLES = {
+    "displacement": Quantity("displacement [m]", _stored("displacement"), nodal=False),
+    "stress": Quantity(f"stress {TENSOR} [Pa]", _stored("stress")),
+    "mean stress": Quantity("mean stress [Pa]", _mean_stress),
+    "deviatoric stress q": Quantity("deviatoric stress q [Pa]", _deviatoric_stress),
+    "strain": Quantity(f"strain {TENSOR} [-]", _stored("strain")),
+    "volume": Quantity("volume [m2 per m]", _stored("volume"), nodal=False),
+    "eps_v": Quantity("eps_v [-]", _stored("eps_v")),
+    "velocity": Quantity("velocity [m/s]", _stored("velocity"), nodal=False),
+    "acceleration": Quantity("acceleration [m/s2]", _stored("acceleration"), nodal=False),
+    "material": Quantity("material [-]", _stored("material"), nodal=False),
+    "number": Quantity("number [-]", _stored("number"), nodal=False),
+}
+#: History variables of the laws of tawami.
+HISTORY = ("plastic_strain", "dilatancy")
+#: Names, or quantities of the driver script.
+Given = str | Quantity
+
+
+class Subject(Protocol):
+    """A scene, or its motion, which has velocities too."""
+
+    @property
+    def scene(self) -> Any:
+        """The scene."""
+
+
+def history(name: str) -> Quantity:
+    """The quantity of a history variable."""
+    return Quantity(f"{name} [-]", _stored(name))
+
+
+# -- arrays of particles -----------------------------------------------------
+
+
+def arrays_of(particles: _rust.Particles) -> list[str]:
+    """Names of the arrays that particles have, without those of a motion that are gradients."""
+    stored = dict(particles.arrays)
+    names = [name for name in ("x", *PARTICLES, GRADIENT) if name in stored or name == "strain"]
+    return [*names, *particles.history_names]
+
+
+def array_of(particles: _rust.Particles, name: str) -> npt.NDArray[Any]:
+    """An array of particles by its name.
+
+    Raises:
+        InputError: The particles do not have it; the message names what models it.
+    """
+    known = dict.fromkeys(["x", *PARTICLES, GRADIENT, *HISTORY, *particles.history_names])
+    if name not in known:
+        raise unknown("arrays of the particles", name, known)
+    if name in CARRIED:
+        return particles.carried(name)
+    if name not in (*PARTICLES, GRADIENT, "x"):
+        return particles.history(name)
+    return np.asarray(getattr(particles, name))
+
+
+def local_arrays(subject: Subject) -> Arrays:
+    """Arrays of the particles of this rank."""
+    return Arrays(lambda name: _present(subject, name))
+
+
+def _present(subject: Subject, name: str) -> npt.NDArray[Any]:
+    with not_modelled():
+        if name in CARRIED:
+            _ = getattr(subject, name)  # or the error of the scene that has none
+        return array_of(subject.scene.particles, name)
+
+
+def body_arrays(subject: Subject) -> Arrays:
+    """Arrays of the particles of all ranks in the order of their numbers; calls for all ranks."""
+    gather = placement.in_order(subject.scene.grid.comm, _present(subject, "number"))
+    return Arrays(lambda name: gather(_present(subject, name)))
+
+
+def named(histories: Iterable[str]) -> dict[str, Quantity]:
+    """Quantities by name, with those of history variables."""
+    return PARTICLES | {name: history(name) for name in histories}
+
+
+# -- by name -----------------------------------------------------------------
+
+
+def of_particles(given: Iterable[Given], subject: Subject) -> list[Quantity]:
+    """Quantities of the particles by their names; a call for all ranks.
+
+    Raises:
+        NotModelledError: The scene does not have one; the message names the switch that adds it.
+        InputError: An unknown name, or a function of the driver script that fails.
+    """
+    known = named(subject.scene.particles.history_names)
+    found = []
+    for one in given:
+        if isinstance(one, Quantity):
+            one.values(body_arrays(subject))
+            found.append(one)
+            continue
+        if one not in known and one not in HISTORY:
+            raise unknown("particles", one, known)
+        quantity = known.get(one, history(one))
+        quantity.of(local_arrays(subject))
+        found.append(quantity)
+    labels = [quantity.label for quantity in dict.fromkeys(found)]
+    for label in labels:
+        if labels.count(label) > 1:
+            raise InputError(f"two quantities are called '{label}': expected different labels")
+    return found
+
+
+def usual_of_particles(subject: Any) -> tuple[str, ...]:
+    """Quantities of an output without names."""
+    scene, names = subject.scene, ["displacement", "stress", "mean stress"]
+    names += ["eps_v"] if scene.form.kinematics.has_eps_v else []
+    names += ["velocity"] if subject.motion is not None else []
+    return (*names, *scene.particles.history_names)
+
+
+def unknown(place: str, name: str, known: Iterable[str]) -> InputError:
+    """The error for a name that no quantity has."""
+    return InputError(f"{place}: '{name}' is unknown: expected one of {', '.join(known)}")
+
+
+@contextmanager
+def not_modelled() -> Iterator[None]:
+    """Raise InputError of the block as NotModelledError."""
+    try:
+        yield
+    except InputError as error:
+        raise NotModelledError(str(error)) from None
+
+
+def split(label: str) -> tuple[str, tuple[str, ...], str]:
+    """Name, components and unit of a label; of a tensor, the components of its label."""
+    name, _, unit = label.removesuffix("]").rpartition(" [")
+    if name.endswith(f" {TENSOR}"):
+        return name.removesuffix(f" {TENSOR}"), PLANE.tensor, unit
+    return name, (), unit
