@@ -16,7 +16,6 @@ SCENE = {
     "laws", "mass", "particles_per_cell", "left", "stopwatch", "configuration",
     "remove", "change_material",
     "initial", "fix", "hold", "wall", "release", "traction", "load", "gravity",
-    "remove", "change_material",
     "time", "solve", "solve_part", "advanced",
     "residual", "tangent", "reduction", "split", "num_coefficients",
 }  # fmt: skip
