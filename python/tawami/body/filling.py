@@ -22,8 +22,8 @@ from tawami.body.moment_fitting import fewer
 from tawami.body.points import ROUND_OFF, Points, joined
 from tawami.grid.grid import Grid
 
-#: Particles per cell and axis where a script says nothing. With 2 the sums over cells are less exact: a
-#: strip load is three times as far off (tests/body/test_per_axis.py).
+#: Default number of particles per cell and axis. With 2 the sums over cells are less exact: the error
+#: under a strip load is three times as large (tests/body/test_per_axis.py).
 PER_AXIS = 3
 #: Largest Gauss rule along an axis.
 MOST_POINTS = 1000

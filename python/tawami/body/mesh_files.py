@@ -1,4 +1,4 @@
-"""Mesh files: the reader of each format, and what readers print."""
+"""Mesh files: the reader of each format, and the output of readers."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ Entry = tuple[float, str]
 
 
 def write_vtu(path: str | Path, frame: Frame) -> None:
-    """Write a VTU file. It is not compressed: zlib takes eight times as long (`cases/writing.py`).
+    """Write a VTU file. It is not compressed: zlib takes eight times as long (`cases/costs/writing.py`).
 
     Raises:
         OutputError: The file cannot be written, or has another ending.
