@@ -121,9 +121,9 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     for axes in (left, right):
         axes.set_xlabel("offset [cells]")
         axes.axvline(SLIVER, color="black", linewidth=0.5)
-        axes.grid(alpha=0.3)
-    right.text(SLIVER, right.get_ylim()[1], " sliver of $10^{-8} h$", va="top", fontsize=8)
-    left.legend(fontsize=8)
+        axes.grid()
+    right.text(SLIVER, right.get_ylim()[1], " sliver of $10^{-8} h$", va="top")
+    left.legend()
     save(figure, path)
 
 

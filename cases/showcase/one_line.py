@@ -21,7 +21,7 @@ from mpi4py import MPI
 from ufl import div, dot, grad
 
 import tawami
-from cases.common.figure import save
+from cases.common.figure import add_bar, draw_particles, save
 from cases.common.program import Program
 from cases.showcase.collapse.pile import roughness
 
@@ -68,19 +68,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         rough = roughness(solution.x, solution.mean_stress, H)
         title = "without the line" if residual is unstable else "with it"
         print(f"{title:16} roughness of the mean stress {rough:.4f}")
-        points = axis.scatter(
-            *solution.x.T,
-            c=solution.mean_stress / 1e3,
-            s=5,
-            marker="s",
-            linewidths=0,
-            cmap="viridis",
-            vmin=-1,
-            vmax=0,
-        )
-        axis.set(aspect="equal", title=title, xlabel="$x$ [m]")
+        stress, limits = solution.mean_stress, (-LOAD, 0.0)
+        points = draw_particles(axis, solution.x, 0.4 * H, stress, "Pa", limits)
+        axis.set(title=title, xlabel="$x$ [m]")
     axes[0].set_ylabel("$y$ [m]")
-    figure.colorbar(points, ax=axes, label="mean stress [kPa]", extend="both")
+    add_bar(points, axes)
     save(figure, PROGRAM.folder / "mean_stress.png")
     PROGRAM.list_results()
 

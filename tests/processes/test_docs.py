@@ -232,6 +232,25 @@ def test_tutorials_can_be_downloaded_as_notebooks(name):
     assert notebooks.download(PAGES[name]) == notebooks.download(PAGES[name])
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in PAGES if "{code-cell}" in PAGES[name]])
+def test_code_of_pages_runs_anywhere(name, tmp_path, monkeypatch):
+    """In a folder outside the repository, that of tutorials with the package alone."""
+    nbclient = pytest.importorskip("nbclient", reason="installed by make docs")
+    nbformat = pytest.importorskip("nbformat")
+    folders = [sources.ROOT / "python"] + [sources.ROOT] * (name not in pages.TUTORIALS)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(map(str, folders)))
+    monkeypatch.setenv("MPLBACKEND", "module://matplotlib_inline.backend_inline")
+    notebook = nbformat.reads(notebooks.download(PAGES[name]), as_version=4)
+    folder = {"metadata": {"path": str(tmp_path)}}
+    nbclient.NotebookClient(notebook, timeout=300, resources=folder).execute()
+    nbformat.write(notebook, tmp_path / "page.ipynb")
+    assert notebooks.problems(tmp_path) == []
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    drawn = any("image/png" in output.get("data", {}) for output in outputs)
+    assert drawn or name not in pages.TUTORIALS
+
+
 @pytest.mark.parametrize("name", pages.CASES)
 def test_docstrings_of_cases_become_text(name):
     folder = sources.ROOT / "cases" / pages.CASES[name][1] / name

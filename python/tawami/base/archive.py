@@ -23,7 +23,7 @@ from tawami.base.errors import CheckpointError
 from tawami.base.files import atomic_file, reason
 
 #: Version of the content of a state.
-FORMAT = 3
+FORMAT = 4
 #: Entry of the archive with the JSON.
 ABOUT = "about.json"
 #: Folder of the checkpoints in the folder of a run.

@@ -38,11 +38,11 @@ class Energies:
         dissipated: Work of the stress on plastic strains.
         friction: Lost to the friction of walls.
         external: Work of loads and of supports that move; between two steps of a motion, the elastic
-            energy that static steps add.
+            energy that static steps and new laws add.
         transfer: Energy lost on the way from the particles to the grid and back: kinetic, and elastic
             where the mean stress of a mixed form is projected on the present grid.
         impact: Kinetic energy lost where supports stop the grid.
-        left: Kinetic and elastic energy of the particles that left the grid.
+        left: Kinetic and elastic energy of the particles that left the grid or were removed.
         integration: Remainder of the balance.
     """
 
@@ -123,6 +123,8 @@ class Balance:
         #: Kinetic energy of the particles when the last step was stored.
         self._stored_kinetic = self.energies.kinetic
         self._statics = configuration.activity.statics
+        #: Energy of the particles that were removed, as far as the balance counts it.
+        self._removed = configuration.removed
 
     def sum(self, value: float) -> float:
         """A sum over the ranks."""
@@ -140,9 +142,10 @@ class Balance:
         return self.sum(self._now.domain.stage.elastic_energy())
 
     def begin(self) -> None:
-        """Start a step: add the energy of velocities that the script wrote into the particles, and of
-        static steps since the last one.
+        """Start a step: add the energy of velocities that the script wrote into the particles, of particles
+        that were removed since the last step, and of static steps.
         """
+        self._count_removed()
         kinetic = self.kinetic
         self._growth.add(kinetic - self._stored_kinetic)
         self._stored_kinetic = kinetic
@@ -150,6 +153,23 @@ class Balance:
             self._statics, elastic, e = self._now.activity.statics, self.elastic, self.energies
             external = e.external + elastic - e.elastic
             self.energies = replace(e, elastic=elastic, external=external)
+
+    def _count_removed(self) -> None:
+        """Move the energy of particles that the script has removed to the term of those that left."""
+        (kinetic, elastic), e = self._now.removed - self._removed, self.energies
+        if not (kinetic or elastic):
+            return
+        self._removed = self._now.removed
+        self._stored_kinetic -= kinetic
+        if not self._now.model.moves:  # the energy of the grid, with the mass that is left
+            mass = self._now.domain.lumped_mass
+            v, _ = self._carried.mapped(mass)
+            kinetic = e.kinetic - 0.5 * float(mass @ (v**2).sum(axis=1))
+        left = kinetic + elastic
+        self.energies = replace(
+            e, kinetic=e.kinetic - kinetic, elastic=e.elastic - elastic, left=e.left + left
+        )
+        self._growth.add(-left)
 
     def of_step(
         self, mass: Array, velocities: tuple[Array, Array, Array], accepted: Accepted
@@ -217,6 +237,7 @@ class Balance:
             "energies": asdict(self.energies),
             "growth": self._growth.state(),
             "stored_kinetic": self._stored_kinetic,
+            "removed": [*self._removed],
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -224,4 +245,6 @@ class Balance:
         self.energies = Energies(**state["energies"])
         self._growth.restore(state["growth"])
         self._stored_kinetic = state["stored_kinetic"]
+        kinetic, elastic = state["removed"]
+        self._removed = np.array([kinetic, elastic])
         self._statics = self._now.activity.statics

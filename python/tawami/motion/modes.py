@@ -30,7 +30,7 @@ class Modes:
         frequencies: [Hz]; 0 for a rigid motion, negative where the body is unstable and the motion grows
             (minus its rate over 2 pi).
         shapes: Displacements of the particles, modes x particles x dim, in the order of the body. Their
-            sum over the mass, sum_i m_i |u_i|^2, is 1 [1/sqrt(kg per metre depth)] on the grid.
+            sum over the mass, `sum_i m_i |u_i|^2`, is 1 [1/sqrt(kg per metre depth)] on the grid.
     """
 
     frequencies: Array

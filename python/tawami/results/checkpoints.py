@@ -116,8 +116,8 @@ class Checkpoints:
         self._source = files[-1 - len(problems)] if files else None
         if unknown:
             self._warn(
-                f"'{self.phase}' is resumed, and these values cannot be compared to those of the run "
-                f"before: {'; '.join(unknown)}. Expected the same values as then"
+                f"'{self.phase}' is resumed, and these values cannot be compared with those of the "
+                f"interrupted run: {'; '.join(unknown)}. Make sure that they are the same"
             )
         return state
 

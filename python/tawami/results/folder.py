@@ -112,8 +112,8 @@ class RunFolder:
             others = [name for name in COPIES if self._is_foreign(self.path / name)]
             if others:
                 raise InputError(
-                    f"{self._what}: the folder holds '{others[0]}', which is of no run: "
-                    "expected a folder of its own for the results"
+                    f"{self._what}: the folder holds '{others[0]}', which does not belong "
+                    "to a run: expected a separate folder for the results"
                 )
         result_folder(self.path / archive.FOLDER)
         return resumes

@@ -1,4 +1,4 @@
-"""The time of a scene, and what it is doing: a step must not begin within another one."""
+"""The time and the activity of a scene: a step must not begin within another one."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ def checked_limits(limits: Any) -> tuple[float, float] | None:
     """
     if limits is None:
         return None
-    low, high = checks.pair("limits", limits, "two numbers, as (-1e3, 1e3)")
+    low, high = checks.pair("limits", limits, "numbers, as (-1e3, 1e3)")
     low = checks.number("limits[0]", low)
     return low, checks.number("limits[1]", high, low=np.nextafter(low, np.inf))
 
