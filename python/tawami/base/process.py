@@ -26,7 +26,7 @@ def check_process() -> None:
     """Check that this process was not forked from one that uses MPI and threads.
 
     Raises:
-        InputError: It was forked; calls could wait for ever.
+        InputError: It was forked; calls could wait forever.
     """
     if os.getpid() in _forked:
         raise InputError(

@@ -1,7 +1,7 @@
 """Programs on several ranks: how they start, and how an error on one rank ends all of them.
 
 An error that nothing catches is printed once and ends all ranks (:func:`watch`), and so does sys.exit on
-one rank in a function that tawami calls (:func:`leave_together`). The others would wait for ever.
+one rank in a function that tawami calls (:func:`leave_together`). The others would wait forever.
 """
 
 from __future__ import annotations

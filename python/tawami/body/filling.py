@@ -69,10 +69,10 @@ class Filling:
         return int(self.per_axis**self.grid.space.dim)
 
     def check_memory(self, cells: int) -> None:
-        """Check that there is memory for the particles of so many full cells.
+        """Check that there is memory for the particles of this number of full cells.
 
         Raises:
-            InputError: There is not.
+            InputError: There is not enough.
         """
         what = f"per_axis = {shown(self.per_axis)} in {cells} cell{'s' if cells > 1 else ''}"
         room(what, cells * self.per_cell, BYTES_PER_PARTICLE, "expected fewer particles")

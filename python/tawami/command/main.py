@@ -187,7 +187,7 @@ def _add_plot(commands: Any) -> None:
 
 def _add_new(commands: Any) -> None:
     new = _add(commands, "new", _new, "write a driver script", (
-        "Writes NAME.py, a commented script that runs as it is. An existing file is not changed."
+        "Writes NAME.py, a commented script that runs without changes. An existing file is not changed."
     ))  # fmt: skip
     new.add_argument("file", metavar="NAME", help="as mycase, or folder/mycase.py")
     kind = new.add_mutually_exclusive_group()

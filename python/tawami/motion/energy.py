@@ -142,8 +142,8 @@ class Balance:
         return self.sum(self._now.domain.stage.elastic_energy())
 
     def begin(self) -> None:
-        """Start a step: add the energy of velocities that the script wrote into the particles, of particles
-        that were removed since the last step, and of static steps.
+        """Start a step: add the energy of velocities that the script wrote into the particles, of
+        particles that were removed since the last step, and of static steps.
         """
         self._count_removed()
         kinetic = self.kinetic

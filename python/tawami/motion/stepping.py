@@ -36,7 +36,7 @@ def march(
         end: Time [s] or share at which the steps end.
         smallest: Size below which a step is not tried again.
         attempt: Function of the end of a step and its size that takes the step; if it raises, it must
-            leave everything as it was.
+            change nothing.
         observer: Observer of the steps.
         activity: Of the scene; no step may begin while observer and `each` are called.
         each: Called with the solution of each accepted step.

@@ -89,7 +89,7 @@ class Series:
         """Add a file.
 
         Raises:
-            OutputError: It cannot be written; the series is as it was before.
+            OutputError: It cannot be written; the series is unchanged.
         """
         path = self.files / f"{self.name}-{step:06d}.vtu"
         write_vtu(path, frame)

@@ -69,5 +69,5 @@ class Activity:
             raise InputError(
                 f"{what} was called while a step of this scene was being solved, by a law, an "
                 "amplitude, a velocity or another function that the step evaluates: expected a function "
-                "that returns its values and leaves the scene as it is"
+                "that returns its values and does not change the scene"
             )

@@ -193,9 +193,10 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         top of it. A call for all ranks.
 
         'stress' is the stress from which the laws start: (xx, yy, zz, xy) [Pa], Kirchhoff's per V0 at
-        finite strain. With a field eps_v it sets this too, to sigma_m / K, the elastic part. 'eps_v' (larger than this
-        part, by plastic strain; or 0: counted from this state) and 'displacement' [m] are records that
-        enter no equation: positions stay. History variables of the laws have their own names.
+        finite strain. With a field eps_v it sets this too, to sigma_m / K, the elastic part. 'eps_v'
+        (larger than this part, by plastic strain; or 0: counted from this state) and 'displacement' [m]
+        are records that enter no equation: positions stay. History variables of the laws have their own
+        names.
 
         Args:
             name: 'stress', 'displacement', 'eps_v', or a history variable.
@@ -309,7 +310,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         return self.configuration.domain.layout.split(self._coefficients(coefficients))
 
     def reduction(self) -> Reduction:
-        """Unknowns that the present supports leave free: coefficients = selection @ unknowns + offset."""
+        """Unknowns that the supports leave free: coefficients = selection @ unknowns + offset."""
         return StaticStep(self.configuration, self.configuration.moment()).problem().reduction
 
     def residual(self, coefficients: Array) -> Array:
