@@ -1,4 +1,4 @@
-"""The body in its present configuration, under its supports and loads: what a step starts from.
+"""The body in its present configuration, under its supports and loads: the start of a step.
 
 A step either changes all of it or nothing.
 """
@@ -63,14 +63,14 @@ class Configuration:
     """Particles, supports and loads of one scene between two steps.
 
     Args:
-        model: What the scene is made of.
+        model: Grid, form and laws of the scene.
         particles: The particles of the whole body, on every rank.
         numerics: How a step is solved.
 
     Attributes:
         domain: The particles where they are; another object after a step that moves them.
         supports, loads: As the driver script made them.
-        activity: Time of the scene, and what it is doing.
+        activity: Time and activity of the scene.
         total: Coefficients of all fields since the start, where particles do not move.
         left: Number, position [m] and time [s] of the particles that left the grid or were removed.
         removed: Kinetic and elastic energy of the particles that were removed [J per metre depth].
@@ -293,7 +293,7 @@ class Configuration:
     # -- checkpoints ---------------------------------------------------------
 
     def identity(self) -> dict[str, Any]:
-        """What tells it from another one, for checkpoints; a call for all ranks."""
+        """Facts that identify it, for checkpoints; a call for all ranks."""
         grid = self.model.grid
         sizes = {"stress": self.domain.responses.stiffest} | dict.fromkeys(LENGTHS, grid.h)
         arrays = placement.gathered(grid, self.domain.particles)
@@ -309,7 +309,7 @@ class Configuration:
         return self.model.identity() | facts | particles
 
     def state(self) -> dict[str, Any]:
-        """All that is carried from one step to the next, of all ranks; a call for all ranks."""
+        """State that passes from one step to the next, of all ranks; a call for all ranks."""
         return {
             "particles": placement.gathered(self.model.grid, self.domain.particles),
             "time": self.activity.time,
