@@ -317,6 +317,22 @@ def test_a_fingerprint_depends_on_its_files():
     assert one != executed.fingerprint(["forms/*.py"], "more")
 
 
+def test_a_fingerprint_depends_on_code_only(tmp_path, monkeypatch):
+    """Not on comments, docstrings and layout of Python files."""
+    monkeypatch.setattr(executed, "ROOT", tmp_path)
+    marks = {}
+    for text in (
+        'def f():\n    """One."""\n    return 1',
+        "def f():\n    'Two'\n    return (1)  # one",
+    ):
+        (tmp_path / "f.py").write_text(text)
+        (tmp_path / "f.rs").write_text("fn f() {}")
+        marks[text] = executed.fingerprint(["f.*"])
+    assert len(set(marks.values())) == 1
+    (tmp_path / "f.py").write_text("def f():\n    return 2")
+    assert executed.fingerprint(["f.*"]) not in marks.values()
+
+
 def test_every_case_is_a_page_and_can_be_run():
     for name, (_, room, beside) in pages.CASES.items():
         folder = sources.ROOT / "cases" / room / name
