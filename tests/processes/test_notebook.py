@@ -57,6 +57,7 @@ def test_a_notebook_shows_tables_pictures_and_progress(notebook):
     assert "arning" not in run["stderr"]
     assert "<table>" in notebook("solution = motion.step(0.1); solution")["text/html"]
     assert "image/png" in notebook("solution.plot('velocity x');")
+    assert "image/png" in notebook("import matplotlib.pyplot as plt; plt.plot([1, 2]);")
     film = notebook("motion.animate(1.0, 0.1, 'velocity x')")
     assert film["text/html"].count("data:image/png;base64") == 5
     assert "arning" not in film["stderr"]
