@@ -73,10 +73,10 @@ class Configuration:
         activity: Time and activity of the scene.
         total: Coefficients of all fields since the start, where particles do not move.
         left: Number, position [m] and time [s] of the particles that left the grid or were removed.
-        removed: Kinetic and elastic energy of the particles that were removed [J per metre depth].
+        removed: Kinetic and elastic energy of removed particles [J per metre depth].
         begun: Whether a step was stored.
-        projected: Elastic energy that the projection of the mean stress took from the particles of this
-            rank at the end of the last step [J per metre depth].
+        projected: Elastic energy that projecting the mean stress took from this rank's particles in the
+            last step [J per metre depth].
         stopwatch: Where the time goes.
     """
 
