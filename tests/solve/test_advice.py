@@ -90,7 +90,7 @@ def test_shorter_steps_along_a_path():
         )
         return path.complete
 
-    with pytest.raises(tawami.ConvergenceError, match="Take shorter steps along the path"):
+    with pytest.raises(tawami.ConvergenceError, match="Use shorter steps along the path"):
         ended(0.02)
     assert ended(0.002)
 
@@ -111,7 +111,7 @@ def test_a_smaller_time_step():
             scene, velocity=20.0 * np.column_stack([-body.x[:, 1], body.x[:, 0]])
         )
 
-    with pytest.raises(tawami.ConvergenceError, match=r"Take a smaller dt; run\(...\) does this"):
+    with pytest.raises(tawami.ConvergenceError, match=r"Use a smaller dt; run\(...\) does this"):
         spinning().step(0.2)
     spinning().step(0.02)
     assert len(spinning().run(0.2, 0.2)) > 1

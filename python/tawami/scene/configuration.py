@@ -99,9 +99,8 @@ class Configuration:
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
         earlier: Domain | None = getattr(self, "domain", None)
-        self.domain = Domain.attach(
-            self.model, particles, location, self.numerics, self.stopwatch, earlier
-        )
+        of = self.model, particles, location, self.numerics, self.stopwatch
+        self.domain = Domain.attach(*of, earlier)
 
     @property
     def before(self) -> Array:
@@ -202,7 +201,7 @@ class Configuration:
         assert step is not None
         raise ConvergenceError(
             f"contact and friction of the walls did not settle in {PASSES} solves. Nothing was changed "
-            "in the particles. Take a smaller step",
+            "in the particles. Use a smaller step",
             step.history,
         )
 

@@ -39,7 +39,8 @@ class Solved(Protocol):
 class Solution(Elsewhere, Sealed, Unique):
     """Equilibrium of a scene, or the end of a step.
 
-    On several ranks all of it is on every rank. Arrays of particles are in the order of their numbers.
+    On several ranks every rank has the complete solution. Arrays of particles are in the order of their
+    numbers.
 
     Attributes:
         scene: The scene.

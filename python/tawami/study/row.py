@@ -1,4 +1,4 @@
-"""Rows of a study: measured runs, and what changes between two settings."""
+"""Rows of a study: measured runs, and changes between two settings."""
 
 from __future__ import annotations
 
