@@ -380,5 +380,5 @@ def test_a_law_that_changes_while_a_run_goes_cannot_be_resumed(tmp_path):
 
     with pytest.raises(Killed):
         run(Kill(4))
-    with pytest.raises(tawami.CheckpointError, match="laws were changed while the run went"):
+    with pytest.raises(tawami.CheckpointError, match="laws were changed during the run"):
         run(Kill())
