@@ -14,7 +14,7 @@ pub(super) struct PyMaterial {
     made: Made,
 }
 
-/// What a law was made of, to copy and to pickle it.
+/// Arguments with which a law was made, to copy and to pickle it.
 enum Made {
     /// A linear elastic law: the function, and its two arguments.
     Elastic(&'static str, f64, f64),

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! on the tensor Gauss points with k + 1 points per axis, `sum_q w_q |J| D_q f(xi_q) = sum_p V_p D_p f(xi_p)`
-//! holds to round-off for every f in Q_k (README, The method).
+//! holds to round-off for every f in Q_k (documentation, Theory).
 
 use ndarray::ArrayView2;
 use rayon::prelude::*;

@@ -64,7 +64,7 @@ def test_a_ramp_and_a_path_where_the_load_is_too_large():
     scene = pressed(0.49, 0.0)
     with pytest.raises(tawami.ConvergenceError, match=r"follow\(scene, ...\) passes a limit load"):
         scene.solve()
-    with pytest.warns(tawami.IncompleteWarning, match="allow a smaller `smallest`"):
+    with pytest.warns(tawami.IncompleteWarning, match="use a smaller `smallest`"):
         coarse = tawami.ramp(scene, 0.2, smallest=0.15)
     with pytest.warns(tawami.IncompleteWarning, match=r"follow\(scene, ...\) passes a limit load"):
         fine = tawami.ramp(scene, 0.2, smallest=0.01)  # of the rest
@@ -123,7 +123,7 @@ def test_more_resets_or_a_larger_tolerance():
         return tawami.settle(scene, **options)
 
     penalty = "on"
-    with pytest.raises(tawami.ConvergenceError, match="or take ghost_penalty='off'"):
+    with pytest.raises(tawami.ConvergenceError, match="or use ghost_penalty='off'"):
         settled(max_resets=10)
     assert settled(max_resets=10, tolerance=0.1)
     penalty = "off"
