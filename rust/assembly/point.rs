@@ -144,7 +144,7 @@ impl Entries {
     }
 }
 
-/// Where a kernel is evaluated.
+/// Places where a kernel is evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
     /// At each particle.

@@ -54,7 +54,7 @@ impl PyMaterial {
         Ok(Self { law, made: Made::Law(maker.name, elastic, parameters) })
     }
 
-    /// How to make a copy, here or in another process.
+    /// Arguments for a copy, here or in another process.
     fn __reduce__<'py>(
         &self,
         py: Python<'py>,

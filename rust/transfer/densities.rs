@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use crate::grid::{Location, Rule, MAX_POINTS};
 use crate::space::{volume_of_cell, Index, DIM};
 
-/// Which columns of the particle data are given to which points of a tensor rule.
+/// Columns of the particle data, and the points of a tensor rule that receive their densities.
 #[derive(Debug, Clone, Copy)]
 pub struct Densities<'a> {
     /// One-dimensional rule of the points.

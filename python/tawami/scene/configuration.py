@@ -65,7 +65,7 @@ class Configuration:
     Args:
         model: Grid, form and laws of the scene.
         particles: The particles of the whole body, on every rank.
-        numerics: How a step is solved.
+        numerics: Numerical settings of a step.
 
     Attributes:
         domain: The particles where they are; another object after a step that moves them.
@@ -77,7 +77,7 @@ class Configuration:
         begun: Whether a step was stored.
         projected: Elastic energy that the projection of the mean stress took from the particles of this
             rank at the end of the last step [J per metre depth].
-        stopwatch: Where the time goes.
+        stopwatch: Time of each stage of a step.
     """
 
     def __init__(self, model: Model, particles: _rust.Particles, numerics: Numerics) -> None:

@@ -28,8 +28,8 @@ class Problem:
         external: External forces on all coefficients [N per metre depth].
         inertia: Of a dynamic step.
         guess: Increments of all fields to start from.
-        crossings: How far supports will have moved the body across their edges [m], by the number of
-            the support.
+        crossings: Distances by which supports will have moved the body across their edges [m], by the
+            number of the support.
         path: Path on which the load factor is an unknown; `external` is at its start.
         load: Share of the new loads; NaN in dynamics.
     """

@@ -75,7 +75,7 @@ class Wall:
     Attributes:
         functions: Displacement functions along it.
         state: Their states of contact.
-        returns: How often each came back to the wall or to rest in this step.
+        returns: Number of times that each came back to the wall or to rest in this step.
     """
 
     grid: Grid
