@@ -65,7 +65,7 @@ def test_an_excavated_column_rebounds_by_the_closed_form(form):
         kept = np.array(scene.particles.number)
         error = 1e-4 if scene.form.strain.finite else 1e-8
         np.testing.assert_allclose(rise(scene, before)[:, 1], u[kept], rtol=0, atol=error * u.max())
-        assert scene.solve().history[0][0] < 1e-5  # nothing is left to fade
+        assert scene.solve().history[0][0] < 1e-5  # no force remains to fade
 
 
 def test_outputs_and_numbers_are_those_of_the_particles_that_stay():
