@@ -93,7 +93,7 @@ class Squares:
         from matplotlib.collections import PolyCollection
 
         self._scale = scale
-        self.artist = PolyCollection([], cmap=scale.colours, edgecolors="face", linewidths=0.3)
+        self.artist = PolyCollection([], cmap=scale.colours, edgecolors="face", linewidths=0.6)
         self.artist.set_clim(scale.low, scale.high)
         self.artist.set_zorder(2)
         axes.add_collection(self.artist, autolim=False)

@@ -333,7 +333,8 @@ class Configuration:
         particles, location = placement.scattered(
             self.model.grid, self.domain.particles, state["particles"], moving=self.model.moves
         )
-        if np.shape(state["total"]) != self.total.shape:
+        sizes = {np.shape(state["total"]), np.shape(state["loads"]["unbalanced"])}
+        if sizes - {(0,)} != {self.total.shape}:
             raise CheckpointError("its fields have another number of coefficients than the scene")
         self.model.check_same_laws(state["laws"])
         self.activity.time, self.total = state["time"], state["total"]
