@@ -88,7 +88,7 @@ def test_particles_of_finite_strain_are_drawn_with_their_deformation(finite):
     np.testing.assert_allclose(area(corners), finite.volume * np.linalg.det(f))
 
 
-def test_what_follows_from_stress_and_displacement_can_be_drawn(finite):
+def test_quantities_of_stress_and_displacement_can_be_drawn(finite):
     (left, right), s = plt.subplots(1, 2)[1], finite.stress
     for name, expected in {
         "stress xy": s[:, 3], "deviatoric stress q": finite.arrays.deviatoric_stress_q,

@@ -55,7 +55,7 @@ class Checkpoints:
         folder: Of the run.
         number: Of the phase in the run.
         phase: Its name.
-        subject: What is observed.
+        subject: Scene or motion that is observed.
         schedule: When they are written.
         resumes: Whether the run is resumed: the phase begins from its newest checkpoint.
 

@@ -85,8 +85,8 @@ class Output:
 
         Args:
             folder: Of the phase.
-            subject: What is observed.
-            state: What :meth:`state` returned for the checkpoint from which the run is resumed; later
+            subject: Scene or motion that is observed.
+            state: Result of :meth:`state` for the checkpoint from which the run is resumed; later
                 files are removed. None for a new phase.
 
         Raises:

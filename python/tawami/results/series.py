@@ -53,7 +53,7 @@ class Series:
     """VTU files in time and their index; for the rank that writes.
 
     Args:
-        folder: Where the index NAME.pvd and the folder NAME of the files are.
+        folder: Folder of the index NAME.pvd and of the folder NAME with the files.
         name: Of both.
     """
 

@@ -65,7 +65,7 @@ class Configuration:
     Args:
         model: Grid, form and laws of the scene.
         particles: The particles of the whole body, on every rank.
-        numerics: How a step is solved.
+        numerics: Numerical settings of a step.
 
     Attributes:
         domain: The particles where they are; another object after a step that moves them.
@@ -75,9 +75,8 @@ class Configuration:
         left: Number, position [m] and time [s] of the particles that left the grid or were removed.
         removed: Kinetic and elastic energy of removed particles [J per metre depth].
         begun: Whether a step was stored.
-        projected: Elastic energy that projecting the mean stress took from this rank's particles in the
-            last step [J per metre depth].
-        stopwatch: Where the time goes.
+        projected: Elastic energy [J per metre depth] that projecting the mean stress took in the last step.
+        stopwatch: Time of each stage of a step.
     """
 
     def __init__(self, model: Model, particles: _rust.Particles, numerics: Numerics) -> None:
@@ -201,7 +200,7 @@ class Configuration:
         assert step is not None
         raise ConvergenceError(
             f"contact and friction of the walls did not settle in {PASSES} solves. Nothing was changed "
-            "in the particles. Take a smaller step",
+            "in the particles. Use a smaller step",
             step.history,
         )
 
