@@ -9,6 +9,8 @@ import warnings
 
 from IPython import get_ipython
 
+from tawami.base import line
+
 
 def _prepare():
     def lines(kind, text):
@@ -23,6 +25,7 @@ def _prepare():
     get_ipython().InteractiveTB.structured_traceback = brief
     warnings.showwarning = show
     logging.disable(logging.INFO)  # compiling forms logs much
+    line.in_notebook = lambda: False  # no bars of progress in pages
 
 
 _prepare()

@@ -156,7 +156,7 @@ def wrong(comm: MPI.Comm) -> None:
     scene.traction("right", 1e3)  # wrong: arg-type
     scene.traction("right", (0.0, "down"))  # wrong: arg-type
     scene.gravity(-9.81)  # wrong: arg-type
-    print(scene.solve().strain)  # wrong: attr-defined
+    print(scene.solve().strains)  # wrong: attr-defined
     tawami.Dynamics(scene, transfer="musl")  # wrong: arg-type
     tawami.Dynamics(scene).run(1.0)  # wrong: call-arg
     tawami.NumpyLaw(lambda strain: strain, K=1.0, mu=1.0)  # wrong: arg-type misc

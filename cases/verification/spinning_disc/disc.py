@@ -31,6 +31,7 @@ from mpi4py import MPI
 
 import tawami
 from cases.common.program import progress
+from tawami.picture import style
 
 Array = npt.NDArray[np.float64]
 
@@ -52,10 +53,10 @@ class Kind:
 
 
 KINDS = (
-    Kind("u_epsv_finite", "affine_flip", "mixed, affine FLIP", "tab:red"),
-    Kind("u_epsv_finite", "tpic", "mixed, TPIC", "tab:blue"),
-    Kind("u_finite", "affine_flip", "displacement only, affine FLIP", "tab:gray"),
-    Kind("u_epsv_finite", "flip", "mixed, plain FLIP", "tab:orange"),
+    Kind("u_epsv_finite", "affine_flip", "mixed, affine FLIP", style.VERMILION),
+    Kind("u_epsv_finite", "tpic", "mixed, TPIC", style.BLUE),
+    Kind("u_finite", "affine_flip", "displacement only, affine FLIP", style.GRAY),
+    Kind("u_epsv_finite", "flip", "mixed, plain FLIP", style.ORANGE),
 )
 
 

@@ -43,8 +43,9 @@ class Line:
 
     def __init__(self, shown: bool | None) -> None:
         self.stream: TextIO = sys.stderr
-        self._notebook = in_notebook() and find_spec("tqdm") is not None
-        self._shown = (self._notebook or self.stream.isatty()) if shown is None else shown
+        notebook = in_notebook()
+        self._shown = (notebook or self.stream.isatty()) if shown is None else shown
+        self._has_bar = notebook and find_spec("tqdm") is not None
         self._last, self._written = -INTERVAL, False
         self._bar: Any = None
 
@@ -59,7 +60,7 @@ class Line:
         if not self._shown or (not now and monotonic() - self._last < INTERVAL):
             return
         self._last, self._written = monotonic(), True
-        if self._notebook:
+        if self._has_bar:
             if self._bar is None:
                 self._bar = progress_bar(total=1.0, bar_format="{percentage:3.0f}%|{bar}| {desc}")
             self._bar.n = min(max(share, 0.0), 1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,6 +23,12 @@ if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation
 
 Movie = Literal["gif", "mp4"]
+#: Signs in place of the icons of matplotlib's player, which come from the web.
+ICONS = {
+    "minus": "-", "fast-backward": "|&lt;&lt;", "step-backward": "|&lt;",
+    "play fa-flip-horizontal": "&#9664;", "pause": "| |", "play": "&#9654;", "step-forward": "&gt;|",
+    "fast-forward": "&gt;&gt;|", "plus": "+",
+}  # fmt: skip
 #: Frames of a second.
 RATE = 12
 
@@ -34,7 +41,7 @@ class Frame:
         title: Of the picture.
         x: Positions [m], particles x 2.
         shape: Of the particles; see `Squares.show`.
-        values: What colours them.
+        values: Quantity that colours them.
     """
 
     title: str
@@ -114,7 +121,10 @@ def _player() -> Any:
 
         def _repr_html_(self) -> str:
             with style.used():
-                return str(self.to_jshtml())
+                page = re.sub(r"<link[^>]*>", "", self.to_jshtml())
+            for icon, sign in ICONS.items():
+                page = page.replace(f'<i class="fa fa-{icon}"></i>', sign)
+            return page
 
         @style.used()
         def save(self, filename: Any, writer: Any = None, *more: Any, **options: Any) -> None:

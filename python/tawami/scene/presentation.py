@@ -66,7 +66,7 @@ def checked_limits(limits: Any) -> tuple[float, float] | None:
     """
     if limits is None:
         return None
-    low, high = checks.pair("limits", limits, "two numbers, as (-1e3, 1e3)")
+    low, high = checks.pair("limits", limits, "numbers, as (-1e3, 1e3)")
     low = checks.number("limits[0]", low)
     return low, checks.number("limits[1]", high, low=np.nextafter(low, np.inf))
 
@@ -88,21 +88,17 @@ def plot(
     name, unit, values = pick(given, arrays, histories)
     x, corners = positions(arrays, moved=moved, deformed=deformed), corners_of(grid)
     lower, upper = view(x, corners)
+    new = axes is None
     if axes is None:
         axes = shown_axes(*size_of(lower, upper))
-        beside = False
     else:
         from matplotlib.axes import Axes
 
         checks.instance("plot: axes", axes, Axes, "axes of matplotlib, or None")
-        beside = True
     draw_frame(axes, lower, upper, corners)
     squares = Squares(axes, scale_of(name, unit, [values], limits))
     squares.show(x, shapes(arrays, moved=moved, deformed=deformed), values)
-    if beside:
-        squares.add_bar_beside(axes)
-    else:
-        squares.add_bar(axes)
+    (squares.add_bar if new else squares.add_bar_beside)(axes)
     factor = "at the start" if deformed == 0 else f"displacements x {deformed:g}"
     axes.set_title(name if deformed == 1 else f"{name}, {factor}")
     return axes
