@@ -23,7 +23,11 @@ SUBJECTS: dict[str, tuple[str, ...]] = {
     "Solving": ("solve",),
     "Scene": ("scene",),
     "Steps and motion": ("motion",),
+<<<<<<< HEAD
+    "Results": ("picture", "results"),
+=======
     "Results": ("results", "picture"),
+>>>>>>> main
     "Studies": ("study",),
     "Command line": ("command",),
 }
