@@ -75,7 +75,7 @@ class Configuration:
         left: Number, position [m] and time [s] of the particles that left the grid or were removed.
         removed: Kinetic and elastic energy of removed particles [J per metre depth].
         begun: Whether a step was stored.
-        projected: Elastic energy [J per metre depth] that projecting the mean stress took in the last step.
+        projected: Elastic energy [J per metre depth] that the projection of the last step took.
         stopwatch: Time of each stage of a step.
     """
 
