@@ -45,7 +45,7 @@ quick: setup $(STAMPS)/cargo-tests
 	cargo test --locked --quiet
 	$(PYTEST) -m 'not slow and not mpi' $(TESTS)
 
-test-all: setup $(STAMPS)/cargo-tests $(STAMPS)/docs
+test-all: setup $(STAMPS)/cargo-tests $(STAMPS)/docs $(STAMPS)/notebook
 	cargo test --locked --quiet
 	$(PYTEST) $(TESTS)
 
@@ -55,7 +55,7 @@ fuzz: setup $(STAMPS)/cargo-tests
 	PROPTEST_RNG_SEED=$(SEED) PROPTEST_CASES=5000 cargo test --locked --quiet
 	HYPOTHESIS_PROFILE=fuzz SEED=$(SEED) $(PYTEST) -m 'fuzz or hypothesis' --hypothesis-seed=$(SEED) $(TESTS)
 
-docs: setup $(STAMPS)/docs
+docs: setup $(STAMPS)/docs $(STAMPS)/notebook
 	$(PYTHON) python/docs $(if $(PAGE),--page $(PAGE)) $(if $(LINKS),--links) $(if $(THUMBNAILS),--thumbnails)
 
 matrix:
@@ -142,6 +142,10 @@ $(STAMPS)/lint: $(STAMPS)/python
 $(STAMPS)/docs: $(STAMPS)/python Makefile
 	$(call from_debian,chromium)
 	$(PIP) 'sphinx>=7.2' 'myst-nb>=1.1' 'ipykernel>=6.25' 'furo>=2024.1.29' 'sphinx-design>=0.6' 'sphinx-mathjax-offline>=0.0.2' 'playwright>=1.40'
+	@mkdir -p $(STAMPS) && touch $@
+
+$(STAMPS)/notebook: $(STAMPS)/python Makefile
+	$(PIP) 'ipykernel>=6.25' 'pandas>=2.0' 'pyvista>=0.42'
 	@mkdir -p $(STAMPS) && touch $@
 
 # Built for the processor it runs on, and again where that is another one.

@@ -65,7 +65,7 @@ pub struct Bilinear<'a> {
     pub couplings: Vec<[Kernels<'a>; 2]>,
 }
 
-/// The state of an assembly that all cells share.
+/// The state of an assembly, common to all cells.
 #[derive(Clone, Copy)]
 pub struct State<'a> {
     /// The cells and their fields.

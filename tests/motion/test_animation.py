@@ -44,6 +44,8 @@ def test_a_motion_is_run_and_animated(tmp_path):
     page = animation._repr_html_()
     assert page.count("data:image/png;base64") == 5
     assert "<script" in page
+    assert "http" not in page.replace("http://www.w3.org", "")
+    assert "fa-" not in page
 
 
 def test_the_last_state_is_a_frame_and_there_are_about_48_by_default():

@@ -30,7 +30,7 @@ def column(form="u_epsv", law=None, *, body=None, **options):
 
 
 def rise(scene, before):
-    """How far the particles have moved since then, by their numbers."""
+    """Distances by which the particles have moved since then, by their numbers."""
     return scene.particles.displacement - before[scene.particles.number]
 
 
@@ -66,7 +66,7 @@ def test_an_excavated_column_rebounds_by_the_closed_form(form):
         kept = np.array(scene.particles.number)
         error = 1e-4 if scene.form.strain.finite else 1e-8
         np.testing.assert_allclose(rise(scene, before)[:, 1], u[kept], rtol=0, atol=error * u.max())
-        assert scene.solve().history[0][0] < 1e-5  # nothing is left to fade
+        assert scene.solve().history[0][0] < 1e-5  # no force remains to fade
 
 
 def test_outputs_and_numbers_are_those_of_the_particles_that_stay():
@@ -175,7 +175,7 @@ def test_supports_on_removed_particles_and_wrong_selections_raise_an_error():
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_column_whose_modulus_changes_keeps_its_stress(form):
-    """Nothing moves; a further load finds the new modulus, in a part of the column or in all of it."""
+    """The body does not move. A further load meets the new modulus, in a part of the column or all."""
     stiff = 1e3 if "finite" in form else 1.0  # small strains
     law, new = (tawami.linear_elastic(E=E * stiff * k, nu=0.0) for k in (1.0, 0.25))
     part = 2.0 if "epsv" in form else 1.0  # eps_v has no jumps
@@ -385,7 +385,7 @@ def test_a_killed_run_with_excavations_and_laws_resumes_to_the_bit(tmp_path, for
     assert found == whole
     assert len(scene.left) == 90
     with (
-        pytest.raises(tawami.CheckpointError, match="is of another run: laws"),
+        pytest.raises(tawami.CheckpointError, match="belongs to another run: laws"),
         pytest.warns(tawami.CheckpointWarning, match="The checkpoint before it is tried"),
     ):
         staged(results_of(tmp_path / "cut"), None, form, soft=0.6)

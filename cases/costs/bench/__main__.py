@@ -2,7 +2,7 @@
 
 By default it measures the cantilever for sizes, particles per cell, threads, ranks and both assemblies,
 then the import, the Python part of a step and the particles of a level set.
-Every setting runs in a process of its own. One run gives a table, a CSV file and ratios.
+Every setting runs in a separate process. One run gives a table, a CSV file and ratios.
 
 With --against it compares this checkout with another one that has been set up, interleaved, and prints
 the ratio new/old of the processor time of every stage, for steps of the cantilever and of collapsing

@@ -1,4 +1,4 @@
-"""Measurement of one setting, in a process of its own: prints its numbers as JSON."""
+"""Measurement of one setting, in a separate process: prints its numbers as JSON."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def settings(
 
 
 def in_own_process(setting: Setting) -> dict[str, Any]:
-    """Measure a setting in a process of its own, so that its peak memory is its own.
+    """Measure a setting in a separate process, so that its peak memory is its own.
 
     Raises:
         TawamiError: The measurement failed.

@@ -267,7 +267,7 @@ def room(what: str, count: int, each: float, advice: str) -> None:
         what: Input that decides the number of objects.
         count: Number of objects.
         each: Memory of one object [bytes].
-        advice: What to do.
+        advice: Advice for the message.
 
     Raises:
         InputError: It is not enough; the message says how much is needed.

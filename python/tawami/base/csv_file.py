@@ -13,7 +13,7 @@ import numpy as np
 from tawami.base.arrays import Array
 from tawami.base.files import unreadable
 
-#: Separators of files that are not read, and what messages call them.
+#: Separators of files that are not read, and their names in messages.
 OTHERS = {";": "semicolons", "\t": "tabs"}
 
 

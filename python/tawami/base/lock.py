@@ -37,8 +37,8 @@ def hold(folder: Path, what: str, patience: float = PATIENCE) -> BaseFileLock:
 
     Args:
         folder: Created if it does not exist.
-        what: What messages call it, as "Results('folder')".
-        patience: How long to wait until another process releases it [s].
+        what: Its name in messages, as "Results('folder')".
+        patience: Longest time to wait until another process releases it [s].
 
     Raises:
         InputError: Another process holds it; the message names its host and its number.

@@ -21,7 +21,7 @@ from tawami.base import files, lock, ranks
 from tawami.base.errors import MissingDependencyError, OutputError
 from tawami.fem.dolfinx import OLD, jit
 
-#: How long to wait for a form that another process compiles [s].
+#: Longest time to wait for a form that another process compiles [s].
 PATIENCE = 300.0
 #: Names of the errors of CFFI and setuptools if the compiler fails.
 COMPILER_ERRORS = ("VerificationError", "CompileError")
@@ -103,7 +103,7 @@ def _replace(code: Path, compile_into: Callable[[Path], object]) -> None:
 
 
 def intact(folder: Path) -> bool:
-    """Whether a folder of compiled code is as it was when it was compiled."""
+    """Whether a folder of compiled code has not changed since it was compiled."""
     try:
         return (folder / CHECKSUM).read_text() == _content(folder)
     except (OSError, UnicodeDecodeError):

@@ -1,4 +1,4 @@
-"""What particles carry in a motion, and its way to the grid and back.
+"""Velocities and accelerations of the particles in a motion, and their transfer to the grid and back.
 
 At small strain particles do not move: velocity and acceleration stay on the grid.
 """
@@ -26,7 +26,7 @@ class Carried:
 
     Args:
         configuration: The body.
-        transfer: How velocities are transferred.
+        transfer: Transfer of velocities.
         damping: Time in which velocities of FLIP relax towards those of PIC [s].
     """
 
@@ -121,7 +121,7 @@ class Carried:
             self._stationary = v1, a1, *self._given()
 
     def state(self) -> dict[str, Any]:
-        """What is not in the particles, for a checkpoint."""
+        """The part of the state that is not in the particles, for a checkpoint."""
         stationary = self.on_grid
         return {"on_grid": None if stationary is None else list(stationary)}
 

@@ -69,7 +69,7 @@ def modes(scene: Scene, number: int = 6) -> Modes:
     squares, vectors = found
     order = np.argsort(squares)
     squares, vectors = squares[order], vectors[:, order]
-    # what the shift cannot tell from zero is a rigid motion
+    # a value that the shift makes equal to zero belongs to a rigid motion
     squares[np.abs(squares) < 1e-6 * abs(shift)] = 0.0
     now = scene.configuration
     space, domain = now.model.space, now.domain

@@ -55,7 +55,7 @@ class Steps(list[Step]):
 
     Attributes:
         loads: Share of the new loads that is in equilibrium after each step.
-        error: Why the next step failed; None if none did.
+        error: Error of the step that failed; None if none did.
     """
 
     def __init__(self) -> None:

@@ -144,7 +144,7 @@ def check_staying(
             )
     staying = ranks.sum_of(grid.comm, np.array([np.sum(~gone)]))
     if not staying[0]:
-        raise InputError("the last particle would leave the grid: nothing is left to compute")
+        raise InputError("the last particle would leave the grid, and no body would remain")
 
 
 def removed(

@@ -44,8 +44,14 @@ def used() -> Iterator[None]:
     Raises:
         MissingDependencyError: matplotlib is not installed.
     """
-    with optional("matplotlib", "pictures need").rc_context(PARAMETERS):
+    settings = optional("matplotlib", "pictures need").rcParams
+    # these alone: rc_context would undo what the first figure in a notebook makes of pyplot
+    before = {name: settings[name] for name in PARAMETERS}
+    try:
+        settings.update(PARAMETERS)
         yield
+    finally:
+        settings.update(before)
 
 
 def labelled(name: str, unit: str) -> str:

@@ -1,4 +1,4 @@
-"""The body in its present configuration, under its supports and loads: what a step starts from.
+"""The body in its present configuration, under its supports and loads: the start of a step.
 
 A step either changes all of it or nothing.
 """
@@ -63,21 +63,20 @@ class Configuration:
     """Particles, supports and loads of one scene between two steps.
 
     Args:
-        model: What the scene is made of.
+        model: Grid, form and laws of the scene.
         particles: The particles of the whole body, on every rank.
-        numerics: How a step is solved.
+        numerics: Numerical settings of a step.
 
     Attributes:
         domain: The particles where they are; another object after a step that moves them.
         supports, loads: As the driver script made them.
-        activity: Time of the scene, and what it is doing.
+        activity: Time and activity of the scene.
         total: Coefficients of all fields since the start, where particles do not move.
         left: Number, position [m] and time [s] of the particles that left the grid or were removed.
-        removed: Kinetic and elastic energy of the particles that were removed [J per metre depth].
+        removed: Kinetic and elastic energy of removed particles [J per metre depth].
         begun: Whether a step was stored.
-        projected: Elastic energy that the projection of the mean stress took from the particles of this
-            rank at the end of the last step [J per metre depth].
-        stopwatch: Where the time goes.
+        projected: Elastic energy [J per metre depth] that the projection of the last step took.
+        stopwatch: Time of each stage of a step.
     """
 
     def __init__(self, model: Model, particles: _rust.Particles, numerics: Numerics) -> None:
@@ -201,7 +200,7 @@ class Configuration:
         assert step is not None
         raise ConvergenceError(
             f"contact and friction of the walls did not settle in {PASSES} solves. Nothing was changed "
-            "in the particles. Take a smaller step",
+            "in the particles. Use a smaller step",
             step.history,
         )
 
@@ -293,7 +292,7 @@ class Configuration:
     # -- checkpoints ---------------------------------------------------------
 
     def identity(self) -> dict[str, Any]:
-        """What tells it from another one, for checkpoints; a call for all ranks."""
+        """Facts that identify it, for checkpoints; a call for all ranks."""
         grid = self.model.grid
         sizes = {"stress": self.domain.responses.stiffest} | dict.fromkeys(LENGTHS, grid.h)
         arrays = placement.gathered(grid, self.domain.particles)
@@ -309,7 +308,7 @@ class Configuration:
         return self.model.identity() | facts | particles
 
     def state(self) -> dict[str, Any]:
-        """All that is carried from one step to the next, of all ranks; a call for all ranks."""
+        """State that passes from one step to the next, of all ranks; a call for all ranks."""
         return {
             "particles": placement.gathered(self.model.grid, self.domain.particles),
             "time": self.activity.time,

@@ -1,4 +1,4 @@
-"""The header of a run: what a scene models, and what it does not with the switch that adds it."""
+"""The header of a run: what a scene models, what it does not, and the switches that add it."""
 
 from __future__ import annotations
 

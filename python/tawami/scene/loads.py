@@ -40,7 +40,7 @@ class Load(Action):
         return f"{self}{self.terms[-1].factor}{' until it fades' if self.released else ''}"
 
     def place(self) -> list[Any]:
-        """Where it acts, as JSON holds it."""
+        """Place where it acts, in the types of JSON."""
         return []
 
 
@@ -149,7 +149,7 @@ class Loads(Owner[Load]):
     Args:
         grid: The grid.
         volume: Volume of each particle of the body [m2].
-        activity: Time of the scene, and what it is doing.
+        activity: Time and activity of the scene.
 
     Attributes:
         all: The loads, also those that were released and have not faded.
@@ -270,13 +270,13 @@ class Loads(Owner[Load]):
         return domain.tractions.forces(edge, np.where(loaded[:, None, None], at_nodes, 0.0))
 
     def _cells(self, domain: Domain, traction: Traction) -> Mask:
-        """Which cells with particles along its edge a traction loads."""
+        """Mask of the cells with particles along its edge that a traction loads."""
         part = edges.cells_between(self.grid, traction.edge, traction.between)
         mask: Mask = part[domain.tractions.cells(traction.edge)]
         return mask
 
     def accept(self, now: Moment) -> None:
-        """Later parts grow from this moment; what has faded is dropped."""
+        """Let later parts grow from this moment; drop loads that have faded."""
         super().accept(now)
         self._drop_faded()
         if self.unbalanced is not None:
@@ -293,11 +293,11 @@ class Loads(Owner[Load]):
         return listed(lines)
 
     def identity(self) -> list[Any]:
-        """What decides the results of a run, as JSON holds it."""
+        """Facts that decide the results of a run, in the types of JSON."""
         return [[type(load).__name__, *load.place(), *load.identity()] for load in self.all]
 
     def state(self) -> dict[str, Any]:
-        """How much of each load the body carries, and the forces that fade."""
+        """Share of each load that the body carries, and the forces that fade."""
         unbalanced = np.zeros(0) if self.unbalanced is None else self.unbalanced
         return {"all": [load.state() for load in self.all], "unbalanced": unbalanced}
 

@@ -1,4 +1,4 @@
-"""What a scene is made of: input that was checked once and never changes."""
+"""Grid, form and laws of a scene: input that was checked once and never changes."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Model:
             with the same moduli.
         density: Of each material [kg/m3]; None if the scene has no mass.
         names: Name of the group of each material; empty if the body has no names.
-        leaving: What happens to particles that leave the grid.
+        leaving: 'stop' or 'remove', for particles that leave the grid.
         num_particles: Particles of the body, on all ranks.
     """
 
@@ -70,7 +70,7 @@ class Model:
 
     @property
     def space(self) -> Space:
-        """What follows from the dimension."""
+        """Everything that follows from the dimension."""
         return self.grid.space
 
     @property
@@ -109,8 +109,8 @@ class Model:
         """
         if list(texts) != self.texts:
             raise CheckpointError(
-                "laws were changed during the run (each=): expected change_material(...) between "
-                "two phases"
+                "laws were changed during the run (each=): expected change_material(...) between two "
+                "phases"
             )
 
     @property
@@ -126,7 +126,7 @@ class Model:
         return ", ".join([f"{self.form.name} in {' and '.join(self.form.fields)}", *used])
 
     def identity(self) -> dict[str, Any]:
-        """What tells it from another model, for checkpoints."""
+        """Facts that identify the model, for checkpoints."""
         laws = [] if self.law is None else [self.law.identity()]
         return (
             self.grid.identity()

@@ -30,7 +30,7 @@ def of_mumps(code: int, detail: int, stage: str, unknowns: int) -> SolverError:
     Args:
         code: INFOG(1).
         detail: INFOG(2).
-        stage: What MUMPS did, as "factorise".
+        stage: Stage of MUMPS, as "factorise".
         unknowns: Size of the tangent.
     """
     what = f"MUMPS could not {stage} the tangent of {unknowns} unknowns"
