@@ -75,8 +75,7 @@ class Configuration:
         left: Number, position [m] and time [s] of the particles that left the grid or were removed.
         removed: Kinetic and elastic energy of the particles that were removed [J per metre depth].
         begun: Whether a step was stored.
-        projected: Elastic energy that the projection of the mean stress took from the particles of this
-            rank at the end of the last step [J per metre depth].
+        projected: Elastic energy that the last projection of the mean stress took [J per metre depth].
         stopwatch: Time of each stage of a step.
     """
 
