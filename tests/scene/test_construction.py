@@ -132,7 +132,7 @@ def test_supports_on_removed_particles_and_wrong_selections_raise_an_error():
         scene.remove(lambda x, y: y < 0.5)
     for where, words in (
         (lambda x, y: y > 9, r"remove\(...\): no particle was chosen"),
-        (lambda x, y: y > -1, r"remove\(...\) of all particles: expected some that stay"),
+        (lambda x, y: y > -1, r"remove\(...\) of all particles: expected some that remain"),
         ("clay", "the body has no groups with names"),
     ):
         with pytest.raises(tawami.InputError, match=words):
