@@ -360,7 +360,7 @@ def test_a_killed_run_with_excavations_and_laws_resumes_to_the_bit(tmp_path, for
     assert found == whole
     assert len(scene.left) == 90
     with (
-        pytest.raises(tawami.CheckpointError, match="is of another run: laws"),
+        pytest.raises(tawami.CheckpointError, match="belongs to another run: laws"),
         pytest.warns(tawami.CheckpointWarning, match="The checkpoint before it is tried"),
     ):
         staged(results_of(tmp_path / "cut"), None, form, soft=0.6)
