@@ -68,7 +68,7 @@ def test_a_resumed_table_must_have_the_same_columns(tmp_path):
     drive(motion, [output], tmp_path, 2)
     before = (tmp_path / "table.csv").read_text()
     with pytest.raises(
-        tawami.InputError, match=r"run-out \[m\], and .*momentum y .* are asked for"
+        tawami.InputError, match=r"run-out \[m\], and .*momentum y .* are requested"
     ):
         tawami.TableOutput("momentum").begin(tmp_path, motion, output.state())
     assert (tmp_path / "table.csv").read_text() == before

@@ -151,7 +151,7 @@ class Study:
         if problem is not None:
             raise InputError(
                 f"study '{self.name}': '{path}' cannot be read ({problem}): expected the runs that it "
-                "has stored; remove it to begin anew"
+                "has stored; remove it to start again"
             )
         for line in path.read_text(errors="replace").splitlines():
             try:
