@@ -83,7 +83,7 @@ def dynamics(comm: MPI.Comm) -> None:
     motion.run(end=1.0, dt=1e-3, smallest=1e-6)
     results = tawami.Results(
         Path("results") / "block",
-        tawami.ParticleOutput("stress", every=0.1),
+        tawami.ParticleOutput("stress", tawami.Quantity("size [m]", lambda p: p.x), every=0.1),
         tawami.GridOutput("mean stress", every_steps=10, projection="consistent"),
         tawami.TableOutput("energies", phases=["motion"]),
         checkpoint_steps=100,
@@ -157,6 +157,7 @@ def wrong(comm: MPI.Comm) -> None:
     scene.traction("right", (0.0, "down"))  # wrong: arg-type
     scene.gravity(-9.81)  # wrong: arg-type
     print(scene.solve().strains)  # wrong: attr-defined
+    print(scene.solve().plot(3))  # wrong: arg-type
     tawami.Dynamics(scene, transfer="musl")  # wrong: arg-type
     tawami.Dynamics(scene).run(1.0)  # wrong: call-arg
     tawami.NumpyLaw(lambda strain: strain, K=1.0, mu=1.0)  # wrong: arg-type misc

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 Movie = Literal["gif", "mp4"]
 #: Signs in place of the icons of matplotlib's player, which come from the web.
 ICONS = {
-    "minus": "-", "fast-backward": "|&lt;&lt;", "step-backward": "|&lt;",
-    "play fa-flip-horizontal": "&#9664;", "pause": "| |", "play": "&#9654;", "step-forward": "&gt;|",
-    "fast-forward": "&gt;&gt;|", "plus": "+",
+    "minus": "-", "fast-backward": "&#8676;", "step-backward": "&lsaquo;",
+    "play fa-flip-horizontal": "&#9664;", "pause": "||", "play": "&#9654;", "step-forward": "&rsaquo;",
+    "fast-forward": "&#8677;", "plus": "+",
 }  # fmt: skip
 #: Frames of a second.
 RATE = 12

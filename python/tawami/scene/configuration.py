@@ -73,9 +73,9 @@ class Configuration:
         activity: Time and activity of the scene.
         total: Coefficients of all fields since the start, where particles do not move.
         left: Number, position [m] and time [s] of the particles that left the grid or were removed.
-        removed: Kinetic and elastic energy of the particles that were removed [J per metre depth].
+        removed: Kinetic and elastic energy of removed particles [J per metre depth].
         begun: Whether a step was stored.
-        projected: Elastic energy that the last projection of the mean stress took [J per metre depth].
+        projected: Elastic energy [J per metre depth] that the projection of the last step took.
         stopwatch: Time of each stage of a step.
     """
 
