@@ -78,7 +78,7 @@ def test_a_damaged_index_is_named(tmp_path):
     (tmp_path / "particles.pvd").write_text("<VTKFile><Coll")
     motion = plastic_block()
     with pytest.raises(
-        tawami.OutputError, match=r"particles.pvd' cannot be read .*remove it to beg"
+        tawami.OutputError, match=r"particles.pvd' cannot be read .*remove it to start"
     ):
         tawami.ParticleOutput("velocity").begin(
             tmp_path, motion, {"seen": 3, "written": 3, "time": 0.1}
