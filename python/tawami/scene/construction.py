@@ -68,7 +68,7 @@ class Construction:
 
         Raises:
             InputError: No particle, all particles, or a call from within a step; nothing has changed.
-            SupportError: A support or a traction would act on nothing; nothing has changed.
+            SupportError: A support or a traction would have no particles; nothing has changed.
         """
         now = self.configuration
         now.activity.check_between_steps("remove(...)")
