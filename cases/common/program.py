@@ -36,7 +36,7 @@ class Program:
 
     Args:
         module: Name of the case's module, as after `python -m`.
-        description: What `--help` prints.
+        description: Text that `--help` prints.
         files: Whether the case writes files: adds the option `--results`.
 
     Attributes:
@@ -113,7 +113,7 @@ def numbers(kind: type[T], valid: Callable[[T], bool], expected: str) -> Callabl
     Args:
         kind: Type of each number.
         valid: Whether a number is in its range.
-        expected: What the error message asks for.
+        expected: Expected value, for the error message.
     """
 
     def parse(text: str) -> list[T]:

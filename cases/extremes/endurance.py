@@ -72,7 +72,7 @@ class _Counter(ctypes.Structure):
     _fields_ = [("tag", ctypes.c_int), ("objects", ctypes.c_int)]
 
 
-#: Stands for an unknown number of objects.
+#: Represents an unknown number of objects.
 HIDDEN = -1
 
 

@@ -1,4 +1,4 @@
-"""A block in different positions on the grid: how partially filled cells affect answer and condition.
+"""A block in different positions on the grid: the effect of partially filled cells.
 
      ________
     |        |       1.5 m x 1.5 m, 6 x 6 cells of 0.25 m, 2 x 2 particles each, plane strain

@@ -6,7 +6,7 @@
     |                     |    2 m x 1 m, 32 x 16 cells, plane strain, E = 1 MPa, nu = 0.4999
     |_____________________|    smooth sides and floor, bilinear functions
 
-The weak form stands here as in a driver script. Its last term, alpha h^2 (K/mu) lap(eps_v), is the
+The weak form is written as in a driver script. Its last term, alpha h^2 (K/mu) lap(eps_v), is the
 stabilisation of the paper. Without it the mean stress oscillates from cell to cell.
 
 python -m cases.showcase.one_line
@@ -37,7 +37,7 @@ def unstable(u, eps_v, w, q, sigma, K, t, sum_p, ds):  # type: ignore[no-untyped
 
 
 def stable(u, eps_v, w, q, sigma, K, mu, t, h, sum_p, ds):  # type: ignore[no-untyped-def]
-    """The same and one line."""
+    """The same equations with one more term."""
     R_u = sum_p(sigma, grad(w)) - dot(t, w) * ds
     R_q = sum_p(K, q * (div(u) - eps_v))
     R_q -= sum_p(K**2 / mu, 0.01 * h**2 * dot(grad(q), grad(eps_v)))

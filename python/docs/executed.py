@@ -6,6 +6,7 @@ error of `make docs`.
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import hashlib
 import json
@@ -16,6 +17,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from time import perf_counter
 
@@ -55,12 +57,32 @@ class Output:
 
 
 def fingerprint(patterns: Iterable[str], *more: str) -> str:
-    """Fingerprint of the files that match patterns, from the top of the repository, and of texts."""
+    """Fingerprint of the files that match patterns, from the top of the repository, and of texts.
+
+    Comments, docstrings and the layout of Python files do not count.
+    """
     total = hashlib.sha256("\0".join(more).encode())
     for path in sorted({path for pattern in patterns for path in ROOT.glob(pattern)}):
         if path.is_file():
-            total.update(f"\0{path.relative_to(ROOT)}\0".encode() + path.read_bytes())
+            total.update(
+                f"\0{path.relative_to(ROOT)}\0".encode() + _meaning(path.read_bytes(), path.suffix)
+            )
     return total.hexdigest()
+
+
+@cache
+def _meaning(content: bytes, suffix: str) -> bytes:
+    """What a file does, as bytes: of a Python file its syntax tree without docstrings."""
+    if suffix != ".py":
+        return content
+    tree = ast.parse(content)
+    for node in ast.walk(tree):
+        if (
+            isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
+            and ast.get_docstring(node, clean=False) is not None
+        ):
+            node.body[0] = ast.Pass()
+    return ast.dump(tree).encode()
 
 
 def cached(folder: Path, mark: str, work: Callable[[], str]) -> Output:

@@ -54,7 +54,7 @@ def script(tmp_path):
 
 @pytest.fixture
 def process() -> Callable[..., Finished]:
-    """Run the command in a process of its own, which costs a second."""
+    """Run the command in a separate process, which costs a second."""
     return lambda *arguments, **options: python("-m", "tawami", *arguments, **options)
 
 

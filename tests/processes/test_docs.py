@@ -227,9 +227,28 @@ def test_tutorials_can_be_downloaded_as_notebooks(name):
     assert not re.search(r"\{\w+\}`|eval-rst", text)
     imported = set(re.findall(r"^(?:import|from) (\w+)", "\n".join(code), flags=re.MULTILINE))
     assert imported <= sys.stdlib_module_names | {"tawami", "numpy", "matplotlib", "mpi4py", "ufl"}
-    assert any("subplots" in source for source in code)
+    assert any("plot" in source for source in code)
     assert any("print(" in source for source in code)
     assert notebooks.download(PAGES[name]) == notebooks.download(PAGES[name])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in PAGES if "{code-cell}" in PAGES[name]])
+def test_code_of_pages_runs_anywhere(name, tmp_path, monkeypatch):
+    """In a folder outside the repository, that of tutorials with the package alone."""
+    nbclient = pytest.importorskip("nbclient", reason="installed by make docs")
+    nbformat = pytest.importorskip("nbformat")
+    folders = [sources.ROOT / "python"] + [sources.ROOT] * (name not in pages.TUTORIALS)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(map(str, folders)))
+    monkeypatch.setenv("MPLBACKEND", "module://matplotlib_inline.backend_inline")
+    notebook = nbformat.reads(notebooks.download(PAGES[name]), as_version=4)
+    folder = {"metadata": {"path": str(tmp_path)}}
+    nbclient.NotebookClient(notebook, timeout=300, resources=folder).execute()
+    nbformat.write(notebook, tmp_path / "page.ipynb")
+    assert notebooks.problems(tmp_path) == []
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    drawn = any("image/png" in output.get("data", {}) for output in outputs)
+    assert drawn or name not in pages.TUTORIALS
 
 
 @pytest.mark.parametrize("name", pages.CASES)
@@ -296,6 +315,22 @@ def test_a_fingerprint_depends_on_its_files():
     assert one == executed.fingerprint(["forms/*.py"])
     assert one != executed.fingerprint(["forms/u*.py", "Cargo.lock"])
     assert one != executed.fingerprint(["forms/*.py"], "more")
+
+
+def test_a_fingerprint_depends_on_code_only(tmp_path, monkeypatch):
+    """Not on comments, docstrings and layout of Python files."""
+    monkeypatch.setattr(executed, "ROOT", tmp_path)
+    marks = {}
+    for text in (
+        'def f():\n    """One."""\n    return 1',
+        "def f():\n    'Two'\n    return (1)  # one",
+    ):
+        (tmp_path / "f.py").write_text(text)
+        (tmp_path / "f.rs").write_text("fn f() {}")
+        marks[text] = executed.fingerprint(["f.*"])
+    assert len(set(marks.values())) == 1
+    (tmp_path / "f.py").write_text("def f():\n    return 2")
+    assert executed.fingerprint(["f.*"]) not in marks.values()
 
 
 def test_every_case_is_a_page_and_can_be_run():

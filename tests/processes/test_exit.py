@@ -1,4 +1,4 @@
-"""sys.exit on one of several ranks: no rank waits for ever, and one message names the rank."""
+"""sys.exit on one of several ranks: no rank waits forever, and one message names the rank."""
 
 from __future__ import annotations
 

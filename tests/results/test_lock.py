@@ -86,7 +86,7 @@ def test_a_process_holds_a_folder_several_times(tmp_path):
 def test_a_folder_that_was_refused_is_free(tmp_path):
     (tmp_path / "script.py").write_text("mine")
     results = results_of(tmp_path)
-    with pytest.raises(tawami.InputError, match="which is of no run"):
+    with pytest.raises(tawami.InputError, match="which does not belong to a run"):
         tawami.Dynamics(block()).run(0.01, 0.005, results=results)
     assert hold(tmp_path, "").lock_counter == 1
 

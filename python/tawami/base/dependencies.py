@@ -76,5 +76,5 @@ if np.dtype(PETSc.ScalarType) != np.float64:
 
 if np.dtype(PETSc.IntType) != np.int32:
     raise MissingDependencyError(
-        f"tawami needs PETSc with 32-bit indices, but its are {np.dtype(PETSc.IntType)}. {ADVICE}"
+        f"tawami needs PETSc with 32-bit indices, but they are {np.dtype(PETSc.IntType)}. {ADVICE}"
     )

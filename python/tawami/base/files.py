@@ -142,7 +142,7 @@ def append_line(path: str | Path, line: str, *, sync: bool = False) -> None:
         sync: Wait until it is on the disk.
 
     Raises:
-        OutputError: The file cannot be written; it is as it was before.
+        OutputError: The file cannot be written; it is unchanged.
     """
     file_path = checks.path("path", path)
     with writing(file_path):
@@ -174,7 +174,7 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def check_regular(path: Path, *, new: bool = False) -> None:
-    """Check before a file is opened: to open a pipe would wait for ever.
+    """Check before a file is opened: to open a pipe would wait forever.
 
     Args:
         path: Of the file.

@@ -24,7 +24,7 @@ class Sealed:
         self._is_sealed = True
 
     def _how_to_set(self, name: str) -> str:
-        """What to do instead of setting an attribute; subclasses know better."""
+        """Advice for an attribute that cannot be set; subclasses give their own."""
         return f"a {type(self).__name__} is changed by its methods only"
 
     def __setattr__(self, name: str, value: Any) -> None:

@@ -85,7 +85,7 @@ class Body:
         return Body(x, volume, number, names, lattice)
 
     def __radd__(self, other: Literal[0]) -> Body:
-        """So that `sum([...])` joins bodies: it begins with 0."""
+        """Join bodies with `sum([...])`, which begins with 0."""
         return self if isinstance(other, int) and other == 0 else NotImplemented
 
 

@@ -101,7 +101,7 @@ def triangulated(
         of_square = (np.cumsum(again) - 1)[of_part[pending]]
     raise InputError(
         f"level_set: tolerance = {tolerance:g} of the area was not reached in squares of "
-        f"{squares.size:.1g} cells: expected a border that is a curve; take a larger tolerance"
+        f"{squares.size:.1g} cells: expected a border that is a curve; use a larger tolerance"
     )
 
 

@@ -64,7 +64,7 @@ def materials(
 
 
 def _members(read: Any, blocks: Blocks, tags: str | None) -> tuple[str, dict[str, Mask]]:
-    """What the groups are called, and a mask over the elements for each; without empty ones."""
+    """Kind of the groups, and a mask over the elements for each group that is not empty."""
     physical, sets = _physical(read, blocks), _sets(read, blocks)
     if tags is None:
         return ("physical groups", physical) if physical else ("cell sets", sets)

@@ -159,13 +159,13 @@ def _add_run(commands: Any) -> None:
 def _add_resume(commands: Any) -> None:
     parser = _add(commands, "resume", _resume, "resume an interrupted run", (
         "Runs the copy of the script in this folder, with the same arguments, in the same directory: "
-        "finished phases are loaded, the interrupted phase continues from its newest checkpoint. A "
-        "folder of results is code: resume only runs that you trust."
+        "finished phases are loaded, the interrupted phase continues from its newest checkpoint. "
+        "This executes the script: resume only runs that you trust."
     ))  # fmt: skip
     parser.add_argument(
         "--trust",
         action="store_true",
-        help="run the copy also if it is not the script that the run was started with",
+        help="run the copy even if it differs from the script that started the run",
     )
     parser.add_argument("folder", metavar="FOLDER", help="folder of results, as results/pile")
     _add_ranks(parser)
@@ -187,7 +187,7 @@ def _add_plot(commands: Any) -> None:
 
 def _add_new(commands: Any) -> None:
     new = _add(commands, "new", _new, "write a driver script", (
-        "Writes NAME.py, a commented script that runs as it is. An existing file is not changed."
+        "Writes NAME.py, a commented script that runs without changes. An existing file is not changed."
     ))  # fmt: skip
     new.add_argument("file", metavar="NAME", help="as mycase, or folder/mycase.py")
     kind = new.add_mutually_exclusive_group()
@@ -290,11 +290,11 @@ def _unusable(path: Path) -> str | None:
     """Why a script cannot have this name; None if it can."""
     name = path.stem
     if not name.isidentifier():
-        return f"'{name}' is not a name of Python"
+        return f"'{name}' is not a valid name in Python"
     if keyword.iskeyword(name):
         return f"'{name}' is a keyword of Python"
     if name.startswith("__"):
-        return f"'{name}' has a meaning to Python"
+        return f"'{name}' is reserved by Python"
     # a script is the first that Python finds: a numpy.py would be imported instead of NumPy
     own = {Path.cwd(), path.parent.resolve()}
     installed = [folder for folder in sys.path if folder and Path(folder).resolve() not in own]

@@ -103,7 +103,7 @@ def _replace(code: Path, compile_into: Callable[[Path], object]) -> None:
 
 
 def intact(folder: Path) -> bool:
-    """Whether a folder of compiled code is as it was when it was compiled."""
+    """Whether a folder of compiled code has not changed since it was compiled."""
     try:
         return (folder / CHECKSUM).read_text() == _content(folder)
     except (OSError, UnicodeDecodeError):

@@ -16,7 +16,7 @@ from tawami.base import ranks
 from tawami.fem import cache
 from tawami.fem.dolfinx import OLD, ffcx, jit, version
 
-#: What an integral goes over, in the order of FFCx.
+#: Domains of integrals, in the order of FFCx.
 Kind = Literal["cell", "exterior_facet", "interior_facet"]
 KINDS: tuple[Kind, ...] = ("cell", "exterior_facet", "interior_facet")
 #: Sums may be reordered, so that they vectorise: this saves a fifth of the time. -ffast-math is avoided,

@@ -49,7 +49,7 @@ class Reduction:
         SupportError: Supports contradict each other, or leave a rigid motion free.
     """
 
-    #: What point constraints eliminate: dependent coefficients, the others involved, and their weights.
+    #: Elimination by point constraints: dependent coefficients, the others involved, and their weights.
     _eliminated: tuple[Indices, Indices, Array] | None
 
     def __init__(

@@ -210,7 +210,7 @@ class Symbols:
             warnings.warn(
                 f"form {self.form.name}: sum_p of an expression of degree {degree:g} (degrees of "
                 "factors add up) differs from the sum over the particles: expected at most degree "
-                f"{EXACT_DEGREE}; put what is nonlinear in the fields into the material law",
+                f"{EXACT_DEGREE}; move terms that are nonlinear in the fields to the material law",
                 InexactSumWarning,
                 stacklevel=2,
             )

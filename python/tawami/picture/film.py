@@ -41,7 +41,7 @@ class Frame:
         title: Of the picture.
         x: Positions [m], particles x 2.
         shape: Of the particles; see `Squares.show`.
-        values: What colours them.
+        values: Quantity that colours them.
     """
 
     title: str

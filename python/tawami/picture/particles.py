@@ -134,7 +134,7 @@ class Squares:
 
 
 def view(x: Array, grid: Corners) -> tuple[Array, Array]:
-    """Corners of what is shown: the grid, or the part of it that particles at x reach."""
+    """Corners of the view: the grid, or the part of it that particles at x reach."""
     lower, upper = x.min(axis=0), x.max(axis=0)
     margin = 0.06 * (upper - lower).max() + 1e-12
     size = grid.upper - grid.lower

@@ -33,7 +33,7 @@ Entry = tuple[float, str]
 
 
 def write_vtu(path: str | Path, frame: Frame) -> None:
-    """Write a VTU file. It is not compressed: zlib takes eight times as long (`cases/writing.py`).
+    """Write a VTU file. It is not compressed: zlib takes eight times as long (`cases/costs/writing.py`).
 
     Raises:
         OutputError: The file cannot be written, or has another ending.
@@ -89,7 +89,7 @@ class Series:
         """Add a file.
 
         Raises:
-            OutputError: It cannot be written; the series is as it was before.
+            OutputError: It cannot be written; the series is unchanged.
         """
         path = self.files / f"{self.name}-{step:06d}.vtu"
         write_vtu(path, frame)

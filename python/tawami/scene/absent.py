@@ -46,7 +46,7 @@ class Absent:
 
 
 class Elsewhere:
-    """What neither a scene nor its solutions have, whatever they model."""
+    """Attributes that neither a scene nor its solutions have, whatever they model."""
 
     velocity = Absent(INERTIA)
     acceleration = Absent(INERTIA)

@@ -1,4 +1,4 @@
-"""The header of a run: what a scene models, and what it does not with the switch that adds it."""
+"""The header of a run: what a scene models, what it does not, and the switches that add it."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def _particles(now: Configuration) -> str:
     number = int(ranks.sum_of(now.model.grid.comm, np.array([len(particles)]))[0])
     each = particles.bytes_per_particle
     arrays = ", ".join(f"{name} {width}" for name, width in particles.arrays)
-    gone = f" ({len(now.left)} left the grid)" if now.left else ""
+    gone = f" ({len(now.left)} have left)" if now.left else ""
     return (
         f"{number}{gone}, {each} bytes each ({arrays}), {size(number * each)} in all; while a step is "
         f"solved {now.domain.responses.bytes_per_particle} more each for the responses of the laws"

@@ -2,7 +2,7 @@
 
 The laws add the increments of a step to the initial stress. eps_v and the displacement of the particles
 are sums of increments that enter no equation. In a mixed form with an elastic law sigma_m = K eps_v,
-since both are counted from the state without stress: an initial stress keeps that.
+since both are counted from the state without stress: an initial stress keeps this relation.
 """
 
 from __future__ import annotations

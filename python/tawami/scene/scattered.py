@@ -100,7 +100,7 @@ class Scattered:
         name: Of the file, for messages.
         x: Positions [m], points x dimensions.
         columns: Other columns.
-        outside: What particles outside the points get.
+        outside: Values of particles outside the points.
     """
 
     name: str

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami.base import checks
-from tawami.base.errors import CheckpointError, InputError
+from tawami.base.errors import CheckpointError, InputError, SupportError
 from tawami.base.identity import text
 from tawami.base.text import listed
 from tawami.field.constraints import Held, PointHeld, held_edge, held_point
@@ -23,6 +23,7 @@ from tawami.scene.activity import Activity
 from tawami.scene.contact import ActiveSet
 from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor, InTime
+from tawami.scene.points import is_in_body
 from tawami.scene.share import Moment
 from tawami.scene.support import Place, Support
 from tawami.scene.walls import Wall, checked_friction
@@ -219,6 +220,26 @@ class Supports(Owner[Support]):
             self.grid, self.basis, domain.active, support.place, support.component,
             _total(support, amount), domain.layout.active,
         )  # fmt: skip
+
+    def check_reach(self, before: Domain, after: Domain) -> None:
+        """Check that supports still hold something once particles were removed; a call for all ranks.
+
+        Args:
+            before, after: The particles before and after.
+
+        Raises:
+            SupportError: One would hold nothing.
+        """
+        for support in self.all:
+            if isinstance(support.place, str):
+                lost = self._is_left(after, support) and not self._is_left(before, support)
+            else:
+                lost = not is_in_body(after, support.place)
+            if lost:
+                raise SupportError(
+                    f"{support} {support.axis} would hold nothing after remove(...): expected supports "
+                    "on particles that stay; release() it before. Nothing was changed"
+                )
 
     def num_free(self, domain: Domain) -> int:
         """Number of unknowns that the supports leave."""

@@ -200,7 +200,7 @@ class Wall:
         """Change the states that contradict a solution; returns whether there were any.
 
         A function that comes back to the wall, or to rest, more than RETURNS times in one step
-        keeps its state: otherwise the search could repeat the same states for ever.
+        keeps its state: otherwise the search could repeat the same states forever.
 
         Args:
             forces: What supports and walls exert on the body, functions x dim.
