@@ -72,7 +72,7 @@ def fingerprint(patterns: Iterable[str], *more: str) -> str:
 
 @cache
 def _meaning(content: bytes, suffix: str) -> bytes:
-    """What a file does, as bytes: of a Python file its syntax tree without docstrings."""
+    """Content of a file as bytes; of a Python file its syntax tree without docstrings."""
     if suffix != ".py":
         return content
     tree = ast.parse(content)
@@ -146,7 +146,9 @@ def all_cases(rooms: Mapping[str, str]) -> None:
         rooms: Folder of `cases/` of each case. Those of `costs` measure times and run one by one.
     """
     costs = [name for name, room in rooms.items() if room == "costs"]
-    others = [name for name in rooms if name not in costs]
+    others = sorted(
+        set(rooms) - set(costs), key=lambda name: (name not in SHORTER, name)
+    )  # long first
     with ThreadPoolExecutor(workers()) as pool:
         list(pool.map(lambda name: case(rooms[name], name), others))
     for name in costs:

@@ -29,7 +29,7 @@ def column(form="u_epsv", law=None, *, body=None, **options):
 
 
 def rise(scene, before):
-    """How far the particles have moved since then, by their numbers."""
+    """Distances by which the particles have moved since then, by their numbers."""
     return scene.particles.displacement - before[scene.particles.number]
 
 
@@ -65,7 +65,7 @@ def test_an_excavated_column_rebounds_by_the_closed_form(form):
         kept = np.array(scene.particles.number)
         error = 1e-4 if scene.form.strain.finite else 1e-8
         np.testing.assert_allclose(rise(scene, before)[:, 1], u[kept], rtol=0, atol=error * u.max())
-        assert scene.solve().history[0][0] < 1e-5  # nothing is left to fade
+        assert scene.solve().history[0][0] < 1e-5  # no force remains to fade
 
 
 def test_outputs_and_numbers_are_those_of_the_particles_that_stay():
@@ -125,14 +125,16 @@ def test_supports_on_removed_particles_and_wrong_selections_raise_an_error():
     state = scene.particles.rows().tobytes()
     with pytest.raises(
         tawami.SupportError,
-        match=r"hold\(point=\(0.5, 1.9\)\) y would hold nothing after remove.*release\(\) it before",
+        match=r"hold\(point=\(0.5, 1.9\)\) y would hold no particles.*release\(\) it before",
     ):
         scene.remove(lambda x, y: y > 1.25)
-    with pytest.raises(tawami.SupportError, match=r"fix\(edge='bottom'\) y would hold nothing"):
+    with pytest.raises(
+        tawami.SupportError, match=r"fix\(edge='bottom'\) y would hold no particles"
+    ):
         scene.remove(lambda x, y: y < 0.5)
     for where, words in (
         (lambda x, y: y > 9, r"remove\(...\): no particle was chosen"),
-        (lambda x, y: y > -1, r"remove\(...\) of all particles: expected some that stay"),
+        (lambda x, y: y > -1, r"remove\(...\) of all particles: expected some that remain"),
         ("clay", "the body has no groups with names"),
     ):
         with pytest.raises(tawami.InputError, match=words):
@@ -150,7 +152,7 @@ def test_supports_on_removed_particles_and_wrong_selections_raise_an_error():
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_column_whose_modulus_changes_keeps_its_stress(form):
-    """Nothing moves; a further load finds the new modulus, in a part of the column or in all of it."""
+    """The body does not move. A further load meets the new modulus, in a part of the column or all."""
     stiff = 1e3 if "finite" in form else 1.0  # small strains
     law, new = (tawami.linear_elastic(E=E * stiff * k, nu=0.0) for k in (1.0, 0.25))
     part = 2.0 if "epsv" in form else 1.0  # eps_v has no jumps
@@ -360,7 +362,7 @@ def test_a_killed_run_with_excavations_and_laws_resumes_to_the_bit(tmp_path, for
     assert found == whole
     assert len(scene.left) == 90
     with (
-        pytest.raises(tawami.CheckpointError, match="is of another run: laws"),
+        pytest.raises(tawami.CheckpointError, match="belongs to another run: laws"),
         pytest.warns(tawami.CheckpointWarning, match="The checkpoint before it is tried"),
     ):
         staged(results_of(tmp_path / "cut"), None, form, soft=0.6)

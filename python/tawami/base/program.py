@@ -56,7 +56,7 @@ def _all_end(patience: float) -> bool:
 
 
 def _finish(comm: Any) -> None:
-    """Wait for the other ranks at the end of the program, and free what is left."""
+    """Wait for the other ranks at the end of the program, and free the remaining objects."""
     if not _all_end(NOTICE):
         sys.stderr.write(
             f"tawami: rank {comm.rank} reached the end of the program {NOTICE:g} s ago, other ranks "

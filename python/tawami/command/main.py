@@ -287,7 +287,7 @@ def _new(asked: argparse.Namespace) -> int:
 
 
 def _unusable(path: Path) -> str | None:
-    """Why a script cannot have this name; None if it can."""
+    """Reason why a script cannot have this name; None if it can."""
     name = path.stem
     if not name.isidentifier():
         return f"'{name}' is not a valid name in Python"

@@ -21,7 +21,7 @@ from tawami.base import files, lock, ranks
 from tawami.base.errors import MissingDependencyError, OutputError
 from tawami.fem.dolfinx import OLD, jit
 
-#: How long to wait for a form that another process compiles [s].
+#: Longest time to wait for a form that another process compiles [s].
 PATIENCE = 300.0
 #: Names of the errors of CFFI and setuptools if the compiler fails.
 COMPILER_ERRORS = ("VerificationError", "CompileError")

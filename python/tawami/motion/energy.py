@@ -110,7 +110,7 @@ class Balance:
 
     Args:
         configuration: The body.
-        carried: What its particles carry.
+        carried: Velocities of its particles.
 
     Attributes:
         energies: The balance since the start.
@@ -198,7 +198,7 @@ class Balance:
 
         Args:
             step: As :meth:`of_step` gave it.
-            dissipated: What the laws dissipated on this rank [J per metre depth].
+            dissipated: Energy that the laws dissipated on this rank [J per metre depth].
             steps: Steps so far.
             time: At the end of the step [s].
         """

@@ -16,7 +16,7 @@ from tawami.base.arrays import Array
 from tawami.base.errors import OutputError
 from tawami.base.files import atomic_file
 from tawami.picture import style
-from tawami.picture.figure import new_figure, save
+from tawami.picture.figure import lay_out, new_figure, save
 from tawami.picture.particles import Corners, Scale, Squares, draw_frame, size_of, view
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class Film:
         self.squares = Squares(self.axes, scale)
         self.squares.add_bar(self.axes)
         self.show(-1)
-        self.figure.draw_without_rendering()
+        lay_out(self.figure)
         self.figure.set_layout_engine("none")  # the same view in all frames
 
     def show(self, number: int) -> None:

@@ -1,4 +1,4 @@
-"""Rows of a study: measured runs, and what changes between two settings."""
+"""Rows of a study: measured runs, and changes between two settings."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Row:
         values: Quantities that are single numbers.
         errors: Error of each quantity with a reference.
         costs: wall_s, cpu_s, peak_MB, newton_iterations, steps, unknowns.
-        failure: Why the run failed and has none of these; None if it succeeded.
+        failure: Error message of a run that failed and has none of these; None if it succeeded.
     """
 
     series: str
