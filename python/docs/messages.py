@@ -23,11 +23,7 @@ SUBJECTS: dict[str, tuple[str, ...]] = {
     "Solving": ("solve",),
     "Scene": ("scene",),
     "Steps and motion": ("motion",),
-<<<<<<< HEAD
-    "Results": ("results", "picture"),
-=======
     "Results": ("picture", "results"),
->>>>>>> main
     "Studies": ("study",),
     "Command line": ("command",),
 }
