@@ -180,7 +180,7 @@ def test_messages_are_collected():
     """Examples of errors raised directly and by a helper, and of errors of Rust."""
     found = {(message.kind, message.says) for message in messages.collected()}
     for kind, says in (
-        ("InputError", "edge <shown(name)>: expected 'left', 'right', 'bottom' or 'top'"),
+        ("InputError", "edge <shown(name)>: expected 'left', 'right', 'bottom' or 'top'<hint>"),
         ("FormError", "field '<name>' is of kind '<kind>': expected one of <quoted(FIELD_UNITS)>"),
         ("InputError", "volume of particle <index> is <value> m2: expected a positive number"),
         ("InputError", "phi = <value>: expected a friction angle in degrees, 0 <= phi < 90"),
@@ -190,13 +190,14 @@ def test_messages_are_collected():
 
 def executed_notebook(folder, *tags, raised=()):
     """Problems of a notebook whose cell has tags and raised errors."""
-    nbformat = pytest.importorskip("nbformat", reason="installed by make docs")
+    nbformat = pytest.importorskip("nbformat")
     outputs = [nbformat.v4.new_output("error", ename=name, evalue="no") for name in raised]
     cell = nbformat.v4.new_code_cell("1 + 1", metadata={"tags": list(tags)}, outputs=outputs)
     nbformat.write(nbformat.v4.new_notebook(cells=[cell]), folder / "page.ipynb")
     return notebooks.problems(folder)
 
 
+@pytest.mark.slow
 def test_code_of_a_page_must_raise_the_expected_error(tmp_path):
     assert executed_notebook(tmp_path) == []
     expected = ("raises-exception", "ValueError")
@@ -215,6 +216,7 @@ def test_every_page_with_code_is_a_notebook():
             assert re.fullmatch(r"raises-exception, \w+Error", tags), (name, tags)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", pages.TUTORIALS)
 def test_tutorials_can_be_downloaded_as_notebooks(name):
     """Text and code only, which imports nothing of the repository but the package."""
