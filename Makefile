@@ -4,7 +4,8 @@
 # make test-all     all tests, also the slow ones: extremes, studies, endurance, large cases
 # make fuzz         test random arguments (SEED=... repeats a run)
 # make docs         the documentation as HTML; runs its scripts and cases (PAGE=start builds one page,
-#                   LINKS=1 checks the web's links, THUMBNAILS=1 draws the pictures of README's gallery)
+#                   SCREENS=1 writes pictures of the pages, LINKS=1 checks the web's links,
+#                   THUMBNAILS=1 draws the pictures of README's gallery)
 # make matrix       make test-all on Debian 12, 13 and sid, each in a throw-away root (see tests/matrix.sh)
 # make extremes     try the method at its limits, print the settings that survive or are rejected
 # make bench        speed and memory, stage by stage (AGAINST=../checkout compares with another checkout)
@@ -56,7 +57,7 @@ fuzz: setup $(STAMPS)/cargo-tests
 	HYPOTHESIS_PROFILE=fuzz SEED=$(SEED) $(PYTEST) -m 'fuzz or hypothesis' --hypothesis-seed=$(SEED) $(TESTS)
 
 docs: setup $(STAMPS)/docs $(STAMPS)/notebook
-	$(PYTHON) python/docs $(if $(PAGE),--page $(PAGE)) $(if $(LINKS),--links) $(if $(THUMBNAILS),--thumbnails)
+	$(PYTHON) python/docs $(if $(PAGE),--page $(PAGE)) $(if $(SCREENS),--screens) $(if $(LINKS),--links) $(if $(THUMBNAILS),--thumbnails)
 
 matrix:
 	tests/matrix.sh

@@ -20,6 +20,7 @@ __all__ = [
     "Requests",
     "Stage",
     "TawamiError",
+    "__version__",
     "basis_1d",
     "basis_len",
     "cell_sums",
@@ -35,6 +36,9 @@ __all__ = [
 _Floats = npt.NDArray[np.float64]
 _Numbers = npt.NDArray[np.uint32]
 _Integers = npt.NDArray[np.int64]
+
+#: Of Cargo.toml, from which pip takes the version of the package too.
+__version__: str
 
 class TawamiError(Exception):
     """Base of every error that tawami raises."""

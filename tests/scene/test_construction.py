@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 
+import meshio
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -89,6 +90,30 @@ def test_outputs_and_numbers_are_those_of_the_particles_that_stay():
     assert scene.num_particles == n
 
 
+def test_files_of_a_run_have_the_particles_of_their_step(tmp_path):
+    scene = column()
+    scene.gravity((0.0, -G))
+    outputs = [
+        tawami.ParticleOutput("stress", "displacement", every_steps=1),
+        tawami.TableOutput("particles", every_steps=1),
+    ]
+    results, counts = tawami.Results(tmp_path / "run", *outputs, progress=False), []
+
+    def each(solution):
+        counts.append(len(solution.number))
+        if solution.load == 0.5:
+            scene.remove(lambda x, y: y > 1.5)
+
+    tawami.ramp(scene, 0.5, results=results, each=each)
+    tawami.ramp(scene, 1.0, results=results)
+    assert counts == [288, 216]
+    found = {
+        str(path.relative_to(tmp_path / "run")): len(meshio.read(path).points)
+        for path in (tmp_path / "run").rglob("*.vtu")
+    }
+    assert sorted(found.values()) == [216, 216, 216, 288, 288]
+
+
 def test_the_share_of_a_load_goes_with_its_particles():
     """The rest of the load stays; a traction is released before its cells are removed."""
     scene = column()
@@ -133,7 +158,7 @@ def test_supports_on_removed_particles_and_wrong_selections_raise_an_error():
     ):
         scene.remove(lambda x, y: y < 0.5)
     for where, words in (
-        (lambda x, y: y > 9, r"remove\(...\): no particle was chosen"),
+        (lambda x, y: y > 9, r"remove\(...\): where: no particle was chosen"),
         (lambda x, y: y > -1, r"remove\(...\) of all particles: expected some that remain"),
         ("clay", "the body has no groups with names"),
     ):

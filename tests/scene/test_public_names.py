@@ -15,7 +15,6 @@ SCENE = {
     "grid", "form", "basis", "parameters", "options", "numerics", "particles", "num_particles",
     "laws", "mass", "particles_per_cell", "left", "stopwatch", "configuration",
     "initial", "fix", "hold", "wall", "release", "traction", "load", "gravity",
-    "remove", "change_material",
     "time", "solve", "solve_part", "advanced",
     "residual", "tangent", "reduction", "split", "num_coefficients",
 }  # fmt: skip

@@ -245,6 +245,5 @@ class Balance:
         self.energies = Energies(**state["energies"])
         self._growth.restore(state["growth"])
         self._stored_kinetic = state["stored_kinetic"]
-        kinetic, elastic = state["removed"]
-        self._removed = np.array([kinetic, elastic])
+        self._removed = np.reshape(state["removed"], 2)
         self._statics = self._now.activity.statics

@@ -13,6 +13,7 @@ from tawami import _rust
 from tawami.base import checks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError, NotModelledError
+from tawami.base.text import meant
 from tawami.grid import edges
 from tawami.motion.energy import Energies
 from tawami.motion.observer import Motion, Snapshot, Subject
@@ -88,7 +89,9 @@ def _columns(name: str, subject: Subject) -> Columns:
         return _reaction(name, rest, subject.scene)
     if kind == "displacement" and rest:
         return _displacement(name, _point(name, rest), subject.scene)
-    raise InputError(f"table: '{name}' is unknown: expected one of {', '.join(KNOWN)}")
+    raise InputError(
+        f"table: '{name}' is unknown: expected one of {', '.join(KNOWN)}{meant(name, KNOWN)}"
+    )
 
 
 def _moving(now: Snapshot) -> Motion:

@@ -339,8 +339,7 @@ class Configuration:
         self.activity.time, self.total = state["time"], state["total"]
         self.activity.statics += 1
         self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
-        kinetic, elastic = state["removed"]
-        self.removed = np.array([kinetic, elastic])
+        self.removed = np.reshape(state["removed"], 2)
         self._coverage_checked, self.begun = state["coverage_checked"], True
         self._travel = state["travel"]
         self.supports.restore(state["supports"])

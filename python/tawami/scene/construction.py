@@ -72,7 +72,7 @@ class Construction:
         """
         now = self.configuration
         now.activity.check_between_steps("remove(...)")
-        chosen = selection.numbers(now.domain, "remove(...)", where)
+        chosen = selection.numbers(now.domain, "remove(...): where", where)
         return _remove(now, np.isin(now.domain.particles.number, chosen))
 
     def change_material(self, where: Where, material: _rust.Material | NumpyLaw) -> None:
@@ -96,7 +96,7 @@ class Construction:
         """
         now = self.configuration
         now.activity.check_between_steps("change_material(...)")
-        chosen = selection.numbers(now.domain, "change_material(...)", where)
+        chosen = selection.numbers(now.domain, "change_material(...): where", where)
         mask = np.isin(now.domain.particles.number, chosen)
         _check_any(now, "change_material(...)", mask)
         _change_material(now, mask, material, int(chosen[0]))
