@@ -134,7 +134,7 @@ impl<'a> State<'a> {
                     }
                 }
             }
-            // SAFETY: the caller vouches for the kernel and the length of `element`. Integrals over cells
+            // SAFETY: the caller guarantees the kernel and the length of `element`. Integrals over cells
             // do not read facet, permutations and user data.
             unsafe {
                 (kernel.tabulate)(

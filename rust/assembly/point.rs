@@ -414,7 +414,7 @@ impl<const M: usize, const P: usize, const W: usize> Points<M, P, W> {
         let (rows, columns) = (entries.test.len(), entries.trial.len());
         let result = &mut self.result[..rows * columns.max(1)];
         result.fill(0.0);
-        // SAFETY: the caller vouches for the kernel, which writes rows x columns numbers.
+        // SAFETY: the caller guarantees the kernel, which writes rows x columns numbers.
         unsafe {
             (kernel.tabulate)(
                 result.as_mut_ptr(),

@@ -150,14 +150,16 @@ def test_supports_on_removed_particles_and_wrong_selections_raise_an_error():
     state = scene.particles.rows().tobytes()
     with pytest.raises(
         tawami.SupportError,
-        match=r"hold\(point=\(0.5, 1.9\)\) y would hold nothing after remove.*release\(\) it before",
+        match=r"hold\(point=\(0.5, 1.9\)\) y would hold no particles.*release\(\) it before",
     ):
         scene.remove(lambda x, y: y > 1.25)
-    with pytest.raises(tawami.SupportError, match=r"fix\(edge='bottom'\) y would hold nothing"):
+    with pytest.raises(
+        tawami.SupportError, match=r"fix\(edge='bottom'\) y would hold no particles"
+    ):
         scene.remove(lambda x, y: y < 0.5)
     for where, words in (
         (lambda x, y: y > 9, r"remove\(...\): where: no particle was chosen"),
-        (lambda x, y: y > -1, r"remove\(...\) of all particles: expected some that stay"),
+        (lambda x, y: y > -1, r"remove\(...\) of all particles: expected some that remain"),
         ("clay", "the body has no groups with names"),
     ):
         with pytest.raises(tawami.InputError, match=words):

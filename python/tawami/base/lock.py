@@ -44,7 +44,7 @@ def hold(folder: Path, what: str, patience: float = PATIENCE) -> BaseFileLock:
         InputError: Another process holds it; the message names its host and its number.
         OutputError: The folder cannot be written, or its file system has no locks.
     """
-    from filelock import FileLock, Timeout  # here: a scene without results does without it
+    from filelock import FileLock, Timeout  # here: a scene without results does not need it
 
     home = result_folder(folder).resolve()
     lock = FileLock(home / LOCK, timeout=patience, is_singleton=True, thread_local=False)

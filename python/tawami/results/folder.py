@@ -104,7 +104,7 @@ class RunFolder:
                 raise InputError(
                     f"{self._what}: the folder holds a run that finished {finished[-1]}, and "
                     "no checkpoint to resume it from: expected its checkpoints, or existing='replace' "
-                    "to start anew"
+                    "to start a new run"
                 )
             if not resumes:
                 self._clear()

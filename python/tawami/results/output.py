@@ -167,5 +167,5 @@ def _check_state(name: str, state: dict[str, Any]) -> None:
     except ValueError as error:
         raise CheckpointError(
             f"the checkpoint cannot be used ({error}): its content is not that of a checkpoint. Remove "
-            "it to resume from the one before it, or start anew with existing='replace'"
+            "it to resume from the one before it, or start a new run with existing='replace'"
         ) from None

@@ -54,7 +54,7 @@ class Weight(Load):
 
     @property
     def acceleration(self) -> Array:
-        """The acceleration that the script asked for [m/s2]."""
+        """The acceleration in the driver script [m/s2]."""
         return np.array(self.terms[-1].values if not self.released else np.zeros(2), dtype=float)
 
     def __str__(self) -> str:
@@ -204,7 +204,7 @@ class Loads(Owner[Load]):
 
     @property
     def gravity(self) -> Array:
-        """The acceleration that the script asked for, without amplitudes [m/s2]."""
+        """The acceleration in the driver script, without amplitudes [m/s2]."""
         weights = [load.acceleration for load in self.all if isinstance(load, Weight)]
         return sum(weights, np.zeros(self.grid.space.dim))
 

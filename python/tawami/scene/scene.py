@@ -250,7 +250,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
             for support in self.configuration.supports.all:
                 if support.has_velocity:
                     raise InputError(
-                        f"{support} has a velocity, which statics does not follow: expected a value, "
+                        f"{support} has a velocity, which static steps do not follow: expected a value, "
                         "with amplitude=... and until=... if it changes in time, or Dynamics(scene)"
                     )
             self.configuration.check_coverage()

@@ -122,7 +122,9 @@ class Solution(Elsewhere, Sealed, Unique):
         if name not in self._arrays:
             with quantities.not_modelled():  # the error says how to model it
                 quantities.array_of(self.scene.particles, name)
-            raise NotModelledError(f"{name}: this solution was found before the scene had it")
+            raise NotModelledError(
+                f"{name}: this solution is older than this quantity of the scene"
+            )
         return self._arrays[name]
 
     def _of_form(self, name: str, values: Array | None, having: str) -> Array:

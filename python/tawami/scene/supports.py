@@ -228,7 +228,7 @@ class Supports(Owner[Support]):
             before, after: The particles before and after.
 
         Raises:
-            SupportError: One would hold nothing.
+            SupportError: One would hold no particles.
         """
         for support in self.all:
             if isinstance(support.place, str):
@@ -237,8 +237,8 @@ class Supports(Owner[Support]):
                 lost = not is_in_body(after, support.place)
             if lost:
                 raise SupportError(
-                    f"{support} {support.axis} would hold nothing after remove(...): expected supports "
-                    "on particles that stay; release() it before. Nothing was changed"
+                    f"{support} {support.axis} would hold no particles after remove(...): expected "
+                    "supports on particles that remain; release() it before. Nothing was changed"
                 )
 
     def num_free(self, domain: Domain) -> int:

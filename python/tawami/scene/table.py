@@ -15,6 +15,7 @@ from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.files import reason
 from tawami.base.space import PLANE
+from tawami.base.text import meant
 from tawami.scene.scattered import AXES, Column, Outside, Scattered, check_plane, named, split
 
 
@@ -109,6 +110,7 @@ def table(path: str | Path, *columns: str, outside: Outside = "stop") -> Table:
         raise InputError(
             f"table({name}) has no column '{columns[wanted.index(None)]}': expected one of "
             f"{', '.join(map(repr, content.header))}"
+            f"{meant(columns[wanted.index(None)], content.header)}"
         )
     every = [
         Column(label, partial(content.column, place)) for place, label in enumerate(content.header)

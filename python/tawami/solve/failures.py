@@ -41,7 +41,7 @@ def of_mumps(code: int, detail: int, stage: str, unknowns: int) -> SolverError:
         return SolverError(f"{what}: it is too large for integers of 32 bits {found}. {ADVICE}")
     return SolverError(
         f"{what} {found}: see 'Error diagnostics' in the MUMPS users' guide. linear_solver='iterative' "
-        "does without MUMPS"
+        "does not use MUMPS"
     )
 
 

@@ -21,7 +21,8 @@ def error_of(value: Any, reference: Any) -> float:
     found, expected = (np.asarray(v, dtype=float).ravel() for v in (value, reference))
     if found.shape != expected.shape:
         raise InputError(
-            f"a quantity has {found.size} numbers and its reference {expected.size}: expected as many"
+            f"a quantity has {found.size} numbers and its reference {expected.size}: expected "
+            "the same number"
         )
     size = float(np.linalg.norm(expected))
     return float(np.linalg.norm(found - expected)) / (size or 1.0)
