@@ -236,7 +236,7 @@ class Action:
         """The reverse of :meth:`state`.
 
         Raises:
-            CheckpointError: It was changed to a function while the run went.
+            CheckpointError: It was changed to a function during the run.
         """
         known = {term.number: term for term in self.terms}
         factors = {term.since: term.factor for term in self.terms}
