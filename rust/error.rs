@@ -92,7 +92,7 @@ pub enum Error {
     },
     /// An incompressible material with kinematics that need K.
     #[error(
-        "particle {index} is of an incompressible material (nu = 0.5, K infinite): \
+        "the material of particle {index} is incompressible (nu = 0.5, K infinite): \
          it needs a form with the kinematics 'deviatoric'. Use form 'u_p', or nu < 0.5"
     )]
     Incompressible {

@@ -35,7 +35,7 @@ impl VonMises {
             return Err(Error::Parameter { name: "yield_stress", value: yield_stress, expected });
         }
         if !(hardening >= 0.0 && hardening.is_finite()) {
-            let expected = "a hardening modulus of at least 0 Pa (softening needs a length)";
+            let expected = "a hardening modulus of at least 0 Pa (softening needs a length scale)";
             return Err(Error::Parameter { name: "hardening", value: hardening, expected });
         }
         Ok(Self { elastic, yield_stress, hardening })

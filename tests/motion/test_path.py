@@ -107,7 +107,7 @@ def test_a_law_that_softens_warns_once_where_it_does():
 
 def test_a_law_in_rust_that_softens_is_rejected():
     elastic = tawami.linear_elastic(E=1e3, nu=0.3)
-    with pytest.raises(tawami.InputError, match="hardening = -1: .*softening needs a length"):
+    with pytest.raises(tawami.InputError, match="hardening = -1: .*softening needs a length scale"):
         tawami.von_mises(elastic, yield_stress=1.0, hardening=-1.0)
 
 
