@@ -41,7 +41,7 @@ def draw_particles(
         axes: Of one figure.
         x: Positions [m], particles x 2.
         side: Sides of the squares [m], one for all or one each.
-        values: What colours them.
+        values: Quantity for the colours.
         unit: Of the values.
         limits: Ends of the range of colours, in this unit.
         name: Of the values.

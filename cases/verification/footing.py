@@ -82,7 +82,7 @@ class Run:
         form: Weak form.
         law: Material.
         basis: Basis of u.
-        footing: How the settlement is prescribed.
+        footing: Kind of prescribed settlement.
         n: Cells over half the footing's width.
         nu: Poisson's ratio.
         alpha: Stabilisation.
@@ -93,7 +93,7 @@ class Run:
         uneven: Difference of the largest and smallest settlement under the footing, as a share.
         seconds: Wall time.
         x, plastic: Positions [m] and plastic strain of the particles at the end.
-        stopped: Why the run ended early; empty if it did not.
+        stopped: Reason why the run ended early; empty if it did not.
     """
 
     form: str

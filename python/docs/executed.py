@@ -72,7 +72,7 @@ def fingerprint(patterns: Iterable[str], *more: str) -> str:
 
 @cache
 def _meaning(content: bytes, suffix: str) -> bytes:
-    """What a file does, as bytes: of a Python file its syntax tree without docstrings."""
+    """Content of a file as bytes; of a Python file its syntax tree without docstrings."""
     if suffix != ".py":
         return content
     tree = ast.parse(content)

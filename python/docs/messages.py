@@ -15,7 +15,7 @@ from tawami.base import errors
 PACKAGE = ROOT / "python" / "tawami"
 #: Headings of the list, and the rooms whose messages they hold.
 SUBJECTS: dict[str, tuple[str, ...]] = {
-    "Inputs, installation and ranks": ("base", "picture", "fem"),
+    "Inputs, installation and ranks": ("base", "fem"),
     "Grid and body": ("grid", "body"),
     "Forms": ("form", "check"),
     "Particles and laws": ("particles", "rust"),
@@ -23,7 +23,7 @@ SUBJECTS: dict[str, tuple[str, ...]] = {
     "Solving": ("solve",),
     "Scene": ("scene",),
     "Steps and motion": ("motion",),
-    "Results": ("results", "picture"),
+    "Results": ("picture", "results"),
     "Studies": ("study",),
     "Command line": ("command",),
 }

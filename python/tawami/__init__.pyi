@@ -1,6 +1,7 @@
 """tawami: implicit material point method with the mixed displacement - volumetric strain form."""
 
 from tawami._rust import Material
+from tawami._rust import __version__ as __version__
 from tawami.base.errors import (
     CheckpointError,
     CheckpointWarning,

@@ -20,6 +20,7 @@ __all__ = [
     "Requests",
     "Stage",
     "TawamiError",
+    "__version__",
     "basis_1d",
     "basis_len",
     "cell_sums",
@@ -36,14 +37,17 @@ _Floats = npt.NDArray[np.float64]
 _Numbers = npt.NDArray[np.uint32]
 _Integers = npt.NDArray[np.int64]
 
+#: Of Cargo.toml, from which pip takes the version of the package too.
+__version__: str
+
 class TawamiError(Exception):
     """Base of every error that tawami raises."""
 
 class InputError(TawamiError):
-    """An input is wrong; the message says which."""
+    """A wrong input; the message names it."""
 
 class InvertedError(TawamiError):
-    """An iterate turns a particle inside out."""
+    """An iterate that turns a particle inside out."""
 
 @final
 class Grid:

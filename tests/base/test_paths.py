@@ -183,7 +183,8 @@ CASES = [
     *((use, bad) for use in READ_FOLDER
       for bad in (*SPECIAL, missing, folder, regular_file, dangling_link, no_permission)),
     *((use, bad) for use in WRITE for bad in (*SPECIAL, missing, folder, no_permission)
-      if bad is not loop or use in ("append_line", "tawami new")),  # others replace the link
+      if bad is not loop or use in ("append_line", "tawami new")  # others replace the link
+      if bad is not missing or use != "tawami new"),  # it creates the folder
     *((use, bad) for use in WRITE_FOLDER
       for bad in (*SPECIAL, regular_file, dangling_link, no_permission)),
 ]  # fmt: skip

@@ -60,7 +60,7 @@ def process() -> Callable[..., Finished]:
 
 @pytest.fixture
 def here(monkeypatch, capsys) -> Callable[..., Finished]:
-    """Run the command in this process, which is then as it was before."""
+    """Run the command in this process, and restore the state of the process."""
 
     def run(*arguments: object, cwd: object = None) -> Finished:
         words, environment, code = [*map(str, arguments)], dict(os.environ), 0

@@ -26,14 +26,19 @@ def test_every_command_has_its_help(capsys):
         assert max(map(len, said.splitlines())) <= 100
 
 
-def test_plot_passes_its_options_on(capsys, rejected, monkeypatch):
+def test_plot_passes_its_options_on(capsys, rejected, monkeypatch, tmp_path):
     asked = []
 
     def plot(folder, *, quantity, movie):
-        asked.append((folder, quantity, movie))
-        if folder == "empty":
+        asked.append((str(folder), quantity, movie))
+        if str(folder) == "empty":
             raise tawami.InputError("'empty' holds no results")
         return [Path(folder) / "a.png", Path(folder) / "b.gif"]
+
+    monkeypatch.chdir(tmp_path)
+    for name in ("pile", "empty"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "run.json").touch()
 
     fake = types.ModuleType("tawami.results.plot")
     fake.plot = plot  # type: ignore[attr-defined]
@@ -82,8 +87,10 @@ def test_new_writes_a_script_but_not_over_another(capsys, rejected, tmp_path, ki
     path.write_text("mine")
     assert "exists already, and was not changed" in rejected("new", path)
     assert path.read_text() == "mine"
-    assert main.main(["new", str(tmp_path / "nowhere" / "case")]) == 1
-    assert "cannot be written: No such file" in capsys.readouterr().err
+    assert main.main(["new", str(tmp_path / "new" / "folder" / "case")]) == 0
+    assert (tmp_path / "new" / "folder" / "case.py").is_file()
+    assert main.main(["new", str(path / "case")]) == 1  # below a file
+    assert "cannot be written: " in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -103,9 +103,7 @@ def test_the_copy_runs_on_ranks(script, results, process):
 
 
 def test_a_run_that_cannot_be_resumed_is_rejected(rejected, script, results):
-    assert "'nowhere/run.json' cannot be read (No such file or directory): expected" in rejected(
-        "resume", "nowhere"
-    )
+    assert "'nowhere' does not exist: expected the folder of a run" in rejected("resume", "nowhere")
     file = results / "run.json"
     for text, message in [
         ("{", "to run again (Expecting"),

@@ -21,7 +21,7 @@ def scene_of(law=None, *, form="u", density=1.0):
     return scene
 
 
-#: What a function of the script may call, of a scene with a motion.
+#: Calls that a function of the script may make, of a scene with a motion.
 STEPS = {
     "solve": lambda scene, motion: scene.solve(),
     "step": lambda scene, motion: motion.step(1e-3),

@@ -206,6 +206,7 @@ def whole(motion: tawami.Dynamics) -> dict[str, np.ndarray]:
     particles, comm = motion.scene.particles, motion.scene.grid.comm
     order = np.argsort(allgathered(comm, particles.number))
     arrays = {"x": particles.x, "stress": particles.stress, "velocity": motion.velocity}
+    arrays["strain"] = particles.strain
     return {name: allgathered(comm, np.array(values))[order] for name, values in arrays.items()}
 
 

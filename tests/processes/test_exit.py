@@ -102,4 +102,4 @@ time.sleep(2)
 """
     run = on_ranks(2, "-c", code)
     assert run.returncode == 0, run.stderr
-    assert run.stderr.count("rank 1 has been at the end of the program for 0.5 s") == 1
+    assert run.stderr.count("rank 1 reached the end of the program 0.5 s ago") == 1

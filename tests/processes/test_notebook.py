@@ -62,6 +62,7 @@ def test_a_notebook_shows_tables_pictures_and_progress(notebook):
     assert film["text/html"].count("data:image/png;base64") == 5
     assert "arning" not in film["stderr"]
     assert "velocity x [m/s]" in notebook("solution.to_pandas()")["text/html"]
+    assert "stderr" not in notebook("cloud = solution.to_pyvista()")
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 
+import meshio
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -29,7 +30,7 @@ def column(form="u_epsv", law=None, *, body=None, **options):
 
 
 def rise(scene, before):
-    """How far the particles have moved since then, by their numbers."""
+    """Distances by which the particles have moved since then, by their numbers."""
     return scene.particles.displacement - before[scene.particles.number]
 
 
@@ -65,7 +66,7 @@ def test_an_excavated_column_rebounds_by_the_closed_form(form):
         kept = np.array(scene.particles.number)
         error = 1e-4 if scene.form.strain.finite else 1e-8
         np.testing.assert_allclose(rise(scene, before)[:, 1], u[kept], rtol=0, atol=error * u.max())
-        assert scene.solve().history[0][0] < 1e-5  # nothing is left to fade
+        assert scene.solve().history[0][0] < 1e-5  # no force remains to fade
 
 
 def test_outputs_and_numbers_are_those_of_the_particles_that_stay():
@@ -87,6 +88,30 @@ def test_outputs_and_numbers_are_those_of_the_particles_that_stay():
     again = scene.remove([0, 1, int(np.flatnonzero(top)[0])])  # one of them is gone already
     assert again.number.tolist() == [0, 1]
     assert scene.num_particles == n
+
+
+def test_files_of_a_run_have_the_particles_of_their_step(tmp_path):
+    scene = column()
+    scene.gravity((0.0, -G))
+    outputs = [
+        tawami.ParticleOutput("stress", "displacement", every_steps=1),
+        tawami.TableOutput("particles", every_steps=1),
+    ]
+    results, counts = tawami.Results(tmp_path / "run", *outputs, progress=False), []
+
+    def each(solution):
+        counts.append(len(solution.number))
+        if solution.load == 0.5:
+            scene.remove(lambda x, y: y > 1.5)
+
+    tawami.ramp(scene, 0.5, results=results, each=each)
+    tawami.ramp(scene, 1.0, results=results)
+    assert counts == [288, 216]
+    found = {
+        str(path.relative_to(tmp_path / "run")): len(meshio.read(path).points)
+        for path in (tmp_path / "run").rglob("*.vtu")
+    }
+    assert sorted(found.values()) == [216, 216, 216, 288, 288]
 
 
 def test_the_share_of_a_load_goes_with_its_particles():
@@ -125,14 +150,16 @@ def test_supports_on_removed_particles_and_wrong_selections_raise_an_error():
     state = scene.particles.rows().tobytes()
     with pytest.raises(
         tawami.SupportError,
-        match=r"hold\(point=\(0.5, 1.9\)\) y would hold nothing after remove.*release\(\) it before",
+        match=r"hold\(point=\(0.5, 1.9\)\) y would hold no particles.*release\(\) it before",
     ):
         scene.remove(lambda x, y: y > 1.25)
-    with pytest.raises(tawami.SupportError, match=r"fix\(edge='bottom'\) y would hold nothing"):
+    with pytest.raises(
+        tawami.SupportError, match=r"fix\(edge='bottom'\) y would hold no particles"
+    ):
         scene.remove(lambda x, y: y < 0.5)
     for where, words in (
-        (lambda x, y: y > 9, r"remove\(...\): no particle was chosen"),
-        (lambda x, y: y > -1, r"remove\(...\) of all particles: expected some that stay"),
+        (lambda x, y: y > 9, r"remove\(...\): where: no particle was chosen"),
+        (lambda x, y: y > -1, r"remove\(...\) of all particles: expected some that remain"),
         ("clay", "the body has no groups with names"),
     ):
         with pytest.raises(tawami.InputError, match=words):
@@ -150,7 +177,7 @@ def test_supports_on_removed_particles_and_wrong_selections_raise_an_error():
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_column_whose_modulus_changes_keeps_its_stress(form):
-    """Nothing moves; a further load finds the new modulus, in a part of the column or in all of it."""
+    """The body does not move. A further load meets the new modulus, in a part of the column or all."""
     stiff = 1e3 if "finite" in form else 1.0  # small strains
     law, new = (tawami.linear_elastic(E=E * stiff * k, nu=0.0) for k in (1.0, 0.25))
     part = 2.0 if "epsv" in form else 1.0  # eps_v has no jumps
@@ -360,7 +387,7 @@ def test_a_killed_run_with_excavations_and_laws_resumes_to_the_bit(tmp_path, for
     assert found == whole
     assert len(scene.left) == 90
     with (
-        pytest.raises(tawami.CheckpointError, match="is of another run: laws"),
+        pytest.raises(tawami.CheckpointError, match="belongs to another run: laws"),
         pytest.warns(tawami.CheckpointWarning, match="The checkpoint before it is tried"),
     ):
         staged(results_of(tmp_path / "cut"), None, form, soft=0.6)

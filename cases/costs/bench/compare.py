@@ -151,7 +151,7 @@ def compare(
         other: Root of the other checkout.
         cells: Sizes of the beam, in cells over the height.
         particles: Sizes of the pile, in particles.
-        rounds: How often new processes start.
+        rounds: Number of times that new processes start.
         pairs: Pairs of steps of each scene in a round, fewer of a large one.
         threads: Threads of the Rust part.
         kernels: Core type that the other checkout's OpenBLAS uses.

@@ -41,7 +41,7 @@ def pile(finer: int = 1) -> Any:
     """The pile of `cases.showcase.collapse` in motion.
 
     Args:
-        finer: How much smaller cells are than 1 cm: 800 finer^2 particles.
+        finer: Ratio of 1 cm to the cell size: 800 finer^2 particles.
     """
     cells = (80 * finer, 14 * finer)
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.01 / finer, cells=cells)

@@ -46,7 +46,7 @@ class Run:
         crossed: Cells that the tip has crossed.
         seconds: Wall time.
         at, mean_stress: Positions [m] and mean stress [Pa] of the particles at the end.
-        stopped: Why the run ended early; empty if it did not.
+        stopped: Reason why the run ended early; empty if it did not.
     """
 
     load: float

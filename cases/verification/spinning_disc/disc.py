@@ -70,7 +70,7 @@ class Run:
         steps: Steps per turn.
         turns: Time in turns [-].
         angular: Angular momentum, over that of the start.
-        conserved: What the trapezoidal rule conserves, over the angular momentum of the start.
+        conserved: Quantity that the trapezoidal rule conserves, over the angular momentum of the start.
         energy: Kinetic plus elastic energy, over that of the start.
         linear: Linear momentum, over the sum of its magnitudes.
         roundness: (r_max - r_min)/R of the outer ring, about the centre of mass.

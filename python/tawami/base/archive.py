@@ -124,7 +124,7 @@ def unusable(path: Path | None, error: Exception) -> CheckpointError:
     what = f"{error} is missing" if isinstance(error, KeyError) else reason(error)
     return CheckpointError(
         f"checkpoint '{path}' cannot be used ({what}): its content is not that of a checkpoint. Remove "
-        "it to resume from the one before it, or start anew with existing='replace'"
+        "it to resume from the one before it, or start a new run with existing='replace'"
     )
 
 

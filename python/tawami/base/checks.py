@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError
+from tawami.base.text import meant
 
 #: The smallest number above 0.
 LEAST = sys.float_info.min
@@ -100,7 +101,8 @@ def choice(name: str, value: Any, known: Collection[str], wrong: str = "") -> An
         listed = (
             f"one of {', '.join([*others, last])}" if len(others) != 1 else f"{others[0]} or {last}"
         )
-        raise InputError(f"{name} = {shown(value)}: {wrong}expected {listed}")
+        hint = meant(value, known) if isinstance(value, str) else ""
+        raise InputError(f"{name} = {shown(value)}: {wrong}expected {listed}{hint}")
     return value
 
 
@@ -267,7 +269,7 @@ def room(what: str, count: int, each: float, advice: str) -> None:
         what: Input that decides the number of objects.
         count: Number of objects.
         each: Memory of one object [bytes].
-        advice: What to do.
+        advice: Advice for the message.
 
     Raises:
         InputError: It is not enough; the message says how much is needed.
@@ -278,6 +280,6 @@ def room(what: str, count: int, each: float, advice: str) -> None:
     size = float(min(count, 10**300)) * each
     if size > available:
         raise InputError(
-            f"{what} needs about {size / 2**30:.3g} GB of memory, of which there are "
-            f"{available / 2**30:.3g} GB: {advice}"
+            f"{what} needs about {size / 2**30:.3g} GB of memory, and {available / 2**30:.3g} GB are "
+            f"available: {advice}"
         )

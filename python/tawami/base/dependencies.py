@@ -65,7 +65,7 @@ try:
 except ImportError as error:  # pragma: no cover - exercised in a subprocess by the tests
     report_missing(error)
 
-#: How to install the right PETSc.
+#: Advice on the installation of the right PETSc.
 ADVICE = "On Debian: apt install python3-dolfinx-real python3-petsc4py-real, and unset PETSC_DIR"
 
 if np.dtype(PETSc.ScalarType) != np.float64:

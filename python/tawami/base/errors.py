@@ -80,7 +80,7 @@ class LockingWarning(TawamiWarning):
 
 
 class ParameterWarning(TawamiWarning):
-    """A parameter of a form beyond its usual range, where results are far off."""
+    """A parameter of a form beyond its usual range, where results are inaccurate."""
 
 
 class QuadratureWarning(TawamiWarning):

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import difflib
 import errno
 import os
 import platform
 import re
 import stat
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from tawami.base import checks
 from tawami.base.errors import InputError, OutputError
+from tawami.base.text import suggestion
 
 #: Temporary files: .PROCESS@HOST@NAME.
 PART = re.compile(r"\.(\d+)@([^@]*)@.*", re.DOTALL)
@@ -22,12 +24,12 @@ OLD = 86400.0
 
 
 def reason(error: BaseException) -> str:
-    """Why something failed, in the words of the system where it has some."""
+    """Reason of a failure, in the words of the system where possible."""
     return getattr(error, "strerror", None) or str(error) or type(error).__name__
 
 
 def unreadable(path: Path) -> str | None:
-    """Why a path is not a regular file that can be read; None if it is one."""
+    """Reason why a path is not a regular file that can be read; None if it is one."""
     try:
         check_regular(path)
         with path.open("rb"):
@@ -40,9 +42,9 @@ def readable_file(what: str, path: str | Path, expected: str) -> Path:
     """The path of a regular file that can be read.
 
     Args:
-        what: What messages call the file, as 'script'.
+        what: Name of the file in messages, as 'script'.
         path: Its path.
-        expected: What messages say after 'expected'.
+        expected: Text after 'expected' in messages.
 
     Raises:
         InputError: No path, or not that of such a file.
@@ -50,8 +52,42 @@ def readable_file(what: str, path: str | Path, expected: str) -> Path:
     file = checks.path(what, path)
     problem = unreadable(file)
     if problem is not None:
-        raise InputError(f"{what} '{file}' cannot be read ({problem}): expected {expected}")
+        hint = suggestion(None if os.path.lexists(file) else nearest(file, _alike(file)))
+        raise InputError(f"{what} '{file}' cannot be read ({problem}): expected {expected}{hint}")
     return file
+
+
+def nearest(path: Path, fits: Callable[[Path], bool]) -> Path | None:
+    """The path that fits and whose names are nearly those of this path; None without one.
+
+    Args:
+        path: A path that does not exist.
+        fits: Whether a path is one of those to choose from.
+    """
+    *folders, name = path.parts or ("",)
+    found = Path()
+    for part in folders:
+        if not os.path.isdir(found / part):
+            near = difflib.get_close_matches(part, _names(found, Path.is_dir), 1)
+            if not near:
+                return None
+            part = near[0]
+        found /= part
+    names = _names(found, fits)
+    near = [name] if name in names else difflib.get_close_matches(name, names, 1)
+    return found / near[0] if near else None
+
+
+def _names(folder: Path, fits: Callable[[Path], bool]) -> list[str]:
+    try:
+        return sorted(path.name for path in folder.iterdir() if fits(path))
+    except OSError:
+        return []
+
+
+def _alike(file: Path) -> Callable[[Path], bool]:
+    """Whether a path is that of a file of the same kind; of any kind if this one has no ending."""
+    return lambda path: path.is_file() and file.suffix in ("", path.suffix)
 
 
 def result_folder(path: str | Path) -> Path:

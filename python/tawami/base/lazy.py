@@ -35,4 +35,4 @@ def attach(
     def names() -> list[str]:
         return sorted({*vars(sys.modules[package]), *home})
 
-    return get, names, sorted(home)
+    return get, names, sorted(name for name in home if not name.startswith("_"))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import sys
-import warnings
 from importlib.util import find_spec
 from time import monotonic
 from typing import Any, TextIO
@@ -16,16 +15,12 @@ INTERVAL = 0.1
 
 
 def progress_bar(*arguments: Any, **options: Any) -> Any:
-    """A bar of `tqdm.auto`, which suits terminals and notebooks.
+    """A bar of `tqdm.auto`, which suits terminals and notebooks; one of text without ipywidgets.
 
     Raises:
         MissingDependencyError: tqdm is not installed.
     """
-    with warnings.catch_warnings():
-        # without ipywidgets a notebook gets a bar of text, which is no reason for a warning
-        warnings.simplefilter("ignore")
-        tqdm = optional("tqdm.auto", "a progress bar needs").tqdm
-    return tqdm(*arguments, **options)
+    return optional("tqdm.auto", "a progress bar needs").tqdm(*arguments, **options)
 
 
 def in_notebook() -> bool:

@@ -37,14 +37,14 @@ def hold(folder: Path, what: str, patience: float = PATIENCE) -> BaseFileLock:
 
     Args:
         folder: Created if it does not exist.
-        what: What messages call it, as "Results('folder')".
-        patience: How long to wait until another process releases it [s].
+        what: Its name in messages, as "Results('folder')".
+        patience: Longest time to wait until another process releases it [s].
 
     Raises:
         InputError: Another process holds it; the message names its host and its number.
         OutputError: The folder cannot be written, or its file system has no locks.
     """
-    from filelock import FileLock, Timeout  # here: a scene without results does without it
+    from filelock import FileLock, Timeout  # here: a scene without results does not need it
 
     home = result_folder(folder).resolve()
     lock = FileLock(home / LOCK, timeout=patience, is_singleton=True, thread_local=False)

@@ -27,6 +27,11 @@ COURTESY, LONGEST = 1.0, 4.0
 #: Seconds in which all ranks must call sys.exit if one does, and after which a rank that has reached the
 #: end of the program reports that others have not.
 GRACE, NOTICE = 10.0, 60.0
+#: Environment variables without which mpirun does not start for root.
+AS_ROOT = ("OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM")
+#: Environment variable with which `tawami run --ranks` asks for a line on standard error when an error
+#: that is printed ends all ranks, and this line.
+ANNOUNCE, ENDED = "TAWAMI_ANNOUNCE", "\x1dtawami: an error ends all ranks"
 #: A communicator for the end of the program alone, and the request of this rank that ends with it.
 _end: list[Any] = []
 
@@ -56,7 +61,7 @@ def _all_end(patience: float) -> bool:
 
 
 def _finish(comm: Any) -> None:
-    """Wait for the other ranks at the end of the program, and free what is left."""
+    """Wait for the other ranks at the end of the program, and free the remaining objects."""
     if not _all_end(NOTICE):
         sys.stderr.write(
             f"tawami: rank {comm.rank} reached the end of the program {NOTICE:g} s ago, other ranks "
@@ -84,6 +89,8 @@ def leave_together() -> Iterator[None]:
             )
         if isinstance(end.code, str) and rank:
             end.code = 1  # the first rank prints the text
+        if end.code:
+            _announce()
         raise
 
 
@@ -105,14 +112,21 @@ def _abort(text: str, code: int = 1) -> NoReturn:
     comm = MPI.COMM_WORLD
     time.sleep(min(COURTESY * comm.rank, LONGEST))
     sys.stderr.write(text)
-    sys.stderr.flush()
+    _announce()
     comm.Abort(code)
     raise SystemExit(code)
 
 
+def _announce() -> None:
+    """Tell the process that started the ranks that messages of MPI would only repeat an error."""
+    if ANNOUNCE in os.environ:
+        sys.stderr.write(f"{ENDED}\n")
+    sys.stderr.flush()
+
+
 def own_environment() -> dict[str, str]:
     """The environment without the variables of MPI: a child process is not a rank of this program."""
-    own = ("OMPI_", "PMIX_", "PRTE_")
+    own = ("OMPI_", "PMIX_", "PRTE_", ANNOUNCE)
     return {k: v for k, v in os.environ.items() if not k.startswith(own)}
 
 
@@ -122,8 +136,7 @@ def mpirun(number: int, command: list[str]) -> tuple[list[str], dict[str, str]]:
     There may be more ranks than processors, and root may start them, as in containers.
     """
     environment = own_environment() | {
-        "OMPI_ALLOW_RUN_AS_ROOT": "1",
-        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+        **dict.fromkeys(AS_ROOT, "1"),
         "OMPI_MCA_rmaps_base_oversubscribe": "1",
         "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     }

@@ -42,7 +42,7 @@ class Settings(Mapping[str, Value]):
 
     Args:
         values: The values by name.
-        instead: What to do instead of setting one, for the error message.
+        instead: Advice on what to do instead, for the error message.
     """
 
     def __init__(self, values: Mapping[str, Value], instead: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import textwrap
 from collections.abc import Iterable, Sequence
 
@@ -32,6 +33,16 @@ def listed(texts: Sequence[str]) -> str:
 def quoted(names: Iterable[object]) -> str:
     """Names in quotes, for messages."""
     return ", ".join(f"'{name}'" for name in names)
+
+
+def meant(name: str, known: Iterable[str]) -> str:
+    """The end of a message with the known name that is nearly this one; empty without one."""
+    return suggestion(next(iter(difflib.get_close_matches(name, list(known), 1)), None))
+
+
+def suggestion(name: object) -> str:
+    """The end of a message that suggests a name; empty without one."""
+    return "" if name is None else f"; did you mean '{name}'?"
 
 
 def size(number: int) -> str:

@@ -15,7 +15,7 @@ from tawami.body.points import areas
 
 #: Bisections that find where the sign changes.
 BISECTIONS = 46
-#: How many times a square is divided at most.
+#: Largest number of times that a square is divided.
 DEEPEST = 20
 #: Squares, besides four times the initial ones, above which the border is not a curve.
 MANY = 20_000

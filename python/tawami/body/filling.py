@@ -32,7 +32,7 @@ BYTES_PER_PARTICLE = 128.0
 
 
 class Filling:
-    """How the cells of a grid are filled with particles: the arguments that all shapes share.
+    """Arguments of all shapes: they define how the cells of a grid are filled with particles.
 
     Attributes:
         grid: The grid.

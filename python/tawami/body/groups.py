@@ -40,7 +40,7 @@ def materials(
         members = {name: members[name] for name in names("mesh: groups", groups, tuple(members))}
         if not members:
             raise InputError(
-                f"mesh: groups = {shown(groups)}: expected the name of a group or more"
+                f"mesh: groups = {shown(groups)}: expected the names of one or more groups"
             )
     if not members:
         return np.zeros(sum(len(block.data) for _, block in blocks), dtype=np.int64), ()

@@ -158,7 +158,7 @@ def _filled(
     """Particles for squares between samples that are inside, and along the border.
 
     Args:
-        filling: How cells are filled.
+        filling: Rule for filling cells.
         inside: Mask of the squares between samples, y by x.
         triangles: Triangles along the border, n x 3 x 2.
         whole: Smaller squares along the border.

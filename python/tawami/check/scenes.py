@@ -94,7 +94,7 @@ def tangent_error(scene: Scene) -> float:
 
 
 def path_difference(form: Form, given: Settings) -> float:
-    """Difference of residual and tangent between the fast and the reference assembly."""
+    """Difference of residual and tangent between the assembly at the points and that by dolfinx."""
     parts = []
     for path in ("points", "dolfinx"):
         scene = cloud(form, given, assembly=path)

@@ -17,6 +17,7 @@ from time import perf_counter
 
 from mpi4py import MPI
 
+from tawami.base import program
 from tawami.base.errors import TawamiError
 from tawami.base.text import labelled
 from tawami.check import scenes
@@ -79,7 +80,12 @@ def _memory() -> str:
 def _ranks() -> str:
     library = MPI.Get_library_version().splitlines()[0].split("\x00")[0].strip().rstrip(",")
     starts = shutil.which("mpirun") or "no mpirun: apt install openmpi-bin"
-    return f"{MPI.COMM_WORLD.size} now; {library}; {starts}"
+    text = f"{MPI.COMM_WORLD.size} now; {library}; {starts}"
+    missing = [name for name in program.AS_ROOT if name not in os.environ]
+    if os.geteuid() == 0 and missing:
+        text += f". As root, mpirun needs: export {' '.join(f'{name}=1' for name in missing)}"
+        text += " (tawami run --ranks sets them)"
+    return text
 
 
 def _compiler() -> str:

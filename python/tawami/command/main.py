@@ -7,25 +7,24 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import keyword
 import os
 import shlex
 import sys
 from collections.abc import Callable, Sequence
-from importlib.machinery import PathFinder
-from pathlib import Path
 from typing import Any
 
+from tawami._rust import __version__
 from tawami.base import checks
-from tawami.base.errors import InputError, TawamiError
-from tawami.base.files import writing
+from tawami.base.errors import FormError, InputError, TawamiError
+from tawami.command import new
+from tawami.command.folders import run_folder
+from tawami.command.misuse import command_line, unrecognised
 from tawami.command.resume import resume
 from tawami.command.script import INTERRUPTED, Script, start
 from tawami.results.progress import LOG_LEVEL
 from tawami.results.results import EXISTING
 
-CODES = "Exit codes: 0 success; 1 the run or check failed; 2 wrong input; 130 Ctrl-C"
-TEMPLATES = Path(__file__).parent / "templates"
+CODES = "Exit codes: 0 success; 1 the run or check failed; 2 wrong command line; 130 Ctrl-C; 143 SIGTERM"
 LEVELS = ("debug", "info", "warning", "error")
 
 
@@ -73,7 +72,13 @@ def _parsed(given: list[str]) -> argparse.Namespace:
     if "--" in given:
         own, rest = given[: given.index("--")], given[given.index("--") + 1 :]
     parser = _parser()
-    asked = parser.parse_args(own)
+    if own and own[0].endswith(".py"):
+        parser.error(f"'{own[0]}' is not a command: to run a script: {command_line('run', own[0])}")
+    asked, unknown = parser.parse_known_args(own)
+    if asked.name == "tawami run" and asked.script is asked.module is None:
+        asked.parser.error("expected a SCRIPT, or -m with the name of a module")
+    if unknown or (asked.name == "tawami run" and asked.script and asked.module):
+        asked.parser.error(unrecognised(asked, unknown, own))
     if rest and asked.name != "tawami run":
         parser.error(f"arguments after -- belong to a script: {asked.name} does not run one")
     asked.arguments = rest
@@ -88,6 +93,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog=f"tawami COMMAND --help describes a command. {CODES}.",
         allow_abbrev=False,
     )
+    parser.add_argument("--version", action="version", version=f"tawami {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_run(commands)
     _add_resume(commands)
@@ -120,7 +126,7 @@ def _add(
         allow_abbrev=False,
         formatter_class=argparse.RawDescriptionHelpFormatter if epilog else argparse.HelpFormatter,
     )
-    parser.set_defaults(command=command, name=f"{under} {name}")
+    parser.set_defaults(command=command, name=f"{under} {name}", parser=parser)
     return parser
 
 
@@ -134,9 +140,8 @@ def _add_run(commands: Any) -> None:
         "  tawami run pile.py --ranks 4 --replace -- --friction 0.3\n"
         "  tawami run -m cases.showcase.collapse"
     ))  # fmt: skip
-    what = run.add_mutually_exclusive_group(required=True)
-    what.add_argument("script", nargs="?", metavar="SCRIPT", help="a Python file")
-    what.add_argument("-m", "--module", metavar="NAME", help="a module, as after python -m")
+    run.add_argument("script", nargs="?", metavar="SCRIPT", help="a Python file")
+    run.add_argument("-m", "--module", metavar="NAME", help="a module, as after python -m")
     _add_ranks(run)
     existing = run.add_mutually_exclusive_group()
     existing.add_argument(
@@ -176,7 +181,9 @@ def _add_plot(commands: Any) -> None:
     plot = _add(commands, "plot", _plot, "pictures and a movie of results", (
         "Draws the results of a run into its folder figures, and prints the names of the files."
     ))  # fmt: skip
-    plot.add_argument("folder", metavar="FOLDER", help="folder of results, as results/pile")
+    plot.add_argument(
+        "folder", metavar="FOLDER", help="folder of results, as results/pile, or a file in it"
+    )
     plot.add_argument(
         "--quantity",
         metavar="Q",
@@ -186,11 +193,11 @@ def _add_plot(commands: Any) -> None:
 
 
 def _add_new(commands: Any) -> None:
-    new = _add(commands, "new", _new, "write a driver script", (
+    parser = _add(commands, "new", _new, "write a driver script", (
         "Writes NAME.py, a commented script that runs without changes. An existing file is not changed."
     ))  # fmt: skip
-    new.add_argument("file", metavar="NAME", help="as mycase, or folder/mycase.py")
-    kind = new.add_mutually_exclusive_group()
+    parser.add_argument("file", metavar="NAME", help="as mycase, or folder/mycase.py")
+    kind = parser.add_mutually_exclusive_group()
     for name, text in (("statics", "a beam, solved once (default)"), ("dynamics", "a slump")):
         kind.add_argument(
             f"--{name}", dest="kind", action="store_const", const=name, default="statics", help=text
@@ -256,58 +263,33 @@ def _run(asked: argparse.Namespace) -> int:
 
 
 def _resume(asked: argparse.Namespace) -> int:
-    folder = checks.path("tawami resume: folder", asked.folder)
-    return resume(folder, asked.ranks, _environment(asked), trust=asked.trust)
+    return resume(run_folder(asked.folder), asked.ranks, _environment(asked), trust=asked.trust)
 
 
 def _plot(asked: argparse.Namespace) -> int:
     plot = importlib.import_module("tawami.results.plot")  # here: it imports matplotlib
     movie = None if asked.movie == "none" else asked.movie
-    for path in plot.plot(asked.folder, quantity=asked.quantity, movie=movie):
+    for path in plot.plot(run_folder(asked.folder), quantity=asked.quantity, movie=movie):
         print(path)
     return 0
 
 
 def _new(asked: argparse.Namespace) -> int:
-    path = checks.path("tawami new: NAME", asked.file)
-    path = path if path.suffix == ".py" else path.parent / f"{path.name}.py"
-    if os.path.lexists(path):
-        raise InputError(f"'{path}' exists already, and was not changed: expected a new name")
-    problem = _unusable(path)
-    if problem is not None:
-        raise InputError(
-            f"'{asked.file}': {problem}: expected another name of letters, digits and _, as mycase, so "
-            "that Python files can import it"
-        )
-    text = (TEMPLATES / f"{asked.kind}.py").read_text(encoding="utf-8")
-    with writing(path), path.open("x", encoding="utf-8") as file:
-        file.write(text.replace("SCRIPT.py", path.name).replace("SCRIPT", path.stem))
+    path = new.write(asked.file, asked.kind)
     print(f"{path} is written; run it with: tawami run {shlex.quote(str(path))}")
     return 0
 
 
-def _unusable(path: Path) -> str | None:
-    """Why a script cannot have this name; None if it can."""
-    name = path.stem
-    if not name.isidentifier():
-        return f"'{name}' is not a valid name in Python"
-    if keyword.iskeyword(name):
-        return f"'{name}' is a keyword of Python"
-    if name.startswith("__"):
-        return f"'{name}' is reserved by Python"
-    # a script is the first that Python finds: a numpy.py would be imported instead of NumPy
-    own = {Path.cwd(), path.parent.resolve()}
-    installed = [folder for folder in sys.path if folder and Path(folder).resolve() not in own]
-    names = {*sys.stdlib_module_names, *sys.builtin_module_names}
-    if name in names or PathFinder.find_spec(name, installed) is not None:
-        return f"the module '{name}' is installed"
-    return None
-
-
 def _form_check(asked: argparse.Namespace) -> int:
     from tawami.check.form_check import check_form
+    from tawami.form.files import file_of
 
-    report = check_form(asked.form, **dict(map(_setting, asked.settings)))
+    settings = dict(map(_setting, asked.settings))
+    try:
+        file_of(asked.form)
+    except FormError as error:
+        raise InputError(str(error)) from error
+    report = check_form(asked.form, **settings)
     print(report)
     return 0 if report.usable else 1
 

@@ -6,9 +6,8 @@ import importlib.util
 import linecache
 import os
 import runpy
+import shlex
 import shutil
-import signal
-import subprocess
 import sys
 import traceback
 from dataclasses import dataclass
@@ -20,7 +19,10 @@ from mpi4py import MPI
 
 from tawami.base import program
 from tawami.base.errors import InputError
-from tawami.base.files import readable_file, reason
+from tawami.base.files import nearest, readable_file, reason
+from tawami.base.text import suggestion
+from tawami.command.folders import is_run
+from tawami.command.launch import launch
 from tawami.results.provenance import SOURCE
 from tawami.results.results import EXISTING, Results
 
@@ -69,6 +71,11 @@ class Script:
 
 
 def _check_file(path: Path) -> None:
+    if is_run(path):
+        raise InputError(
+            f"'{path}' is the folder of a run: expected a Python file; to resume the run: "
+            f"{shlex.join(['tawami', 'resume', str(path)])}"
+        )
     readable_file("script", path, "a Python file, as tawami new writes one")
     try:
         compile(path.read_bytes(), str(path), "exec", dont_inherit=True)
@@ -92,9 +99,12 @@ def _check_module(name: str) -> None:
     finally:
         sys.path.pop(0)
     if found is None:
+        file = Path(f"{name.strip('.').replace('.', '/')}.py")
+        near = nearest(file, lambda path: path.suffix == ".py")
+        hint = suggestion(near and ".".join(near.with_suffix("").parts))
         raise InputError(
             f"no module '{name}' can be run from '{Path.cwd()}': expected its name as after python -m, "
-            "or the path of a script without -m"
+            f"or the path of a script without -m{hint}"
         )
 
 
@@ -140,17 +150,7 @@ def _run_on_ranks(script: Script, number: int) -> int:
     words = ["run", *script.command, "--", *script.arguments]
     if script.copy is not None:  # it was checked
         words = ["resume", "--trust", str(script.copy.parent)]
-    command, variables = program.mpirun(number, [sys.executable, "-m", "tawami", *words])
-    process, interrupted = subprocess.Popen(command, env=variables), False
-    while process.poll() is None:
-        try:
-            process.wait()
-        except KeyboardInterrupt:  # mpirun receives it too, and ends its ranks
-            interrupted = True
-    code = int(process.returncode)
-    if interrupted or code == -signal.SIGINT:
-        return INTERRUPTED
-    return 128 - code if code < 0 else code
+    return launch(number, [sys.executable, "-m", "tawami", *words])
 
 
 def _run_here(script: Script) -> int:

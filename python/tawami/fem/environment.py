@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import platform
 import resource
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 from petsc4py import PETSc
 
+from tawami._rust import __version__
 from tawami.base.dependencies import CORE
 from tawami.fem import dolfinx
 
@@ -57,7 +57,7 @@ def peak_memory() -> float:
 def versions() -> dict[str, str]:
     """Versions of the packages that a result depends on."""
     return {
-        "tawami": version("tawami"),
+        "tawami": __version__,
         "dolfinx": dolfinx.version,
         "PETSc": ".".join(map(str, PETSc.Sys.getVersion())),
         "Python": platform.python_version(),

@@ -65,7 +65,7 @@ class Kernel:
     """A compiled integral over cells or facets, not yet attached to a mesh.
 
     Attributes:
-        kind: What it integrates over.
+        kind: Domain of the integral.
         address: Address of the C function.
         coefficients: Positions in the form of the coefficients that it reads, in packed order.
         module: Compiled module, which holds the C function.

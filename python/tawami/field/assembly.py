@@ -1,6 +1,6 @@
 """The seam between particles and field problem (contract 3 of CONTRIBUTING.md).
 
-(form, particle densities on active cells, reduction) -> residual and reduced tangent. `reference` and
+(form, particle data on active cells, reduction) -> residual and reduced tangent. `reference` and
 `points` implement it, and nothing else depends on the choice.
 """
 

@@ -9,8 +9,8 @@ from types import ModuleType
 
 from tawami.base.checks import path as as_path
 from tawami.base.errors import FormError
-from tawami.base.files import unreadable
-from tawami.base.text import quoted
+from tawami.base.files import nearest, unreadable
+from tawami.base.text import meant, quoted, suggestion
 
 #: Folder of the shipped forms.
 SHIPPED = Path(__file__).parents[1] / "forms"
@@ -30,21 +30,36 @@ def module_of(source: str | Path) -> ModuleType:
     Raises:
         FormError: The file does not exist, or raises an error when it is imported.
     """
+    path = file_of(source).resolve()
+    return _imported(path, path.stat().st_mtime_ns)
+
+
+def file_of(source: str | Path) -> Path:
+    """The file of a form.
+
+    Args:
+        source: Name of a shipped form, or path of a file that ends in .py.
+
+    Raises:
+        FormError: The file does not exist, or cannot be read.
+    """
     path = as_path("form", source)
     if path.suffix != ".py":
+        file = Path(f"{source}.py")
         path = SHIPPED / f"{source}.py"
         if unreadable(path) is not None:
+            hint = suggestion(file) if file.is_file() else meant(str(source), shipped())
             raise FormError(
                 f"form '{source}' is not shipped: expected one of {quoted(shipped())}, "
-                "or the path of a .py file"
+                f"or the path of a .py file{hint}"
             )
     problem = unreadable(path)
     if problem is not None:
+        hint = suggestion(nearest(path, lambda other: other.suffix == ".py"))
         raise FormError(
-            f"form file '{source}' cannot be read ({problem}): expected a Python file with a form"
+            f"form file '{source}' cannot be read ({problem}): expected a Python file with a form{hint}"
         )
-    path = path.resolve()
-    return _imported(path, path.stat().st_mtime_ns)
+    return path
 
 
 @functools.cache

@@ -277,7 +277,7 @@ class Form:
         """A warning for each parameter above its usual range."""
         return [
             f"{name} = {value:g}: expected at most {self.parameters[name]['usual']:g}, beyond which the "
-            f"results of form {self.name} are far off; use a smaller {name}"
+            f"results of form {self.name} are inaccurate; use a smaller {name}"
             for name, value in parameters.items()
             if value > self.parameters[name].get("usual", math.inf)
         ]

@@ -31,7 +31,7 @@ from tawami.form.quantities import (
 PLACEHOLDERS = 1000
 #: Degree along x and along y up to which the densities of `sum_p` integrate exactly.
 EXACT_DEGREE = 4
-#: How a form is evaluated: by kernels at the particles, or by integrals over cells in plain dolfinx.
+#: Evaluation of a form: by kernels at the particles, or by integrals over cells in plain dolfinx.
 Assembly = Literal["points", "dolfinx"]
 
 

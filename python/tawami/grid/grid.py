@@ -17,6 +17,7 @@ from tawami.base.checks import number, one_of, pair, point, room, shown, whole_n
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
 from tawami.base.space import PLANE, Counts, Position
+from tawami.base.text import meant
 from tawami.fem import mesh
 
 Edge = Literal["left", "right", "bottom", "top"]
@@ -137,7 +138,10 @@ class Grid(Unique):
             InputError: No such edge.
         """
         if not one_of(name, EDGES):
-            raise InputError(f"edge {shown(name)}: expected 'left', 'right', 'bottom' or 'top'")
+            hint = meant(name, EDGES) if isinstance(name, str) else ""
+            raise InputError(
+                f"edge {shown(name)}: expected 'left', 'right', 'bottom' or 'top'{hint}"
+            )
         return EDGES.index(name) // 2, -(EDGES.index(name) % 2)
 
     def axis_positions(self, axis: int, cell: Any, t: Any) -> Array:

@@ -26,7 +26,7 @@ class Carried:
 
     Args:
         configuration: The body.
-        transfer: How velocities are transferred.
+        transfer: Transfer of velocities.
         damping: Time in which velocities of FLIP relax towards those of PIC [s].
     """
 

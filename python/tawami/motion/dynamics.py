@@ -192,7 +192,7 @@ class Dynamics(Sealed, Unique):
             dt: Size of a step [s].
             smallest: Size below which the run ends [s]; dt/1024 by default.
             each: Called with the solution of each accepted step.
-            results: Where the run writes its results and checkpoints.
+            results: `tawami.Results` of the run, with outputs and checkpoints.
 
         Returns:
             The accepted steps, with those of a run that was resumed.

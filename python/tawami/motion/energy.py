@@ -110,7 +110,7 @@ class Balance:
 
     Args:
         configuration: The body.
-        carried: What its particles carry.
+        carried: Velocities of its particles.
 
     Attributes:
         energies: The balance since the start.
@@ -198,7 +198,7 @@ class Balance:
 
         Args:
             step: As :meth:`of_step` gave it.
-            dissipated: What the laws dissipated on this rank [J per metre depth].
+            dissipated: Energy that the laws dissipated on this rank [J per metre depth].
             steps: Steps so far.
             time: At the end of the step [s].
         """
@@ -245,6 +245,5 @@ class Balance:
         self.energies = Energies(**state["energies"])
         self._growth.restore(state["growth"])
         self._stored_kinetic = state["stored_kinetic"]
-        kinetic, elastic = state["removed"]
-        self._removed = np.array([kinetic, elastic])
+        self._removed = np.reshape(state["removed"], 2)
         self._statics = self._now.activity.statics

@@ -200,7 +200,7 @@ class NewmarkUpdate:
     """Changes that a dynamic step stores; storing them cannot fail.
 
     Attributes:
-        configuration, carried, balance, clock: What it changes.
+        configuration, carried, balance, clock: Objects that it changes.
         after: The clock at the end of the step.
         moment: The end of the step.
         arrays: Of the particles.

@@ -94,7 +94,7 @@ class PathStep:
 
     Attributes:
         following: The path.
-        configuration: What it starts from.
+        configuration: Configuration at its start.
         size: Length [m].
     """
 
@@ -171,7 +171,7 @@ class PathUpdate:
     """Changes that a step along a path stores.
 
     Attributes:
-        following, configuration: What it changes.
+        following, configuration: Objects that it changes.
         factor, direction, point: After the step.
     """
 
@@ -221,7 +221,7 @@ def follow(
         smallest: Length below which a step is not halved any more [m]; size/1024 by default.
         each: Called with the solution of each accepted step; `solution.load` is the load factor.
         results: `tawami.Results` of the run, with outputs and checkpoints.
-        stop: What to do if the smallest step does not converge: 'return' the steps with a warning, or
+        stop: Action if the smallest step does not converge: 'return' the steps with a warning, or
             'raise' the error.
 
     Returns:

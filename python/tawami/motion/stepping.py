@@ -15,7 +15,7 @@ from tawami.scene.activity import Activity
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
 
-#: What to do if the smallest step does not converge.
+#: Actions if the smallest step does not converge.
 Stop = Literal["return", "raise"]
 
 
@@ -118,7 +118,7 @@ def ramp(
         until: Time for amplitudes at the end [s]; the time of the scene by default.
         each: Called with the solution of each accepted step.
         results: `tawami.Results` of the run, with outputs and checkpoints.
-        stop: What to do if the smallest step does not converge: 'return' the steps with a warning, or
+        stop: Action if the smallest step does not converge: 'return' the steps with a warning, or
             'raise' the error.
 
     Returns:

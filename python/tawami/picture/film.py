@@ -16,7 +16,7 @@ from tawami.base.arrays import Array
 from tawami.base.errors import OutputError
 from tawami.base.files import atomic_file
 from tawami.picture import style
-from tawami.picture.figure import new_figure, save
+from tawami.picture.figure import lay_out, new_figure, save
 from tawami.picture.particles import Corners, Scale, Squares, draw_frame, size_of, view
 
 if TYPE_CHECKING:
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 Movie = Literal["gif", "mp4"]
 #: Signs in place of the icons of matplotlib's player, which come from the web.
 ICONS = {
-    "minus": "-", "fast-backward": "|&lt;&lt;", "step-backward": "|&lt;",
-    "play fa-flip-horizontal": "&#9664;", "pause": "| |", "play": "&#9654;", "step-forward": "&gt;|",
-    "fast-forward": "&gt;&gt;|", "plus": "+",
+    "minus": "-", "fast-backward": "&#8676;", "step-backward": "&lsaquo;",
+    "play fa-flip-horizontal": "&#9664;", "pause": "||", "play": "&#9654;", "step-forward": "&rsaquo;",
+    "fast-forward": "&#8677;", "plus": "+",
 }  # fmt: skip
 #: Frames of a second.
 RATE = 12
@@ -69,7 +69,7 @@ class Film:
         self.squares = Squares(self.axes, scale)
         self.squares.add_bar(self.axes)
         self.show(-1)
-        self.figure.draw_without_rendering()
+        lay_out(self.figure)
         self.figure.set_layout_engine("none")  # the same view in all frames
 
     def show(self, number: int) -> None:

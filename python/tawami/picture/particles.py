@@ -117,13 +117,8 @@ class Squares:
 
     def add_bar(self, axes: Axes | Sequence[Axes], **where: Any) -> None:
         """Add the colour bar below the axes, or where the arguments of `Figure.colorbar` say."""
-        usual = {
-            "ax": axes,
-            "orientation": "horizontal",
-            "fraction": 0.06,
-            "aspect": 45,
-            "pad": 0.02,
-        }
+        # without pad=, with which the layout needs three draws to fit
+        usual = {"ax": axes, "orientation": "horizontal", "fraction": 0.06, "aspect": 45}
         scale, figure = self._scale, self.artist.figure
         assert figure is not None
         figure.colorbar(self.artist, extend=scale.extend, label=scale.label, **(where or usual))

@@ -55,7 +55,7 @@ class Checkpoints:
         folder: Of the run.
         number: Of the phase in the run.
         phase: Its name.
-        subject: What is observed.
+        subject: Scene or motion that is observed.
         schedule: When they are written.
         resumes: Whether the run is resumed: the phase begins from its newest checkpoint.
 
@@ -82,7 +82,7 @@ class Checkpoints:
         self._source: Path | None = None
 
     def newest(self, like: Mapping[str, Any]) -> dict[str, Any] | None:
-        """The newest state that can be used; None if the phase begins anew.
+        """The newest state that can be used; None if the phase starts from its beginning.
 
         Args:
             like: A state of this program, to which entries of that name are compared in kind.
@@ -137,7 +137,7 @@ class Checkpoints:
         for name, other, own in differences(written, self._identity):
             raise CheckpointError(
                 f"checkpoint '{path}' belongs to another run: {name} is {_short(other)} there and "
-                f"{_short(own)} here. Expected the same scene; start anew with existing='replace'"
+                f"{_short(own)} here. Expected the same scene; start a new run with existing='replace'"
             )
         try:
             archive.check_particles(state["scene"]["particles"])

@@ -13,6 +13,7 @@ from tawami import _rust
 from tawami.base import checks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError, NotModelledError
+from tawami.base.text import meant
 from tawami.grid import edges
 from tawami.motion.energy import Energies
 from tawami.motion.observer import Motion, Snapshot, Subject
@@ -88,7 +89,9 @@ def _columns(name: str, subject: Subject) -> Columns:
         return _reaction(name, rest, subject.scene)
     if kind == "displacement" and rest:
         return _displacement(name, _point(name, rest), subject.scene)
-    raise InputError(f"table: '{name}' is unknown: expected one of {', '.join(KNOWN)}")
+    raise InputError(
+        f"table: '{name}' is unknown: expected one of {', '.join(KNOWN)}{meant(name, KNOWN)}"
+    )
 
 
 def _moving(now: Snapshot) -> Motion:
@@ -188,7 +191,7 @@ def displacement_near(subject: Subject, point: tuple[float, float], what: str) -
             f"{what}: no particle was within a cell ({h:g} m) of it: expected a point of the body "
             "at the start"
         )
-    # all at the distance of the last one, lest round-off choose among them
+    # all at the distance of the last one, so that round-off does not choose among them
     last = np.sort(distance)[:NEIGHBOURS][-1]
     near = np.flatnonzero(distance <= last + ROUND_OFF * h)
     basis = np.column_stack([np.ones(len(near)), offset[near]])

@@ -31,7 +31,7 @@ class RunFolder:
 
     Args:
         path: Of the folder.
-        existing: What to do with a run in it: 'stop', 'replace' or 'resume'.
+        existing: Treatment of a run in it: 'stop', 'replace' or 'resume'.
     """
 
     #: The object that writes into a folder: the last one of this process that opened it.
@@ -104,7 +104,7 @@ class RunFolder:
                 raise InputError(
                     f"{self._what}: the folder holds a run that finished {finished[-1]}, and "
                     "no checkpoint to resume it from: expected its checkpoints, or existing='replace' "
-                    "to start anew"
+                    "to start a new run"
                 )
             if not resumes:
                 self._clear()
@@ -152,7 +152,7 @@ class RunFolder:
         return known if isinstance(known, dict) else {}
 
     def _reached(self) -> str:
-        """How far the run in the folder has come, for a message."""
+        """Progress of the run in the folder, for a message."""
         files = self.checkpoints
         return f", last checkpoint '{files[-1].name}'" if files else ""
 

@@ -85,8 +85,8 @@ class Output:
 
         Args:
             folder: Of the phase.
-            subject: What is observed.
-            state: What :meth:`state` returned for the checkpoint from which the run is resumed; later
+            subject: Scene or motion that is observed.
+            state: Result of :meth:`state` for the checkpoint from which the run is resumed; later
                 files are removed. None for a new phase.
 
         Raises:
@@ -167,5 +167,5 @@ def _check_state(name: str, state: dict[str, Any]) -> None:
     except ValueError as error:
         raise CheckpointError(
             f"the checkpoint cannot be used ({error}): its content is not that of a checkpoint. Remove "
-            "it to resume from the one before it, or start anew with existing='replace'"
+            "it to resume from the one before it, or start a new run with existing='replace'"
         ) from None

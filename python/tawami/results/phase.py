@@ -34,7 +34,7 @@ class Phase:
     Args:
         folder: Of the run.
         name: Of the phase.
-        subject: What is observed.
+        subject: Scene or motion that is observed.
         end: Time [s] or share at which it ends.
         unit: Of that.
         outputs: Its outputs.

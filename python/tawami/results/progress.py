@@ -106,14 +106,13 @@ def logged(path: Path | None) -> Iterator[None]:
         OutputError: The file cannot be written.
         InputError: See :func:`level`.
     """
-    if path is None:
-        yield
-        return
     shown = level()
-    with writing(path):
-        check_regular(path, new=True)
-        handlers: list[logging.Handler] = [logging.FileHandler(path, encoding="utf-8")]
-    if LOG_LEVEL in os.environ:
+    handlers: list[logging.Handler] = [logging.NullHandler()]
+    if path is not None:
+        with writing(path):
+            check_regular(path, new=True)
+            handlers = [logging.FileHandler(path, encoding="utf-8")]
+    if path is not None and LOG_LEVEL in os.environ:
         handlers.append(logging.StreamHandler())
         handlers[-1].setLevel(shown)
     before, show = (log.level, log.propagate), warnings.showwarning

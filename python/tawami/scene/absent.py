@@ -24,7 +24,7 @@ class Absent:
     """An attribute that is not modelled; using it raises an error that names the switch.
 
     Args:
-        reason: Why it is absent, and what models it.
+        reason: Reason why it is absent, and the switch that adds it.
     """
 
     def __init__(self, reason: str) -> None:

@@ -65,7 +65,7 @@ class Configuration:
     Args:
         model: Grid, form and laws of the scene.
         particles: The particles of the whole body, on every rank.
-        numerics: How a step is solved.
+        numerics: Numerical settings of a step.
 
     Attributes:
         domain: The particles where they are; another object after a step that moves them.
@@ -73,11 +73,10 @@ class Configuration:
         activity: Time and activity of the scene.
         total: Coefficients of all fields since the start, where particles do not move.
         left: Number, position [m] and time [s] of the particles that left the grid or were removed.
-        removed: Kinetic and elastic energy of the particles that were removed [J per metre depth].
+        removed: Kinetic and elastic energy of removed particles [J per metre depth].
         begun: Whether a step was stored.
-        projected: Elastic energy that the projection of the mean stress took from the particles of this
-            rank at the end of the last step [J per metre depth].
-        stopwatch: Where the time goes.
+        projected: Elastic energy [J per metre depth] that the projection of the last step took.
+        stopwatch: Time of each stage of a step.
     """
 
     def __init__(self, model: Model, particles: _rust.Particles, numerics: Numerics) -> None:
@@ -201,7 +200,7 @@ class Configuration:
         assert step is not None
         raise ConvergenceError(
             f"contact and friction of the walls did not settle in {PASSES} solves. Nothing was changed "
-            "in the particles. Take a smaller step",
+            "in the particles. Use a smaller step",
             step.history,
         )
 
@@ -340,8 +339,7 @@ class Configuration:
         self.activity.time, self.total = state["time"], state["total"]
         self.activity.statics += 1
         self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
-        kinetic, elastic = state["removed"]
-        self.removed = np.array([kinetic, elastic])
+        self.removed = np.reshape(state["removed"], 2)
         self._coverage_checked, self.begun = state["coverage_checked"], True
         self._travel = state["travel"]
         self.supports.restore(state["supports"])

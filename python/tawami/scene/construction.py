@@ -1,8 +1,8 @@
 """Changes of a body between two steps: particles that are removed, laws that are replaced.
 
-What such a change leaves out of balance is a force on the functions of the grid, the difference of the
-internal and external forces after and before it. The scene keeps it as a load that fades as a released
-one does: with a static solve at once, in a ramp in steps, in a motion with the next step.
+After such a change, forces on the functions of the grid are out of balance by the difference of internal
+and external forces after and before it. The scene keeps them as a load that fades like a released one:
+at once in a static solve, in steps in a ramp, with the next step in a motion.
 """
 
 from __future__ import annotations
@@ -56,23 +56,23 @@ class Construction:
     def remove(self, where: Where) -> Removed:
         """Remove particles, as an excavation does.
 
-        The forces that they exerted on the rest fade as a released load does. Their weight and their
-        share of the loads on particles go with them. `scene.left` lists them; numbers of the others
-        stay. `scene.particles` is another object afterwards. A call for all ranks.
+        The forces that they exerted on the other particles fade like a released load. Their weight and
+        their share of the loads are removed too. `scene.left` lists them; the others keep their
+        numbers. `scene.particles` is another object afterwards. A call for all ranks.
 
         Args:
             where: The particles, as in `load`.
 
         Returns:
-            What was removed.
+            The removed particles.
 
         Raises:
             InputError: No particle, all particles, or a call from within a step; nothing has changed.
-            SupportError: A support or a traction would act on nothing; nothing has changed.
+            SupportError: A support or a traction would have no particles; nothing has changed.
         """
         now = self.configuration
         now.activity.check_between_steps("remove(...)")
-        chosen = selection.numbers(now.domain, "remove(...)", where)
+        chosen = selection.numbers(now.domain, "remove(...): where", where)
         return _remove(now, np.isin(now.domain.particles.number, chosen))
 
     def change_material(self, where: Where, material: _rust.Material | NumpyLaw) -> None:
@@ -80,7 +80,7 @@ class Construction:
 
         Stress and density stay. A law of the same name keeps its history variables; those of another
         law begin at 0. If the stress is beyond the yield surface of the new law, it returns to it with
-        the next step; what this leaves out of balance fades as a released load does. `scene.particles`
+        the next step; forces out of balance then fade like a released load. `scene.particles`
         is another object afterwards. A call for all ranks.
 
         Args:
@@ -96,7 +96,7 @@ class Construction:
         """
         now = self.configuration
         now.activity.check_between_steps("change_material(...)")
-        chosen = selection.numbers(now.domain, "change_material(...)", where)
+        chosen = selection.numbers(now.domain, "change_material(...): where", where)
         mask = np.isin(now.domain.particles.number, chosen)
         _check_any(now, "change_material(...)", mask)
         _change_material(now, mask, material, int(chosen[0]))
@@ -116,7 +116,7 @@ def _remove(now: Configuration, mask: Mask) -> Removed:
     comm, particles = model.grid.comm, before.particles
     _check_any(now, "remove(...)", mask)
     if not ranks.any_of(comm, np.array([not mask.all()]))[0]:
-        raise InputError("remove(...) of all particles: expected some that stay")
+        raise InputError("remove(...) of all particles: expected some that remain")
     moving = "velocity" in dict(particles.arrays)
     velocity = particles.carried("velocity")[mask] if moving else np.zeros((0, model.space.dim))
     mass = before.mass[mask] if model.density is not None else np.full(int(mask.sum()), np.nan)

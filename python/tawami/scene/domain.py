@@ -115,7 +115,7 @@ class Domain:
 
     @property
     def layout(self) -> Layout:
-        """Where the coefficients of each field stand."""
+        """Positions of the coefficients of each field."""
         return self.assembly.layout
 
     @property

@@ -40,7 +40,7 @@ class Load(Action):
         return f"{self}{self.terms[-1].factor}{' until it fades' if self.released else ''}"
 
     def place(self) -> list[Any]:
-        """Where it acts, as JSON holds it."""
+        """Place where it acts, in the types of JSON."""
         return []
 
 
@@ -54,7 +54,7 @@ class Weight(Load):
 
     @property
     def acceleration(self) -> Array:
-        """The acceleration that the script asked for [m/s2]."""
+        """The acceleration in the driver script [m/s2]."""
         return np.array(self.terms[-1].values if not self.released else np.zeros(2), dtype=float)
 
     def __str__(self) -> str:
@@ -204,7 +204,7 @@ class Loads(Owner[Load]):
 
     @property
     def gravity(self) -> Array:
-        """The acceleration that the script asked for, without amplitudes [m/s2]."""
+        """The acceleration in the driver script, without amplitudes [m/s2]."""
         weights = [load.acceleration for load in self.all if isinstance(load, Weight)]
         return sum(weights, np.zeros(self.grid.space.dim))
 
@@ -297,7 +297,7 @@ class Loads(Owner[Load]):
         return [[type(load).__name__, *load.place(), *load.identity()] for load in self.all]
 
     def state(self) -> dict[str, Any]:
-        """How much of each load the body carries, and the forces that fade."""
+        """Share of each load that the body carries, and the forces that fade."""
         unbalanced = np.zeros(0) if self.unbalanced is None else self.unbalanced
         return {"all": [load.state() for load in self.all], "unbalanced": unbalanced}
 

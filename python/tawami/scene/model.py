@@ -176,8 +176,8 @@ def build(
     densities = assignment.densities(density, len(materials), body.names)
     if loaded.strain.finite and law is not None:
         raise InputError(
-            f"form {loaded.name} has finite strains: expected a law in Rust, a NumpyLaw has small ones "
-            "only"
+            f"form {loaded.name} has finite strains: expected a law in Rust; a NumpyLaw works at "
+            "small strain only"
         )
     ratios = np.array([m.bulk_modulus / m.shear_modulus for m in materials])[particles.material]
     warn_of_locking(grid, loaded, float(ratios.max()), int(ratios.argmax()))

@@ -13,7 +13,7 @@ from tawami.base.errors import InputError
 from tawami.base.optional import optional
 from tawami.grid.grid import Grid
 from tawami.picture import style
-from tawami.picture.figure import shown_axes
+from tawami.picture.figure import lay_out, shown_axes
 from tawami.picture.particles import Corners, Squares, draw_frame, scale_of, size_of, view
 from tawami.scene.quantities import GRADIENT, Arrays, Given, Quantity, named
 from tawami.scene.scalars import pick, scalars
@@ -101,6 +101,8 @@ def plot(
     (squares.add_bar if new else squares.add_bar_beside)(axes)
     factor = "at the start" if deformed == 0 else f"displacements x {deformed:g}"
     axes.set_title(name if deformed == 1 else f"{name}, {factor}")
+    if new:
+        lay_out(axes.get_figure(root=True))
     return axes
 
 

@@ -20,6 +20,7 @@ from tawami.base import checks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError, NotModelledError
 from tawami.base.space import PLANE
+from tawami.base.text import meant
 from tawami.particles import placement
 
 #: Arrays of the particles that are carried by a motion.
@@ -264,7 +265,9 @@ def usual_of_particles(subject: Any) -> tuple[str, ...]:
 
 def unknown(place: str, name: str, known: Iterable[str]) -> InputError:
     """The error for a name that no quantity has."""
-    return InputError(f"{place}: '{name}' is unknown: expected one of {', '.join(known)}")
+    some = list(known)
+    hint = meant(name, some)
+    return InputError(f"{place}: '{name}' is unknown: expected one of {', '.join(some)}{hint}")
 
 
 @contextmanager

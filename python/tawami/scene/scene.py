@@ -56,8 +56,8 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         form: Weak form: the name of a shipped one ('u_epsv', 'u_p', 'u_bbar', 'u'), the path of a
             file, a module, or a `Form`.
         basis: Basis of the displacement: 'quadratic_spline', 'bilinear' or 'biquadratic'.
-        tolerance, max_iterations, assembly, factorise, linear_solver: How a step is
-            solved; see `tawami.solve.numerics.Numerics`.
+        tolerance, max_iterations, assembly, factorise, linear_solver: Numerical settings; see
+            `tawami.solve.numerics.Numerics`.
         density: Mass density at the start [kg/m3], one for all materials or one each (a list or a
             dictionary as for the materials); gravity needs it.
         leaving: Treatment of particles that leave the grid: 'stop' with an error before they do, or
@@ -66,7 +66,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
 
     Attributes:
         grid, form, basis: As given.
-        numerics: How a step is solved.
+        numerics: Numerical settings of a step.
         parameters, options: Of the form, as they are used. They cannot be changed.
         num_particles: Number of particles of the body, on all ranks.
         stopwatch: Time of each stage of a step.
@@ -166,7 +166,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
 
     @property
     def numerics(self) -> Numerics:
-        """How a step is solved."""
+        """Numerical settings of a step."""
         return self.configuration.numerics
 
     @property
@@ -202,7 +202,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
             name: 'stress', 'displacement', 'eps_v', or a history variable.
             source: Numbers, the same for all or one row a particle of the body; a function f(x, y) on
                 arrays that returns the components; `tawami.table(...)` or `tawami.earlier(...)`.
-            beyond: What to do with stress beyond the yield surface: 'stop' with an error, or 'return'
+            beyond: Treatment of stress beyond the yield surface: 'stop' with an error, or 'return'
                 it to the surface as the law does.
 
         Raises:
@@ -250,7 +250,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
             for support in self.configuration.supports.all:
                 if support.has_velocity:
                     raise InputError(
-                        f"{support} has a velocity, which statics does not follow: expected a value, "
+                        f"{support} has a velocity, which static steps do not follow: expected a value, "
                         "with amplitude=... and until=... if it changes in time, or Dynamics(scene)"
                     )
             self.configuration.check_coverage()

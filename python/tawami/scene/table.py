@@ -15,6 +15,7 @@ from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.files import reason
 from tawami.base.space import PLANE
+from tawami.base.text import meant
 from tawami.scene.scattered import AXES, Column, Outside, Scattered, check_plane, named, split
 
 
@@ -78,8 +79,8 @@ def table(path: str | Path, *columns: str, outside: Outside = "stop") -> Table:
         path: The file.
         columns: Names of the components in the order xx yy zz xy, or x y, if the file calls them
             otherwise.
-        outside: What particles outside the points get: 'stop' is an error, 'nearest' the value of the
-            nearest point.
+        outside: Treatment of particles outside the points: 'stop' raises an error, 'nearest' gives them
+            the value of the nearest point.
 
     Raises:
         InputError: The file cannot be read, a row is longer or shorter than the header, a column is
@@ -109,6 +110,7 @@ def table(path: str | Path, *columns: str, outside: Outside = "stop") -> Table:
         raise InputError(
             f"table({name}) has no column '{columns[wanted.index(None)]}': expected one of "
             f"{', '.join(map(repr, content.header))}"
+            f"{meant(columns[wanted.index(None)], content.header)}"
         )
     every = [
         Column(label, partial(content.column, place)) for place, label in enumerate(content.header)
