@@ -46,7 +46,7 @@ def build(page: str | None, *, links: bool, screens: bool) -> int:
     else:
         options += ["-D", f"root_doc={page}", "-D", "suppress_warnings=ref,myst.xref_missing,toc"]
     code = sphinx(["-b", "html", *options, str(source), str(html)])
-    problems = [*pages.problems(html), *notebooks.problems(folder / "jupyter_execute")]
+    problems = [*pages.problems(html), *notebooks.problems(html)]
     problems += browser.problems(html)
     for problem in problems:
         print(f"docs: {problem}", file=sys.stderr)

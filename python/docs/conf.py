@@ -33,6 +33,7 @@ nb_execution_in_temp = True
 nb_execution_timeout = 600
 nb_execution_show_tb = True
 nb_merge_streams = True
+nb_render_error_lexer = "text"  # that of tracebacks does not know one without lines of code
 
 # Markdown
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]

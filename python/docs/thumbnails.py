@@ -16,7 +16,7 @@ PARTS: dict[str, tuple[str, tuple[float, float, float, float]]] = {
     "elastica": ("shapes.png", (0.0, 0.335, 0.62, 1.0)),
     "footing": ("zones.png", (0.0, 0.0, 0.86, 0.5)),
     "vibrating_beam": ("motion.png", (0.0, 0.0, 0.5, 0.33)),
-    "spinning_disc": ("film.png", (0.0, 0.0, 0.345, 0.315)),
+    "spinning_disc": ("film.png", (0.0, 0.0, 0.262, 0.315)),
     "collapse": ("film.png", (0.0, 0.165, 0.305, 0.645)),
 }
 #: Cases of README's gallery.
