@@ -29,6 +29,7 @@ __all__ = [
     "gauss",
     "gradients",
     "interpolate",
+    "logarithmic_strain",
     "nodal_sums",
     "parameters",
 ]
@@ -231,6 +232,7 @@ def extraction(
     basis: str, size: Sequence[int], cells: _Integers, nodes: _Floats
 ) -> tuple[_Integers, _Floats]: ...
 def gauss(n: int) -> tuple[_Floats, _Floats]: ...
+def logarithmic_strain(gradients: _Floats) -> _Floats: ...
 def densities(
     location: Location,
     volume: _Floats,

@@ -73,6 +73,7 @@ fn _rust(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<stage::PyStage>()?;
     m.add_class::<stage::PyRequests>()?;
     m.add_function(wrap_pyfunction!(law::parameters, m)?)?;
+    m.add_function(wrap_pyfunction!(particles::logarithmic_strain, m)?)?;
     m.add_function(wrap_pyfunction!(transfer::interpolate, m)?)?;
     m.add_function(wrap_pyfunction!(transfer::gradients, m)?)?;
     m.add_function(wrap_pyfunction!(grid::basis_1d, m)?)?;

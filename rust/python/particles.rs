@@ -3,9 +3,11 @@
 use numpy::{PyArray, PyArray2, PyArrayMethods, ToPyArray};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use rayon::prelude::*;
 
 use super::array::{Read1, Read2};
 use super::law::{laws, PyMaterial};
+use super::threads::detached;
 use super::{require, InputError};
 use crate::particles::stage::check_materials;
 use crate::particles::{Particles, Role, Values, GRADIENT};
@@ -56,6 +58,29 @@ fn optional<'py>(
         place.ok_or_else(|| InputError::new_err(missing(object.0.names(role))))?
     };
     column(particles, place)
+}
+
+/// Logarithmic strains of displacement gradients, one after the other.
+fn logarithmic_rows<'py>(
+    py: Python<'py>,
+    gradients: &[f64],
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let rows: Vec<_> = detached(py, || {
+        let gradients = gradients.par_chunks_exact(space::GRADIENT);
+        gradients.map(|h| logarithmic(&matrix(h))).collect()
+    });
+    rows.as_flattened().to_pyarray(py).reshape([rows.len(), COMPONENTS])
+}
+
+/// Logarithmic strains (shear as eps_xy) of displacement gradients, rows xx, xy, yx, yy.
+#[pyfunction]
+pub(super) fn logarithmic_strain<'py>(
+    py: Python<'py>,
+    gradients: Read2<f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let gradients = gradients.as_array();
+    require(gradients.ncols() == space::GRADIENT, "gradients of another space")?;
+    logarithmic_rows(py, gradients.as_standard_layout().as_slice().unwrap_or_default())
 }
 
 #[pymethods]
@@ -228,11 +253,7 @@ impl PyParticles {
         match (small, gradient) {
             (Some(place), _) => read_only(slf, place),
             (None, Some(place)) => {
-                let particles = &slf.try_borrow()?.0;
-                let gradients = particles.reals(place).chunks_exact(space::GRADIENT);
-                let rows: Vec<_> = gradients.map(|h| logarithmic(&matrix(h))).collect();
-                let strain = rows.as_flattened().to_pyarray(slf.py());
-                Ok(strain.reshape([particles.len(), COMPONENTS])?.into_any())
+                Ok(logarithmic_rows(slf.py(), slf.try_borrow()?.0.reals(place))?.into_any())
             }
             (None, None) => Err(InputError::new_err("internal: particles without a scene")),
         }

@@ -106,6 +106,7 @@ CALLS: dict[str, Callable[[Sample], tuple[Any, ...]]] = {
     ),
     "basis_len": lambda s: (_rust.basis_len, BASIS, 4),
     "gauss": lambda s: (_rust.gauss, 3),
+    "logarithmic_strain": lambda s: (_rust.logarithmic_strain, np.zeros((3, 4))),
     "densities": lambda s: (
         _rust.densities, s.location, s.volume, s.data, TERMS, False, s.rows, [0, 1], 2, s.packed,
     ),

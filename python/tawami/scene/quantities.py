@@ -181,9 +181,9 @@ def history(name: str) -> Quantity:
 
 
 def arrays_of(particles: _rust.Particles) -> list[str]:
-    """Names of the arrays that particles have, without those of a motion that are gradients."""
+    """Names of the arrays that particles store, without those of a motion that are gradients."""
     stored = dict(particles.arrays)
-    names = [name for name in ("x", *PARTICLES, GRADIENT) if name in stored or name == "strain"]
+    names = [name for name in ("x", *PARTICLES, GRADIENT) if name in stored]
     return [*names, *particles.history_names]
 
 

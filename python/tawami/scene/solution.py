@@ -56,9 +56,6 @@ class Solution(Elsewhere, Sealed, Unique):
         x: Positions of the particles [m].
         volume: Their volumes [m2] at the start.
         stress: Their stress [Pa] (xx, yy, zz, xy) at the end of this step.
-        strain: Their strain (xx, yy, zz, xy) since the start, from the displacement: the small strain,
-            or at finite strain the logarithmic strain 1/2 ln(F F^T). xy is half the engineering shear
-            strain. Its volume is div u, not the field eps_v.
         displacement_of_particles: Their displacement [m] since the start.
         condition: Estimate of the condition number of the scaled tangent that was factorised last: its
             Frobenius norm over the square root of its size, times that of its inverse as random
@@ -87,7 +84,6 @@ class Solution(Elsewhere, Sealed, Unique):
         self.x, self.volume = particles["x"], particles["volume"]
         self.stress = particles["stress"]
         self.displacement_of_particles = particles["displacement"]
-        self.strain = particles["strain"]
         self._eps_v = particles.get("eps_v")
         self._arrays = particles
         self._seal()
@@ -119,6 +115,9 @@ class Solution(Elsewhere, Sealed, Unique):
 
     def _array(self, name: str) -> npt.NDArray[Any]:
         """An array of the particles by its name."""
+        if name == "strain" and quantities.GRADIENT in self._arrays:
+            gradient = self._arrays[quantities.GRADIENT]
+            return _rust.logarithmic_strain(gradient.reshape(len(gradient), -1))
         if name not in self._arrays:
             with quantities.not_modelled():  # the error says how to model it
                 quantities.array_of(self.scene.particles, name)
@@ -136,6 +135,14 @@ class Solution(Elsewhere, Sealed, Unique):
                 f"{' or '.join(map(repr, kinematics))}, as form='{form.strain.mixed_form}'"
             )
         return values
+
+    @property
+    def strain(self) -> Array:
+        """Strain (xx, yy, zz, xy) of the particles since the start, from the displacement: the small
+        strain, or at finite strain the logarithmic strain 1/2 ln(F F^T). xy is half the engineering
+        shear strain. Its volume is div u, not the field eps_v.
+        """
+        return self.arrays["strain"]
 
     @property
     def mean_stress(self) -> Array:
@@ -227,9 +234,8 @@ class Solution(Elsewhere, Sealed, Unique):
     def _usual(self) -> tuple[list[str], list[str]]:
         """Quantities of a table without names, and the history variables among them."""
         histories = self.scene.particles.history_names
-        stored = [
-            name for name in quantities.PARTICLES if name in self._arrays and name != "number"
-        ]
+        known = {*self._arrays, "strain"} - {"number"}
+        stored = [name for name in quantities.PARTICLES if name in known]
         return [*stored, *quantities.DERIVED, *histories], histories
 
     def _repr_html_(self) -> str:
