@@ -1,14 +1,15 @@
 # make cantilever   set up what is missing, run the study of the cantilever
-# make test         set up what is missing, pass the tests (TESTS="..." some of pytest's files)
-# make quick        those of them that start no ranks
-# make test-all     all tests, the slow ones too: extremes, studies, endurance, large cases
-# make fuzz         look for arguments that fail, at random (SEED=... again with that seed)
-# make docs         the documentation as HTML, every script and case in it run (PAGE=start one page,
-#                   LINKS=1 checks the web's links, THUMBNAILS=1 draws the pictures of README's gallery)
+# make test         set up what is missing, run the tests (TESTS="..." selects files of pytest)
+# make quick        the tests that start no ranks
+# make test-all     all tests, also the slow ones: extremes, studies, endurance, large cases
+# make fuzz         test random arguments (SEED=... repeats a run)
+# make docs         the documentation as HTML; runs its scripts and cases (PAGE=start builds one page,
+#                   SCREENS=1 writes pictures of the pages, LINKS=1 checks the web's links,
+#                   THUMBNAILS=1 draws the pictures of README's gallery)
 # make matrix       make test-all on Debian 12, 13 and sid, each in a throw-away root (see tests/matrix.sh)
-# make extremes     try the method at its limits, print what survives and what is rejected
+# make extremes     try the method at its limits, print the settings that survive or are rejected
 # make bench        speed and memory, stage by stage (AGAINST=../checkout compares with another checkout)
-# make trade        what accuracy costs: the settings of five cases; resumes an interrupted study
+# make trade        cost of accuracy: the settings of five cases; resumes an interrupted study
 # make lint, make format, make clean
 #
 # Set-up needs Debian 12, 13 or sid (root or sudo for the packages that are missing) and Rust.
@@ -45,18 +46,18 @@ quick: setup $(STAMPS)/cargo-tests
 	cargo test --locked --quiet
 	$(PYTEST) -m 'not slow and not mpi' $(TESTS)
 
-test-all: setup $(STAMPS)/cargo-tests $(STAMPS)/docs
+test-all: setup $(STAMPS)/cargo-tests $(STAMPS)/docs $(STAMPS)/notebook
 	cargo test --locked --quiet
 	$(PYTEST) $(TESTS)
 
 fuzz: SEED := $(or $(SEED),$(shell od -An -N4 -tu4 /dev/urandom | tr -d ' '))
 fuzz: setup $(STAMPS)/cargo-tests
-	@echo "Again with the same examples: make fuzz SEED=$(SEED)"
+	@echo "Repeat with the same examples: make fuzz SEED=$(SEED)"
 	PROPTEST_RNG_SEED=$(SEED) PROPTEST_CASES=5000 cargo test --locked --quiet
 	HYPOTHESIS_PROFILE=fuzz SEED=$(SEED) $(PYTEST) -m 'fuzz or hypothesis' --hypothesis-seed=$(SEED) $(TESTS)
 
-docs: setup $(STAMPS)/docs
-	$(PYTHON) python/docs $(if $(PAGE),--page $(PAGE)) $(if $(LINKS),--links) $(if $(THUMBNAILS),--thumbnails)
+docs: setup $(STAMPS)/docs $(STAMPS)/notebook
+	$(PYTHON) python/docs $(if $(PAGE),--page $(PAGE)) $(if $(SCREENS),--screens) $(if $(LINKS),--links) $(if $(THUMBNAILS),--thumbnails)
 
 matrix:
 	tests/matrix.sh
@@ -144,7 +145,11 @@ $(STAMPS)/docs: $(STAMPS)/python Makefile
 	$(PIP) 'sphinx>=7.2' 'myst-nb>=1.1' 'ipykernel>=6.25' 'furo>=2024.1.29' 'sphinx-design>=0.6' 'sphinx-mathjax-offline>=0.0.2' 'playwright>=1.40'
 	@mkdir -p $(STAMPS) && touch $@
 
-# Built for the processor it runs on, and again where that is another one.
+$(STAMPS)/notebook: $(STAMPS)/python Makefile
+	$(PIP) 'ipykernel>=6.25' 'pandas>=2.0' 'pyvista>=0.42'
+	@mkdir -p $(STAMPS) && touch $@
+
+# Built for the processor it runs on, and built again for another one.
 PROCESSOR := $(STAMPS)/processor-$(shell grep -m 1 -i flags /proc/cpuinfo 2>/dev/null | cksum | cut -d' ' -f1)
 $(PROCESSOR): $(STAMPS)/rust
 	@touch $@

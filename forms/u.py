@@ -1,4 +1,4 @@
-"""Displacement only. It locks near nu = 0.5: here to show that, and for compressible materials."""
+"""Displacement only. It locks near nu = 0.5: for comparison, and for compressible materials."""
 
 from ufl import dot, grad
 

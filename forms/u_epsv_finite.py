@@ -1,9 +1,9 @@
 """Mixed u-eps_v form at finite strain, updated Lagrangian: tau_m = old + K eps_v, eps_v elastic.
 
 Strains are logarithmic: ln J_f = eps_v + eps_p, eps_p the plastic volumetric strain of the law.
-ln J_f is taken at the particles, as all that is nonlinear in the unknowns. V0, the volume at the start
-of the scene, in both equations keeps the elastic tangent symmetric. theta lumps a share of the mass of
-eps_v: one particle alone in a cell makes the consistent mass singular; constants are unchanged by it.
+ln J_f is evaluated at the particles, as is all that is nonlinear in the unknowns. V0, the volume at the
+start of the scene, in both equations keeps the elastic tangent symmetric. theta lumps a share of the
+mass of eps_v: a single particle in a cell makes the consistent mass singular. Constants are unchanged.
 `ghost_penalty` as in `u_epsv`.
 """
 

@@ -1,4 +1,4 @@
-"""Mixed u-p form: Commend, Truty and Zimmermann 2004. Takes nu = 0.5 exactly (1/K = 0).
+"""Mixed u-p form: Commend, Truty and Zimmermann 2004. It accepts nu = 0.5 exactly (1/K = 0).
 
 p is the increment of the pressure-like mean stress; sigma is the law's stress without it, that is
 the new deviator and the old mean stress. eps_p is the plastic volumetric strain of the law.

@@ -8,7 +8,7 @@
 //! | [`grid`]     | background grid, bases, quadrature rules, location of particles      |
 //! | [`transfer`] | from the grid to the particles, from the particles to grid and rules |
 //! | [`law`]      | material laws                                                        |
-//! | [`particles`]| storage of the particles, their strains and the answers of the laws  |
+//! | [`particles`]| storage of the particles, their strains and responses of the laws    |
 //! | `assembly`   | kernels of the form over the cells, into the reduced matrix          |
 //! | `python`     | bindings                                                             |
 //!

@@ -8,8 +8,8 @@
 #   MATRIX_MINUTES=90 ...                        time limit of each `make test-all`
 #   MATRIX_MIRROR=URL ...                        Debian's mirror; by default that of the host's apt
 #
-# The present commit is cloned; changes that are not committed are not part of it. Mounts live in a
-# namespace of their own and end with it, whatever ends it; the folder is removed on every way out.
+# The present commit is cloned, without changes that are not committed. Mounts are in a separate
+# namespace and end with it; the folder is removed in every case.
 set -euo pipefail
 
 say() { printf 'matrix: %s\n' "$*" >&2; }
@@ -45,8 +45,8 @@ if [ "${1:-}" = --enter ]; then
     enter "$@"
 fi
 
-# root command ...: ends with all that the command started. The first process of the namespace is a shell,
-# because orphans become its children: some programs take a parent of number 1 for the end of theirs.
+# root command ...: ends with all processes of the command. The first process of the namespace is a shell,
+# because orphans become its children: for some programs a parent with number 1 means that theirs has ended.
 within() {
     local root=$1
     shift
@@ -55,7 +55,7 @@ within() {
         /bin/sh -c '"$@"; exit "$?"' sh "$@"
 }
 
-# -- what is needed ----------------------------------------------------------
+# -- requirements ------------------------------------------------------------
 
 [ "$(id -u)" = 0 ] || die "root is needed to make root folders: run 'sudo make matrix'"
 for tool in debootstrap unshare git; do

@@ -1,4 +1,4 @@
-"""How many examples property tests draw, and whether at random.
+"""Number of examples that property tests draw, and whether at random.
 
 `make test` draws the same examples every time. `make fuzz` draws many more, from a seed that it prints.
 """

@@ -1,1 +1,1 @@
-"""What the cases share: program, tables, figures and finite elements."""
+"""Shared parts of the cases: program, tables, figures and finite elements."""

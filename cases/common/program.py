@@ -22,10 +22,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from mpi4py import MPI
-from tqdm import tqdm
 
 import tawami
 from tawami.base.files import atomic_file, result_folder
+from tawami.base.line import in_notebook, progress_bar
 from tawami.fem.environment import header
 
 T = TypeVar("T", int, float)
@@ -36,7 +36,7 @@ class Program:
 
     Args:
         module: Name of the case's module, as after `python -m`.
-        description: What `--help` prints.
+        description: Text that `--help` prints.
         files: Whether the case writes files: adds the option `--results`.
 
     Attributes:
@@ -102,9 +102,9 @@ class Program:
 
 
 def progress(items: Iterable[Any] | None = None, **options: Any) -> Any:
-    """A `tqdm` bar over items; shown by the first rank, and in a terminal only."""
-    shown = MPI.COMM_WORLD.rank == 0 and sys.stderr.isatty()
-    return tqdm(items, disable=not shown, **options)
+    """A `tqdm` bar over items; shown by the first rank, and in a terminal or a notebook only."""
+    shown = MPI.COMM_WORLD.rank == 0 and (sys.stderr.isatty() or in_notebook())
+    return progress_bar(items, disable=not shown, **options)
 
 
 def numbers(kind: type[T], valid: Callable[[T], bool], expected: str) -> Callable[[str], list[T]]:
@@ -113,7 +113,7 @@ def numbers(kind: type[T], valid: Callable[[T], bool], expected: str) -> Callabl
     Args:
         kind: Type of each number.
         valid: Whether a number is in its range.
-        expected: What the error message asks for.
+        expected: Expected value, for the error message.
     """
 
     def parse(text: str) -> list[T]:

@@ -13,7 +13,7 @@ Array = npt.NDArray[np.float64]
 def reduced_tangent(scene: tawami.Scene) -> tuple[Array, npt.NDArray[np.bool_]]:
     """Tangent of a scene at rest, on the free unknowns and without scaling.
 
-    The matrix is not part of what a driver script needs, so this uses internals of `Scene`.
+    Driver scripts do not need the matrix, so this uses internals of `Scene`.
 
     Returns:
         The matrix, unknowns x unknowns, and the mask of the unknowns that belong to u.

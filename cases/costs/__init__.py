@@ -1,1 +1,1 @@
-"""What a run costs: time, memory and accuracy."""
+"""Costs of a run: time, memory and accuracy."""

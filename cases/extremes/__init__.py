@@ -1,4 +1,4 @@
-"""Limits of the method: what it survives, what it rejects, and where.
+"""Limits of the method: settings that it survives, and settings that it rejects.
 
 python -m cases.extremes
 """

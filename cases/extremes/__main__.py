@@ -61,7 +61,7 @@ def as_line(row: Attempt) -> str:
 
 
 def ends(rows: Sequence[Attempt]) -> Iterator[str]:
-    """Lines that tell the limit of each subject: its last survival and its first refusal, as tried.
+    """Lines with the limit of each subject: the last setting that survives, the first that is rejected.
 
     A line follows for each series of settings 'series: value' that does not survive completely.
     """

@@ -1,4 +1,4 @@
-"""The stabilisation from alpha = 0 to 1000 on the cantilever, compared with what theory allows.
+"""The stabilisation from alpha = 0 to 1000 on the cantilever, compared with an estimate from theory.
 
 Let p and p_a be the mean stress without and with the Laplacian's term, and e the difference of the two
 solutions. The difference of their weak forms, tested with e, is
@@ -70,7 +70,7 @@ def bound_of(form: str, alpha: float, stabilisation: str) -> float:
     if stabilisation == "residual_based":
         return 2 * without
     part = 1 / 12 if stabilisation == "projection" else 1.0
-    # a result with a larger error than the estimate at alpha = 1 is useless, whatever theory allows
+    # a result with a larger error than the estimate at alpha = 1 is useless, even if theory allows it
     alpha = min(alpha, 1.0)
     # 5 % because the gradient is that of the closed form instead of the discrete p
     return without + 1.05 * sqrt(part * alpha / 2) / N * gradient_over_size()

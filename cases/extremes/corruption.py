@@ -66,7 +66,7 @@ def refused(motion: tawami.Dynamics, act: Callable[[], object], words: list[str]
             raise AssertionError(f"changed in spite of the error: {changed}") from refusal
         missing = [word for word in words if word not in str(refusal)]
         if missing:
-            raise AssertionError(f"'{refusal}' does not say {missing}") from refusal
+            raise AssertionError(f"'{refusal}' does not contain {missing}") from refusal
         raise
     return np.inf
 

@@ -72,7 +72,7 @@ class _Counter(ctypes.Structure):
     _fields_ = [("tag", ctypes.c_int), ("objects", ctypes.c_int)]
 
 
-#: Stands for an unknown number of objects.
+#: Represents an unknown number of objects.
 HIDDEN = -1
 
 
@@ -166,7 +166,7 @@ def attempts(short: bool) -> Iterator[Attempt]:
         )  # fmt: skip
     if not short:
         yield attempted(
-            SUBJECT, "reference assembly, bytes a step, 300 steps after 200", BOUND,
+            SUBJECT, "assembly by dolfinx, bytes a step, 300 steps after 200", BOUND,
             partial(growth, "u_epsv_finite", 200, 300, assembly="dolfinx"),
         )  # fmt: skip
     number = 20 if short else 1000

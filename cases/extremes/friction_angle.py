@@ -2,9 +2,9 @@
 
 References: between smooth plates that shorten a block and widen it by the same amount, the ratio of
 the stresses becomes (1 + sin phi)/(1 - sin phi) with both laws; dust that flies apart has no stress
-and conserves its kinetic energy, except for what mixed forms take by their resistance to opening; a
-collapsing pile has no stress beyond the yield surface, which is evaluated here independently of the
-package, and no spurious energy.
+and conserves its kinetic energy, except for the work against the resistance to opening in mixed forms;
+a collapsing pile has no spurious energy and no stress beyond the yield surface, which is evaluated
+here independently of the package.
 """
 
 from __future__ import annotations

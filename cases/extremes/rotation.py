@@ -2,7 +2,7 @@
 
 The block spins with rho omega^2 R^2/E = 1e-3, where R is half its side, in 40 steps per turn. Angular
 momentum, linear momentum, energy and shape are compared with the start. The trapezoidal rule itself
-takes up to twice (omega dt)^2/4 = 1.2 % of sum m x x v (see `cases.verification.spinning_disc`).
+reduces sum m x x v by up to twice (omega dt)^2/4 = 1.2 % (see `cases.verification.spinning_disc`).
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ from matplotlib.colors import LogNorm
 import tawami
 from cases.common.figure import save
 from cases.verification.cantilever import beam, mpm
+from tawami.picture import style
 
 #: Columns of the figure: title, form, and its options.
 FORMS: dict[str, tuple[str, dict[str, str]]] = {
@@ -108,7 +109,7 @@ def _panel(axes: Any, mine: Sequence[Point], attribute: str, limits: tuple[float
     columns = list(dict.fromkeys(p.alpha for p in mine))
     values = np.array([getattr(p, attribute) for p in mine]).reshape(len(rows), len(columns))
     image = axes.imshow(
-        values, norm=LogNorm(*limits), aspect="auto", cmap="viridis", interpolation="nearest"
+        values, norm=LogNorm(*limits), aspect="auto", cmap=style.MAGNITUDE, interpolation="nearest"
     )
     for i, j in np.argwhere(np.isnan(values)):
         box = plt.Rectangle((j - 0.5, i - 0.5), 1, 1, facecolor="0.9", edgecolor="0.5", hatch="///")
@@ -116,8 +117,8 @@ def _panel(axes: Any, mine: Sequence[Point], attribute: str, limits: tuple[float
     for i, j in np.argwhere(~np.isnan(values)):
         dark = values[i, j] < np.sqrt(limits[0] * limits[1])
         digit, power = f"{values[i, j]:.0e}".split("e")
-        style = {"ha": "center", "va": "center", "fontsize": 6, "color": "w" if dark else "k"}
-        axes.text(j, i, f"{digit}e{int(power)}", **style)
+        look = {"ha": "center", "va": "center", "fontsize": 6, "color": "w" if dark else "k"}
+        axes.text(j, i, f"{digit}e{int(power)}", **look)
     axes.set_yticks(
         range(len(rows)), [f"{c:g}" if c else r"0 ($\nu = 0.5$)" for c in rows], fontsize=7
     )

@@ -33,7 +33,7 @@ CELLS, PER_AXIS = 16, 4
 #: Bound of `coasting`: moving particles stay 1e-5 of a cell away from its sides.
 COASTING = 1e-5
 #: Bounds of `hanging`: with two particles per cell the rms error in tension is 1.3 and 2 % at the end of
-#: a body (documentation, Limits). B-bar misses the patch test by up to 22 %.
+#: a body (documentation, Limits). B-bar fails the patch test by up to 22 %.
 HANGING = {"u_epsv_finite": 0.05, "u_finite": 0.05, "u_bbar_finite": 0.22}
 
 

@@ -56,7 +56,7 @@ def ramped(form: str, factor: float) -> float:
 
     def wrong() -> float:
         """Difference of the last reaction and the carried share of the load, over the load."""
-        # internal, because `ramp` does not return the share that it reached when it fails
+        # internal, because `ramp(..., stop="raise")` does not return the share that it reached
         share = pull.terms[0].share.carried
         if not np.isfinite(scene.particles.stress).all():
             return np.inf

@@ -1,4 +1,4 @@
-"""A block in different positions on the grid: how partially filled cells affect answer and condition.
+"""A block in different positions on the grid: the effect of partially filled cells.
 
      ________
     |        |       1.5 m x 1.5 m, 6 x 6 cells of 0.25 m, 2 x 2 particles each, plane strain
@@ -121,9 +121,9 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     for axes in (left, right):
         axes.set_xlabel("offset [cells]")
         axes.axvline(SLIVER, color="black", linewidth=0.5)
-        axes.grid(alpha=0.3)
-    right.text(SLIVER, right.get_ylim()[1], " sliver of $10^{-8} h$", va="top", fontsize=8)
-    left.legend(fontsize=8)
+        axes.grid()
+    right.text(SLIVER, right.get_ylim()[1], " sliver of $10^{-8} h$", va="top")
+    left.legend()
     save(figure, path)
 
 

@@ -6,7 +6,7 @@
     |                     |    2 m x 1 m, 32 x 16 cells, plane strain, E = 1 MPa, nu = 0.4999
     |_____________________|    smooth sides and floor, bilinear functions
 
-The weak form stands here as in a driver script. Its last term, alpha h^2 (K/mu) lap(eps_v), is the
+The weak form is written as in a driver script. Its last term, alpha h^2 (K/mu) lap(eps_v), is the
 stabilisation of the paper. Without it the mean stress oscillates from cell to cell.
 
 python -m cases.showcase.one_line
@@ -21,7 +21,7 @@ from mpi4py import MPI
 from ufl import div, dot, grad
 
 import tawami
-from cases.common.figure import save
+from cases.common.figure import add_bar, draw_particles, save
 from cases.common.program import Program
 from cases.showcase.collapse.pile import roughness
 
@@ -37,7 +37,7 @@ def unstable(u, eps_v, w, q, sigma, K, t, sum_p, ds):  # type: ignore[no-untyped
 
 
 def stable(u, eps_v, w, q, sigma, K, mu, t, h, sum_p, ds):  # type: ignore[no-untyped-def]
-    """The same and one line."""
+    """The same equations with one more term."""
     R_u = sum_p(sigma, grad(w)) - dot(t, w) * ds
     R_q = sum_p(K, q * (div(u) - eps_v))
     R_q -= sum_p(K**2 / mu, 0.01 * h**2 * dot(grad(q), grad(eps_v)))
@@ -68,19 +68,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         rough = roughness(solution.x, solution.mean_stress, H)
         title = "without the line" if residual is unstable else "with it"
         print(f"{title:16} roughness of the mean stress {rough:.4f}")
-        points = axis.scatter(
-            *solution.x.T,
-            c=solution.mean_stress / 1e3,
-            s=5,
-            marker="s",
-            linewidths=0,
-            cmap="viridis",
-            vmin=-1,
-            vmax=0,
-        )
-        axis.set(aspect="equal", title=title, xlabel="$x$ [m]")
+        stress, limits = solution.mean_stress, (-LOAD, 0.0)
+        points = draw_particles(axis, solution.x, 0.4 * H, stress, "Pa", limits)
+        axis.set(title=title, xlabel="$x$ [m]")
     axes[0].set_ylabel("$y$ [m]")
-    figure.colorbar(points, ax=axes, label="mean stress [kPa]", extend="both")
+    add_bar(points, axes)
     save(figure, PROGRAM.folder / "mean_stress.png")
     PROGRAM.list_results()
 

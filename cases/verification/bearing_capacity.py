@@ -11,7 +11,7 @@ Prandtl 1921 (Z. angew. Math. Mech. 1, 15): the traction at collapse is
     q = c (exp(pi tan phi) tan^2(45 deg + phi/2) - 1) / tan phi,    (2 + pi) c for phi = 0.
 
 It is exact for associated flow, psi = phi. With psi < phi there is no limit theorem and no unique limit
-load. Davis 1968 (in Soil Mechanics: Selected Topics) takes the soil as associated with the reduced
+load. Davis 1968 (in Soil Mechanics: Selected Topics) treats the soil as associated, with the reduced
 
     tan phi* = r tan phi,  c* = r c,    r = cos psi cos phi / (1 - sin psi sin phi),
 

@@ -39,9 +39,10 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 import tawami
-from cases.common.figure import save
+from cases.common.figure import COLOURS, save
 from cases.common.program import Program, progress
 from cases.common.table import as_csv, as_text
+from tawami.picture import style
 
 Array = npt.NDArray[np.float64]
 
@@ -70,7 +71,6 @@ STUDY: dict[str, list[dict[str, Any]]] = {
     "particles": [{"per_axis": 3, "n": 4}],
 }  # fmt: skip
 FORMS = {"u_epsv": "mixed $u$-$\\varepsilon_v$", "u_bbar": "B-bar", "u": "displacement only"}
-COLOURS = {"u_epsv": "tab:red", "u_bbar": "tab:blue", "u": "tab:gray"}
 DASHES = {2: ":", 4: "--", 8: "-", 16: "-."}
 
 
@@ -82,7 +82,7 @@ class Run:
         form: Weak form.
         law: Material.
         basis: Basis of u.
-        footing: How the settlement is prescribed.
+        footing: Kind of prescribed settlement.
         n: Cells over half the footing's width.
         nu: Poisson's ratio.
         alpha: Stabilisation.
@@ -93,7 +93,7 @@ class Run:
         uneven: Difference of the largest and smallest settlement under the footing, as a share.
         seconds: Wall time.
         x, plastic: Positions [m] and plastic strain of the particles at the end.
-        stopped: Why the run ended early; empty if it did not.
+        stopped: Reason why the run ended early; empty if it did not.
     """
 
     form: str
@@ -246,11 +246,11 @@ def curves(runs: dict[str, list[Run]], path: Path) -> None:
             )  # fmt: skip
         axes.axhline(PRANDTL, color="k", linewidth=0.8, label="$2 + \\pi$")
         axes.set_ylim(0, 12)
-        axes.set_title(title, fontsize=10)
+        axes.set_title(title)
         axes.set_xlabel("settlement $w \\mu / (s_u b)$ [-]")
         axes.set_ylabel("$Q / (s_u B)$ [-]")
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize=7, loc="lower right", ncols=2)
+        axes.grid()
+        axes.legend(loc="lower right", ncols=2)
     save(figure, path)
 
 
@@ -261,14 +261,16 @@ def zones(runs: Sequence[Run], path: Path) -> None:
     )
     for axes, run in zip(panels.ravel(), runs, strict=True):
         times = run.plastic * RIGIDITY / SETTLEMENT
-        shown = axes.scatter(*run.x.T, c=times, s=64 / run.n, cmap="magma_r", vmin=0, vmax=1.5)
+        shown = axes.scatter(
+            *run.x.T, c=times, s=64 / run.n, cmap=style.FROM_ZERO, vmin=0, vmax=1.5
+        )
         axes.plot([0, B_HALF], [0.02, 0.02], "k", linewidth=4, label="footing")
-        axes.plot(*prandtl().T, color="tab:blue", label="Prandtl's lines")
+        axes.plot(*prandtl().T, color=style.BLUE, label="Prandtl's lines")
         axes.set_aspect("equal")
-        axes.set_title(f"{FORMS[run.form]}, $\\nu$ = {run.nu}, {run.n} cells", fontsize=10)
+        axes.set_title(f"{FORMS[run.form]}, $\\nu$ = {run.nu}, {run.n} cells")
         axes.set_xlabel("$x$ [m]")
         axes.set_ylabel("$y$ [m]")
-        axes.legend(loc="lower right", fontsize=8)
+        axes.legend(loc="lower right")
         figure.colorbar(shown, ax=axes, label="plastic strain $\\times\\, b / w$ [-]")
     save(figure, path)
 

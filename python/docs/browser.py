@@ -13,6 +13,8 @@ from executed import RunError
 
 WIDTHS = (380, 900, 1400)  # of a phone, a tablet and a screen [pixels]
 HEIGHT = 900
+#: Root has no sandbox, and a throw-away root no /dev/shm.
+OPTIONS = ("--no-sandbox", "--disable-dev-shm-usage")
 #: Waits until equations are drawn.
 DRAWN = "async () => { if (window.MathJax?.startup?.promise) await MathJax.startup.promise; }"
 LINKS = "() => [...document.querySelectorAll('a[href]')].map(a => a.href)"
@@ -42,7 +44,7 @@ def problems(html: Path) -> list[str]:
     names: dict[Path, set[str]] = {}
     links: dict[Path, list[str]] = {}
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
+        browser = playwright.chromium.launch(executable_path=chromium(), args=list(OPTIONS))
         tab = browser.new_page()
         said: list[str] = []
         tab.on(
@@ -106,8 +108,9 @@ def photograph(html: Path, names: Iterable[str], target: Path) -> None:
     """Write pictures of pages at each width: NAME-WIDTH.png."""
     from playwright.sync_api import sync_playwright
 
+    target.mkdir(parents=True, exist_ok=True)
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
+        browser = playwright.chromium.launch(executable_path=chromium(), args=list(OPTIONS))
         tab = browser.new_page()
         for name in names:
             tab.goto((html / f"{name}.html").as_uri())

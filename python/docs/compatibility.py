@@ -1,4 +1,4 @@
-"""Run combinations of form, law, time and ranks on a small body, and table which of them work.
+"""Run combinations of form, law, time and ranks on a small body; tabulate those that work.
 
 python python/docs/compatibility.py            on the present ranks: JSON of every cell, for `table`
 

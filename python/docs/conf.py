@@ -79,7 +79,7 @@ def src(
 def plain_attributes(
     _app: Any, what: str, _name: str, _thing: Any, _opt: Any, lines: list[str]
 ) -> None:
-    """Prepare docstrings: text before a colon, and all but the last of a list of names, is no type."""
+    """Prepare docstrings: text before a colon, and all names of a list but the last, is not a type."""
     if what == "property":
         lines[0] = lines[0].replace(": ", "; ", 1)
     if "Attributes:" in lines:

@@ -7,7 +7,11 @@ import logging
 import textwrap
 import warnings
 
+import matplotlib
 from IPython import get_ipython
+
+from tawami.base import line
+from tawami.picture import style
 
 
 def _prepare():
@@ -22,7 +26,9 @@ def _prepare():
 
     get_ipython().InteractiveTB.structured_traceback = brief
     warnings.showwarning = show
+    matplotlib.rcParams.update(style.PARAMETERS)  # as in the figures of the package
     logging.disable(logging.INFO)  # compiling forms logs much
+    line.in_notebook = lambda: False  # no bars of progress in pages
 
 
 _prepare()

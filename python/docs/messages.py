@@ -23,7 +23,7 @@ SUBJECTS: dict[str, tuple[str, ...]] = {
     "Solving": ("solve",),
     "Scene": ("scene",),
     "Steps and motion": ("motion",),
-    "Results": ("results",),
+    "Results": ("picture", "results"),
     "Studies": ("study",),
     "Command line": ("command",),
 }

@@ -71,6 +71,7 @@ def assemble(target: Path, only: str | None = None) -> list[str]:
     for name in chosen:
         if name in sources:
             text = complete(sources[name].read_text())
+            text = _with_files(text, sources[name].parent, (target / name).parent)
         else:
             text = case_page(name.removeprefix("cases/"), target)
         _check_links(name, text)
@@ -93,6 +94,16 @@ def draw_thumbnails(target: Path, names: Iterable[str] = thumbnails.PARTS) -> No
     """Write the thumbnails of cases, which are run if necessary, to a folder as NAME.png."""
     for name in names:
         thumbnails.draw(name, executed.case(CASES[name][1], name).folder, target / f"{name}.png")
+
+
+def _with_files(text: str, source: Path, target: Path) -> str:
+    """A page whose files to include are named from another folder."""
+    return re.sub(
+        r"^(```\{(?:literal)?include\}) (\S+)$",
+        lambda match: f"{match[1]} {os.path.relpath(source / match[2], target)}",
+        text,
+        flags=re.MULTILINE,
+    )
 
 
 def _copy(file: Path, folder: Path) -> None:
@@ -188,7 +199,7 @@ def case_page(name: str, target: Path) -> str:
     return (
         f"# {title}\n\n{about}\n\n{pictures}\n\n"
         f"## Output\n\n`{command}` took {_duration(output.seconds)}.{shorter}\n\n"
-        f"````text\n{output.text.strip()}\n````\n\n"
+        f"````{{code-block}} text\n:class: long\n\n{output.text.strip()}\n````\n\n"
         "## Code\n\n" + "\n".join(_listing(file, target / "cases") for file in files)
     )
 

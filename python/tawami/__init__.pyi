@@ -52,6 +52,7 @@ from tawami.particles.laws import (
 )
 from tawami.particles.numpy_law import NumpyLaw
 from tawami.results.outputs import GridOutput, ParticleOutput
+from tawami.results.plot import plot
 from tawami.results.results import Results
 from tawami.results.table import TableOutput
 from tawami.scene.earlier import earlier
@@ -116,6 +117,7 @@ __all__ = [
     "modes",
     "mohr_coulomb",
     "neo_hookean",
+    "plot",
     "polygon",
     "ramp",
     "recommend",

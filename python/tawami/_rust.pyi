@@ -44,10 +44,10 @@ class TawamiError(Exception):
     """Base of every error that tawami raises."""
 
 class InputError(TawamiError):
-    """An input is wrong; the message says which."""
+    """A wrong input; the message names it."""
 
 class InvertedError(TawamiError):
-    """An iterate turns a particle inside out."""
+    """An iterate that turns a particle inside out."""
 
 @final
 class Grid:

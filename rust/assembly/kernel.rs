@@ -65,7 +65,7 @@ pub struct Bilinear<'a> {
     pub couplings: Vec<[Kernels<'a>; 2]>,
 }
 
-/// The state of an assembly that all cells share.
+/// The state of an assembly, common to all cells.
 #[derive(Clone, Copy)]
 pub struct State<'a> {
     /// The cells and their fields.
@@ -134,7 +134,7 @@ impl<'a> State<'a> {
                     }
                 }
             }
-            // SAFETY: the caller vouches for the kernel and the length of `element`. Integrals over cells
+            // SAFETY: the caller guarantees the kernel and the length of `element`. Integrals over cells
             // do not read facet, permutations and user data.
             unsafe {
                 (kernel.tabulate)(

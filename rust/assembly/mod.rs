@@ -51,7 +51,7 @@ struct Shared {
     len: usize,
 }
 
-// SAFETY: see `add`; whoever shares one keeps to disjoint indices.
+// SAFETY: see `add`; users of a shared one write to disjoint indices only.
 unsafe impl Send for Shared {}
 unsafe impl Sync for Shared {}
 

@@ -78,7 +78,7 @@ fn axes_of_second() -> [[usize; 2]; SYMMETRIC] {
     pairs
 }
 
-/// What a kernel reads of the fields, and what the rows and columns of its result multiply.
+/// Values of the fields that a kernel reads, and the factors of the rows and columns of its result.
 #[derive(Debug, Clone)]
 pub struct Entries {
     /// All entries, each once.
@@ -144,7 +144,7 @@ impl Entries {
     }
 }
 
-/// Where a kernel is evaluated.
+/// Places where a kernel is evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
     /// At each particle.
@@ -414,7 +414,7 @@ impl<const M: usize, const P: usize, const W: usize> Points<M, P, W> {
         let (rows, columns) = (entries.test.len(), entries.trial.len());
         let result = &mut self.result[..rows * columns.max(1)];
         result.fill(0.0);
-        // SAFETY: the caller vouches for the kernel, which writes rows x columns numbers.
+        // SAFETY: the caller guarantees the kernel, which writes rows x columns numbers.
         unsafe {
             (kernel.tabulate)(
                 result.as_mut_ptr(),

@@ -11,7 +11,7 @@ use crate::space::{
     FUNCTIONS_1D, ROWS,
 };
 
-/// The functions of a basis on a grid of so many cells.
+/// The functions of a basis on a grid of this number of cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Functions {
     /// Family of functions along each axis.

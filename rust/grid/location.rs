@@ -1,4 +1,4 @@
-//! Where the particles are in the grid.
+//! Location of the particles in the grid.
 
 use super::Grid;
 use crate::error::{check_finite, Error, Result};

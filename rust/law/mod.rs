@@ -33,7 +33,7 @@ laws! {
 /// A law, shared by the particles that have it.
 pub type Shared = Arc<dyn Law>;
 
-/// How a driver script makes a law.
+/// Maker of a law for driver scripts.
 pub struct Maker {
     /// Name of the law in driver scripts.
     pub name: &'static str,

@@ -1,4 +1,4 @@
-//! Particles: their storage, their strains, and the answers of their laws.
+//! Particles: their storage, their strains, and the responses of their laws.
 //!
 //! The storage is one list of named columns, and it has only the columns that a scene needs.
 
@@ -228,7 +228,7 @@ impl Particles {
         }
     }
 
-    /// Add what the strain since the start follows from, zero at first.
+    /// Add the column from which the strain since the start follows, zero at first.
     pub fn add_strain(&mut self, finite: bool) {
         if finite {
             self.add(Role::State, GRADIENT, Some(space::GRADIENT));

@@ -1,4 +1,4 @@
-//! What a weak form asks of the laws: the columns of its particle data.
+//! Quantities of the laws that a weak form needs: the columns of its particle data.
 
 use std::str::FromStr;
 

@@ -16,7 +16,7 @@ use crate::tensor::hencky::Trial;
 use crate::tensor::matrix::{det_minus_one, flat, matrix, multiply, trace};
 use crate::tensor::{dot, mean, symmetric_part, AtMean, Moduli, Strain, Stress, Sym, UNIT};
 
-/// Where stress and tangent come from.
+/// Source of stress and tangent.
 #[derive(Clone, Copy)]
 pub enum Response<'a> {
     /// The laws; the material numbers of the particles count them from 0.
@@ -41,7 +41,7 @@ pub struct Given<'a> {
 
 /// One array of particle data: the requests that are written into its columns.
 pub struct Output<'a> {
-    /// What is written.
+    /// Requests that are written.
     pub requests: &'a [Request],
     /// Number of columns, at least one.
     pub columns: usize,
@@ -49,12 +49,12 @@ pub struct Output<'a> {
     pub data: &'a mut [f64],
 }
 
-/// What the particle stage works on.
+/// Data of the particle stage.
 #[derive(Clone, Copy)]
 pub struct Stage<'a> {
     /// Where the particles are.
     pub location: &'a Location,
-    /// The laws, or their answers.
+    /// The laws, or their responses.
     pub response: Response<'a>,
     /// How the strain follows from the increments.
     pub kinematics: Kinematics,
@@ -88,7 +88,7 @@ struct OfMean {
     plastic: PlasticVolume,
 }
 
-/// Answer of a particle to the increments.
+/// Response of a particle to the increments.
 struct Answer {
     /// Volumetric strain increment, elastic and plastic.
     volume: f64,
@@ -148,7 +148,7 @@ impl Stage<'_> {
         matches!(self.kinematics, Kinematics::Mixed | Kinematics::Deviatoric)
     }
 
-    /// Stress, tangent and plastic volume from what a law answers at a mean stress. `start` is the stress
+    /// Stress, tangent and plastic volume from the response of a law at a mean stress. `start` is the stress
     /// at the start of the step, `slope` the derivative of the mean stress with respect to the field.
     fn at_mean(&self, answer: &AtMean, start: f64, mean: f64, slope: f64) -> OfMean {
         let with_field = self.kinematics == Kinematics::Mixed;
@@ -296,7 +296,7 @@ impl Stage<'_> {
         trace(&g)
     }
 
-    /// Write what is requested into all arrays of particle data. The law of a particle answers once.
+    /// Write the requested quantities into all arrays of particle data. Each law is evaluated once.
     ///
     /// # Errors
     /// [`Error::Inverted`] with the first such particle.

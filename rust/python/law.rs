@@ -14,7 +14,7 @@ pub(super) struct PyMaterial {
     made: Made,
 }
 
-/// What a law was made of, to copy and to pickle it.
+/// Arguments with which a law was made, to copy and to pickle it.
 enum Made {
     /// A linear elastic law: the function, and its two arguments.
     Elastic(&'static str, f64, f64),
@@ -54,7 +54,7 @@ impl PyMaterial {
         Ok(Self { law, made: Made::Law(maker.name, elastic, parameters) })
     }
 
-    /// How to make a copy, here or in another process.
+    /// Arguments for a copy, here or in another process.
     fn __reduce__<'py>(
         &self,
         py: Python<'py>,

@@ -20,12 +20,12 @@ use pyo3::PyClass;
 use crate::error::Error;
 
 create_exception!(tawami, TawamiError, PyException, "Base of every error that tawami raises.");
-create_exception!(tawami, InputError, TawamiError, "An input is wrong; the message says which.");
+create_exception!(tawami, InputError, TawamiError, "A wrong input; the message names it.");
 create_exception!(
     tawami._rust,
     InvertedError,
     TawamiError,
-    "An iterate turns a particle inside out."
+    "An iterate that turns a particle inside out."
 );
 
 impl From<Error> for PyErr {

@@ -37,7 +37,7 @@ pub struct Moduli {
     pub mean_vol: f64,
 }
 
-/// Answer of a law to a deviatoric strain increment at a given mean stress.
+/// Response of a law to a deviatoric strain increment at a given mean stress.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct AtMean {
     /// Deviator s [Pa].
@@ -55,7 +55,7 @@ pub struct AtMean {
 }
 
 impl AtMean {
-    /// From the answer of a law of the total strain whose mean stress is the given one.
+    /// From the response of a law of the total strain that has the given mean stress.
     ///
     /// The total volumetric strain v follows from `sigma_m(deviator, v) = given`, and the plastic one is
     /// `v - sigma_m / K`. `c.mean_vol` is not 0.

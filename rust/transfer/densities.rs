@@ -7,7 +7,7 @@
 //! ```
 //!
 //! on the tensor Gauss points with k + 1 points per axis, `sum_q w_q |J| D_q f(xi_q) = sum_p V_p D_p f(xi_p)`
-//! holds to round-off for every f in Q_k (README, The method).
+//! holds to round-off for every f in Q_k (documentation, Theory).
 
 use ndarray::ArrayView2;
 use rayon::prelude::*;
@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use crate::grid::{Location, Rule, MAX_POINTS};
 use crate::space::{volume_of_cell, Index, DIM};
 
-/// Which columns of the particle data are given to which points of a tensor rule.
+/// Columns of the particle data, and the points of a tensor rule that receive their densities.
 #[derive(Debug, Clone, Copy)]
 pub struct Densities<'a> {
     /// One-dimensional rule of the points.

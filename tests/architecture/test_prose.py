@@ -6,6 +6,7 @@ a reader stumbles over it.
 
 from __future__ import annotations
 
+import ast
 import re
 from pathlib import Path
 
@@ -40,6 +41,36 @@ PHRASES = {
     r"beside (finite|the closed|Euler|Prandtl|Timoshenko|its theory)\w*": "compared with",
     r"but for (the|its|round)\b": "except, up to",
     r"out of nothing\b": "spurious",
+    r"what (comes?|came) (back|out|in)\b": "the result",
+    r"what (is|are) (left|new|written|stored|shown|told|missing elsewhere)\b": "name the thing",
+    r"what (follows|differs|tells|distinguishes|decides|makes|gives|surrounds)\b": "name the thing",
+    r"what messages\b": "name in messages",
+    r"(is|are) left to\b": "is done by",
+    r"as it stands\b": "without changes",
+    r"as (it|they) (was|were) before\b": "unchanged",
+    r"keeps? to (the|disjoint|its)\b": "follow, agree with",
+    r"(nothing|something) is lost\b": "name the thing",
+    r"for so many\b": "for this number of",
+    r"(the|those) ones that\b": "repeat the noun",
+    r"which of (it|them|which)\b": "name the choice",
+    r"one by one by\b": "separately",
+    r"(br(ing|ings|ought)) up (the|a|to)\b": "apply, increase",
+    r"carr(y|ies) no more\b": "cannot carry more load",
+    r"for ever\b": "forever",
+    r"(start|begin|made?|starts|begins) anew\b": "start again",
+    r"lest\b": "so that ... not",
+    r"vouch(es)?\b": "guarantee",
+    r"do(es)? without\b": "does not use, does not need",
+    r"ma(ke|kes|de) up for\b": "cancel, balance",
+    r"(take|takes|took|taking) away\b": "remove",
+    r"not to be (written|changed)\b": "read only",
+    r"(is|are) bought by\b": "costs",
+    r"take (a|an|the) (smaller|larger|shorter|longer|other)\b": "use",
+    r"than it was given\b": "than was supplied",
+    r"of no (run|body|group)\b": "does not belong to",
+    r"(is|are) code: (resume|read)\b": "executes the script",
+    r"(has|have) not the\b": "does not have, lacks",
+    r"no checkpoint of tawami\b": "is not a checkpoint",
 }
 #: The same with any number of blanks between words.
 SEARCHED = {
@@ -92,3 +123,68 @@ def test_phrases_are_found_across_lines_and_in_names(text, phrase):
 
 def test_plain_text_has_no_hits():
     assert hits("The run resumes. No value is missing; `x is None` is code.") == []
+
+
+#: First words of a docstring that is neither an imperative nor a noun phrase.
+QUESTIONS = ("What", "Where", "Which", "Who", "How", "Nothing")
+
+
+@pytest.mark.parametrize(
+    "path", [p for p in texts() if p.suffix == ".py"], ids=lambda path: str(path.relative_to(ROOT))
+)
+def test_docstrings_begin_with_an_imperative_or_a_noun(path):
+    kinds = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    nodes = [
+        n for n in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(n, kinds)
+    ]
+    words = [(ast.get_docstring(node) or "-").split()[0] for node in nodes]
+    assert [word for word in words if word in QUESTIONS] == []
+
+
+NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?!\w)")
+#: Parts of a page that are no prose: front matter, code and directives; then code, mathematics, sources
+#: with years, sizes such as 2 x 2, numbers of lists, values of parameters.
+BLOCKS = re.compile(r"\A---\n.*?\n---\n|^(```+|:::+).*?^\1\n", flags=re.DOTALL | re.MULTILINE)
+INLINE = re.compile(
+    r"`[^`]*`|\$[^$]*\$|\([^()]*\d{4}[^()]*\)|\d+ x \d+|\b(?:19|20)\d\d\b|^\d+\. "
+    r"|(?:nu|alpha|[^\W\da-z_]|K/.|h|k) (?:=|near|to|of) ?[-\d.e°]+"
+)
+
+
+def crowded(page: str) -> list[str]:
+    """Paragraphs with more than five numbers, which belong in a table, or with three semicolons."""
+    paragraphs = re.split(r"\n\s*\n|\n(?=\s*(?:[-*]|\d+\.) )", BLOCKS.sub("", page))
+    prose = [p.strip() for p in paragraphs if not p.lstrip().startswith(("|", "#"))]
+    found = [
+        f"{len(n)} numbers: {p}" for p in prose if len(n := NUMBER.findall(INLINE.sub(" ", p))) > 5
+    ]
+    sentences = [s for p in prose for s in re.split(r"(?<=[.:!?])\s+", INLINE.sub(" ", p))]
+    return found + [f"semicolons: {s}" for s in sentences if s.count(";") > 2]
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        p
+        for p in texts()
+        if p.suffix == ".md" and p.name != "CHANGELOG.md" and "cases" not in p.parts
+    ],
+    ids=lambda path: str(path.relative_to(ROOT)),
+)
+def test_paragraphs_have_few_numbers(path):
+    assert crowded(path.read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize(
+    ("page", "count"),
+    [
+        ("The error is 1, 2, 3, 4 and 5 %.", 0),
+        ("The error is 1, 2, 3, 4, 5 and\n6e-2 %.", 1),
+        ("With nu = 0.3 on 2 x 2 cells the errors are 1, 2, 3, 4 and 5 %.", 0),
+        ("| 1 | 2 | 3 | 4 | 5 | 6 |\n", 0),
+        ("```sh\n1 2 3 4 5 6\n```\n", 0),
+        ("One; two; three; four.", 1),
+    ],
+)
+def test_crowded_paragraphs_are_found(page, count):
+    assert len(crowded(page)) == count

@@ -77,7 +77,7 @@ def test_a_module_imports_only_rooms_below_its_own(name):
 
 def test_modules_do_not_import_each_other_in_a_circle():
     graph = {name: {target for target, _ in imports(name)} - {name} for name in IN_ROOMS}
-    # a package's __init__ hands on the names of its room, which modules of the room do not use
+    # a package's __init__ re-exports the names of its room, which modules of the room do not use
     for name in IN_ROOMS:
         graph[name] = {t for t in graph[name] if not (t[-1] == "__init__" and t[0] == name[0])}
     tuple(graphlib.TopologicalSorter(graph).static_order())

@@ -46,7 +46,7 @@ def test_fallback_kernels_are_replaced(unknown):
     assert core(unknown) == wanted
     assert blas.VARIABLE not in os.environ
     assert blas.multiplies(unknown)
-    assert blas.choose() == blas.Core(wanted)  # they are no fallback
+    assert blas.choose() == blas.Core(wanted)  # they are not a fallback
 
 
 def test_kernels_that_fail_their_trial_are_not_used(unknown, monkeypatch):

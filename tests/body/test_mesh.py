@@ -287,7 +287,7 @@ SQUARE = np.array([[0, 1.0], [0.5, 1.0], [0.5, 1.5], [0, 1.5]])
         ([0, 1, 2, 3], {"cell_data": {"m": [["x"]]}}, {"tags": "m"}, "'m': expected a whole number"),
         ([0, 1, 2, 3], {"cell_data": {"m": [[1.5]]}}, {"tags": "m"}, "'m': expected a whole number"),
         ([0, 1, 2, 3], {"cell_sets": {"a": [[0]]}}, {"groups": "a"}, "expected a list with some of 'a'"),
-        ([0, 1, 2, 3], {"cell_sets": {"a": [[0]]}}, {"groups": []}, "expected the name of a group"),
+        ([0, 1, 2, 3], {"cell_sets": {"a": [[0]]}}, {"groups": []}, "expected the names of one"),
         ([0, 1, 2, 3], {}, {"groups": ["a"]}, "its elements have no groups: expected groups=None"),
     ],
 )  # fmt: skip

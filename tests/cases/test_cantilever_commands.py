@@ -63,7 +63,7 @@ def test_the_benchmark_prints_its_ratios(capsys, tmp_path):
     printed = capsys.readouterr().out
     for words in (
         "all but the factorisation: ", "particle stages: ", "FGMRES iterations [0, ",
-        "us per particle and iteration", "reference over fast", "2 ranks: step ", "growth, ",
+        "us per particle and iteration", "dolfinx over points", "2 ranks: step ", "growth, ",
         "another set of active cells", "of them empty:", "BLAS",
     ):  # fmt: skip
         assert words in printed

@@ -54,13 +54,13 @@ def script(tmp_path):
 
 @pytest.fixture
 def process() -> Callable[..., Finished]:
-    """Run the command in a process of its own, which costs a second."""
+    """Run the command in a separate process, which costs a second."""
     return lambda *arguments, **options: python("-m", "tawami", *arguments, **options)
 
 
 @pytest.fixture
 def here(monkeypatch, capsys) -> Callable[..., Finished]:
-    """Run the command in this process, which is then as it was before."""
+    """Run the command in this process, and restore the state of the process."""
 
     def run(*arguments: object, cwd: object = None) -> Finished:
         words, environment, code = [*map(str, arguments)], dict(os.environ), 0

@@ -96,13 +96,13 @@ def test_new_writes_a_script_but_not_over_another(capsys, rejected, tmp_path, ki
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("my-case", "'my-case' is not a name of Python"),
-        ("my.case", "'my.case' is not a name of Python"),
-        ("2cases", "'2cases' is not a name of Python"),
-        ("my case.py", "'my case' is not a name of Python"),
+        ("my-case", "'my-case' is not a valid name in Python"),
+        ("my.case", "'my.case' is not a valid name in Python"),
+        ("2cases", "'2cases' is not a valid name in Python"),
+        ("my case.py", "'my case' is not a valid name in Python"),
         ("class", "'class' is a keyword of Python"),
         ("None.py", "'None' is a keyword of Python"),
-        ("__init__", "'__init__' has a meaning to Python"),
+        ("__init__", "'__init__' is reserved by Python"),
         ("numpy", "the module 'numpy' is installed"),
         ("tawami.py", "the module 'tawami' is installed"),
         ("random", "the module 'random' is installed"),

@@ -66,7 +66,7 @@ REPEATED = [ABORT_4, EXIT_4, TORN_4, MORE_4, ABORT_5, EXIT_5]
 
 
 def printed(text: str, size: int) -> str:
-    """What is printed of a text that arrives in parts."""
+    """Printed part of a text that arrives in parts."""
     messages, data = Messages(), text.encode()
     parts = [messages.passed(data[k : k + size]) for k in range(0, len(data), size)]
     return (b"".join(parts) + messages.rest()).decode()

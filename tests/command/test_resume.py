@@ -80,7 +80,7 @@ def test_another_script_is_run_only_if_it_is_trusted(script, results, here, reje
     copy = results / "script.py"
     copy.write_text("print('another')\n")
     said = rejected("resume", results)
-    assert "is not the script that the run was started with" in said
+    assert "differs from the script that started the run" in said
     assert f"tawami resume --trust {results}" in said
     run = here("resume", "--trust", results)
     assert (run.returncode, run.stdout.splitlines()[-1]) == (0, "another")

@@ -75,6 +75,7 @@ CALLS: dict[str, Callable[[Sample], tuple[Any, ...]]] = {
     "Particles.carry": lambda s: (s.particles.carry, "acceleration", 2),
     "Particles.carried": lambda s: (s.particles.carried, "velocity"),
     "Particles.history": lambda s: (s.particles.history, "plastic_strain"),
+    "Particles.add_strain": lambda s: (s.particles.add_strain, False),
     "Particles.add_history": lambda s: (s.particles.add_history, [s.law]),
     "Particles.move_to": lambda s: (s.particles.move_to, s.x),
     "Particles.check_materials": lambda s: (s.particles.check_materials, [s.law], "mixed", False),

@@ -92,6 +92,13 @@ def scene_of(form: str = "u_epsv", **options: Any) -> tawami.Scene:
     return scene
 
 
+def without_supports() -> tawami.Scene:
+    scene = scene_of()
+    scene.release((-1.0, 0.5))
+    scene.release((-1.0, 1.5))
+    return scene
+
+
 def motion_of() -> tawami.Dynamics:
     return tawami.Dynamics(scene_of("u_finite"))
 
@@ -278,6 +285,12 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "traction": (lambda **a: solved(scene_of(), "traction")(**a),
                  {"edge": "right", "value": (1.0, 0.0), "amplitude": 1.0, "between": (0.5, 1.5)}),
     "load": (lambda **a: solved(scene_of(), "load")(**a), {"particles": [0, 3], "force": (1.0, 0.0)}),
+    "load, each": (on_scene("load"), {
+        "particles": lambda x, y: x < 9, "force": np.ones((16, 2)), "amplitude": 1.0}),
+    "remove": (lambda **a: without_supports().remove(**a), {"where": [0, 3]}),
+    "change_material": (on_scene("change_material"), {"where": [0, 3], "material": ELASTIC}),
+    "named": (lambda **a: tawami.box(grid_of(), (-1.0, 0.5), (0.0, 1.0)).named(**a),
+              {"name": "clay"}),
     "gravity": (lambda **a: solved(scene_of(), "gravity")(**a),
                 {"acceleration": (0.0, -1.0), "amplitude": 1.0}),
     "change": (lambda **a: scene_of().gravity((0.0, -1.0)).change(**a),

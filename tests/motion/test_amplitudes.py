@@ -152,7 +152,7 @@ def test_a_velocity_changes_and_stays_one():
     assert motion.step(1e-2).displacement((0.25, 1.0))[1] == pytest.approx(0.0, abs=1e-12)
     with pytest.raises(tawami.InputError, match="it was made with a velocity: expected a velocity"):
         top.change(0.0)
-    with pytest.raises(tawami.InputError, match="velocity, which statics does not follow"):
+    with pytest.raises(tawami.InputError, match="velocity, which static steps do not follow"):
         scene.solve()
 
 

@@ -21,7 +21,7 @@ def scene_of(law=None, *, form="u", density=1.0):
     return scene
 
 
-#: What a function of the script may call, of a scene with a motion.
+#: Calls that a function of the script may make, of a scene with a motion.
 STEPS = {
     "solve": lambda scene, motion: scene.solve(),
     "step": lambda scene, motion: motion.step(1e-3),
@@ -40,11 +40,17 @@ CHANGES = {
     "traction": lambda scene, load: scene.traction("left", (1.0, 0.0)),
     "load": lambda scene, load: scene.load([0], (1.0, 0.0)),
     "gravity": lambda scene, load: scene.gravity((1.0, 0.0)),
+    "remove": lambda scene, load: scene.remove([0]),
+    "change_material": lambda scene, load: scene.change_material([0], scene_law()),
     "change": lambda scene, load: load.change((1.0, 0.0)),
     "release": lambda scene, load: load.release(),
     "residual": lambda scene, load: scene.residual(np.zeros(scene.num_coefficients)),
     "tangent": lambda scene, load: scene.tangent(np.zeros(scene.num_coefficients)),
 }
+
+
+def scene_law():
+    return tawami.linear_elastic(E=E, nu=0.0)
 
 
 class Within:

@@ -97,6 +97,59 @@ def test_the_energy_of_removed_particles_is_counted():
     assert abs(e.transfer) + abs(e.integration) < 1e-6 * e.kinetic
 
 
+@pytest.mark.parametrize("form", ["u", "u_epsv_finite"])
+def test_what_the_script_removes_takes_its_mass_momentum_and_energy(form):
+    """A block in flight: the rest flies on as before, and the balance has no other term."""
+    scene = block(form, tolerance=1e-9)
+    scene.gravity((0, -G))
+    motion = tawami.Dynamics(scene, velocity=(2.0, 1.0))
+    motion.run(0.05, 0.01)
+    before, momentum = motion.energies, motion.linear_momentum
+    removed = scene.remove(lambda x, y: y > scene_middle(scene))
+    assert removed.mass == pytest.approx(125.0, rel=1e-9)
+    speed = np.array([2.0, 1.0 - 0.05 * G])
+    assert removed.momentum == pytest.approx(125.0 * speed, rel=1e-6)
+    assert motion.linear_momentum == pytest.approx(momentum - removed.momentum, rel=1e-9)
+    assert removed.kinetic == pytest.approx(0.5 * before.kinetic, rel=1e-6)
+    assert scene.left[0][2] == pytest.approx(0.05)
+    motion.run(0.1, 0.01)
+    e = motion.energies
+    assert e.left == pytest.approx(removed.kinetic, rel=1e-6)
+    speed[1] -= 0.05 * G
+    assert motion.linear_momentum == pytest.approx(125.0 * speed, rel=1e-6)
+    assert e.kinetic == pytest.approx(62.5 * speed @ speed, rel=1e-6)
+    assert abs(e.transfer) + abs(e.integration) + abs(e.impact) + e.elastic < 1e-6 * e.kinetic
+
+
+def scene_middle(scene):
+    return scene.particles.x[:, 1].mean() if scene.form.strain.finite else 0.0
+
+
+def test_a_removal_and_a_new_law_at_rest_leave_no_energy_error():
+    """A loaded block loses its upper half and gets another law: the oscillation keeps its balance."""
+    scene = falling_on_the_floor()
+    scene.gravity((0.0, -G))
+    tawami.settle(scene)
+    motion = tawami.Dynamics(scene)
+    motion.run(0.002, 0.001)
+    before = motion.energies
+    removed = scene.remove(lambda x, y: y > 0.25)
+    elastic = motion.elastic_energy
+    assert before.elastic - elastic == pytest.approx(removed.elastic, rel=1e-9)
+    scene.change_material(lambda x, y: y > -1, tawami.linear_elastic(E=5e4, nu=0.3))
+    assert motion.elastic_energy == pytest.approx(2 * elastic, rel=1e-6)
+    motion.run(0.004, 0.001)
+    e = motion.energies
+    assert e.left == pytest.approx(removed.elastic + removed.kinetic, rel=1e-9)
+    assert e.kinetic > 5e-3 * elastic  # it rebounds
+    assert abs(e.integration) < 1e-3 * elastic
+    gained = e.kinetic + e.elastic + e.left - before.kinetic - before.elastic
+    lost = sum(
+        getattr(e, name) - getattr(before, name) for name in ("transfer", "impact", "integration")
+    )
+    assert gained + lost == pytest.approx(e.external - before.external, rel=1e-9)
+
+
 def test_spurious_energy_gives_one_warning():
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

@@ -155,7 +155,7 @@ def test_wrong_input_of_a_path_raises_an_error():
 
 
 def test_an_amplitude_that_continues_another_one_is_no_new_displacement():
-    """As in a motion, what the old amplitude gave and the new one gives make up for each other."""
+    """As in a motion, what the old amplitude gave and the new one gives cancel."""
     grid = grid_of()
     body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1e3, nu=0.3))

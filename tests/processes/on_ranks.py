@@ -138,6 +138,42 @@ def motion() -> dict[str, np.ndarray]:
     return found
 
 
+def construction() -> dict[str, np.ndarray]:
+    """A slope of two bodies that is excavated, strengthened, and set in motion."""
+    grid = tawami.Grid(COMM, origin=(0, 0), h=0.25, cells=(8, 6))
+    lower = tawami.polygon(grid, [(0, 0), (2, 0), (2, 0.6), (0, 0.85)], per_axis=2)
+    upper = tawami.polygon(grid, [(0, 0.85), (2, 0.6), (2, 1.25), (0, 1.25)], per_axis=2)
+    body = lower.named("clay") + upper.named("fill")
+    law = tawami.linear_elastic(E=1e6, nu=0.3)
+    laws = {"clay": tawami.von_mises(law, yield_stress=1e4), "fill": law}
+    found = {}
+    for form in ("u_epsv", "u_epsv_finite"):
+        scene = tawami.Scene(grid, body, laws, form=form, density=2e3, tolerance=1e-9)
+        for edge, component in (("left", "x"), ("right", "x"), ("bottom", "y")):
+            scene.fix(edge, component)
+        scene.gravity((0, -10))
+        forces = np.outer(body.volume, [50.0, -20.0])
+        scene.load("fill", forces[body.material_of == 1])
+        scene.solve()
+        removed = scene.remove(lambda x, y: (y > 0.9) & (x > 1.0))
+        scene.change_material(lambda x, y: x < 0.6, tawami.von_mises(law, yield_stress=5e3))
+        tawami.ramp(scene, 0.5)
+        block = tawami.Dynamics(scene, velocity=(0.0, 0.01))
+        block.step(1e-3)
+        scene.remove(lambda x, y: (y > 0.9) & (x > 0.5))
+        block.step(1e-3)
+        found |= {f"construction {form} {k}": v for k, v in whole(block).items()}
+        facts = [
+            removed.volume,
+            removed.mass,
+            removed.elastic,
+            block.energies.left,
+            len(scene.left),
+        ]
+        found[f"construction {form} facts"] = np.array(facts)
+    return found
+
+
 def initial() -> dict[str, np.ndarray]:
     """A ring with an initial stress, beyond the yield surface in part; some ranks have no particle."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.125, cells=(16, 16))
@@ -170,6 +206,7 @@ def whole(motion: tawami.Dynamics) -> dict[str, np.ndarray]:
     particles, comm = motion.scene.particles, motion.scene.grid.comm
     order = np.argsort(allgathered(comm, particles.number))
     arrays = {"x": particles.x, "stress": particles.stress, "velocity": motion.velocity}
+    arrays["strain"] = particles.strain
     return {name: allgathered(comm, np.array(values))[order] for name, values in arrays.items()}
 
 
@@ -274,6 +311,7 @@ def output(folder: Path) -> dict[str, np.ndarray]:
 def results(folder: Path) -> dict[str, Any]:
     """Results of all scenes; files are written to the folder."""
     found = beams() | random_clouds() | nonlinear() | singular() | motion() | initial()
+    found |= construction()
     return found | errors() | inverted() | few_cells() | output(folder)
 
 

@@ -1,4 +1,4 @@
-"""sys.exit on one of several ranks: no rank waits for ever, and one message names the rank."""
+"""sys.exit on one of several ranks: no rank waits forever, and one message names the rank."""
 
 from __future__ import annotations
 
@@ -102,4 +102,4 @@ time.sleep(2)
 """
     run = on_ranks(2, "-c", code)
     assert run.returncode == 0, run.stderr
-    assert run.stderr.count("rank 1 has been at the end of the program for 0.5 s") == 1
+    assert run.stderr.count("rank 1 reached the end of the program 0.5 s ago") == 1

@@ -64,7 +64,7 @@ def traced(run: Callable[[], object], at: int) -> int:
     """Run, with Ctrl-C at one line of the package; the number of lines that were run.
 
     Args:
-        run: What is run.
+        run: Command of the run.
         at: Number of the line that Ctrl-C arrives at, counted as lines are run.
     """
     lines = 0

@@ -1,4 +1,4 @@
-"""What README.md shows works as it stands."""
+"""The examples of README.md work without changes."""
 
 from __future__ import annotations
 

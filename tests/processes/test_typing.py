@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tawami.command.main import TEMPLATES
+from tawami.command.new import TEMPLATES
 
 TESTS = Path(__file__).parent
 DRIVER = TESTS / "typed_driver.py"

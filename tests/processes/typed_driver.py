@@ -56,6 +56,11 @@ def statics(comm: MPI.Comm) -> float:
     pull.release()
     scene.hold((2.0, 0.5), "y", amplitude=0.5).change(1e-3)
     scene.load(np.flatnonzero(mine.x[:, 0] > 0), (0.0, -1.0))
+    scene.load(lambda x, y: y > 0, np.ones((4, 2))).change(np.zeros((4, 2)))
+    print((body.named("clay") + mine.named("sand")).names)
+    removed = scene.remove("sand")
+    print(removed.mass, removed.momentum[0], removed.number.size)
+    scene.change_material("clay", materials()[0])
     scene.release("left", "y")
     scene.gravity((0, -9.81))
     print(scene.header(), scene.num_particles, scene.particles.stress.mean())
@@ -83,7 +88,7 @@ def dynamics(comm: MPI.Comm) -> None:
     motion.run(end=1.0, dt=1e-3, smallest=1e-6)
     results = tawami.Results(
         Path("results") / "block",
-        tawami.ParticleOutput("stress", every=0.1),
+        tawami.ParticleOutput("stress", tawami.Quantity("size [m]", lambda p: p.x), every=0.1),
         tawami.GridOutput("mean stress", every_steps=10, projection="consistent"),
         tawami.TableOutput("energies", phases=["motion"]),
         checkpoint_steps=100,
@@ -156,7 +161,8 @@ def wrong(comm: MPI.Comm) -> None:
     scene.traction("right", 1e3)  # wrong: arg-type
     scene.traction("right", (0.0, "down"))  # wrong: arg-type
     scene.gravity(-9.81)  # wrong: arg-type
-    print(scene.solve().strain)  # wrong: attr-defined
+    print(scene.solve().strains)  # wrong: attr-defined
+    print(scene.solve().plot(3))  # wrong: arg-type
     tawami.Dynamics(scene, transfer="musl")  # wrong: arg-type
     tawami.Dynamics(scene).run(1.0)  # wrong: call-arg
     tawami.NumpyLaw(lambda strain: strain, K=1.0, mu=1.0)  # wrong: arg-type misc

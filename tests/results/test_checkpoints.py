@@ -79,7 +79,7 @@ def test_any_damage_to_a_file_is_found(tmp_path, data):
 )
 def test_a_checkpoint_of_another_scene_is_rejected(interrupted, changed, named):
     with (
-        pytest.warns(tawami.CheckpointWarning, match="is of another run"),
+        pytest.warns(tawami.CheckpointWarning, match="belongs to another run"),
         pytest.raises(tawami.CheckpointError, match=named),
     ):
         run(interrupted, scene=block(**changed))

@@ -68,7 +68,7 @@ def test_a_resumed_table_must_have_the_same_columns(tmp_path):
     drive(motion, [output], tmp_path, 2)
     before = (tmp_path / "table.csv").read_text()
     with pytest.raises(
-        tawami.InputError, match=r"run-out \[m\], and .*momentum y .* are asked for"
+        tawami.InputError, match=r"run-out \[m\], and .*momentum y .* are requested"
     ):
         tawami.TableOutput("momentum").begin(tmp_path, motion, output.state())
     assert (tmp_path / "table.csv").read_text() == before
@@ -78,7 +78,7 @@ def test_a_damaged_index_is_named(tmp_path):
     (tmp_path / "particles.pvd").write_text("<VTKFile><Coll")
     motion = plastic_block()
     with pytest.raises(
-        tawami.OutputError, match=r"particles.pvd' cannot be read .*remove it to beg"
+        tawami.OutputError, match=r"particles.pvd' cannot be read .*remove it to start"
     ):
         tawami.ParticleOutput("velocity").begin(
             tmp_path, motion, {"seen": 3, "written": 3, "time": 0.1}

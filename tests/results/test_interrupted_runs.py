@@ -281,7 +281,10 @@ def cycled(results, each, form="u_epsv_finite"):
     scene.load([7], (0.0, 3.0), amplitude=lambda t: np.sin(50 * t))
     motion = tawami.Dynamics(scene, velocity=(0.3, 0.0), gamma=0.6)
     steps.append(motion.run(2.03, 0.004, results=results, each=each))
-    state = scene.configuration.loads.state(), scene.configuration.supports.state()["supports"]
+    state = (
+        scene.configuration.loads.state()["all"],
+        scene.configuration.supports.state()["supports"],
+    )
     return scene.particles.rows().tobytes(), str(motion.energies), scene.time, steps, state
 
 

@@ -88,7 +88,7 @@ def test_a_process_holds_a_folder_several_times(tmp_path):
 def test_a_folder_that_was_refused_is_free(tmp_path):
     (tmp_path / "script.py").write_text("mine")
     results = results_of(tmp_path)
-    with pytest.raises(tawami.InputError, match="which is of no run"):
+    with pytest.raises(tawami.InputError, match="which does not belong to a run"):
         tawami.Dynamics(block()).run(0.01, 0.005, results=results)
     assert hold(tmp_path, "").lock_counter == 1
 
@@ -131,7 +131,7 @@ def test_a_forked_process_does_not_write_with_its_parent(tmp_path):
 
 
 def forked(folder: Path) -> str:
-    """What a forked process is told when it locks the folder."""
+    """The error message of a forked process that locks the folder."""
     try:
         hold(folder, "child")
     except tawami.InputError as error:

@@ -84,7 +84,7 @@ def test_a_run_is_not_resumed_with_other_values(tmp_path, monkeypatch, given, sl
     """The message names the variable and both its values."""
     with pytest.raises(Killed):
         run(tmp_path, end=0.02, scene=scene(script(monkeypatch), 0.1), each=Kill(3), keep=1)
-    with pytest.raises(tawami.CheckpointError, match=f"is of another run: .*{said}"):
+    with pytest.raises(tawami.CheckpointError, match=f"belongs to another run: .*{said}"):
         run(tmp_path, end=0.02, scene=scene(script(monkeypatch, **given), slope, leaving))
     kill = Kill()
     run(tmp_path, end=0.02, scene=scene(script(monkeypatch, other=3), 0.1), each=kill)

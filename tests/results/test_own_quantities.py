@@ -36,6 +36,8 @@ def test_a_quantity_of_the_driver_script_is_written_as_others_are(tmp_path):
     np.testing.assert_allclose(particles["ratio [-]"], mean / np.abs(mean).max())
     scaled = grid["ratio [-]"] * np.abs(mean).max()
     np.testing.assert_allclose(scaled, grid["mean stress [Pa]"], rtol=1e-12)
+    (picture, *_) = tawami.plot(tmp_path, quantity="ratio", movie=None)
+    assert picture.name == "ramp-ratio.png"
 
 
 def test_quantities_of_motions_and_laws_can_be_used(tmp_path):

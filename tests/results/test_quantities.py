@@ -1,4 +1,4 @@
-"""Quantities that outputs may be asked for; those that a scene does not have are rejected by name."""
+"""Quantities of outputs; those that a scene does not have are rejected by name."""
 
 from __future__ import annotations
 

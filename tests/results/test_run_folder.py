@@ -47,7 +47,9 @@ def test_replacing_a_run_removes_only_its_own_files(interrupted, tmp_path):
     other = tmp_path / "mine"
     other.mkdir()
     (other / "script.py").write_text("mine")
-    with pytest.raises(tawami.InputError, match="holds 'script.py', which is of no run"):
+    with pytest.raises(
+        tawami.InputError, match="holds 'script.py', which does not belong to a run"
+    ):
         run(other, existing="replace")
     assert (other / "script.py").read_text() == "mine"
 

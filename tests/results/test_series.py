@@ -1,4 +1,4 @@
-"""What outputs write, compared with the particles of the run and with balances of force and moment."""
+"""Files of outputs, compared with the particles of the run and with balances of force and moment."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ proptest! {
     }
 
     #[test]
-    fn mohr_coulomb_is_never_exceeded_and_its_plastic_strain_is_what_is_left(
+    fn mohr_coulomb_is_never_exceeded_and_its_plastic_strain_is_the_rest(
         e in cornered(), mean in -1.5..0.5_f64, phi in 0.0..89.0_f64, part in 0.0..1.0_f64,
         c in 0.01..0.3_f64, ratio in 0.0..6.0_f64,
     ) {

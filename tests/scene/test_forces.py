@@ -105,7 +105,7 @@ def test_a_run_with_forces_of_particles_is_resumed(tmp_path):
     whole = run_in("whole", Kill())
     with pytest.raises(Killed):
         run_in("cut", Kill(3))
-    with pytest.raises(tawami.CheckpointError, match="is of another run: loads"):
+    with pytest.raises(tawami.CheckpointError, match="belongs to another run: loads"):
         run_in("cut", Kill(), share=1.1)
     assert run_in("cut", Kill()) == whole
 

@@ -206,7 +206,7 @@ def test_functions_of_position_are_part_of_the_identity():
 
 
 def test_versions_tell_that_handles_have_changed():
-    """What others keep for a set of loads or supports is valid while these numbers stay."""
+    """Data that others keep for a set of loads or supports is valid while these numbers stay."""
     scene = block()
     loads, supports = scene.configuration.loads, scene.configuration.supports
     weight, side, wall = scene.gravity((0.0, -G)), scene.fix("left", "x"), scene.wall("top")

@@ -23,11 +23,11 @@ def test_the_header_counts_particles_bytes_and_unknowns(assembly):
     scene.hold((0.0, 1.7), "x", 0.01)
     header = scene.header()
     # 6 x 5 splines in two components, 5 x 4 bilinear functions; 12 along the edge, one by the point
-    assert line(header, "unknowns").startswith("67: 60 of u, 20 of eps_v, less 13 that")
+    assert line(header, "unknowns").startswith("67: 60 of u, 20 of eps_v, minus 13 prescribed")
     assert scene.solve().unknowns == 67
     assert scene.header() == header
     assert line(header, "particles").startswith("48, 120 bytes each (x 16, volume 8,")
-    assert "5.76 kB in all" in header
+    assert "5.76 kB in total" in header
     assert line(header, "solver").endswith(f"assembly {assembly}, 1 rank")
     assert line(header, "supports") == (
         "fix(edge='bottom') x, fix(edge='bottom') y, hold(point=(0.0, 1.7)) x = 0.01 m"
@@ -35,7 +35,7 @@ def test_the_header_counts_particles_bytes_and_unknowns(assembly):
     data = scene.configuration.domain.responses.data["particle"]
     # sigma 3 and its derivatives 3 x (3 + 1), K, K^2/mu; and K and mu themselves
     assert data.shape[1] == 3 + 12 + 2
-    assert f"{8 * (17 + 2)} more each" in line(header, "particles")
+    assert f"{8 * (17 + 2)} more bytes each" in line(header, "particles")
 
 
 def test_only_cells_with_particles_have_unknowns():
@@ -45,7 +45,9 @@ def test_only_cells_with_particles_have_unknowns():
     assert line(scene.header(), "grid").startswith(
         "4 x 3 cells of 0.5 m from (-1, 0.5) to (1, 2), 4 "
     )
-    assert line(scene.header(), "unknowns").startswith("32: 32 of u, less 0 that")  # 4 x 4 splines
+    assert line(scene.header(), "unknowns").startswith(
+        "32: 32 of u, minus 0 prescribed"
+    )  # 4 x 4 splines
 
 
 def switched(**options):

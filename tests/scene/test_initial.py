@@ -99,7 +99,7 @@ def test_eps_v_fits_the_stress_of_an_elastic_law():
     mean = scene.particles.stress[:, :3].mean(axis=1)
     assert scene.particles.eps_v == pytest.approx(mean / SOIL.bulk_modulus)
     with pytest.raises(
-        tawami.InputError, match=r"eps_v of particle 0 is 0.01, with which an elastic"
+        tawami.InputError, match=r"eps_v of particle 0 is 0.01, which gives an elastic"
     ):
         scene.initial("eps_v", 0.01)
     scene.initial("eps_v", 0.0)  # counted from this state

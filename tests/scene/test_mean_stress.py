@@ -1,4 +1,4 @@
-"""The projection of the mean stress on the present grid, and what follows from it for runs."""
+"""The projection of the mean stress on the present grid, and its consequences for runs."""
 
 from __future__ import annotations
 

@@ -68,6 +68,12 @@ def test_a_picture_has_particles_units_and_a_colour_bar(small):
     assert axes.get_figure() is plt.gcf()
 
 
+def test_the_title_is_inside_the_picture(small):
+    figure = small.plot(deformed=10).figure
+    figure.canvas.draw()
+    assert figure.axes[0].title.get_window_extent().y1 < figure.bbox.y1
+
+
 @pytest.mark.parametrize(("factor", "title"), [(0.0, "at the start"), (50.0, "displacements x 50")])
 @pytest.mark.parametrize("kind", ["small", "finite"])
 def test_displacements_are_enlarged_by_a_factor(kind, factor, title, request):
@@ -88,7 +94,7 @@ def test_particles_of_finite_strain_are_drawn_with_their_deformation(finite):
     np.testing.assert_allclose(area(corners), finite.volume * np.linalg.det(f))
 
 
-def test_what_follows_from_stress_and_displacement_can_be_drawn(finite):
+def test_quantities_of_stress_and_displacement_can_be_drawn(finite):
     (left, right), s = plt.subplots(1, 2)[1], finite.stress
     for name, expected in {
         "stress xy": s[:, 3], "deviatoric stress q": finite.arrays.deviatoric_stress_q,

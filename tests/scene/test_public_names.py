@@ -1,4 +1,4 @@
-"""What a user sees of the objects that a driver script works with, and what cannot be set."""
+"""Public attributes of the objects of a driver script, and attributes that cannot be set."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import tawami
 
 #: Attributes that raise an error naming the object or the switch that has them.
 ABSENT = {"velocity", "acceleration", "energies", "plastic_strain", "deformation_gradient"}
-#: What observers and checkpoints of a run use; `configuration` is the way to the rest of the package.
+#: Attributes for observers and checkpoints; `configuration` leads to the rest of the package.
 OF_A_RUN = {"scene", "motion", "state", "restore", "identity", "header"}
 SCENE = {
     "grid", "form", "basis", "parameters", "options", "numerics", "particles", "num_particles",

@@ -64,7 +64,7 @@ def test_a_ramp_and_a_path_where_the_load_is_too_large():
     scene = pressed(0.49, 0.0)
     with pytest.raises(tawami.ConvergenceError, match=r"follow\(scene, ...\) passes a limit load"):
         scene.solve()
-    with pytest.warns(tawami.IncompleteWarning, match="allow a smaller `smallest`"):
+    with pytest.warns(tawami.IncompleteWarning, match="use a smaller `smallest`"):
         coarse = tawami.ramp(scene, 0.2, smallest=0.15)
     with pytest.warns(tawami.IncompleteWarning, match=r"follow\(scene, ...\) passes a limit load"):
         fine = tawami.ramp(scene, 0.2, smallest=0.01)  # of the rest
@@ -90,7 +90,7 @@ def test_shorter_steps_along_a_path():
         )
         return path.complete
 
-    with pytest.raises(tawami.ConvergenceError, match="Take shorter steps along the path"):
+    with pytest.raises(tawami.ConvergenceError, match="Use shorter steps along the path"):
         ended(0.02)
     assert ended(0.002)
 
@@ -111,7 +111,7 @@ def test_a_smaller_time_step():
             scene, velocity=20.0 * np.column_stack([-body.x[:, 1], body.x[:, 0]])
         )
 
-    with pytest.raises(tawami.ConvergenceError, match=r"Take a smaller dt; run\(...\) does this"):
+    with pytest.raises(tawami.ConvergenceError, match=r"Use a smaller dt; run\(...\) does this"):
         spinning().step(0.2)
     spinning().step(0.02)
     assert len(spinning().run(0.2, 0.2)) > 1
@@ -123,7 +123,7 @@ def test_more_resets_or_a_larger_tolerance():
         return tawami.settle(scene, **options)
 
     penalty = "on"
-    with pytest.raises(tawami.ConvergenceError, match="or take ghost_penalty='off'"):
+    with pytest.raises(tawami.ConvergenceError, match="or use ghost_penalty='off'"):
         settled(max_resets=10)
     assert settled(max_resets=10, tolerance=0.1)
     penalty = "off"

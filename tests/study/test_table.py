@@ -44,7 +44,7 @@ def test_changes_compare_pairs_that_differ_in_one_knob():
     assert of_n.cost == pytest.approx((2 * 4) ** 0.5)
     assert ("form", "c") in table.dominated("x")
     assert ("form", "a") not in table.dominated("x")
-    assert "Accuracy is bought by n 1 to 2" in table.in_words("x")
+    assert "Changes that reduce the error: n 1 to 2" in table.in_words("x")
 
 
 def test_a_table_is_read_from_its_file(tmp_path):

@@ -2,12 +2,12 @@
 
 By default it measures the cantilever for sizes, particles per cell, threads, ranks and both assemblies,
 then the import, the Python part of a step and the particles of a level set.
-Every setting runs in a process of its own. One run gives a table, a CSV file and ratios.
+Every setting runs in a separate process. One run gives a table, a CSV file and ratios.
 
 With --against it compares this checkout with another one that has been set up, interleaved, and prints
 the ratio new/old of the processor time of every stage, for steps of the cantilever and of collapsing
 piles.
-`--old-kernels Prescott` shows what OpenBLAS 0.3.21 does on a processor that it does not know.
+`--old-kernels Prescott` shows the speed of OpenBLAS 0.3.21 on a processor that it does not know.
 
 python -m cases.costs.bench
 python -m cases.costs.bench --cells 32,64 --against ../tawami-before
@@ -37,9 +37,11 @@ PROGRAM.option("--per-axis", type=WHOLE, default="2,4", help="particles per cell
 PROGRAM.option("--threads", type=WHOLE, default="1,2", help="threads; with --against the first")
 PROGRAM.option("--ranks", type=WHOLE, default="1,2,4", help="numbers of ranks")
 PROGRAM.option("--against", type=Path, metavar="CHECKOUT", help="compare with this checkout")
-PROGRAM.option("--particles", type=WHOLE, default="800,12800", help="with --against: of the piles")
-PROGRAM.option("--old-kernels", default="", metavar="CORE", help="OPENBLAS_CORETYPE of the other")
-PROGRAM.option("--rounds", type=int, default=5, help="with --against: how often processes start")
+PROGRAM.option(
+    "--particles", type=WHOLE, default="800,12800", help="with --against: sizes of piles"
+)
+PROGRAM.option("--old-kernels", default="", metavar="CORE", help="its OPENBLAS_CORETYPE")
+PROGRAM.option("--rounds", type=int, default=5, help="with --against: number of restarts")
 PROGRAM.option("--pairs", type=int, default=20, help="with --against: pairs of steps in a round")
 
 

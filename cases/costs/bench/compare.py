@@ -1,7 +1,7 @@
 """Two checkouts compared in one run.
 
-Each checkout has a process of its own. The two take their steps in turns, A B A B, so that both meet the
-same disturbances. The ratio new over old is taken for each pair of steps; the result is the median over
+Each checkout has a process of its own. The two take their steps in turns, A B A B, so that disturbances
+affect both alike. The ratio new over old is taken for each pair of steps; the result is the median over
 all pairs. Every round starts new processes.
 """
 
@@ -45,7 +45,7 @@ class Row:
     """One stage of a scene: medians over all pairs of steps.
 
     Attributes:
-        scene: What was solved.
+        scene: Name of the scene.
         stage: Stage of the step.
         new_ms, old_ms: Milliseconds of processor time in a step, of this checkout and of the other.
         ratio, low, high: New over old: median and quartiles.
@@ -81,7 +81,7 @@ class Checkout:
     Args:
         path: Root of the checkout.
         process: The process of `timed`.
-        errors: File of what it writes to stderr.
+        errors: File for its standard error.
 
     Raises:
         TawamiError: The process failed, or imported the package from elsewhere.
@@ -151,7 +151,7 @@ def compare(
         other: Root of the other checkout.
         cells: Sizes of the beam, in cells over the height.
         particles: Sizes of the pile, in particles.
-        rounds: How often new processes start.
+        rounds: Number of times that new processes start.
         pairs: Pairs of steps of each scene in a round, fewer of a large one.
         threads: Threads of the Rust part.
         kernels: Core type that the other checkout's OpenBLAS uses.

@@ -1,4 +1,4 @@
-"""Measurement of one setting, in a process of its own: prints its numbers as JSON."""
+"""Measurement of one setting, in a separate process: prints its numbers as JSON."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tawami.fem.environment import peak_memory
 
 
 def stiffening(u, eps_v, w, q, sigma, K, mu, t, h, sum_p, ds, alpha):  # type: ignore[no-untyped-def]
-    """The form of the paper with the additional stress 2 mu grad(u)^T grad(u), to iterate on."""
+    """The form of the paper with the additional stress 2 mu grad(u)^T grad(u): Newton iterates."""
     R_u = sum_p(sigma, grad(w)) - dot(t, w) * ds
     R_u += sum_p(2 * mu, inner(dot(grad(u).T, grad(u)), grad(w)))
     R_q = sum_p(K, q * (div(u) - eps_v))

@@ -1,4 +1,4 @@
-"""What surrounds the solver: the import, the Python part of a step, and the particles of a level set.
+"""Costs outside the solver: the import, the Python part of a step, and the particles of a level set.
 
 The Python part of a step is its processor time outside of calls into the Rust module and into PETSc
 (with MUMPS). It contains NumPy and SciPy. Steps with and without Python's profiler alternate: the
@@ -95,7 +95,7 @@ NAMES: Mapping[str, Callable[[], Found]] = {
 
 
 def in_turns(checkouts: Sequence[tuple[str, Path]], rounds: int) -> dict[str, list[Found]]:
-    """Medians of what each program finds, for each of these checkouts (interpreter, root)."""
+    """Medians of the measurements of each program, for each checkout (interpreter, root)."""
     found: dict[str, list[Found]] = {}
     for name in NAMES:
         runs = [[_run(*one, name) for one in checkouts] for _ in range(rounds)]
@@ -116,7 +116,7 @@ def _run(python: str, checkout: Path, name: str) -> Found:
 
 
 def lines(found: Mapping[str, Sequence[Found]]) -> list[str]:
-    """What `in_turns` found, as text: this checkout, and its ratio to another one."""
+    """Results of `in_turns` as text: this checkout, and its ratio to another one."""
     texts = ["\nimport, Python part of a step of 800 particles, level set (medians)"]
     for name, of_checkouts in found.items():
         new, old = of_checkouts[0], of_checkouts[-1]

@@ -1,4 +1,4 @@
-"""What the benchmark measures: settings, and the stages of a Newton step."""
+"""Settings of the benchmark, and the stages of a Newton step."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def settings(
 
 
 def in_own_process(setting: Setting) -> dict[str, Any]:
-    """Measure a setting in a process of its own, so that its peak memory is its own.
+    """Measure a setting in a separate process, so that its peak memory is its own.
 
     Raises:
         TawamiError: The measurement failed.

@@ -1,7 +1,7 @@
 """Times of one checkout, on request: a step of the cantilever, or of a collapsing pile.
 
 `compare` runs this file with the package of a checkout on PYTHONPATH. It uses the public API and
-`scene.stopwatch` only, so that it runs with older and newer packages. It repeats the two cases in short,
+`scene.stopwatch` only, so that it runs with older and newer packages. It repeats the two cases briefly,
 because those in `cases/` belong to one version of the package.
 
 Reads requests, one per line: `beam N` for N cells over the height, or `collapse N` for N particles.
@@ -41,7 +41,7 @@ def pile(finer: int = 1) -> Any:
     """The pile of `cases.showcase.collapse` in motion.
 
     Args:
-        finer: How much smaller cells are than 1 cm: 800 finer^2 particles.
+        finer: Ratio of 1 cm to the cell size: 800 finer^2 particles.
     """
     cells = (80 * finer, 14 * finer)
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.01 / finer, cells=cells)
@@ -93,7 +93,7 @@ class Steps:
 
 
 def main() -> None:
-    """Say which package is measured, then answer requests until the input ends."""
+    """Print the package that is measured, then answer requests until the input ends."""
     logging.disable(logging.INFO)  # compiling a form logs many lines
     steps = Steps()
     print(json.dumps({"package": tawami.__file__}), flush=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from cases.common.figure import save
+from cases.common.figure import COLOURS, add_bar, draw_particles, save
 from cases.showcase.collapse.pile import HEIGHT, RHO, Array, G, Run
 from cases.showcase.collapse.runout import Runout
 from tawami.picture.film import Film, Frame
@@ -19,7 +19,6 @@ NAMES = {
     "u_bbar_finite": "B-bar",
     "u_finite": "displacement only",
 }
-COLOURS = {"u_epsv_finite": "tab:red", "u_bbar_finite": "tab:blue", "u_finite": "tab:gray"}
 #: Parts of the energy balance that are drawn, with their names and lines.
 ENERGIES = {
     "kinetic": ("kinetic", "-"),
@@ -36,23 +35,20 @@ def film(runs: Sequence[Run], path: Path) -> None:
         len(wanted), len(runs), figsize=(6.5 * len(runs), 1.6 * len(wanted)), layout="constrained",
         sharex=True, sharey=True, squeeze=False,
     )  # fmt: skip
-    limit = RHO * G * HEIGHT / 1e3
+    limit = RHO * G * HEIGHT
     for column, run in enumerate(runs):
         for row, k in enumerate(wanted):
             axes = panels[row, column]
-            shown = axes.scatter(
-                *run.x[k].T, c=run.mean_stress[k] / 1e3, s=3, cmap="viridis", vmin=-limit, vmax=0
+            shown = draw_particles(
+                axes, run.x[k], np.sqrt(run.volume), run.mean_stress[k], "Pa", (-limit, 0.0)
             )
-            axes.set_aspect("equal")
-            axes.set_title(f"{NAMES[run.form]}, $t$ = {run.time[k]:.2f} s", fontsize=9)
+            axes.set_title(f"{NAMES[run.form]}, $t$ = {run.time[k]:.2f} s")
             axes.set_xlim(0, 0.45)
             axes.set_ylim(0, 1.15 * HEIGHT)
             if column == 0:
                 axes.set_ylabel("$y$ [m]")
         panels[-1, column].set_xlabel("$x$ [m]")
-    figure.colorbar(
-        shown, ax=panels, label="mean Kirchhoff stress [kPa], tension positive", aspect=50
-    )
+    add_bar(shown, panels)
     save(figure, path, dpi=150)
 
 
@@ -86,9 +82,9 @@ def profiles(runs: Sequence[Run], path: Path, h: float) -> None:
             axes.plot(*surface(run.x[k], h), color=shade, label=f"$t$ = {run.time[k]:.2f} s")
         axes.set_aspect("equal")
         axes.set_ylim(0, 1.15 * HEIGHT)
-        axes.set_title(NAMES[run.form], fontsize=9)
+        axes.set_title(NAMES[run.form])
         axes.set_ylabel("$y$ [m]")
-        axes.legend(fontsize=7, ncols=2)
+        axes.legend(ncols=2)
     panels[-1, 0].set_xlabel("$x$ [m]")
     save(figure, path)
 
@@ -97,14 +93,14 @@ def histories(runs: Sequence[Run], path: Path) -> None:
     """Draw run-out, energies, roughness and Newton iterations over time."""
     figure, panels = plt.subplots(2, 2, figsize=(11, 7), layout="constrained")
     for run in runs:
-        style = {"color": COLOURS[run.form], "label": NAMES[run.form]}
-        panels[0, 0].plot(run.time, run.runout, **style)
+        look = {"color": COLOURS[run.form], "label": NAMES[run.form]}
+        panels[0, 0].plot(run.time, run.runout, **look)
         for name, (_, line) in ENERGIES.items():
             values = [getattr(energies, name) for energies in run.energies]
-            label = style["label"] if name == "kinetic" else None
-            panels[0, 1].plot(run.time, values, line, color=style["color"], label=label)
-        panels[1, 0].plot(run.time[1:], run.roughness[1:], **style)
-        panels[1, 1].plot(run.ends, run.iterations, ".", markersize=2, **style)
+            label = look["label"] if name == "kinetic" else None
+            panels[0, 1].plot(run.time, values, line, color=look["color"], label=label)
+        panels[1, 0].plot(run.time[1:], run.roughness[1:], **look)
+        panels[1, 1].plot(run.ends, run.iterations, ".", markersize=2, **look)
     for name, line in ENERGIES.values():
         panels[0, 1].plot([], [], line, color="black", label=name)
     labels = ("run-out (99 % of particles) [m]", "energy [J/m]",
@@ -112,8 +108,8 @@ def histories(runs: Sequence[Run], path: Path) -> None:
     for axes, label in zip(panels.ravel(), labels, strict=True):
         axes.set_xlabel("$t$ [s]")
         axes.set_ylabel(label)
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize=8)
+        axes.grid()
+        axes.legend()
     save(figure, path, dpi=150)
 
 
@@ -129,6 +125,6 @@ def runouts(piles: Sequence[Runout], path: Path) -> None:
         )  # fmt: skip
     axes.set_xlabel("height over length of the pile, $a$ [-]")
     axes.set_ylabel("run-out, $(L_{end} - L_0)/L_0$ [-]")
-    axes.grid(alpha=0.3, which="both")
+    axes.grid(which="both")
     axes.legend()
     save(figure, path)

@@ -112,7 +112,7 @@ def solve(
     every: int = 20,
     **options: Any,
 ) -> Run:
-    """Run the collapse to the time `end` [s] with steps of `dt` [s], recorded `every` so many steps."""
+    """Run the collapse to the time `end` [s] with steps of `dt` [s]; record every `every` steps."""
     motion = build(form, h=h, **options)
     run, start = Run(form, np.array(motion.scene.particles.volume)), perf_counter()
     record(run, motion, h)

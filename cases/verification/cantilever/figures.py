@@ -9,10 +9,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
 
 import tawami
-from cases.common.figure import save
+from cases.common.figure import COLOURS, add_bar, draw_particles, save
 from cases.verification.cantilever.beam import (
     SUPPORTS,
     V_CLAMPED,
@@ -23,17 +22,19 @@ from cases.verification.cantilever.beam import (
     mean_stress,
     point_support_growth,
 )  # fmt: skip
+from tawami.picture import style
+from tawami.picture.particles import Squares
 
 Values = npt.NDArray[np.float64]
 #: Largest mean stress of the closed form [Pa], the range of the colours.
 ROOT_STRESS = float(mean_stress(0.0, D / 2))
 
 STYLES = {
-    "u": ("MPM, displacement only", "tab:gray", "s", "-"),
-    "u_bbar": ("MPM, B-bar", "tab:orange", "D", "-"),
-    "fem_q2": ("FEM, Q2 displacement", "tab:brown", "s", "--"),
+    "u": ("MPM, displacement only", COLOURS["u"], "s", "-"),
+    "u_bbar": ("MPM, B-bar", style.ORANGE, "D", "-"),
+    "fem_q2": ("FEM, Q2 displacement", style.GREEN, "s", "--"),
     "fem_taylor_hood": ("FEM, Taylor-Hood Q2-Q1", "black", "^", "--"),
-    "fem_q1_bbar": ("FEM, Q1 B-bar", "tab:pink", "D", "--"),
+    "fem_q1_bbar": ("FEM, Q1 B-bar", style.PURPLE, "D", "--"),
 }
 TITLES = {
     "paper": "paper: root rolls, centre point held\n(dotted: growth without limit)",
@@ -63,11 +64,11 @@ def deflection_error(rows: Sequence[Row], path: Path) -> None:
                 label, colour, marker, dash = STYLES[method]
             else:
                 label = rf"MPM, $u$-$\varepsilon_v$, $\alpha$ = {alpha:g}"
-                colour, marker, dash = plt.get_cmap("viridis")(1.7 * alpha), "o", "-"
+                colour, marker, dash = plt.get_cmap(style.MAGNITUDE)(1.7 * alpha), "o", "-"
             errors = np.array([row.error_percent for row in line])
             axes.plot(
                 [D / row.n for row in line], np.abs(errors) if support == "exact" else errors,
-                dash, color=colour, marker=marker, markersize=4, linewidth=1.2, label=label,
+                dash, color=colour, marker=marker, label=label,
             )  # fmt: skip
         _reference(axes, support, mine)
         sizes = sorted({D / row.n for row in mine})
@@ -79,10 +80,10 @@ def deflection_error(rows: Sequence[Row], path: Path) -> None:
         axes.set_ylabel(label)
         axes.minorticks_off()
         axes.set_xlabel("cell size $h/D$ [-]")
-        axes.set_title(TITLES[support], fontsize=10)
-        axes.grid(alpha=0.3)
+        axes.set_title(TITLES[support])
+        axes.grid()
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=9)
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
     save(figure, path)
 
 
@@ -110,12 +111,10 @@ def mean_stress_paper(solutions: Mapping[str, tawami.Solution], path: Path) -> N
     )
     for axes, (title, solution) in zip(panels, solutions.items(), strict=True):
         points = _field(axes, solution, solution.mean_stress, ROOT_STRESS)
-        axes.set_title(_titled(title, solution.mean_stress), fontsize=10)
+        axes.set_title(_titled(title, solution.mean_stress))
         axes.set_ylabel("$y$ [m]")
     axes.set_xlabel("$x$ [m]")
-    figure.colorbar(
-        points, ax=panels, label="mean stress [kPa], tension positive", extend="both", aspect=40
-    )
+    add_bar(points, panels)
     save(figure, path)
 
 
@@ -133,31 +132,30 @@ def mean_stress_exact(solutions: Mapping[str, tawami.Solution], path: Path) -> N
         exact = mean_stress(x, y)
         difference = solution.mean_stress - exact
         fields = _field(left, solution, solution.mean_stress, ROOT_STRESS)
-        left.set_title(_titled(title, solution.mean_stress), fontsize=10)
-        differences = _field(right, solution, difference, 0.1 * ROOT_STRESS)
+        left.set_title(_titled(title, solution.mean_stress))
+        differences = _field(
+            right, solution, difference, 0.1 * ROOT_STRESS, name="difference from the closed form"
+        )
         relative = 100 * np.linalg.norm(difference) / np.linalg.norm(exact)
-        right.set_title(f"{title}: minus closed form   (L2 {relative:.2g} %)", fontsize=10)
+        right.set_title(f"{title}: minus closed form   (L2 {relative:.2g} %)")
         left.set_ylabel("$y$ [m]")
         column = x == x[np.argmin(np.abs(x - L / 4))]
         profile.plot(
             solution.mean_stress[column] / 1e3, y[column], ".-", linewidth=0.8, label=title
         )
     _field(closed, solution, exact, ROOT_STRESS)
-    closed.set_title(_titled("closed form", exact), fontsize=10)
+    closed.set_title(_titled("closed form", exact))
     closed.set_ylabel("$y$ [m]")
     profile.plot(exact[column] / 1e3, y[column], "k:", linewidth=1.5, label="closed form")
-    profile.set_title(f"along the particles at $x$ = {x[column][0]:.3g} m", fontsize=10)
+    profile.set_title(f"along the particles at $x$ = {x[column][0]:.3g} m")
     profile.set_xlabel("mean stress [kPa]")
     profile.set_ylabel("$y$ [m]")
-    profile.legend(fontsize=8)
-    profile.grid(alpha=0.3)
+    profile.legend()
+    profile.grid()
     for axes in panels[-1]:
         axes.set_xlabel("$x$ [m]")
-    for points, column_of, label in (
-        (fields, panels[:, 0], "mean stress [kPa], tension positive"),
-        (differences, panels[1:, 1], "difference from the closed form [kPa]"),
-    ):
-        figure.colorbar(points, ax=column_of, label=label, extend="both", aspect=50)
+    add_bar(fields, panels[:, 0])
+    add_bar(differences, panels[1:, 1])
     save(figure, path)
 
 
@@ -165,17 +163,12 @@ def _titled(title: str, values: Values) -> str:
     return f"{title}   (largest |mean stress| {np.abs(values).max() / 1e3:.3g} kPa)"
 
 
-def _field(axes: Axes, solution: tawami.Solution, values: Values, scale: float) -> PolyCollection:
-    """Draw each particle as a square of its volume, coloured from -scale to scale [Pa]."""
-    corners = 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    side = np.sqrt(solution.volume)[:, None, None]
-    squares = PolyCollection(
-        solution.x[:, None, :] + side * corners, array=values / 1e3, cmap="RdBu_r",
-        edgecolors="face", linewidths=0.1,
-    )  # fmt: skip
-    squares.set_clim(-scale / 1e3, scale / 1e3)
-    axes.add_collection(squares)
-    axes.set_aspect("equal")
+def _field(
+    axes: Axes, solution: tawami.Solution, values: Values, scale: float, **name: str
+) -> Squares:
+    """Draw the particles, coloured from -scale to scale [Pa]."""
+    side, limits = np.sqrt(solution.volume), (-scale, scale)
+    squares = draw_particles(axes, solution.x, side, values, "Pa", limits, **name)
     axes.set_xlim(-0.02, L + 0.02)
     axes.set_ylim(-D / 2 - 0.02, D / 2 + 0.02)
     return squares

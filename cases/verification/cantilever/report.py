@@ -35,7 +35,7 @@ def report(rows: Sequence[Row]) -> str:
 
 
 def paper_support(rows: Sequence[Row]) -> str:
-    """Why the support `paper` has no limit, compared with the finest meshes of the rows."""
+    """Reason why the support `paper` has no limit, compared with the finest meshes of the rows."""
     growth = 100 * point_support_growth() / V_THEORY
     line = {row.n: row.error_percent for row in rows
             if (row.method, row.support) == ("fem_taylor_hood", "paper")}  # fmt: skip

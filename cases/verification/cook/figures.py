@@ -8,21 +8,21 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
 
 import tawami
-from cases.common.figure import save
+from cases.common.figure import add_bar, draw_particles, save
 from cases.verification.cook.membrane import CORNERS, HEIGHT, LENGTH, Row
+from tawami.picture import style
 
 STYLES = {
-    "u_epsv_0.1": (r"MPM, $u$-$\varepsilon_v$, $\alpha$ = 0.1", "tab:red", "o", "-"),
-    "u_epsv_0.01": (r"MPM, $u$-$\varepsilon_v$, $\alpha$ = 0.01", "tab:blue", "o", "-"),
+    "u_epsv_0.1": (r"MPM, $u$-$\varepsilon_v$, $\alpha$ = 0.1", style.VERMILION, "o", "-"),
+    "u_epsv_0.01": (r"MPM, $u$-$\varepsilon_v$, $\alpha$ = 0.01", style.BLUE, "o", "-"),
     "u_epsv_projection": (
-        r"MPM, $u$-$\varepsilon_v$, projection, $\alpha$ = 0.1", "tab:cyan", "x", "-"
+        r"MPM, $u$-$\varepsilon_v$, projection, $\alpha$ = 0.1", style.SKY, "x", "-"
     ),
-    "u_bbar": ("MPM, B-bar", "tab:orange", "D", "-"),
-    "u": ("MPM, displacement only", "tab:gray", "s", "-"),
-    "fem_q2": ("FEM, Q2 displacement", "tab:brown", "s", "--"),
+    "u_bbar": ("MPM, B-bar", style.ORANGE, "D", "-"),
+    "u": ("MPM, displacement only", style.GRAY, "s", "-"),
+    "fem_q2": ("FEM, Q2 displacement", style.GREEN, "s", "--"),
     "fem_taylor_hood": ("FEM, Taylor-Hood Q2-Q1", "black", "^", "--"),
 }  # fmt: skip
 TITLES = {
@@ -49,12 +49,12 @@ def deflection_error(rows: Sequence[Row], path: Path) -> None:
     for line, nu in zip(panels, ratios, strict=True):
         for axes, body in zip(line, TITLES, strict=True):
             _errors(axes, [row for row in rows if row.nu == nu and row.body in (body, None)])
-            axes.set_title(rf"$\nu$ = {nu:g}: {TITLES[body]}", fontsize=10)
+            axes.set_title(rf"$\nu$ = {nu:g}: {TITLES[body]}")
         line[0].set_ylabel("|error| of the deflection [%]")
     for axes in panels[-1]:
         axes.set_xlabel("cell size $h$ [-]  (dotted: first order)")
     handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=9)
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
     save(figure, path)
 
 
@@ -64,14 +64,14 @@ def _errors(axes: Axes, rows: Sequence[Row]) -> None:
         mine = [row for row in rows if row.method == method]
         axes.plot(
             [row.h for row in mine], [abs(row.error_percent) for row in mine], dash, label=label,
-            color=colour, marker=marker, markersize=4, linewidth=1.2,
+            color=colour, marker=marker,
         )  # fmt: skip
     sizes = np.array(sorted({row.h for row in rows}))
     axes.plot(sizes, sizes, color="black", linewidth=1, linestyle=":")
     axes.set_xscale("log", base=2)
     axes.set_yscale("log")
     axes.set_xticks(sizes, [f"{h:g}" for h in sizes])
-    axes.grid(alpha=0.3)
+    axes.grid()
 
 
 def mean_stress(solutions: Mapping[str, tawami.Solution], nu: float, h: float, path: Path) -> None:
@@ -81,31 +81,17 @@ def mean_stress(solutions: Mapping[str, tawami.Solution], nu: float, h: float, p
     )
     outline = np.array([*CORNERS, CORNERS[0]])
     for axes, (method, solution) in zip(panels, solutions.items(), strict=True):
-        squares = _particles(solution)
-        axes.add_collection(squares)
+        x = solution.x + MAGNIFIED * solution.displacement_of_particles
+        stress, limits = solution.mean_stress, (-STRESS, STRESS)
+        squares = draw_particles(axes, x, np.sqrt(solution.volume), stress, "-", limits)
         axes.plot(*outline.T, color="black", linewidth=0.8, linestyle=":")
-        axes.set_aspect("equal")
         axes.set_xlim(-2, LENGTH + 2)
         axes.set_ylim(-2, HEIGHT + 8)
         largest = np.abs(solution.mean_stress).max()
         title = f"{STYLES[method][0]}\n(largest |mean stress| {largest:.2g})"
-        axes.set_title(title, fontsize=10)
+        axes.set_title(title)
         axes.set_xlabel(f"$x$ [-]  (displacements x {MAGNIFIED})")
     panels[0].set_ylabel("$y$ [-]")
-    figure.suptitle(rf"$\nu$ = {nu:g}, $h$ = {h:g}: {TITLES['even']}", fontsize=11)
-    label = "mean stress [-], tension positive"
-    figure.colorbar(squares, ax=panels, label=label, extend="both", aspect=40)
+    figure.suptitle(rf"$\nu$ = {nu:g}, $h$ = {h:g}: {TITLES['even']}")
+    add_bar(squares, panels)
     save(figure, path)
-
-
-def _particles(solution: tawami.Solution) -> PolyCollection:
-    """Displaced particles as squares of their volume."""
-    corners = 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    side = np.sqrt(solution.volume)[:, None, None]
-    x = solution.x + MAGNIFIED * solution.displacement_of_particles
-    squares = PolyCollection(
-        x[:, None, :] + side * corners, array=solution.mean_stress, cmap="RdBu_r",
-        edgecolors="face", linewidths=0.1,
-    )  # fmt: skip
-    squares.set_clim(-STRESS, STRESS)
-    return squares

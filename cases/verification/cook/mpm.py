@@ -39,7 +39,7 @@ def body_of(grid: tawami.Grid, kind: str) -> tawami.Body:
 
     even      2 x 2 in full cells, Gauss points of triangles in cut cells
     gauss     3 x 3 Gauss points in full cells, the same in cut cells: all integrals exact
-    lattice   2 x 2 in every cell, those outside the membrane left out
+    lattice   2 x 2 in every cell, without those outside the membrane
     """
     if kind == "even":
         return tawami.polygon(grid, CORNERS, per_axis=2)

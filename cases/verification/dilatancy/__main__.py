@@ -1,11 +1,11 @@
 """Why the field of the mixed form is the elastic volumetric strain.
 
 1. A block is pressed on a rough base, for angles of dilation up to that of friction and Poisson's
-   ratios up to 0.4999 (`block.py`). All runs arrive, in 4 to 5 iterations a step.
+   ratios up to 0.4999 (`block.py`). All runs converge, in 4 to 5 iterations per step.
 2. The rate problem of a small patch on the verge of yield is stated with the total and with the elastic
    volumetric strain as field (`enumeration.py`). Each candidate is plastic or not, so that all active
    sets can be solved. A set is consistent if its plastic particles flow forward and its elastic ones
-   stay within the yield surface. Without a consistent set there is no solution to be found.
+   stay within the yield surface. Without a consistent set there is no solution.
 
 With the total strain 40 states out of 40 have one consistent set at nu = 0.3 and 0.45. At nu = 0.49, 11
 have none and 12 have several. With the elastic strain every state has exactly one at every nu.

@@ -55,7 +55,7 @@ class Counts:
         form: Meaning of the field, total or elastic.
         nu: Poisson's ratio.
         states: Number of states.
-        none, one, more: States with so many consistent sets.
+        none, one, more: Numbers of states with no, one or more consistent sets.
         negative: Share of active sets whose determinant has another sign than that of the empty set.
     """
 

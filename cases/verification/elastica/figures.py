@@ -8,16 +8,16 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from cases.common.figure import save
+from cases.common.figure import COLOURS, save
 from cases.verification.elastica.mpm import Run
 from cases.verification.elastica.strip import LOADS, D, curve, mean_stress
+from tawami.picture import style
 
 FORMS = {
     "u_epsv_finite": "mixed $u$-$\\varepsilon_v$",
     "u_finite": "displacement only",
     "u_bbar_finite": "B-bar",
 }
-COLOURS = {"u_epsv_finite": "tab:red", "u_finite": "tab:gray", "u_bbar_finite": "tab:blue"}
 
 
 def shapes(runs: Sequence[Run], path: Path) -> None:
@@ -36,16 +36,14 @@ def shapes(runs: Sequence[Run], path: Path) -> None:
         # colours up to the stress of the outer fibres at the root, for the largest Poisson's ratio
         limit = mean_stress(run.load, 0.499, L, np.array([[0.0, D / 2]]))[0] / 1e3
         shown = axes.scatter(
-            *run.at.T, c=run.mean_stress / 1e3, s=2, cmap="coolwarm", vmin=-limit, vmax=limit
+            *run.at.T, c=run.mean_stress / 1e3, s=2, cmap=style.SIGNED, vmin=-limit, vmax=limit
         )
         axes.plot(*L * curve(run.load, np.linspace(0, 1, 200))[:2], "k", label="elastica")
         axes.set_aspect("equal")
-        axes.set_title(
-            f"{FORMS[run.form]}, $\\nu$ = {run.nu}, $PL^2/\\bar{{E}}I$ = {run.load:g}", fontsize=10
-        )
+        axes.set_title(f"{FORMS[run.form]}, $\\nu$ = {run.nu}, $PL^2/\\bar{{E}}I$ = {run.load:g}")
         axes.set_xlabel("$x$ [m]")
         axes.set_ylabel("$y$ [m]")
-        axes.legend(loc="lower left", fontsize=8)
+        axes.legend(loc="lower left")
         if column == len(FORMS) - 1:
             figure.colorbar(shown, ax=panels[row], label="mean stress [kPa], tension positive")
     save(figure, path)
@@ -67,9 +65,9 @@ def errors(cells: Sequence[Run], steps: Sequence[Run], path: Path) -> None:
         shown = [tick for tick in ticks if low < tick < high]
         axes.minorticks_off()
         axes.set_yticks(shown, [f"{tick:g}" for tick in shown])
-        axes.grid(alpha=0.3)
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside right upper", fontsize=8)
-    panels[2, 1].legend(fontsize=8, loc="upper left")
+        axes.grid()
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside right upper")
+    panels[2, 1].legend(loc="upper left")
     save(figure, path)
 
 
@@ -79,10 +77,10 @@ def _over_cells(panels: Sequence[plt.Axes], runs: Sequence[Run]) -> None:
     for form, nu in dict.fromkeys((run.form, run.nu) for run in runs):
         chosen = [run for run in runs if (run.form, run.nu) == (form, nu)]
         n = [run.n for run in chosen]
-        style = {"color": COLOURS[form], "marker": markers[nu],
+        look = {"color": COLOURS[form], "marker": markers[nu],
                  "label": f"{FORMS[form]}, $\\nu$ = {nu}"}  # fmt: skip
-        panels[0].loglog(n, [run.error for run in chosen], **style)
-        panels[1].loglog(n, [run.stress_error for run in chosen], **style)
+        panels[0].loglog(n, [run.error for run in chosen], **look)
+        panels[1].loglog(n, [run.stress_error for run in chosen], **look)
     expected = [run.expected for run in chosen]
     panels[0].loglog(n, expected, "k--", label="of the particles' second moment")
     panels[0].set_ylabel("distance of the tips / $L$ [%]")
@@ -94,7 +92,7 @@ def _over_cells(panels: Sequence[plt.Axes], runs: Sequence[Run]) -> None:
 
 def _over_steps(axes: plt.Axes, runs: Sequence[Run]) -> None:
     """Error of the tip, one line per factor of the ghost penalty."""
-    for k, colour in ((1e-3, "tab:orange"), (1e-2, "tab:red"), (1e-1, "tab:purple")):
+    for k, colour in ((1e-3, style.ORANGE), (1e-2, style.VERMILION), (1e-1, style.PURPLE)):
         chosen = sorted((run for run in runs if run.k == k), key=lambda run: run.steps)
         accepted = [run.accepted for run in chosen]
         axes.loglog(

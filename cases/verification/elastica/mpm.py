@@ -1,9 +1,10 @@
-"""The bent strip by the material point method.
+"""The strip by the material point method.
 
 The load grows in steps. After each step the particles have moved and the grid is reset. Without inertia
 the tangent becomes singular as soon as the beam leaves the grid lines: the first particle in a cell
 activates functions that no other particle supports. The ghost penalty of the shipped forms, k = 0.01,
-ties these functions to their neighbours. Each reset costs some accuracy, so more steps are not better.
+ties these functions to their neighbours. Each reset costs some accuracy, so more
+steps do not help.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ class Run:
         crossed: Cells that the tip has crossed.
         seconds: Wall time.
         at, mean_stress: Positions [m] and mean stress [Pa] of the particles at the end.
-        stopped: Why the run ended early; empty if it did not.
+        stopped: Reason why the run ended early; empty if it did not.
     """
 
     load: float

@@ -1,4 +1,4 @@
-"""A slender cantilever bent far by a dead load at its tip: statics at finite strain, across many cells.
+"""Large bending of a slender cantilever by a dead load at its tip: static, at finite strain.
 
     held  |=====================|  P      length L = 2 m, depth D = 0.1 m, plane strain
                                 |         E = 1 MPa, Hencky elastic; P L^2/(Ebar I) = 1 and 10

@@ -60,7 +60,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     turned = 2 * np.pi / runs[0].steps
     print(
         f"rho omega^2 R^2 / E = {TENSION / E:g}, nu = {NU}, {len(runs[0].radii)} particles. The "
-        f"trapezoidal rule itself takes {turned**2 / 4:.1e} of the angular momentum, at most twice that."
+        f"trapezoidal rule itself reduces the angular momentum by {turned**2 / 4:.1e}, at most by "
+        "twice that."
     )
     figures.film([run for run in runs if run.kind.transfer != "tpic"], PROGRAM.folder / "film.png")
     figures.histories(runs, PROGRAM.folder / "histories.png")

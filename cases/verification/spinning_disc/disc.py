@@ -31,6 +31,7 @@ from mpi4py import MPI
 
 import tawami
 from cases.common.program import progress
+from tawami.picture import style
 
 Array = npt.NDArray[np.float64]
 
@@ -52,10 +53,10 @@ class Kind:
 
 
 KINDS = (
-    Kind("u_epsv_finite", "affine_flip", "mixed, affine FLIP", "tab:red"),
-    Kind("u_epsv_finite", "tpic", "mixed, TPIC", "tab:blue"),
-    Kind("u_finite", "affine_flip", "displacement only, affine FLIP", "tab:gray"),
-    Kind("u_epsv_finite", "flip", "mixed, plain FLIP", "tab:orange"),
+    Kind("u_epsv_finite", "affine_flip", "mixed, affine FLIP", style.VERMILION),
+    Kind("u_epsv_finite", "tpic", "mixed, TPIC", style.BLUE),
+    Kind("u_finite", "affine_flip", "displacement only, affine FLIP", style.GRAY),
+    Kind("u_epsv_finite", "flip", "mixed, plain FLIP", style.ORANGE),
 )
 
 
@@ -69,7 +70,7 @@ class Run:
         steps: Steps per turn.
         turns: Time in turns [-].
         angular: Angular momentum, over that of the start.
-        conserved: What the trapezoidal rule conserves, over the angular momentum of the start.
+        conserved: Quantity that the trapezoidal rule conserves, over the angular momentum of the start.
         energy: Kinetic plus elastic energy, over that of the start.
         linear: Linear momentum, over the sum of its magnitudes.
         roundness: (r_max - r_min)/R of the outer ring, about the centre of mass.

@@ -11,17 +11,18 @@ import numpy as np
 from cases.common.figure import save
 from cases.verification.vibrating_beam.beam import AMPLITUDE, NUS
 from cases.verification.vibrating_beam.mpm import Run
+from tawami.picture import style
 
 COLOURS = {
-    "affine_flip": "tab:red",
-    "apic": "tab:cyan",
-    "tpic": "tab:blue",
-    "flip": "tab:orange",
-    "pic": "tab:gray",
+    "affine_flip": style.VERMILION,
+    "apic": style.SKY,
+    "tpic": style.BLUE,
+    "flip": style.ORANGE,
+    "pic": style.GRAY,
 }
 #: Dashed, because their lines coincide with that of affine FLIP.
 DASHES = {"apic": ":", "tpic": "--"}
-OF_NU = {0.3: "tab:green", 0.49: "tab:purple"}
+OF_NU = {0.3: style.GREEN, 0.49: style.PURPLE}
 
 
 def motion(runs: Sequence[Run], periods: Mapping[float, float], path: Path) -> None:
@@ -38,11 +39,11 @@ def motion(runs: Sequence[Run], periods: Mapping[float, float], path: Path) -> N
         for run in (run for run in runs if run.nu == nu):
             time = np.array(run.time) / periods[nu]
             dashes = DASHES.get(run.transfer, "-")
-            style = {"color": COLOURS[run.transfer], "label": run.transfer, "linestyle": dashes}
-            top.plot(time, np.array(run.deflection) / AMPLITUDE, **style)
-            middle.plot(time, run.energy, **style)
+            look = {"color": COLOURS[run.transfer], "label": run.transfer, "linestyle": dashes}
+            top.plot(time, np.array(run.deflection) / AMPLITUDE, **look)
+            middle.plot(time, run.energy, **look)
             if run.energy[-1] > 0.99:
-                bottom.plot(time, run.energy, **style)
+                bottom.plot(time, run.energy, **look)
         time = np.linspace(0, time[-1], 500)
         top.plot(time, np.sin(2 * np.pi * time), "k:", label="finite elements, without damping")
         top.set_title(f"$\\nu$ = {nu}")
@@ -53,11 +54,11 @@ def motion(runs: Sequence[Run], periods: Mapping[float, float], path: Path) -> N
         bottom.set_ylim(0.99, 1.001)
         bottom.set_xlabel("$t$ / period of the finite elements [-]")
         for axes in panels[:, column]:
-            axes.grid(alpha=0.3)
+            axes.grid()
         top.set_ylim(-1.1, 1.9)
-        top.legend(fontsize=8, loc="upper center", ncols=3)
-        middle.legend(fontsize=8, loc="lower left")
-        bottom.legend(fontsize=8, loc="lower left")
+        top.legend(loc="upper center", ncols=3)
+        middle.legend(loc="lower left")
+        bottom.legend(loc="lower left")
     save(figure, path)
 
 
@@ -81,10 +82,10 @@ def accuracy(
         for nu in NUS:
             chosen = sorted((r for r in runs if r.nu == nu), key=lambda r: getattr(r, name))
             abscissa = [getattr(run, name) for run in chosen]
-            style = {"color": OF_NU[nu], "marker": "o", "label": f"$\\nu$ = {nu}"}
+            look = {"color": OF_NU[nu], "marker": "o", "label": f"$\\nu$ = {nu}"}
             error = [run.period / periods[nu] - 1 for run in chosen]
-            top.plot(abscissa, 100 * np.array(error), **style)
-            bottom.plot(abscissa, [100 * (1 - run.energy[-1]) for run in chosen], **style)
+            top.plot(abscissa, 100 * np.array(error), **look)
+            bottom.plot(abscissa, [100 * (1 - run.energy[-1]) for run in chosen], **look)
         expected = [100 * run.expected for run in chosen]
         top.plot(abscissa, expected, "k--", label="of trapezoidal rule and particles' places")
         for axes, values in zip((top, bottom), ticks, strict=True):
@@ -94,8 +95,8 @@ def accuracy(
             axes.set_yticks(values, [str(value) for value in values])
             axes.set_yticks([], minor=True)
             axes.set_xlabel(label)
-            axes.grid(alpha=0.3)
-            axes.legend(fontsize=8)
+            axes.grid()
+            axes.legend()
     panels[0, 0].set_ylabel("period, longer than by finite elements [%]")
     panels[1, 0].set_ylabel("energy lost in five periods [%]")
     save(figure, path)

@@ -1,4 +1,4 @@
-"""What knows no mechanics: errors, input checks, ranks, PETSc handles, signals, files, timing."""
+"""Code without mechanics: errors, input checks, ranks, PETSc handles, signals, files, timing."""
 
 from tawami.base import dependencies  # isort: skip  # before any other module imports MPI or PETSc
 from tawami.base.files import atomic_file, result_folder

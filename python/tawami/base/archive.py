@@ -23,7 +23,7 @@ from tawami.base.errors import CheckpointError
 from tawami.base.files import atomic_file, reason
 
 #: Version of the content of a state.
-FORMAT = 3
+FORMAT = 4
 #: Entry of the archive with the JSON.
 ABOUT = "about.json"
 #: Folder of the checkpoints in the folder of a run.
@@ -94,8 +94,8 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
             state = _unpack(about["state"], arrays) if found == FORMAT else {}
     except Exception as error:
         raise CheckpointError(
-            f"checkpoint '{path}' cannot be read ({reason(error)}): it is damaged, or no checkpoint of "
-            "tawami"
+            f"checkpoint '{path}' cannot be read ({reason(error)}): it is damaged, or is not a "
+            "checkpoint of tawami"
         ) from None
     if found != FORMAT:
         raise CheckpointError(
@@ -108,7 +108,7 @@ def particles(path: Path) -> dict[str, Any]:
     """Arrays of the particles in a checkpoint, by name, each particles x components.
 
     Raises:
-        CheckpointError: As :func:`read`, or its content is not what tawami writes.
+        CheckpointError: As :func:`read`, or its content is not that of a checkpoint.
     """
     _, state = read(path)
     try:
@@ -123,8 +123,8 @@ def unusable(path: Path | None, error: Exception) -> CheckpointError:
     """A checkpoint whose checksums are right and whose content is not."""
     what = f"{error} is missing" if isinstance(error, KeyError) else reason(error)
     return CheckpointError(
-        f"checkpoint '{path}' cannot be used ({what}): its content is not what tawami writes. Remove "
-        "it to resume from the one before it, or start anew with existing='replace'"
+        f"checkpoint '{path}' cannot be used ({what}): its content is not that of a checkpoint. Remove "
+        "it to resume from the one before it, or start a new run with existing='replace'"
     )
 
 
@@ -156,7 +156,7 @@ def check_particles(arrays: Any) -> None:
 def check_like(found: Any, own: Any, name: str) -> None:
     """Check a stored value against one of the same kind: type, columns of an array, finite numbers.
 
-    What `own` leaves open is not checked: None, an empty list or dictionary, the number of rows.
+    The number of rows, and parts for which `own` is None, an empty list or dictionary, are not checked.
 
     Args:
         found: The stored value.
@@ -175,7 +175,7 @@ def check_like(found: Any, own: Any, name: str) -> None:
             raise ValueError(f"{name} is not finite")
     elif isinstance(own, Mapping):
         if not isinstance(found, Mapping) or (own and found.keys() != own.keys()):
-            raise ValueError(f"{name or 'the state'} has not the entries {', '.join(own)}")
+            raise ValueError(f"{name or 'the state'} lacks entries, expected {', '.join(own)}")
         for key, value in own.items():
             if key == "factor" and isinstance(found[key], str):
                 continue  # a number that became a function

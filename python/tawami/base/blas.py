@@ -47,7 +47,7 @@ class Core:
     Attributes:
         name: Core type; empty if the BLAS is another library.
         instead_of: Core type that OpenBLAS took by itself, if it was replaced.
-        advice: What to do about slow kernels that were kept; empty if there is nothing to do.
+        advice: Advice on slow kernels that were kept; empty if there are none.
     """
 
     name: str = ""

@@ -269,7 +269,7 @@ def room(what: str, count: int, each: float, advice: str) -> None:
         what: Input that decides the number of objects.
         count: Number of objects.
         each: Memory of one object [bytes].
-        advice: What to do.
+        advice: Advice for the message.
 
     Raises:
         InputError: It is not enough; the message says how much is needed.
@@ -280,6 +280,6 @@ def room(what: str, count: int, each: float, advice: str) -> None:
     size = float(min(count, 10**300)) * each
     if size > available:
         raise InputError(
-            f"{what} needs about {size / 2**30:.3g} GB of memory, of which there are "
-            f"{available / 2**30:.3g} GB: {advice}"
+            f"{what} needs about {size / 2**30:.3g} GB of memory, and {available / 2**30:.3g} GB are "
+            f"available: {advice}"
         )

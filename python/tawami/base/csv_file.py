@@ -13,7 +13,7 @@ import numpy as np
 from tawami.base.arrays import Array
 from tawami.base.files import unreadable
 
-#: Separators of files that are not read, and what messages call them.
+#: Separators of files that are not read, and their names in messages.
 OTHERS = {";": "semicolons", "\t": "tabs"}
 
 
@@ -35,7 +35,7 @@ class CsvFile:
         """The numbers of a column, one per row.
 
         Raises:
-            ValueError: A cell is not a number, or NaN or infinite where `finite` is asked for.
+            ValueError: A cell is not a number, or, with `finite`, is NaN or infinite.
         """
         cells = [row[place] for row in self.rows]
         numbers = np.array([_number(cell) for cell in cells], dtype=float)
@@ -99,7 +99,7 @@ def _check_lengths(header: Sequence[str], rows: Sequence[Sequence[str]], lines: 
 
 
 def _number(cell: str) -> float:
-    """The number of a cell; NaN if it is none."""
+    """The number in a cell; NaN if it is not a number."""
     try:
         return math.nan if "_" in cell else float(cell)  # Python reads 1_000 as 1000
     except ValueError:

@@ -65,7 +65,7 @@ try:
 except ImportError as error:  # pragma: no cover - exercised in a subprocess by the tests
     report_missing(error)
 
-#: How to install the right PETSc.
+#: Advice on the installation of the right PETSc.
 ADVICE = "On Debian: apt install python3-dolfinx-real python3-petsc4py-real, and unset PETSC_DIR"
 
 if np.dtype(PETSc.ScalarType) != np.float64:
@@ -76,5 +76,5 @@ if np.dtype(PETSc.ScalarType) != np.float64:
 
 if np.dtype(PETSc.IntType) != np.int32:
     raise MissingDependencyError(
-        f"tawami needs PETSc with 32-bit indices, but its are {np.dtype(PETSc.IntType)}. {ADVICE}"
+        f"tawami needs PETSc with 32-bit indices, but they are {np.dtype(PETSc.IntType)}. {ADVICE}"
     )

@@ -4,7 +4,7 @@ Wrong input from a driver script raises a `TawamiError`; `tawami.run` and `tawam
 line. Any other exception is a fault of tawami, or of a function of the driver script that tawami calls.
 
 ========================= ========================================================================
-TawamiError               base of all of them
+TawamiError               base of all errors
   InputError              a wrong argument, value or file
     NotModelledError      an attribute that this scene does not have (also an AttributeError)
   FormError               a weak form that cannot be used
@@ -31,7 +31,7 @@ TawamiWarning             base of warnings about results that should not be trus
   SofteningWarning        a material that softens: results depend on the grid
 ========================= ========================================================================
 
-When a step fails, the particles are as they were before it.
+When a step fails, the particles are unchanged.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class TawamiWarning(UserWarning):
 
 
 class EnergyWarning(TawamiWarning):
-    """A motion whose energy grew without work of loads or supports."""
+    """A motion whose energy grew without work by loads or supports."""
 
 
 class GeometryWarning(TawamiWarning):
@@ -80,7 +80,7 @@ class LockingWarning(TawamiWarning):
 
 
 class ParameterWarning(TawamiWarning):
-    """A parameter of a form beyond its usual range, where results are far off."""
+    """A parameter of a form beyond its usual range, where results are inaccurate."""
 
 
 class QuadratureWarning(TawamiWarning):
@@ -96,7 +96,7 @@ class SmallStrainWarning(TawamiWarning):
 
 
 class SofteningWarning(TawamiWarning):
-    """A material that softens, without a length: results depend on the grid."""
+    """A material that softens without a length scale: results depend on the grid."""
 
 
 class SingularError(TawamiError):

@@ -24,12 +24,12 @@ OLD = 86400.0
 
 
 def reason(error: BaseException) -> str:
-    """Why something failed, in the words of the system where it has some."""
+    """Reason of a failure, in the words of the system where possible."""
     return getattr(error, "strerror", None) or str(error) or type(error).__name__
 
 
 def unreadable(path: Path) -> str | None:
-    """Why a path is not a regular file that can be read; None if it is one."""
+    """Reason why a path is not a regular file that can be read; None if it is one."""
     try:
         check_regular(path)
         with path.open("rb"):
@@ -42,9 +42,9 @@ def readable_file(what: str, path: str | Path, expected: str) -> Path:
     """The path of a regular file that can be read.
 
     Args:
-        what: What messages call the file, as 'script'.
+        what: Name of the file in messages, as 'script'.
         path: Its path.
-        expected: What messages say after 'expected'.
+        expected: Text after 'expected' in messages.
 
     Raises:
         InputError: No path, or not that of such a file.
@@ -178,7 +178,7 @@ def append_line(path: str | Path, line: str, *, sync: bool = False) -> None:
         sync: Wait until it is on the disk.
 
     Raises:
-        OutputError: The file cannot be written; it is as it was before.
+        OutputError: The file cannot be written; it is unchanged.
     """
     file_path = checks.path("path", path)
     with writing(file_path):
@@ -210,7 +210,7 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def check_regular(path: Path, *, new: bool = False) -> None:
-    """Check before a file is opened: to open a pipe would wait for ever.
+    """Check before a file is opened: to open a pipe would wait forever.
 
     Args:
         path: Of the file.

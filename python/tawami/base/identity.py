@@ -8,12 +8,12 @@ from typing import Any
 
 from tawami.base.meaning import ALIKE, CODE, PYTHON, UNKNOWN, meaning
 
-#: In place of a fact that only the other one has.
+#: Placeholder of a fact that only the other run has.
 NOTHING = "nothing"
 
 
 def text(value: Any) -> Any:
-    """A number as text; of a function what it computes."""
+    """A number as text; for a function, the facts about its code and values."""
     return {_name(value): meaning(value)} if callable(value) else repr(value)
 
 
@@ -28,7 +28,7 @@ def same(one: Any, other: Any) -> bool:
 
 
 def differences(one: Any, other: Any, name: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """What differs between two facts: the name of the part, and both its values.
+    """The difference of two facts: the name of the part, and both values.
 
     Code of two versions of Python is not compared; see :func:`not_compared`.
     """

@@ -19,7 +19,7 @@ def attach(
 
     Args:
         package: Full name of the package.
-        file: Its `__init__.py`; the stub is beside it.
+        file: Its `__init__.py`; the stub is in the same folder.
     """
     stub = ast.parse(Path(file).with_suffix(".pyi").read_text(encoding="utf-8"))
     imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]

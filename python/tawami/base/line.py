@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import sys
-import warnings
 from importlib.util import find_spec
 from time import monotonic
 from typing import Any, TextIO
@@ -16,16 +15,12 @@ INTERVAL = 0.1
 
 
 def progress_bar(*arguments: Any, **options: Any) -> Any:
-    """A bar of `tqdm.auto`, which suits terminals and notebooks.
+    """A bar of `tqdm.auto`, which suits terminals and notebooks; one of text without ipywidgets.
 
     Raises:
         MissingDependencyError: tqdm is not installed.
     """
-    with warnings.catch_warnings():
-        # without ipywidgets a notebook gets a bar of text, which is no reason for a warning
-        warnings.simplefilter("ignore")
-        tqdm = optional("tqdm.auto", "a progress bar needs").tqdm
-    return tqdm(*arguments, **options)
+    return optional("tqdm.auto", "a progress bar needs").tqdm(*arguments, **options)
 
 
 def in_notebook() -> bool:
@@ -43,8 +38,9 @@ class Line:
 
     def __init__(self, shown: bool | None) -> None:
         self.stream: TextIO = sys.stderr
-        self._notebook = in_notebook() and find_spec("tqdm") is not None
-        self._shown = (self._notebook or self.stream.isatty()) if shown is None else shown
+        notebook = in_notebook()
+        self._shown = (notebook or self.stream.isatty()) if shown is None else shown
+        self._has_bar = notebook and find_spec("tqdm") is not None
         self._last, self._written = -INTERVAL, False
         self._bar: Any = None
 
@@ -59,7 +55,7 @@ class Line:
         if not self._shown or (not now and monotonic() - self._last < INTERVAL):
             return
         self._last, self._written = monotonic(), True
-        if self._notebook:
+        if self._has_bar:
             if self._bar is None:
                 self._bar = progress_bar(total=1.0, bar_format="{percentage:3.0f}%|{bar}| {desc}")
             self._bar.n = min(max(share, 0.0), 1.0)

@@ -38,8 +38,8 @@ def hold(folder: Path, what: str, patience: float = PATIENCE) -> BaseFileLock:
 
     Args:
         folder: Created if it does not exist.
-        what: What messages call it, as "Results('folder')".
-        patience: How long to wait until another process releases it [s].
+        what: Its name in messages, as "Results('folder')".
+        patience: Longest time to wait until another process releases it [s].
 
     Raises:
         InputError: Another process holds it; the message names its host and its number. Or this process
@@ -47,7 +47,7 @@ def hold(folder: Path, what: str, patience: float = PATIENCE) -> BaseFileLock:
         OutputError: The folder cannot be written, or its file system has no locks.
     """
     check_process()  # a fork shares the lock of its parent
-    from filelock import FileLock, Timeout  # here: a scene without results does without it
+    from filelock import FileLock, Timeout  # here: a scene without results does not need it
 
     home = result_folder(folder).resolve()
     lock = FileLock(home / LOCK, timeout=patience, is_singleton=True, thread_local=False)

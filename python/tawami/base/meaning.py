@@ -1,7 +1,7 @@
-"""What a function of a script computes: its code and the values that it reads, as JSON can hold them.
+"""Facts about a function of a script, its code and the values that it reads, in the types of JSON.
 
 A checkpoint stores this, so that a run is not resumed with another stiffness because a constant of the
-script has changed. Compared are the byte code and that of nested functions, module variables that the
+script has changed. The facts are the byte code and that of nested functions, module variables that the
 code names, attributes of modules (`settings.E`), closures, defaults, and the same of functions, methods
 and objects among these values. Functions of installed packages are compared by name.
 """
@@ -45,7 +45,7 @@ def fingerprint(values: Any, size: float) -> float:
 
 
 def meaning(value: Any, inside: tuple[int, ...] = ()) -> Any:
-    """A value as JSON can hold it, equal for equal values; of functions what they compute.
+    """A value in the types of JSON, equal for equal values; for functions, the facts about them.
 
     Args:
         value: Any value.

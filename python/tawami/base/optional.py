@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from importlib import import_module
 from typing import Any
 
@@ -19,7 +20,10 @@ def optional(module: str, purpose: str) -> Any:
         MissingDependencyError: The package is not installed; the message says how to install it.
     """
     try:
-        return import_module(module)
+        # a package may warn, when it is imported, of packages that it would like to have
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return import_module(module)
     except ImportError as error:
         package = module.partition(".")[0]
         raise MissingDependencyError(f"{purpose} {package}: pip install {package}") from error

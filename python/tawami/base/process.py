@@ -26,11 +26,11 @@ def check_process() -> None:
     """Check that this process was not forked from one that uses MPI and threads.
 
     Raises:
-        InputError: It was forked; calls could wait for ever.
+        InputError: It was forked; calls could wait forever.
     """
     if os.getpid() in _forked:
         raise InputError(
             "this process was forked from one that uses tawami, where neither MPI nor the threads of "
-            "the particles work: expected multiprocessing.get_context('spawn'), or a process started "
-            "as tawami.Study starts its own"
+            "the particles work: expected a process that was spawned; use "
+            "multiprocessing.get_context('spawn'), or tawami.Study"
         )

@@ -1,7 +1,7 @@
 """Programs on several ranks: how they start, and how an error on one rank ends all of them.
 
 An error that nothing catches is printed once and ends all ranks (:func:`watch`), and so does sys.exit on
-one rank in a function that tawami calls (:func:`leave_together`). The others would wait for ever.
+one rank in a function that tawami calls (:func:`leave_together`). The others would wait forever.
 """
 
 from __future__ import annotations
@@ -61,11 +61,11 @@ def _all_end(patience: float) -> bool:
 
 
 def _finish(comm: Any) -> None:
-    """Wait for the other ranks at the end of the program, and free what is left."""
+    """Wait for the other ranks at the end of the program, and free the remaining objects."""
     if not _all_end(NOTICE):
         sys.stderr.write(
-            f"tawami: rank {comm.rank} has been at the end of the program for {NOTICE:g} s, other ranks "
-            "have not. If it called sys.exit, they may wait for it for ever: interrupt the program, "
+            f"tawami: rank {comm.rank} reached the end of the program {NOTICE:g} s ago, other ranks "
+            "have not. If it called sys.exit, they may wait for it forever: interrupt the program, "
             "and call sys.exit on all ranks\n"
         )
         _end[1].Wait()
@@ -83,8 +83,8 @@ def leave_together() -> Iterator[None]:
         rank = MPI.COMM_WORLD.rank
         if not _all_end(GRACE):
             _abort(
-                f"sys.exit({end.code!r}) was called on rank {rank} and not on all ranks, which would "
-                "wait for it: all of them end\n",
+                f"sys.exit({end.code!r}) was called on rank {rank} and not on all ranks. The others "
+                "would wait for it, so all ranks end\n",
                 end.code if isinstance(end.code, int) and end.code else 1,
             )
         if isinstance(end.code, str) and rank:

@@ -21,7 +21,7 @@ def sum_of(comm: Any, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 
 def any_of(comm: Any, mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Where the mask of any rank is set, in place."""
+    """Union of the masks of all ranks, in place."""
     if comm.size > 1:
         comm.Allreduce(MPI.IN_PLACE, mask, op=MPI.LOR)
     return mask

@@ -24,7 +24,7 @@ class Sealed:
         self._is_sealed = True
 
     def _how_to_set(self, name: str) -> str:
-        """What to do instead of setting an attribute; subclasses know better."""
+        """Advice for an attribute that cannot be set; subclasses give their own."""
         return f"a {type(self).__name__} is changed by its methods only"
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -42,7 +42,7 @@ class Settings(Mapping[str, Value]):
 
     Args:
         values: The values by name.
-        instead: What to do instead of setting one, for the error message.
+        instead: Advice on what to do instead, for the error message.
     """
 
     def __init__(self, values: Mapping[str, Value], instead: str) -> None:

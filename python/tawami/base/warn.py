@@ -13,7 +13,7 @@ def warn(message: str, category: type[Warning]) -> None:
     """Warn at the nearest caller outside of tawami.
 
     Args:
-        message: What is wrong and what to do.
+        message: The fault and the advice.
         category: One of the warnings of `tawami.base.errors`.
     """
     level, frame = 2, sys._getframe(1)

@@ -57,8 +57,8 @@ class Body:
         if len(self.names) > 1 or (self.material_of is not None and np.any(self.material_of)):
             groups = f"the groups {_listed(self.names)}" if self.names else "several materials"
             raise InputError(
-                f"named('{name}'): the body has {groups}: expected a body with one; join bodies after "
-                "they got their names"
+                f"named('{name}'): the body has {groups}: expected a body with one; name "
+                "bodies before joining them"
             )
         return replace(self, material_of=None, names=(name,))
 
@@ -85,7 +85,7 @@ class Body:
         return Body(x, volume, number, names, lattice)
 
     def __radd__(self, other: Literal[0]) -> Body:
-        """So that `sum([...])` joins bodies: it begins with 0."""
+        """Join bodies with `sum([...])`, which begins with 0."""
         return self if isinstance(other, int) and other == 0 else NotImplemented
 
 

@@ -15,7 +15,7 @@ from tawami.body.points import areas
 
 #: Bisections that find where the sign changes.
 BISECTIONS = 46
-#: How many times a square is divided at most.
+#: Largest number of times that a square is divided.
 DEEPEST = 20
 #: Squares, besides four times the initial ones, above which the border is not a curve.
 MANY = 20_000
@@ -101,7 +101,7 @@ def triangulated(
         of_square = (np.cumsum(again) - 1)[of_part[pending]]
     raise InputError(
         f"level_set: tolerance = {tolerance:g} of the area was not reached in squares of "
-        f"{squares.size:.1g} cells: expected a border that is a curve; take a larger tolerance"
+        f"{squares.size:.1g} cells: expected a border that is a curve; use a larger tolerance"
     )
 
 

@@ -22,8 +22,8 @@ from tawami.body.moment_fitting import fewer
 from tawami.body.points import ROUND_OFF, Points, joined
 from tawami.grid.grid import Grid
 
-#: Particles per cell and axis where a script says nothing. With 2 the sums over cells are less exact: a
-#: strip load is three times as far off (tests/body/test_per_axis.py).
+#: Default number of particles per cell and axis. With 2 the sums over cells are less exact: the error
+#: under a strip load is three times as large (tests/body/test_per_axis.py).
 PER_AXIS = 3
 #: Largest Gauss rule along an axis.
 MOST_POINTS = 1000
@@ -32,7 +32,7 @@ BYTES_PER_PARTICLE = 128.0
 
 
 class Filling:
-    """How the cells of a grid are filled with particles: the arguments that all shapes share.
+    """Arguments of all shapes: they define how the cells of a grid are filled with particles.
 
     Attributes:
         grid: The grid.
@@ -69,10 +69,10 @@ class Filling:
         return int(self.per_axis**self.grid.space.dim)
 
     def check_memory(self, cells: int) -> None:
-        """Check that there is memory for the particles of so many full cells.
+        """Check that there is memory for the particles of this number of full cells.
 
         Raises:
-            InputError: There is not.
+            InputError: There is not enough.
         """
         what = f"per_axis = {shown(self.per_axis)} in {cells} cell{'s' if cells > 1 else ''}"
         room(what, cells * self.per_cell, BYTES_PER_PARTICLE, "expected fewer particles")

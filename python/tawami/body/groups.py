@@ -40,7 +40,7 @@ def materials(
         members = {name: members[name] for name in names("mesh: groups", groups, tuple(members))}
         if not members:
             raise InputError(
-                f"mesh: groups = {shown(groups)}: expected the name of a group or more"
+                f"mesh: groups = {shown(groups)}: expected the names of one or more groups"
             )
     if not members:
         return np.zeros(sum(len(block.data) for _, block in blocks), dtype=np.int64), ()
@@ -64,7 +64,7 @@ def materials(
 
 
 def _members(read: Any, blocks: Blocks, tags: str | None) -> tuple[str, dict[str, Mask]]:
-    """What the groups are called, and a mask over the elements for each; without empty ones."""
+    """Kind of the groups, and a mask over the elements for each group that is not empty."""
     physical, sets = _physical(read, blocks), _sets(read, blocks)
     if tags is None:
         return ("physical groups", physical) if physical else ("cell sets", sets)

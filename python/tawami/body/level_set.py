@@ -86,8 +86,8 @@ def level_set(
     so that curved parts have the right area. A full cell gets `per_axis` x `per_axis` particles, a cut
     one at most 28.
 
-    What lies between the samples is not seen: parts and gaps thinner than h / samples are lost
-    completely or in part.
+    Parts and gaps thinner than h / samples may lie between the samples, and are then lost completely
+    or in part.
 
     Args:
         grid: The grid.
@@ -116,7 +116,7 @@ def level_set(
         raise InputError(
             f"level_set: f is not negative at any of the {signs.size} samples, "
             f"{grid.h / samples:g} m apart, so the body has no particles: expected f < 0 inside the "
-            "body; change its sign, move it into the grid, or take more samples"
+            "body; change its sign, move it into the grid, or use more samples"
         )
     _check_ends(signs, ended)
     corners = signs[:-1, :-1], signs[:-1, 1:], signs[1:, :-1], signs[1:, 1:]
@@ -158,7 +158,7 @@ def _filled(
     """Particles for squares between samples that are inside, and along the border.
 
     Args:
-        filling: How cells are filled.
+        filling: Rule for filling cells.
         inside: Mask of the squares between samples, y by x.
         triangles: Triangles along the border, n x 3 x 2.
         whole: Smaller squares along the border.

@@ -52,7 +52,7 @@ def mesh(
         source: A mesh of meshio, or a file: .msh of Gmsh, .inp of Abaqus, .mdpa of Kratos, .vtu, .vtk
             and others that meshio reads. If it has a third coordinate, this must be the same at all
             nodes of elements.
-        tags: What tells the groups apart: the name of an array of cell data with whole numbers, or
+        tags: Source of the groups: the name of an array of cell data with whole numbers, or
             'sets' for the cell sets of the mesh. By default Gmsh's physical groups if there are any,
             else the cell sets if there are any, else all elements are one group. `Body.names` are the
             names of the groups in the order of their numbers, or the numbers if they have no names.

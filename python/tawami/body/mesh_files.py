@@ -1,4 +1,4 @@
-"""Mesh files: the reader of each format, and what readers print."""
+"""Mesh files: the reader of each format, and the output of readers."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def read(source: Any) -> Any:
 
 
 class UnreadError(Exception):
-    """meshio ended the program; the message is the one that it printed."""
+    """meshio ended the program; the message is its printed output."""
 
 
 def _by_meshio(file: Path, file_format: str | None) -> Any:

@@ -19,7 +19,7 @@ from tawami.body.points import DEGREE
 EXPONENTS = np.array([e for e in product(range(DEGREE + 1), repeat=PLANE.dim) if sum(e) <= DEGREE])
 #: Largest number of points that is left: the number of moments.
 MOST = len(EXPONENTS)
-#: Number of points beyond which the ones that are left are looked for among SOME of them first.
+#: Number of points beyond which the remaining points are first searched among SOME of them.
 MANY, SOME = 300, 100
 #: Largest error of the moments, relative to the area.
 MOMENT_ERROR = 1e-12
@@ -58,7 +58,7 @@ def fewer(x: Array, weight: Array, allowed: Mask) -> tuple[Array, Array]:
 
 
 def _of_some(x: Array, weight: Array) -> tuple[Array, Array]:
-    """As :func:`fewer`, for many points: those that are left are looked for among some of them first.
+    """As :func:`fewer`, for many points: the remaining points are first searched among some of them.
 
     The points of a rule on many triangles are many more than their moments need.
     """

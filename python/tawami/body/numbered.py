@@ -64,8 +64,8 @@ class Numbered:
         place += [0.0] * (3 - len(place))
         if self.nodes.setdefault(number, place) != place:
             self.fail(
-                f"node {number} for the second time, at another place: expected numbers that are used "
-                "once, in one part; write all parts as one"
+                f"node {number} is listed twice, at different places: expected each number once; "
+                "write all parts as one"
             )
 
     def add_element(self, kind: str, number: int, nodes: list[int]) -> None:
@@ -76,7 +76,7 @@ class Numbered:
         """
         same = self.elements.setdefault(kind, {})
         if same.setdefault(number, nodes) is not nodes:
-            self.fail(f"element {number} for the second time: expected numbers that are used once")
+            self.fail(f"element {number} is listed twice: expected each number once")
 
     def mesh(self) -> Any:
         """The mesh, with the sets as cell sets.

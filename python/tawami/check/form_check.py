@@ -243,7 +243,7 @@ def _locking(form: Form, given: Settings) -> Found:
         yield "not tried", "it needs a term - dot(t, w) * ds"
         return
     error = scenes.bent_beam(form, given)
-    words = f"mean stress of a bent beam, K/mu = 1e4: {100 * error:.2g} % off"
+    words = f"error of the mean stress of a bent beam, K/mu = 1e4: {100 * error:.2g} %"
     yield ("ok", words) if error < BEAM else ("note", f"{words}: it locks")
 
 

@@ -94,7 +94,7 @@ def tangent_error(scene: Scene) -> float:
 
 
 def path_difference(form: Form, given: Settings) -> float:
-    """Difference of residual and tangent between the fast and the reference assembly."""
+    """Difference of residual and tangent between the assembly at the points and that by dolfinx."""
     parts = []
     for path in ("points", "dolfinx"):
         scene = cloud(form, given, assembly=path)
@@ -229,7 +229,7 @@ def inf_sup(form: Form, given: Settings) -> float:
     except np.linalg.LinAlgError:
         raise SingularError(
             f"form {form.name}: displacements of a block that is held all around are free: expected a "
-            "term of the deviator, as sum_p(sigma, grad(w)) has it"
+            "term of the deviator, such as sum_p(sigma, grad(w))"
         ) from None
     schur = B @ lifted - tangent[~of_u][:, ~of_u]
     schur = (schur + schur.T) / (2 * to_p**2)

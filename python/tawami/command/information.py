@@ -26,7 +26,12 @@ from tawami.form.form import Form
 
 MEMORY = Path("/proc/meminfo")
 #: Optional packages and their purposes.
-OPTIONAL = (("matplotlib", "figures, tawami plot"), ("tqdm", "progress of the cases"))
+OPTIONAL = (
+    ("matplotlib", "figures, tawami plot"),
+    ("tqdm", "progress in notebooks and of the cases"),
+    ("pandas", "solution.to_pandas()"),
+    ("pyvista", "solution.to_pyvista()"),
+)
 
 
 def lines() -> Iterator[tuple[str, str]]:

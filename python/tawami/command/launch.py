@@ -101,28 +101,28 @@ class Messages:
     def __init__(self) -> None:
         self._line = b""  # has not ended
         self._begun = False  # whether the begin of this line is printed
-        self._frame = b""  # a line of dashes: what follows decides
+        self._frame = b""  # a line of dashes, whose meaning the next line decides
         self._inside = False  # a block that repeats an error
         self._repeated: list[bytes] = []
         self._announced = False
 
     def passed(self, part: bytes) -> bytes:
-        """What to print after this part has arrived."""
+        """Text to print after this part has arrived."""
         *lines, self._line = (self._line + part).split(b"\n")
         return b"".join(self._sorted(line + b"\n") for line in lines)
 
     def waiting(self) -> bytes:
-        """What to print if nothing more arrives for a while."""
+        """Text to print if nothing more arrives for a while."""
         text, self._frame, self._line = self._frame + self._line, b"", b""
         self._begun = self._begun or not (not text or text.endswith(b"\n"))
         return text
 
     def rest(self) -> bytes:
-        """What to print at the end."""
+        """Text to print at the end."""
         return self.waiting() + (b"" if self._announced else b"".join(self._repeated))
 
     def _sorted(self, line: bytes) -> bytes:
-        """What to print after this line."""
+        """Text to print after this line."""
         line, ended, _ = line.partition(f"{program.ENDED}\n".encode())
         self._announced = self._announced or bool(ended)
         text = line.decode(errors="replace").strip()

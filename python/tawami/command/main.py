@@ -164,13 +164,13 @@ def _add_run(commands: Any) -> None:
 def _add_resume(commands: Any) -> None:
     parser = _add(commands, "resume", _resume, "resume an interrupted run", (
         "Runs the copy of the script in this folder, with the same arguments, in the same directory: "
-        "finished phases are loaded, the interrupted phase continues from its newest checkpoint. A "
-        "folder of results is code: resume only runs that you trust."
+        "finished phases are loaded, the interrupted phase continues from its newest checkpoint. "
+        "This executes the script: resume only runs that you trust."
     ))  # fmt: skip
     parser.add_argument(
         "--trust",
         action="store_true",
-        help="run the copy also if it is not the script that the run was started with",
+        help="run the copy even if it differs from the script that started the run",
     )
     parser.add_argument("folder", metavar="FOLDER", help="folder of results, as results/pile")
     _add_ranks(parser)
@@ -194,7 +194,7 @@ def _add_plot(commands: Any) -> None:
 
 def _add_new(commands: Any) -> None:
     parser = _add(commands, "new", _new, "write a driver script", (
-        "Writes NAME.py, a commented script that runs as it is. An existing file is not changed."
+        "Writes NAME.py, a commented script that runs without changes. An existing file is not changed."
     ))  # fmt: skip
     parser.add_argument("file", metavar="NAME", help="as mycase, or folder/mycase.py")
     kind = parser.add_mutually_exclusive_group()

@@ -48,14 +48,14 @@ def write(name: str, kind: str) -> Path:
 
 
 def _unusable(path: Path) -> str | None:
-    """Why a script cannot have this name; None if it can."""
+    """Reason why a script cannot have this name; None if it can."""
     name = path.stem
     if not name.isidentifier():
-        return f"'{name}' is not a name of Python"
+        return f"'{name}' is not a valid name in Python"
     if keyword.iskeyword(name):
         return f"'{name}' is a keyword of Python"
     if name.startswith("__"):
-        return f"'{name}' has a meaning to Python"
+        return f"'{name}' is reserved by Python"
     # a script is the first that Python finds: a numpy.py would be imported instead of NumPy
     own = {Path.cwd(), path.parent.resolve()}
     installed = [folder for folder in sys.path if folder and Path(folder).resolve() not in own]

@@ -94,14 +94,14 @@ class Run:
         readable_file("copy of the script", self.copy, expected)
         if _hash(self.copy) != self.sha256 and not trust:
             raise InputError(
-                f"'{self.copy}' is not the script that the run was started with (its checksum differs "
+                f"'{self.copy}' differs from the script that started the run (its checksum differs "
                 f"from that in {RUN}): expected the same file. Read it, and run it with: "
                 f"tawami resume --trust {shlex.quote(str(self.folder))}"
             )
 
     @property
     def remark(self) -> str | None:
-        """What differs from the script that was run, and how to run that one; None if nothing does."""
+        """The difference from the script that was run, and how to run that one; None if they agree."""
         if self.file is None or _hash(self.file) == _hash(self.copy):
             return None
         if not os.path.isfile(self.file):
@@ -153,7 +153,7 @@ def resume(
 ) -> int:
     """Run the script of an interrupted run again: it loads the finished phases and resumes the last.
 
-    The copy of the script in the folder is run: a folder of results is code.
+    The copy of the script in the folder is run.
 
     Args:
         folder: Of the results.

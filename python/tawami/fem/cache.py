@@ -21,7 +21,7 @@ from tawami.base import files, lock, ranks
 from tawami.base.errors import MissingDependencyError, OutputError
 from tawami.fem.dolfinx import OLD, jit
 
-#: How long to wait for a form that another process compiles [s].
+#: Longest time to wait for a form that another process compiles [s].
 PATIENCE = 300.0
 #: Names of the errors of CFFI and setuptools if the compiler fails.
 COMPILER_ERRORS = ("VerificationError", "CompileError")
@@ -77,15 +77,15 @@ def _compile(code: Path, compile_into: Callable[[Path], object]) -> None:
     except (OSError, OutputError) as error:
         raise OutputError(
             f"the cache of compiled forms '{home}' cannot be written "
-            f"({files.reason(error.__cause__ or error)}): expected room and write permission there, or "
-            "another folder in the environment variable XDG_CACHE_HOME"
+            f"({files.reason(error.__cause__ or error)}): expected free space and write permission "
+            "there, or another folder in the environment variable XDG_CACHE_HOME"
         ) from error
     except Exception as error:
         if type(error).__name__ not in COMPILER_ERRORS:
             raise
         raise MissingDependencyError(
             f"the C compiler failed on the code of FFCx: {error}. It needs gcc and Python's headers (on "
-            f"Debian: apt install g++ python3-dev), memory, and room in '{home}'"
+            f"Debian: apt install g++ python3-dev), memory, and free space in '{home}'"
         ) from error
 
 
@@ -103,7 +103,7 @@ def _replace(code: Path, compile_into: Callable[[Path], object]) -> None:
 
 
 def intact(folder: Path) -> bool:
-    """Whether a folder of compiled code is as it was when it was compiled."""
+    """Whether a folder of compiled code has not changed since it was compiled."""
     try:
         return (folder / CHECKSUM).read_text() == _content(folder)
     except (OSError, UnicodeDecodeError):

@@ -1,7 +1,7 @@
 """The imports of dolfinx, basix and FFCx and the elements: versions 0.5.2, 0.9 and 0.11.
 
 The modules of this room take `basix`, `cpp`, `dolfinx`, `ffcx`, `jit` and `ufl` from here, after the
-checks that tell a user what is missing. Nothing outside this room imports them.
+checks that report missing packages. Nothing outside this room imports them.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from tawami.base import ranks
 from tawami.fem import cache
 from tawami.fem.dolfinx import OLD, ffcx, jit, version
 
-#: What an integral goes over, in the order of FFCx.
+#: Domains of integrals, in the order of FFCx.
 Kind = Literal["cell", "exterior_facet", "interior_facet"]
 KINDS: tuple[Kind, ...] = ("cell", "exterior_facet", "interior_facet")
 #: Sums may be reordered, so that they vectorise: this saves a fifth of the time. -ffast-math is avoided,
@@ -65,7 +65,7 @@ class Kernel:
     """A compiled integral over cells or facets, not yet attached to a mesh.
 
     Attributes:
-        kind: What it integrates over.
+        kind: Domain of the integral.
         address: Address of the C function.
         coefficients: Positions in the form of the coefficients that it reads, in packed order.
         module: Compiled module, which holds the C function.

@@ -1,4 +1,4 @@
-"""The field problem: (form, particle densities, reduction) -> residual and reduced tangent."""
+"""The field problem: (form, particle data, reduction) -> residual and reduced tangent."""
 
 from tawami.field.assembly import Assembly
 from tawami.field.attachment import Attachment

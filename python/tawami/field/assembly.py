@@ -1,7 +1,7 @@
 """The seam between particles and field problem (contract 3 of CONTRIBUTING.md).
 
-(form, particle densities on active cells, reduction) -> residual and reduced tangent. `reference` and
-`points` implement it, and nothing else knows which of them is used.
+(form, particle data on active cells, reduction) -> residual and reduced tangent. `reference` and
+`points` implement it, and nothing else depends on the choice.
 """
 
 from __future__ import annotations

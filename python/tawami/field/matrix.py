@@ -38,7 +38,7 @@ class ReducedMatrix:
         self.reduction: Reduction | None = None
 
     def fit(self, assembler: _rust.Assembler, attachment: Attachment, reduction: Reduction) -> None:
-        """Make the matrix anew if the unknowns, or the cells that couple them, are others.
+        """Make a new matrix if the unknowns, or the cells that couple them, are others.
 
         Cells and unknowns of all ranks are known on each of them, so that all ranks decide alike.
         """

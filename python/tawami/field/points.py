@@ -2,7 +2,7 @@
 
 For each cell, on all threads: the integrand and its derivative at each particle, B^T r and B^T D B with
 the functions there, and the sum into known entries of P^T K P. There is no matrix of the mesh. Integrals
-over cells (`dx`) are kernels of FFCx on the cell. The numbers are those of the reference assembly up to
+over cells (`dx`) are kernels of FFCx on the cell. The numbers are those of `reference` (dolfinx) up to
 round-off (`tests/field/test_assemblies.py`).
 """
 

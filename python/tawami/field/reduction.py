@@ -49,7 +49,7 @@ class Reduction:
         SupportError: Supports contradict each other, or leave a rigid motion free.
     """
 
-    #: What point constraints eliminate: dependent coefficients, the others involved, and their weights.
+    #: Elimination by point constraints: dependent coefficients, the others involved, and their weights.
     _eliminated: tuple[Indices, Indices, Array] | None
 
     def __init__(
@@ -244,7 +244,7 @@ class Reduction:
 
 
 def _prescribed(held: Sequence[Held], size: int, tolerance: float) -> tuple[Mask, Array]:
-    """Which coefficients are prescribed, and their values."""
+    """Mask of the prescribed coefficients, and their values."""
     fixed, total, last = np.zeros(size, dtype=bool), np.zeros(size), np.full(size, -1)
     for number, support in enumerate(held):
         change = np.abs(total[support.indices] - support.values) * fixed[support.indices]

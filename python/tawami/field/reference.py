@@ -1,4 +1,4 @@
-"""The reference assembly: plain dolfinx over the active cells, then P^T r and P^T K P by PETSc."""
+"""Assembly by plain dolfinx over the active cells, then P^T r and P^T K P by PETSc."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ class Tractions:
         return -attached.summed(attached.layout.extraction_on(cells).T @ vector)
 
     def _on(self, edge: Edge) -> Mask:
-        """Which biquadratic nodes of a cell lie on its side towards an edge."""
+        """The biquadratic nodes of a cell on its side towards an edge."""
         axis, end = self._grid.edge(edge)
         nodes = self._grid.rectangle.to_grid_axes(dolfinx.reference_nodes(2))
         return np.isclose(nodes[:, axis], 1.0 if end else 0.0)

@@ -1,4 +1,4 @@
-"""The contract of a weak form: what a file in `forms/` declares.
+"""The contract of a weak form: the declarations of a file in `forms/`.
 
 A form declares `fields` and `kinematics`, optionally `parameters`, `options`, `strain` and
 `whole_cells`, and a function `residual`. The names of its arguments select from the following:
@@ -58,7 +58,7 @@ from tawami.form.quantities import COMPONENTS
 
 #: Default of declarations that are optional.
 NOTHING: Mapping[str, Any] = {}
-#: What a form declares besides its residual; the first two are required.
+#: Declarations of a form besides its residual; the first two are required.
 DECLARATIONS = (
     "fields", "kinematics", "parameters", "options", "static_options", "strain", "whole_cells"
 )  # fmt: skip
@@ -226,7 +226,7 @@ class Form:
         return _from_module(module, getattr(module, "residual", None), name)
 
     def identity(self) -> dict[str, Any]:
-        """What tells it from another form, for checkpoints."""
+        """Facts that identify the form, for checkpoints."""
         declared = {key: getattr(self, key) for key in DECLARATIONS}
         kept = declared | {key: str(declared[key]) for key in ("kinematics", "strain")}
         return {
@@ -277,7 +277,7 @@ class Form:
         """A warning for each parameter above its usual range."""
         return [
             f"{name} = {value:g}: expected at most {self.parameters[name]['usual']:g}, beyond which the "
-            f"results of form {self.name} are far off; use a smaller {name}"
+            f"results of form {self.name} are inaccurate; use a smaller {name}"
             for name, value in parameters.items()
             if value > self.parameters[name].get("usual", math.inf)
         ]

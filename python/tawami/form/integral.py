@@ -91,7 +91,7 @@ class KernelBuilder:
 
         Args:
             form: The form.
-            kind: What it integrates over.
+            kind: Domain of the integrals.
         """
         symbols, slots, packed = self._symbols, self._field_slots(), {}
         for rule, densities, columns in self._used(form):

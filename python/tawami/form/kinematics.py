@@ -25,7 +25,7 @@ FIELD_UNITS: Mapping[str, str] = {"displacement": "m", "volumetric_strain": "-",
 
 @dataclass(frozen=True)
 class Kinematics:
-    """Which strain the material law receives at a particle.
+    """Strain that the material law receives at a particle.
 
     Attributes:
         name: As a form file declares it.
@@ -54,7 +54,7 @@ class Kinematics:
 
 @dataclass(frozen=True)
 class StrainMeasure:
-    """How strains follow from a displacement gradient, and the stresses that belong to them.
+    """Strains of a displacement gradient, and the stresses that belong to them.
 
     Attributes:
         name: As a form file declares it.

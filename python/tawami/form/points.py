@@ -31,8 +31,8 @@ class PointForm:
 
     Attributes:
         form: The form on a unit interval with one point.
-        fields, test, trial: What the components of the coefficient of the fields, of the test function
-            and of the trial function are; none of the last in a linear form.
+        fields, test, trial: Meaning of the components of the coefficient of the fields, of the test
+            function and of the trial function; empty for the last in a linear form.
     """
 
     form: Any
@@ -92,7 +92,7 @@ def _space(size: int, domain: Any) -> Any:
 
 
 def _entry(node: Any, increments: Any) -> tuple[Any, Entry]:
-    """What a component is: of the fields, of argument 0 or 1, or (None, ...) of anything else."""
+    """Origin of a component: the fields, argument 0 or 1, or (None, ...) for anything else."""
     symbol, index = node.ufl_operands
     while isinstance(symbol, Grad):
         (symbol,) = symbol.ufl_operands

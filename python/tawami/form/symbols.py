@@ -31,7 +31,7 @@ from tawami.form.quantities import (
 PLACEHOLDERS = 1000
 #: Degree along x and along y up to which the densities of `sum_p` integrate exactly.
 EXACT_DEGREE = 4
-#: How a form is evaluated: by kernels at the particles, or by integrals over cells in plain dolfinx.
+#: Evaluation of a form: by kernels at the particles, or by integrals over cells in plain dolfinx.
 Assembly = Literal["points", "dolfinx"]
 
 
@@ -210,7 +210,7 @@ class Symbols:
             warnings.warn(
                 f"form {self.form.name}: sum_p of an expression of degree {degree:g} (degrees of "
                 "factors add up) differs from the sum over the particles: expected at most degree "
-                f"{EXACT_DEGREE}; put what is nonlinear in the fields into the material law",
+                f"{EXACT_DEGREE}; move terms that are nonlinear in the fields to the material law",
                 InexactSumWarning,
                 stacklevel=2,
             )

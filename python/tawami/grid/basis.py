@@ -80,7 +80,7 @@ def extraction(basis: Basis, cells: Counts, degree: int) -> sp.csr_matrix:
 
 @functools.lru_cache(maxsize=2)
 def greville(basis: Basis, origin: Position, h: float, cells: Counts) -> Array:
-    """Greville points [m] of the functions of a grid, functions x axes; not to be written."""
+    """Greville points [m] of the functions of a grid, functions x axes; read only."""
     axes = zip(origin, cells, strict=True)
     points = lattice([x + h * greville_1d(basis, n) for x, n in axes])
     points.flags.writeable = False

@@ -76,7 +76,7 @@ def edge_functions(grid: Grid, basis: Basis, edge: Edge) -> Indices:
 
 @functools.lru_cache(maxsize=32)
 def _at_end(basis: Basis, cells: Counts, axis: int, end: int) -> Indices:
-    """Numbers of the functions that do not vanish at an end of an axis; not to be written."""
+    """Numbers of the functions that do not vanish at an end of an axis; read only."""
     shape = [_rust.basis_len(basis, n) for n in cells]
     numbers = np.arange(np.prod(shape)).reshape(shape, order="F")
     functions: Indices = np.take(numbers, end, axis=axis)

@@ -108,7 +108,7 @@ class Grid(Unique):
         return self.origin, self.h, self.cells
 
     def identity(self) -> dict[str, Any]:
-        """What distinguishes it from another grid, for checkpoints."""
+        """Facts that identify the grid, for checkpoints."""
         return {"grid": [list(self.origin), self.h, list(self.cells)]}
 
     @property

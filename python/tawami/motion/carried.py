@@ -1,4 +1,4 @@
-"""What particles carry in a motion, and its way to the grid and back.
+"""Velocities and accelerations of the particles in a motion, and their transfer to the grid and back.
 
 At small strain particles do not move: velocity and acceleration stay on the grid.
 """
@@ -26,7 +26,7 @@ class Carried:
 
     Args:
         configuration: The body.
-        transfer: How velocities are transferred.
+        transfer: Transfer of velocities.
         damping: Time in which velocities of FLIP relax towards those of PIC [s].
     """
 
@@ -37,8 +37,8 @@ class Carried:
         for name, rank in ARRAYS.items():
             particles.carry(name, self._space.dim**rank)
             particles.carried(name)[:] = 0.0
-        #: v and a of a grid that stays (functions x dim), and the velocities that the particles got.
-        self._stationary: tuple[Array, Array, Array] | None = None
+        #: v and a of a grid that stays (functions x dim), and velocities and numbers of its particles.
+        self._stationary: tuple[Array, Array, Array, Array] | None = None
 
     @property
     def velocity(self) -> Array:
@@ -68,7 +68,8 @@ class Carried:
         """v and a of a grid that stays, functions x dim; None once velocities were written."""
         if self._stationary is None:
             return None
-        v, a, given = self._stationary
+        v, a, given, number = self._stationary
+        given = given[np.isin(number, self._now.domain.particles.number)]  # some may be removed
         written = np.array([not np.array_equal(given, self.velocity)])
         return None if ranks.any_of(self._now.model.grid.comm, written)[0] else (v, a)
 
@@ -117,10 +118,10 @@ class Carried:
             array = self._view(name)
             array[:] = values.reshape(array.shape)
         if not self._now.model.moves:
-            self._stationary = v1, a1, np.array(self.velocity)
+            self._stationary = v1, a1, *self._given()
 
     def state(self) -> dict[str, Any]:
-        """What is not in the particles, for a checkpoint."""
+        """The part of the state that is not in the particles, for a checkpoint."""
         stationary = self.on_grid
         return {"on_grid": None if stationary is None else list(stationary)}
 
@@ -136,7 +137,11 @@ class Carried:
             if [np.shape(values) for values in on_grid] != [shape, shape]:
                 raise ValueError("v and a of the grid have another number of functions")
             check_like(on_grid, [np.zeros(shape)] * 2, "v and a of the grid")
-        self._stationary = None if on_grid is None else (*on_grid, np.array(self.velocity))
+        self._stationary = None if on_grid is None else (*on_grid, *self._given())
+
+    def _given(self) -> tuple[Array, Array]:
+        """Copies of the velocities and numbers of the particles."""
+        return np.array(self.velocity), np.array(self._now.domain.particles.number)
 
 
 def divided(sums: Array, weights: Array) -> Array:

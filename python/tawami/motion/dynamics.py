@@ -96,7 +96,7 @@ class Dynamics(Sealed, Unique):
         self._seal()
 
     def _how_to_set(self, name: str) -> str:
-        """What to do instead of setting an attribute."""
+        """Advice for an attribute that cannot be set."""
         if name in ("velocity", "acceleration", "velocity_gradient"):
             return f"write into the array, as motion.{name}[:] = ..."
         return "a motion is given by Dynamics(scene, ...) and changed by step(...) and run(...)"
@@ -111,7 +111,7 @@ class Dynamics(Sealed, Unique):
         title = f"Dynamics at {self.time:g} s after {self.steps} steps"
         return html.table(title, description.lines(self._now, self._line))
 
-    # -- what the particles carry --------------------------------------------
+    # -- arrays of the particles ---------------------------------------------
 
     @property
     def velocity(self) -> Array:
@@ -151,7 +151,7 @@ class Dynamics(Sealed, Unique):
         return self._clock.steps
 
     def step(self, dt: float) -> Solution:
-        """Take one step of `dt` seconds; if it fails nothing has changed.
+        """Take one step of `dt` seconds. If it fails, nothing has changed.
 
         Raises:
             ConvergenceError, SingularError: As `Scene.solve`.
@@ -185,14 +185,14 @@ class Dynamics(Sealed, Unique):
         each: Callable[[Solution], None] | None = None,
         results: Recorder | None = None,
     ) -> list[Step]:
-        """Take steps until `end` [s]; one that fails is halved, and the size grows again after three.
+        """Take steps until `end` [s]. A step that fails is halved; the size grows after three steps.
 
         Args:
             end: Time of the end [s].
             dt: Size of a step [s].
             smallest: Size below which the run ends [s]; dt/1024 by default.
             each: Called with the solution of each accepted step.
-            results: Where the run writes its results and checkpoints.
+            results: `tawami.Results` of the run, with outputs and checkpoints.
 
         Returns:
             The accepted steps, with those of a run that was resumed.

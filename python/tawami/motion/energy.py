@@ -2,8 +2,8 @@
 
     kinetic + elastic + dissipated + friction + left = start + external - transfer - impact - integration
 
-All are measured but the last, which closes the balance: the error of the time integration, and what the
-stabilisation of the form stores and takes (1/2 alpha h^2 sum V K^2/mu |grad eps_v|^2).
+All terms are measured except the last, the remainder: the error of the time integration, and the energy
+in the stabilisation of the form (1/2 alpha h^2 sum V K^2/mu |grad eps_v|^2).
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ class Energies:
         dissipated: Work of the stress on plastic strains.
         friction: Lost to the friction of walls.
         external: Work of loads and of supports that move; between two steps of a motion, the elastic
-            energy that static steps add.
+            energy that static steps and new laws add.
         transfer: Energy lost on the way from the particles to the grid and back: kinetic, and elastic
             where the mean stress of a mixed form is projected on the present grid.
         impact: Kinetic energy lost where supports stop the grid.
-        left: Kinetic and elastic energy of the particles that left the grid.
-        integration: What closes the balance.
+        left: Kinetic and elastic energy of the particles that left the grid or were removed.
+        integration: Remainder of the balance.
     """
 
     kinetic: float = 0.0
@@ -61,7 +61,7 @@ class Energies:
 
 
 class Growth:
-    """Warns, once, of spurious energy: a body that has more than it was given.
+    """Warns, once, of spurious energy: a body has more than loads and supports supplied.
 
     Args:
         energy: That it has at the start [J per metre depth].
@@ -72,7 +72,7 @@ class Growth:
         self._warned = False
 
     def state(self) -> dict[str, Any]:
-        """The energy it was given, the most it had, and whether it has warned."""
+        """The supplied energy, the largest energy, and whether a warning was issued."""
         return dict(vars(self))
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -84,7 +84,7 @@ class Growth:
         self._given += energy
 
     def check(self, energies: Energies, steps: int, time: float) -> None:
-        """Warn at the end of a step if the body has more energy than it was given.
+        """Warn at the end of a step if the body has more energy than was supplied.
 
         Args:
             energies: The balance.
@@ -98,9 +98,9 @@ class Growth:
             return
         self._warned = True
         warn(
-            f"after {steps} steps, at {time:g} s, the body has {grown:.3g} J/m more energy than it was "
-            f"given, {100 * grown / self._most:.2g} % of the most it had: its stress cannot be trusted. "
-            "Take shorter steps or more particles; motion.energies is the balance",
+            f"after {steps} steps, at {time:g} s, the body has {grown:.3g} J/m more energy than loads "
+            f"and supports supplied, {100 * grown / self._most:.2g} % of its largest energy: its stress "
+            "is not reliable. Use shorter steps or more particles; motion.energies is the balance",
             EnergyWarning,
         )
 
@@ -110,7 +110,7 @@ class Balance:
 
     Args:
         configuration: The body.
-        carried: What its particles carry.
+        carried: Velocities of its particles.
 
     Attributes:
         energies: The balance since the start.
@@ -123,6 +123,8 @@ class Balance:
         #: Kinetic energy of the particles when the last step was stored.
         self._stored_kinetic = self.energies.kinetic
         self._statics = configuration.activity.statics
+        #: Energy of the particles that were removed, as far as the balance counts it.
+        self._removed = configuration.removed
 
     def sum(self, value: float) -> float:
         """A sum over the ranks."""
@@ -140,9 +142,10 @@ class Balance:
         return self.sum(self._now.domain.stage.elastic_energy())
 
     def begin(self) -> None:
-        """Start a step: count what velocities that the script wrote into the particles have added, and
-        static steps since the last one.
+        """Start a step: add the energy of velocities that the script wrote into the particles, of
+        particles that were removed since the last step, and of static steps.
         """
+        self._count_removed()
         kinetic = self.kinetic
         self._growth.add(kinetic - self._stored_kinetic)
         self._stored_kinetic = kinetic
@@ -150,6 +153,23 @@ class Balance:
             self._statics, elastic, e = self._now.activity.statics, self.elastic, self.energies
             external = e.external + elastic - e.elastic
             self.energies = replace(e, elastic=elastic, external=external)
+
+    def _count_removed(self) -> None:
+        """Move the energy of particles that the script has removed to the term of those that left."""
+        (kinetic, elastic), e = self._now.removed - self._removed, self.energies
+        if not (kinetic or elastic):
+            return
+        self._removed = self._now.removed
+        self._stored_kinetic -= kinetic
+        if not self._now.model.moves:  # the energy of the grid, with the mass that is left
+            mass = self._now.domain.lumped_mass
+            v, _ = self._carried.mapped(mass)
+            kinetic = e.kinetic - 0.5 * float(mass @ (v**2).sum(axis=1))
+        left = kinetic + elastic
+        self.energies = replace(
+            e, kinetic=e.kinetic - kinetic, elastic=e.elastic - elastic, left=e.left + left
+        )
+        self._growth.add(-left)
 
     def of_step(
         self, mass: Array, velocities: tuple[Array, Array, Array], accepted: Accepted
@@ -178,7 +198,7 @@ class Balance:
 
         Args:
             step: As :meth:`of_step` gave it.
-            dissipated: What the laws dissipated on this rank [J per metre depth].
+            dissipated: Energy that the laws dissipated on this rank [J per metre depth].
             steps: Steps so far.
             time: At the end of the step [s].
         """
@@ -197,7 +217,7 @@ class Balance:
             self._growth.check(self.energies, steps, time)
 
     def project(self, taken: float) -> None:
-        """Count what the projection of the mean stress took from the particles of this rank.
+        """Count the energy that the projection of the mean stress took from the particles of this rank.
 
         Args:
             taken: Elastic energy [J per metre depth].
@@ -217,6 +237,7 @@ class Balance:
             "energies": asdict(self.energies),
             "growth": self._growth.state(),
             "stored_kinetic": self._stored_kinetic,
+            "removed": [*self._removed],
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -224,4 +245,5 @@ class Balance:
         self.energies = Energies(**state["energies"])
         self._growth.restore(state["growth"])
         self._stored_kinetic = state["stored_kinetic"]
+        self._removed = np.reshape(state["removed"], 2)
         self._statics = self._now.activity.statics

@@ -30,7 +30,7 @@ class Modes:
         frequencies: [Hz]; 0 for a rigid motion, negative where the body is unstable and the motion grows
             (minus its rate over 2 pi).
         shapes: Displacements of the particles, modes x particles x dim, in the order of the body. Their
-            sum over the mass, sum_i m_i |u_i|^2, is 1 [1/sqrt(kg per metre depth)] on the grid.
+            sum over the mass, `sum_i m_i |u_i|^2`, is 1 [1/sqrt(kg per metre depth)] on the grid.
     """
 
     frequencies: Array
@@ -69,7 +69,7 @@ def modes(scene: Scene, number: int = 6) -> Modes:
     squares, vectors = found
     order = np.argsort(squares)
     squares, vectors = squares[order], vectors[:, order]
-    # what the shift cannot tell from zero is a rigid motion
+    # a value that the shift makes equal to zero belongs to a rigid motion
     squares[np.abs(squares) < 1e-6 * abs(shift)] = 0.0
     now = scene.configuration
     space, domain = now.model.space, now.domain

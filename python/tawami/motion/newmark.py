@@ -197,10 +197,10 @@ class NewmarkStep:
 
 @dataclass(frozen=True)
 class NewmarkUpdate:
-    """What a dynamic step stores; nothing in it fails.
+    """Changes that a dynamic step stores; storing them cannot fail.
 
     Attributes:
-        configuration, carried, balance, clock: What it changes.
+        configuration, carried, balance, clock: Objects that it changes.
         after: The clock at the end of the step.
         moment: The end of the step.
         arrays: Of the particles.
@@ -236,5 +236,5 @@ class NewmarkUpdate:
 
 
 def signature(configuration: Configuration) -> tuple[int, ...]:
-    """A value that differs once loads or supports are others."""
+    """A value that changes with loads and supports."""
     return configuration.loads.version, configuration.supports.version

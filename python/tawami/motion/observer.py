@@ -1,7 +1,7 @@
 """Observers of a run, as `ramp`, `settle` and `Dynamics.run` see them.
 
-What is passed as `results=` is a :class:`Recorder`: it makes an :class:`Observer` for each phase of the
-run, and the phase tells its observer of every step. `tawami.results` implements both.
+The argument `results=` is a :class:`Recorder`. It makes an :class:`Observer` for each phase of the run,
+which is called after every step. `tawami.results` implements both.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tawami.scene.solution import Solution
 
 
 class Subject(Protocol):
-    """What is observed: a `Scene` in `ramp` and `settle`, a `Dynamics` in its `run`."""
+    """Subject of an observer: a `Scene` in `ramp` and `settle`, a `Dynamics` in its `run`."""
 
     @property
     def scene(self) -> Scene:
@@ -37,7 +37,7 @@ class Subject(Protocol):
         """Facts that decide the result, as JSON can hold them; a call for all ranks."""
 
     def state(self) -> dict[str, Any]:
-        """All that is carried from one step to the next; a call for all ranks."""
+        """State that passes from one step to the next; a call for all ranks."""
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`state`; a call for all ranks."""
@@ -158,7 +158,7 @@ class NullObserver:
 
 @runtime_checkable
 class Recorder(Protocol):
-    """What is passed as `results=`; `tawami.Results` is one."""
+    """Object that is passed as `results=`, such as `tawami.Results`."""
 
     def phase(self, kind: str, subject: Subject, end: float, unit: str) -> Observer:
         """Observer of the next phase; a call for all ranks.

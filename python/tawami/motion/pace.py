@@ -55,7 +55,7 @@ class Steps(list[Step]):
 
     Attributes:
         loads: Share of the new loads that is in equilibrium after each step.
-        error: Why the next step failed; None if none did.
+        error: Error of the step that failed; None if none did.
     """
 
     def __init__(self) -> None:
@@ -108,7 +108,7 @@ def check(pace: Mapping[str, Any], steps: Mapping[str, Any]) -> None:
     """Check stored values of a pace, and arrays of :func:`pack`.
 
     Raises:
-        ValueError: A position or a size that is no such number, or incomplete records of steps.
+        ValueError: A position or a size that is not such a number, or incomplete records of steps.
     """
     size, at, ends = pace["size"], pace["at"], steps["end"]
     if not 0 < size < math.inf or not 0 <= at < math.inf:

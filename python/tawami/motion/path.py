@@ -94,7 +94,7 @@ class PathStep:
 
     Attributes:
         following: The path.
-        configuration: What it starts from.
+        configuration: Configuration at its start.
         size: Length [m].
     """
 
@@ -168,10 +168,10 @@ class PathStep:
 
 @dataclass(frozen=True)
 class PathUpdate:
-    """What a step along a path stores.
+    """Changes that a step along a path stores.
 
     Attributes:
-        following, configuration: What it changes.
+        following, configuration: Objects that it changes.
         factor, direction, point: After the step.
     """
 
@@ -182,7 +182,7 @@ class PathUpdate:
     point: tuple[float, float] | None
 
     def store(self, dissipated: float) -> None:
-        """Nothing is to be stored before the particles move."""
+        """Store nothing before the particles move."""
 
     def finish(self) -> None:
         """Record the place on the path."""
@@ -208,9 +208,9 @@ def follow(
 
     The load factor is an unknown of each step: 0 for the loads that are in equilibrium already, 1 for
     all new loads; it may fall and become negative. Each step has a given length, of the displacement of
-    a point, or of the body. A point must move on steadily along the path. An arc length serves a body
-    that snaps through. It may turn back and unload at a sharp snap-back of a body that softens in one
-    place: control a point next to that place.
+    a point, or of the body. The displacement of the point must not reverse along the path. An arc length
+    suits a body that snaps through. It may turn back and unload at a sharp snap-back of a body that
+    softens in one place: control a point next to that place.
 
     Args:
         scene: The scene, with new loads; displacements that supports prescribe are held.
@@ -221,7 +221,7 @@ def follow(
         smallest: Length below which a step is not halved any more [m]; size/1024 by default.
         each: Called with the solution of each accepted step; `solution.load` is the load factor.
         results: `tawami.Results` of the run, with outputs and checkpoints.
-        stop: What to do if the smallest step does not converge: 'return' the steps with a warning, or
+        stop: Action if the smallest step does not converge: 'return' the steps with a warning, or
             'raise' the error.
 
     Returns:

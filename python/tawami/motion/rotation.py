@@ -34,10 +34,7 @@ class Rotation:
 
     def __init__(self, configuration: Configuration) -> None:
         self._now = configuration
-        model = configuration.model
-        K, mu = model.moduli.T
-        self._stiff = STIFF * mu < K
-        self.warned = not (model.moves and self._stiff.any())
+        self.warned = not configuration.model.moves
 
     def check(self, u: Array, dt: float) -> None:
         """Check a step; a call for all ranks.
@@ -49,10 +46,12 @@ class Rotation:
         Warns:
             RotationWarning: More than a tenth of the stiff mass turns further than `LARGEST`.
         """
-        if self.warned:
+        K, mu = self._now.model.moduli.T
+        stiff_laws = STIFF * mu < K
+        if self.warned or not stiff_laws.any():
             return
         domain = self._now.domain
-        stiff = self._stiff[domain.particles.material]
+        stiff = stiff_laws[domain.particles.material]
         gradients = domain.gradients(u)[stiff]
         spin = 0.5 * (gradients - gradients.transpose(0, 2, 1))
         angles = np.sqrt(0.5 * np.einsum("pij,pij->p", spin, spin))

@@ -15,7 +15,7 @@ from tawami.scene.activity import Activity
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
 
-#: What to do if the smallest step does not converge.
+#: Actions if the smallest step does not converge.
 Stop = Literal["return", "raise"]
 
 
@@ -36,7 +36,7 @@ def march(
         end: Time [s] or share at which the steps end.
         smallest: Size below which a step is not tried again.
         attempt: Function of the end of a step and its size that takes the step; if it raises, it must
-            leave everything as it was.
+            change nothing.
         observer: Observer of the steps.
         activity: Of the scene; no step may begin while observer and `each` are called.
         each: Called with the solution of each accepted step.
@@ -88,7 +88,7 @@ def end_early(steps: Steps, error: ConvergenceError, stop: Stop, what: str, scen
         return
     warn(
         f"{what} stopped {error.__notes__[0]}: Newton did not converge. The scene is in its last "
-        "equilibrium; `reached` holds its load. If the body carries more, allow a smaller `smallest`; "
+        "equilibrium; `reached` holds its load. If the body can carry more, use a smaller `smallest`; "
         "follow(scene, ...) passes a limit load; stop='raise' raises the error instead",
         IncompleteWarning,
     )
@@ -109,7 +109,7 @@ def ramp(
     New loads grow in proportion from 0 to their values; loads that are in equilibrium already stay,
     and loads that were released fade. With `until`, loads and displacements with an amplitude follow it
     from the time of the scene to that time, which passes in proportion too.
-    Where the body carries no more, the scene stays in its last equilibrium; later ramps start there.
+    If the body cannot carry more, the scene stays in its last equilibrium; later ramps start there.
 
     Args:
         scene: The scene.
@@ -118,7 +118,7 @@ def ramp(
         until: Time for amplitudes at the end [s]; the time of the scene by default.
         each: Called with the solution of each accepted step.
         results: `tawami.Results` of the run, with outputs and checkpoints.
-        stop: What to do if the smallest step does not converge: 'return' the steps with a warning, or
+        stop: Action if the smallest step does not converge: 'return' the steps with a warning, or
             'raise' the error.
 
     Returns:
@@ -211,7 +211,7 @@ def settle(
         if observer.finished:
             return steps
         ghost = scene.configuration.model.options.get("ghost_penalty") == "on"
-        penalty = ", or take ghost_penalty='off', which settles faster" if ghost else ""
+        penalty = ", or use ghost_penalty='off', which settles faster" if ghost else ""
         raise ConvergenceError(
             f"settle: {steps[-1].history[0][0]:.1e} of the forces are out of balance after {max_resets} "
             f"resets of the grid: expected less than {tolerance:g}; allow more resets, or a larger "

@@ -28,11 +28,11 @@ TransferName = Literal["affine_flip", "flip", "apic", "tpic", "pic"]
 
 @dataclass(frozen=True)
 class Transfer:
-    """How velocities are transferred between particles and grid.
+    """A transfer of velocities between particles and grid.
 
     Attributes:
         name: As a script chooses it.
-        gradient: Where C_p comes from: grad v1, the moments of v1, or nowhere.
+        gradient: Source of C_p: grad v1, the moments of v1, or none.
         flip: Whether particles get the grid's change of velocity, or its velocity.
     """
 
@@ -80,7 +80,7 @@ def gradient_of(transfer: Transfer, domain: Domain, field: Array, back: Array) -
     """C_p of a field of the grid at the end of the step: particles x dim x dim.
 
     Args:
-        transfer: How.
+        transfer: Kind of transfer.
         domain: The particles where they were at the start of the step.
         field: v1 or a1, functions x dim.
         back: f^-1, f = I + grad u of the step.

@@ -1,4 +1,4 @@
-"""Material laws in NumPy, to try one out before it is written in Rust."""
+"""Material laws in NumPy, to test a law before it is written in Rust."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class NumpyLaw:
         self.elastic()
 
     def identity(self) -> Any:
-        """What tells it from another law of the same K and mu, for checkpoints."""
+        """Facts that identify the law, besides K and mu, for checkpoints."""
         return text(self.respond)
 
     def elastic(self) -> _rust.Material:
@@ -146,7 +146,7 @@ class NumpyStage:
         raise AssertionError
 
     def _check(self, bad: npt.NDArray[np.bool_], what: str, strain: Array, value: Array) -> None:
-        """Raise an error if a particle has no answer at the mean stress of the form."""
+        """Raise an error if the law has no response at the mean stress of the form."""
         if not bad.any():
             return
         p = int(np.flatnonzero(bad)[0])

@@ -144,14 +144,19 @@ def check_staying(
             )
     staying = ranks.sum_of(grid.comm, np.array([np.sum(~gone)]))
     if not staying[0]:
-        raise InputError("the last particle would leave the grid: nothing is left to compute")
+        raise InputError("the last particle would leave the grid, and no body would remain")
 
 
 def removed(
-    grid: Grid, particles: _rust.Particles
+    grid: Grid, particles: _rust.Particles, gone: Mask
 ) -> tuple[_rust.Particles, list[tuple[int, tuple[float, float]]]]:
-    """The particles inside the grid; number and position [m] of those outside, on all ranks."""
-    gone = outside(grid, particles.x)
+    """The particles of this rank that stay; number and position [m] of the others, on all ranks.
+
+    Args:
+        grid: The grid.
+        particles: The particles of this rank.
+        gone: Whether each of them is removed.
+    """
     mine = [
         (int(particles.number[p]), (float(particles.x[p, 0]), float(particles.x[p, 1])))
         for p in np.flatnonzero(gone)

@@ -41,6 +41,13 @@ def shown_axes(width: float, height: float) -> Axes:
     return axes
 
 
+def lay_out(figure: Figure | None) -> None:
+    """Place the parts of a figure, which takes two draws where axes have equal scales."""
+    for _ in range(2):
+        assert figure is not None
+        figure.draw_without_rendering()
+
+
 @style.used()
 def save(figure: Figure, path: str | Path, *, dpi: int = 160) -> None:
     """Write a figure as PNG, atomically.

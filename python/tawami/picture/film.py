@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,13 +16,19 @@ from tawami.base.arrays import Array
 from tawami.base.errors import OutputError
 from tawami.base.files import atomic_file
 from tawami.picture import style
-from tawami.picture.figure import new_figure, save
+from tawami.picture.figure import lay_out, new_figure, save
 from tawami.picture.particles import Corners, Scale, Squares, draw_frame, size_of, view
 
 if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation
 
 Movie = Literal["gif", "mp4"]
+#: Signs in place of the icons of matplotlib's player, which come from the web.
+ICONS = {
+    "minus": "-", "fast-backward": "&#8676;", "step-backward": "&lsaquo;",
+    "play fa-flip-horizontal": "&#9664;", "pause": "||", "play": "&#9654;", "step-forward": "&rsaquo;",
+    "fast-forward": "&#8677;", "plus": "+",
+}  # fmt: skip
 #: Frames of a second.
 RATE = 12
 
@@ -34,7 +41,7 @@ class Frame:
         title: Of the picture.
         x: Positions [m], particles x 2.
         shape: Of the particles; see `Squares.show`.
-        values: What colours them.
+        values: Quantity that colours them.
     """
 
     title: str
@@ -62,7 +69,7 @@ class Film:
         self.squares = Squares(self.axes, scale)
         self.squares.add_bar(self.axes)
         self.show(-1)
-        self.figure.draw_without_rendering()
+        lay_out(self.figure)
         self.figure.set_layout_engine("none")  # the same view in all frames
 
     def show(self, number: int) -> None:
@@ -114,7 +121,10 @@ def _player() -> Any:
 
         def _repr_html_(self) -> str:
             with style.used():
-                return str(self.to_jshtml())
+                page = re.sub(r"<link[^>]*>", "", self.to_jshtml())
+            for icon, sign in ICONS.items():
+                page = page.replace(f'<i class="fa fa-{icon}"></i>', sign)
+            return page
 
         @style.used()
         def save(self, filename: Any, writer: Any = None, *more: Any, **options: Any) -> None:

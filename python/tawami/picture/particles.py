@@ -93,7 +93,7 @@ class Squares:
         from matplotlib.collections import PolyCollection
 
         self._scale = scale
-        self.artist = PolyCollection([], cmap=scale.colours, edgecolors="face", linewidths=0.3)
+        self.artist = PolyCollection([], cmap=scale.colours, edgecolors="face", linewidths=0.6)
         self.artist.set_clim(scale.low, scale.high)
         self.artist.set_zorder(2)
         axes.add_collection(self.artist, autolim=False)
@@ -117,13 +117,8 @@ class Squares:
 
     def add_bar(self, axes: Axes | Sequence[Axes], **where: Any) -> None:
         """Add the colour bar below the axes, or where the arguments of `Figure.colorbar` say."""
-        usual = {
-            "ax": axes,
-            "orientation": "horizontal",
-            "fraction": 0.06,
-            "aspect": 45,
-            "pad": 0.02,
-        }
+        # without pad=, with which the layout needs three draws to fit
+        usual = {"ax": axes, "orientation": "horizontal", "fraction": 0.06, "aspect": 45}
         scale, figure = self._scale, self.artist.figure
         assert figure is not None
         figure.colorbar(self.artist, extend=scale.extend, label=scale.label, **(where or usual))
@@ -134,7 +129,7 @@ class Squares:
 
 
 def view(x: Array, grid: Corners) -> tuple[Array, Array]:
-    """Corners of what is shown: the grid, or the part of it that particles at x reach."""
+    """Corners of the view: the grid, or the part of it that particles at x reach."""
     lower, upper = x.min(axis=0), x.max(axis=0)
     margin = 0.06 * (upper - lower).max() + 1e-12
     size = grid.upper - grid.lower

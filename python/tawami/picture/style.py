@@ -17,6 +17,8 @@ PURPLE, SKY, BLACK, GRAY = "#CC79A7", "#56B4E9", "#000000", "#7F7F7F"
 LINES = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK, GRAY)
 #: Colour maps of magnitudes and of values of both signs, and what is drawn behind the latter.
 MAGNITUDE, SIGNED, BEHIND = "viridis", "RdBu_r", "0.85"
+#: Map of magnitudes that are 0 in most of a picture, from light to dark.
+FROM_ZERO = "magma_r"
 #: Settings of matplotlib.
 PARAMETERS = {
     "font.family": "DejaVu Sans",
@@ -42,8 +44,14 @@ def used() -> Iterator[None]:
     Raises:
         MissingDependencyError: matplotlib is not installed.
     """
-    with optional("matplotlib", "pictures need").rc_context(PARAMETERS):
+    settings = optional("matplotlib", "pictures need").rcParams
+    # these alone: rc_context would undo what the first figure in a notebook makes of pyplot
+    before = {name: settings[name] for name in PARAMETERS}
+    try:
+        settings.update(PARAMETERS)
         yield
+    finally:
+        settings.update(before)
 
 
 def labelled(name: str, unit: str) -> str:

@@ -1,6 +1,6 @@
 """Results of a run: files, tables, checkpoints, log and pictures, made by observers of its phases.
 
-`tawami.results.plot.plot` draws a run.
+`tawami.plot` draws a run.
 """
 
 from tawami.results.output import Output

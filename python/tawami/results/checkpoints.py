@@ -55,7 +55,7 @@ class Checkpoints:
         folder: Of the run.
         number: Of the phase in the run.
         phase: Its name.
-        subject: What is observed.
+        subject: Scene or motion that is observed.
         schedule: When they are written.
         resumes: Whether the run is resumed: the phase begins from its newest checkpoint.
 
@@ -82,7 +82,7 @@ class Checkpoints:
         self._source: Path | None = None
 
     def newest(self, like: Mapping[str, Any]) -> dict[str, Any] | None:
-        """The newest state that can be used; None if the phase begins anew.
+        """The newest state that can be used; None if the phase starts from its beginning.
 
         Args:
             like: A state of this program, to which entries of that name are compared in kind.
@@ -116,8 +116,8 @@ class Checkpoints:
         self._source = files[-1 - len(problems)] if files else None
         if unknown:
             self._warn(
-                f"'{self.phase}' is resumed, and these values cannot be compared to those of the run "
-                f"before: {'; '.join(unknown)}. Expected the same values as then"
+                f"'{self.phase}' is resumed, and these values cannot be compared with those of the "
+                f"interrupted run: {'; '.join(unknown)}. Make sure that they are the same"
             )
         return state
 
@@ -132,12 +132,12 @@ class Checkpoints:
             raise archive.unusable(self._source, error) from error
 
     def _read(self, path: Path, like: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
-        """The state of a checkpoint of this run, and what cannot be compared to tell that it is."""
+        """The state of a checkpoint of this run, and the names of values that could not be compared."""
         written, state = archive.read(path)
         for name, other, own in differences(written, self._identity):
             raise CheckpointError(
-                f"checkpoint '{path}' is of another run: {name} is {_short(other)} there and "
-                f"{_short(own)} here. Expected the same scene; start anew with existing='replace'"
+                f"checkpoint '{path}' belongs to another run: {name} is {_short(other)} there and "
+                f"{_short(own)} here. Expected the same scene; start a new run with existing='replace'"
             )
         try:
             archive.check_particles(state["scene"]["particles"])

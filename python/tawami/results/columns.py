@@ -191,7 +191,7 @@ def displacement_near(subject: Subject, point: tuple[float, float], what: str) -
             f"{what}: no particle was within a cell ({h:g} m) of it: expected a point of the body "
             "at the start"
         )
-    # all at the distance of the last one, lest round-off choose among them
+    # all at the distance of the last one, so that round-off does not choose among them
     last = np.sort(distance)[:NEIGHBOURS][-1]
     near = np.flatnonzero(distance <= last + ROUND_OFF * h)
     basis = np.column_stack([np.ones(len(near)), offset[near]])

@@ -20,8 +20,8 @@ MOST = 120
 
 
 def scalars(frame: Frame) -> dict[str, tuple[str, Array]]:
-    """What particles can be coloured by: name -> (unit, values). Of vectors these are the size and the
-    components, of tensors the components, and what follows from them, as the mean stress.
+    """Quantities for the colours of particles: name -> (unit, values). Vectors have their size and
+    components, tensors their components and quantities that follow from them, such as the mean stress.
     """
     return numbers.scalars(numbers.derived(frame.on_points))
 
@@ -32,7 +32,7 @@ def film_of(phase: str, times: Times, quantity: str, grid: Corners) -> film.Film
     Args:
         phase: Name of the phase.
         times: Its series.
-        quantity: What the particles are coloured by.
+        quantity: Quantity for the colours.
         grid: Corners of the grid.
     """
     wanted = np.unique(np.linspace(0, len(times) - 1, MOST).round().astype(int))

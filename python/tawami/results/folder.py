@@ -31,10 +31,10 @@ class RunFolder:
 
     Args:
         path: Of the folder.
-        existing: What to do with a run in it: 'stop', 'replace' or 'resume'.
+        existing: Treatment of a run in it: 'stop', 'replace' or 'resume'.
     """
 
-    #: Who writes into a folder: the last one of this process that opened it.
+    #: The object that writes into a folder: the last one of this process that opened it.
     _writers: ClassVar[WeakValueDictionary[Path, RunFolder]] = WeakValueDictionary()
 
     def __init__(self, path: Path, existing: str) -> None:
@@ -79,7 +79,7 @@ class RunFolder:
 
     @property
     def advice(self) -> str:
-        """How the run in the folder is resumed, after a look into it."""
+        """Advice on how to resume the run in the folder."""
         again = "run its script again, with existing='resume'"
         if self._record().get("script") and os.path.isfile(self.path / SCRIPT):
             again = f"resume it with: tawami resume {shlex.quote(str(self.path))}"
@@ -89,7 +89,7 @@ class RunFolder:
         """See :meth:`open`."""
         known, recorded = self._record(), os.path.exists(self.path / RUN)
         phases = known.get("phases", [])
-        # a run that was refused before its first step has no phases
+        # a run that ended with an error before its first step has no phases
         begun = recorded and not (known and not phases)
         resumes = False
         if self.checkpoints or begun:
@@ -104,7 +104,7 @@ class RunFolder:
                 raise InputError(
                     f"{self._what}: the folder holds a run that finished {finished[-1]}, and "
                     "no checkpoint to resume it from: expected its checkpoints, or existing='replace' "
-                    "to start anew"
+                    "to start a new run"
                 )
             if not resumes:
                 self._clear()
@@ -112,8 +112,8 @@ class RunFolder:
             others = [name for name in COPIES if self._is_foreign(self.path / name)]
             if others:
                 raise InputError(
-                    f"{self._what}: the folder holds '{others[0]}', which is of no run: "
-                    "expected a folder of its own for the results"
+                    f"{self._what}: the folder holds '{others[0]}', which does not belong "
+                    "to a run: expected a separate folder for the results"
                 )
         result_folder(self.path / archive.FOLDER)
         return resumes
@@ -152,7 +152,7 @@ class RunFolder:
         return known if isinstance(known, dict) else {}
 
     def _reached(self) -> str:
-        """How far the run in the folder has come, for a message."""
+        """Progress of the run in the folder, for a message."""
         files = self.checkpoints
         return f", last checkpoint '{files[-1].name}'" if files else ""
 

@@ -1,4 +1,4 @@
-"""Frames: what one file of a series holds, made of quantities of the particles or of the grid."""
+"""Frames: the content of one file of a series, made of quantities of the particles or of the grid."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Outputs of a run: when they write, and what survives when a run is resumed.
+"""Outputs of a run: times at which they write, and their state when a run is resumed.
 
     tawami.ParticleOutput("stress", "velocity", every=0.01)
     tawami.GridOutput("displacement", "mean stress", every=0.05)
@@ -85,14 +85,14 @@ class Output:
 
         Args:
             folder: Of the phase.
-            subject: What is observed.
-            state: What :meth:`state` returned for the checkpoint from which the run is resumed; later
+            subject: Scene or motion that is observed.
+            state: Result of :meth:`state` for the checkpoint from which the run is resumed; later
                 files are removed. None for a new phase.
 
         Raises:
             NotModelledError, InputError: A quantity that the scene does not have, or an unknown one.
             OutputError: The folder cannot be written.
-            CheckpointError: The state is none of an output.
+            CheckpointError: The state is not that of an output.
         """
         state = state or {}
         _check_state(self.name, state)
@@ -108,7 +108,7 @@ class Output:
                 self._open(folder, self._seen if state else None, subject)
 
     def observe(self, snapshot: Snapshot) -> None:
-        """Write what is due; a call for all ranks, for every snapshot of a phase.
+        """Write the output if it is due; a call for all ranks, for every snapshot of a phase.
 
         Raises:
             OutputError: A file cannot be written; files written before still open.
@@ -166,6 +166,6 @@ def _check_state(name: str, state: dict[str, Any]) -> None:
         archive.check_like(state, known if state else {}, f"output '{name}'")
     except ValueError as error:
         raise CheckpointError(
-            f"the checkpoint cannot be used ({error}): its content is not what tawami writes. Remove it "
-            "to resume from the one before it, or start anew with existing='replace'"
+            f"the checkpoint cannot be used ({error}): its content is not that of a checkpoint. Remove "
+            "it to resume from the one before it, or start a new run with existing='replace'"
         ) from None

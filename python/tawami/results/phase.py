@@ -34,10 +34,10 @@ class Phase:
     Args:
         folder: Of the run.
         name: Of the phase.
-        subject: What is observed.
+        subject: Scene or motion that is observed.
         end: Time [s] or share at which it ends.
         unit: Of that.
-        outputs: What is written.
+        outputs: Its outputs.
         checkpoints: Its checkpoints.
         shown: Whether the live line appears; None: only if standard error is a terminal.
     """
@@ -91,7 +91,7 @@ class Phase:
             self._stop()
 
     def _note_checkpoint(self, error: BaseException) -> None:
-        """Add to an error where the newest state is."""
+        """Add the place of the newest state to an error."""
         last = self._checkpoints.last()
         if last is None or not self._steps:
             return

@@ -27,7 +27,7 @@ from tawami.results.series import frames
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: What particles are coloured by.
+#: Default quantity for the colours of particles.
 USUAL = "mean stress"
 
 
@@ -38,7 +38,7 @@ def plot(
 
     Args:
         folder: Of the run, with run.json.
-        quantity: What particles are coloured by, one that the run wrote: 'mean stress', 'stress xx',
+        quantity: Quantity for the colours, one that the run wrote: 'mean stress', 'stress xx',
             'velocity' (its size), 'velocity x', ...; by default the mean stress, or the first quantity
             of a run without stresses.
         movie: 'gif', 'mp4' (needs ffmpeg), or None.

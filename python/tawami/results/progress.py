@@ -26,7 +26,7 @@ FORMAT = logging.Formatter("%(asctime)s %(levelname)s %(message)s")
 
 
 class Progress:
-    """What a phase reports of its steps, in the log and in the live line.
+    """Reports of the steps of a phase, in the log and in the live line.
 
     Args:
         phase: Name of the phase.

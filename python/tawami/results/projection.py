@@ -6,7 +6,7 @@
 `lumped` stays within the range of the particles around a vertex. At the border of a body, where they
 are on one side of the vertex, its error is of the size of the gradient times h. `consistent`, the L2
 projection, is exact for bilinear fields and may overshoot. Its matrix is singular if a cell has fewer
-than four particles: conjugate gradients start from `lumped` and do not change what no particle sees.
+than four particles: conjugate gradients start from `lumped` and leave modes that no particle sees.
 Vertices without particles in their cells have the value NaN. `cases/costs/projection.py` measures both
 errors.
 """

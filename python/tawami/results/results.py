@@ -31,12 +31,12 @@ class Results:
 
     Args:
         folder: Created if it does not exist.
-        outputs: What is written: `ParticleOutput`, `GridOutput`, `TableOutput`.
+        outputs: `ParticleOutput`, `GridOutput` and `TableOutput` objects.
         checkpoint_steps: Accepted steps between checkpoints; None for none by number.
         checkpoint_minutes: Wall time between checkpoints [min]; None for none by time. One is always
             written at the end of a phase, on SIGTERM and Ctrl-C, and on an error that ends the run.
         keep: Checkpoints of a phase that are kept.
-        existing: What to do with a run in the folder: 'stop' with an error, 'replace' it, or 'resume'
+        existing: Treatment of a run in the folder: 'stop' with an error, 'replace' it, or 'resume'
             it. The environment variable TAWAMI_EXISTING takes precedence.
         progress: Show a live line on standard error, or a bar in a notebook; by default if there is
             a terminal or a notebook.

@@ -33,12 +33,12 @@ Entry = tuple[float, str]
 
 
 def write_vtu(path: str | Path, frame: Frame) -> None:
-    """Write a VTU file. It is not compressed: zlib takes eight times as long (`cases/writing.py`).
+    """Write a VTU file. It is not compressed: zlib takes eight times as long (`cases/costs/writing.py`).
 
     Raises:
         OutputError: The file cannot be written, or has another ending.
     """
-    import meshio  # here: a scene without output does without it
+    import meshio  # here: a scene without output does not need it
 
     if checks.path("path", path).suffix != ".vtu":
         raise OutputError(f"'{path}': expected a file name ending in .vtu")
@@ -53,7 +53,7 @@ class Series:
     """VTU files in time and their index; for the rank that writes.
 
     Args:
-        folder: Where the index NAME.pvd and the folder NAME of the files are.
+        folder: Folder of the index NAME.pvd and of the folder NAME with the files.
         name: Of both.
     """
 
@@ -89,7 +89,7 @@ class Series:
         """Add a file.
 
         Raises:
-            OutputError: It cannot be written; the series is as it was before.
+            OutputError: It cannot be written; the series is unchanged.
         """
         path = self.files / f"{self.name}-{step:06d}.vtu"
         write_vtu(path, frame)
@@ -130,7 +130,7 @@ def entries(index: Path) -> list[Entry]:
     except (OSError, ElementTree.ParseError, ValueError) as error:
         raise OutputError(
             f"'{index}' cannot be read ({reason(error)}): expected the index of a series as this run "
-            "wrote it; remove it to begin the series anew"
+            "wrote it; remove it to start a new series"
         ) from error
 
 

@@ -23,7 +23,7 @@ def write_particles(path: str | Path, solution: Solution) -> None:
 
     Args:
         path: File to write, ending in .vtu.
-        solution: What was solved.
+        solution: The solution.
 
     Raises:
         OutputError: The file cannot be written.
@@ -42,7 +42,7 @@ def write_grid(path: str | Path, solution: Solution) -> None:
 
     Args:
         path: File to write, ending in .vtu.
-        solution: What was solved.
+        solution: The solution.
 
     Raises:
         OutputError: The file cannot be written.

@@ -64,12 +64,12 @@ class TableOutput(Output):
         except (OSError, ValueError) as error:
             raise OutputError(
                 f"'{self.path}' cannot be read ({reason(error)}): expected the table as this run wrote "
-                "it; remove it to begin the table anew"
+                "it; remove it to start a new table"
             ) from error
         found, *rows = text.split("\n")[:-1] or [""]
         if found != head:
             raise InputError(
-                f"'{self.path}' has the columns {found}, and {head} are asked for: expected the same "
+                f"'{self.path}' has the columns {found}, and {head} are requested: expected the same "
                 "columns in a run that is resumed; give the new table another name="
             )
         return [row for row in rows if _step(row) <= last]

@@ -1,4 +1,4 @@
-"""What a driver script builds, and one accepted step of it."""
+"""The objects of a driver script, and one accepted step."""
 
 from tawami.scene.earlier import earlier
 from tawami.scene.scene import Scene

@@ -24,7 +24,7 @@ class Absent:
     """An attribute that is not modelled; using it raises an error that names the switch.
 
     Args:
-        reason: Why it is absent, and what models it.
+        reason: Reason why it is absent, and the switch that adds it.
     """
 
     def __init__(self, reason: str) -> None:
@@ -46,7 +46,7 @@ class Absent:
 
 
 class Elsewhere:
-    """What neither a scene nor its solutions have, whatever they model."""
+    """Attributes that neither a scene nor its solutions have, whatever they model."""
 
     velocity = Absent(INERTIA)
     acceleration = Absent(INERTIA)

@@ -1,4 +1,4 @@
-"""Actions on a body: what loads and supports have in common, and their handles in a driver script.
+"""Actions on a body: the common part of loads and supports, and their handles in a driver script.
 
 An action is a sum of terms, each a value times a factor. A change replaces the last term: the old one
 fades while the new one grows, so that the body passes from one to the other as it does to a new load.
@@ -33,7 +33,7 @@ class Term:
         values: Components of the value.
         factor: Its factor in time.
         since: Number of the term that the factor came with.
-        share: What of it the body carries.
+        share: Share of it that the body carries.
     """
 
     number: int
@@ -91,11 +91,11 @@ class Owner(Generic[Acts]):
         return self._made
 
     def changed(self) -> None:
-        """One of them was added, changed or released: what was computed for them is out of date."""
+        """Note that one was added, changed or released: results computed for them are out of date."""
         self.version += 1
 
     def remove(self, action: Any) -> None:
-        """Take one of them away, which was released."""
+        """Remove one that was released."""
         self.all = [one for one in self.all if one is not action]
         self.changed()
 
@@ -106,7 +106,7 @@ class Owner(Generic[Acts]):
 
 
 class Action:
-    """A load or a support of a scene; what the methods of `Scene` return.
+    """A load or a support of a scene, as the methods of `Scene` return it.
 
     Args:
         owner: The loads or the supports that it belongs to.
@@ -177,7 +177,7 @@ class Action:
         return values, Factor(str(self), amplitude, velocity, time=self._owner.activity.time)
 
     def release(self) -> None:
-        """Take it away. In statics a load fades as a new one grows; a support is gone at once.
+        """Remove it. In statics a load fades as a new one grows; a support is removed at once.
 
         Raises:
             InputError: It was released before.
@@ -196,7 +196,7 @@ class Action:
             term.apply(now)
 
     def accept(self, now: Moment) -> None:
-        """Later parts grow from this moment; what has faded is dropped."""
+        """Let later parts grow from this moment; drop terms that have faded."""
         for term in self.terms:
             term.accept(now)
         self.terms = [t for t in self.terms if not t.share.is_gone or t is self.terms[-1]]
@@ -204,7 +204,7 @@ class Action:
     # -- identity, checkpoints -----------------------------------------------
 
     def identity(self) -> list[Any]:
-        """What decides the results of a run, as JSON holds it."""
+        """Facts that decide the results of a run, in the types of JSON."""
         return [
             [
                 *map(_fact, term.values),
@@ -215,7 +215,7 @@ class Action:
         ]
 
     def state(self) -> dict[str, Any]:
-        """What the body carries of it."""
+        """The share that the body carries."""
         terms = [
             {
                 "number": term.number,

@@ -1,4 +1,4 @@
-"""The time of a scene, and what it is doing: a step must not begin within another one."""
+"""The time and the activity of a scene: a step must not begin within another one."""
 
 from __future__ import annotations
 
@@ -69,5 +69,5 @@ class Activity:
             raise InputError(
                 f"{what} was called while a step of this scene was being solved, by a law, an "
                 "amplitude, a velocity or another function that the step evaluates: expected a function "
-                "that returns its values and leaves the scene as it is"
+                "that returns its values and does not change the scene"
             )

@@ -21,11 +21,11 @@ from tawami.scene.walls import Wall
 
 
 class Conditions:
-    """What acts on the body of a scene.
+    """Supports and loads of a scene.
 
-    Loads add up, and so do several calls of one kind. Supports must agree where they meet; if not, the
-    next step raises an error that names both. What a method returns can be changed and released:
-    `load = scene.traction(...)`, then `load.change(...)`, `load.release()`.
+    Loads add up, also those of several calls of one method. Supports must agree where they meet; if not,
+    the next step raises an error that names both. The methods return handles, which can be changed and
+    released: `load = scene.traction(...)`, then `load.change(...)`, `load.release()`.
 
     `amplitude` is a factor of the value, a number or a function of time [s]. In `Dynamics` time is that
     of the motion. In statics it is that of the scene, which is 0 at first and passes in

@@ -1,4 +1,4 @@
-"""The body in its present configuration, under its supports and loads: what a step starts from.
+"""The body in its present configuration, under its supports and loads: the start of a step.
 
 A step either changes all of it or nothing.
 """
@@ -63,20 +63,20 @@ class Configuration:
     """Particles, supports and loads of one scene between two steps.
 
     Args:
-        model: What the scene is made of.
+        model: Grid, form and laws of the scene.
         particles: The particles of the whole body, on every rank.
-        numerics: How a step is solved.
+        numerics: Numerical settings of a step.
 
     Attributes:
         domain: The particles where they are; another object after a step that moves them.
         supports, loads: As the driver script made them.
-        activity: Time of the scene, and what it is doing.
+        activity: Time and activity of the scene.
         total: Coefficients of all fields since the start, where particles do not move.
-        left: Number, position [m] and time [s] of the particles that left the grid.
+        left: Number, position [m] and time [s] of the particles that left the grid or were removed.
+        removed: Kinetic and elastic energy of removed particles [J per metre depth].
         begun: Whether a step was stored.
-        projected: Elastic energy that the projection of the mean stress took from the particles of this
-            rank at the end of the last step [J per metre depth].
-        stopwatch: Where the time goes.
+        projected: Elastic energy [J per metre depth] that the projection of the last step took.
+        stopwatch: Time of each stage of a step.
     """
 
     def __init__(self, model: Model, particles: _rust.Particles, numerics: Numerics) -> None:
@@ -91,15 +91,15 @@ class Configuration:
         self.loads = Loads(model.grid, np.array(particles.volume), self.activity)
         self.total = np.zeros(self.domain.layout.size)
         self.left = list[tuple[int, tuple[float, float], float]]()
+        self.removed = np.zeros(2)
         self.begun = self._coverage_checked = False
         self.projected = self._travel = 0.0
         self._small_strain, self._softens = not model.moves, False
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
         earlier: Domain | None = getattr(self, "domain", None)
-        self.domain = Domain.attach(
-            self.model, particles, location, self.numerics, self.stopwatch, earlier
-        )
+        of = self.model, particles, location, self.numerics, self.stopwatch
+        self.domain = Domain.attach(*of, earlier)
 
     @property
     def before(self) -> Array:
@@ -200,7 +200,7 @@ class Configuration:
         assert step is not None
         raise ConvergenceError(
             f"contact and friction of the walls did not settle in {PASSES} solves. Nothing was changed "
-            "in the particles. Take a smaller step",
+            "in the particles. Use a smaller step",
             step.history,
         )
 
@@ -259,7 +259,8 @@ class Configuration:
         projects = self._must_project(moved)
         self.domain.particles.move_to(moved)
         outcome = self._outcome(accepted, coefficients)
-        particles, gone = placement.removed(grid, self.domain.particles)
+        outside = placement.outside(grid, self.domain.particles.x)
+        particles, gone = placement.removed(grid, self.domain.particles, outside)
         self.left += [(number, x, time) for number, x in gone]
         self._attach(*placement.migrated(grid, particles))
         self.projected = 0.0
@@ -291,7 +292,7 @@ class Configuration:
     # -- checkpoints ---------------------------------------------------------
 
     def identity(self) -> dict[str, Any]:
-        """What tells it from another one, for checkpoints; a call for all ranks."""
+        """Facts that identify it, for checkpoints; a call for all ranks."""
         grid = self.model.grid
         sizes = {"stress": self.domain.responses.stiffest} | dict.fromkeys(LENGTHS, grid.h)
         arrays = placement.gathered(grid, self.domain.particles)
@@ -307,12 +308,14 @@ class Configuration:
         return self.model.identity() | facts | particles
 
     def state(self) -> dict[str, Any]:
-        """All that is carried from one step to the next, of all ranks; a call for all ranks."""
+        """State that passes from one step to the next, of all ranks; a call for all ranks."""
         return {
             "particles": placement.gathered(self.model.grid, self.domain.particles),
             "time": self.activity.time,
             "total": self.total,
             "left": self.left,
+            "removed": [*self.removed],
+            "laws": self.model.texts,
             "travel": self._travel,
             "coverage_checked": self._coverage_checked,
             "supports": self.supports.state(),
@@ -329,11 +332,14 @@ class Configuration:
         particles, location = placement.scattered(
             self.model.grid, self.domain.particles, state["particles"], moving=self.model.moves
         )
-        if np.shape(state["total"]) != self.total.shape:
+        sizes = {np.shape(state["total"]), np.shape(state["loads"]["unbalanced"])}
+        if sizes - {(0,)} != {self.total.shape}:
             raise CheckpointError("its fields have another number of coefficients than the scene")
+        self.model.check_same_laws(state["laws"])
         self.activity.time, self.total = state["time"], state["total"]
         self.activity.statics += 1
         self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
+        self.removed = np.reshape(state["removed"], 2)
         self._coverage_checked, self.begun = state["coverage_checked"], True
         self._travel = state["travel"]
         self.supports.restore(state["supports"])

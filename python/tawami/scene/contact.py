@@ -16,7 +16,7 @@ Mask = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class ActiveSet:
-    """The walls of a scene, with what other supports prescribe along them.
+    """The walls of a scene, and the components that other supports prescribe along them.
 
     Attributes:
         walls: The walls; :meth:`adapt` changes their states.
@@ -27,7 +27,7 @@ class ActiveSet:
     prescribed: Sequence[Mask] = ()
 
     def friction(self, forces: Array) -> Array:
-        """Friction on the body (functions x dim) from what supports and walls have to exert on it."""
+        """Friction on the body (functions x dim) from the forces that supports and walls exert on it."""
         pairs = zip(self.walls, self.prescribed, strict=True)
         parts = (wall.friction_of(forces, prescribed) for wall, prescribed in pairs)
         return sum(parts, np.zeros_like(forces))
@@ -36,7 +36,7 @@ class ActiveSet:
         """Change the states of the walls that a solution contradicts.
 
         Args:
-            forces: What supports and walls exert on the body, functions x dim.
+            forces: Forces of supports and walls on the body, functions x dim.
             u: Increments of the displacement, functions x dim.
             before: Displacement before them since the body touched the walls, functions x dim.
             active: Whether each function has particles.

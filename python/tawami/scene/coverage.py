@@ -33,7 +33,7 @@ def warn_of_faults(domain: Domain) -> None:
         return
     (j, i), what = fault
     warn(
-        f"the particles integrate badly: cell ({i}, {j}) {what}. Stress may be far off; expected "
+        f"the particles integrate badly: cell ({i}, {j}) {what}. The stress may be wrong; expected "
         "particles spread over the cells that they fill, as box(...) and polygon(...) place them",
         QuadratureWarning,
     )
@@ -55,7 +55,7 @@ def _moments(domain: Domain) -> tuple[Array, Array, Array]:
 
 
 def _fault(area: Array, first: Array, second: Array) -> tuple[tuple[int, int], str] | None:
-    """A cell (j, i) and what is wrong with it."""
+    """A cell (j, i) and the fault of its particles."""
     filled = np.abs(area - 1) <= FILLED
 
     def worst(values: Array) -> tuple[tuple[int, int], float]:

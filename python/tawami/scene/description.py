@@ -1,4 +1,4 @@
-"""The header of a run: what a scene models, and what it does not with the switch that adds it."""
+"""The header of a run: what a scene models, what it does not, and the switches that add it."""
 
 from __future__ import annotations
 
@@ -49,10 +49,10 @@ def _particles(now: Configuration) -> str:
     number = int(ranks.sum_of(now.model.grid.comm, np.array([len(particles)]))[0])
     each = particles.bytes_per_particle
     arrays = ", ".join(f"{name} {width}" for name, width in particles.arrays)
-    gone = f" ({len(now.left)} left the grid)" if now.left else ""
+    gone = f" ({len(now.left)} have left)" if now.left else ""
     return (
-        f"{number}{gone}, {each} bytes each ({arrays}), {size(number * each)} in all; while a step is "
-        f"solved {now.domain.responses.bytes_per_particle} more each for the responses of the laws"
+        f"{number}{gone}, {each} bytes each ({arrays}), {size(number * each)} in total; during a step "
+        f"{now.domain.responses.bytes_per_particle} more bytes each, for the responses of the laws"
     )
 
 
@@ -63,7 +63,7 @@ def _unknowns(now: Configuration) -> str:
     names = now.model.form.fields
     fields = ", ".join(f"{n} of {name}" for name, n in zip(names, numbers, strict=False))
     free = now.supports.num_free(now.domain)
-    return f"{free}: {fields}, less {sum(numbers) - free} that supports prescribe"
+    return f"{free}: {fields}, minus {sum(numbers) - free} prescribed by supports"
 
 
 def _models(now: Configuration, motion: str) -> Iterator[str]:

@@ -41,7 +41,7 @@ class Domain:
     """This rank's particles with all that belongs to their present cells.
 
     Attributes:
-        model: What the scene is made of.
+        model: Grid, form and laws of the scene.
         particles: The particles of this rank.
         location: Their cells and positions in them.
         assembly: Assembly of the form over these cells.
@@ -115,7 +115,7 @@ class Domain:
 
     @property
     def layout(self) -> Layout:
-        """Where the coefficients of each field stand."""
+        """Positions of the coefficients of each field."""
         return self.assembly.layout
 
     @property

@@ -68,11 +68,12 @@ class Earlier(Scattered):
 
 
 def earlier(path: str | Path, *, outside: Outside = "stop") -> Earlier:
-    """The particles of an earlier run: as `write_particles` or a series of particles has
-    them, or, with all that they carry, of a checkpoint.
+    """The particles of an earlier run, from a file of `write_particles`, a series of particles, or a
+    checkpoint, which has their complete state.
 
-    Particles with the same number at the same place get exactly what is in the file; others what is
-    linear between its particles. A scene on the very particles: `Scene(grid, state.body, ...)`.
+    Particles with the same number at the same place get exactly the values of the file; others get
+    values that are linear between its particles. `Scene(grid, state.body, ...)` is a scene on the same
+    particles.
 
     Files of other programs: a vector has 2 or 3 components. A tensor has 9, row by row, or its array is
     called after them, as 'stress xx yy zz xy [Pa]'; 4 or 6 components without names are rejected. Units
@@ -83,8 +84,8 @@ def earlier(path: str | Path, *, outside: Outside = "stop") -> Earlier:
         outside: As of `table`.
 
     Raises:
-        InputError: A file that is not there or cannot be read, or points that are not in a plane. Fields
-            are checked when they are used.
+        InputError: A file that does not exist or cannot be read, or points that are not in a plane.
+            Fields are checked when they are used.
         CheckpointError: A checkpoint that is damaged.
     """
     checks.choice("outside", outside, get_args(Outside))

@@ -1,4 +1,4 @@
-"""How a load or a prescribed displacement goes in time."""
+"""The factor in time of a load or a prescribed displacement."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class Factor:
         return [] if self.moves else [self._value(0.0)]
 
     def identity(self) -> list[Any]:
-        """What decides the results of a run, as JSON holds it."""
+        """Facts that decide the results of a run, in the types of JSON."""
         return [self._name, text(self._given)]
 
     def __str__(self) -> str:

@@ -2,7 +2,7 @@
 
 The laws add the increments of a step to the initial stress. eps_v and the displacement of the particles
 are sums of increments that enter no equation. In a mixed form with an elastic law sigma_m = K eps_v,
-since both are counted from the state without stress: an initial stress keeps that.
+since both are counted from the state without stress: an initial stress keeps this relation.
 """
 
 from __future__ import annotations
@@ -103,9 +103,9 @@ def _check_volume(domain: Domain, eps_v: Array) -> None:
     if off.any():
         p = np.flatnonzero(off)[0]
         raise InputError(
-            f"eps_v of particle {domain.particles.number[p]} is {eps_v[p]:g}, with which an elastic law "
-            f"has a mean stress of {elastic[p]:g} Pa, and it has {mean[p]:g} Pa: expected 0, or "
-            "initial('stress', ...) alone, which sets eps_v too"
+            f"eps_v of particle {domain.particles.number[p]} is {eps_v[p]:g}, which gives an "
+            f"elastic law a mean stress of {elastic[p]:g} Pa, but its mean stress is {mean[p]:g} Pa: "
+            "expected 0, or initial('stress', ...) alone, which sets eps_v too"
         )
 
 
@@ -126,8 +126,8 @@ def _to_surface(domain: Domain, beyond: Beyond) -> None:
     raise InputError(
         f"stress of particle {number} at ({x:g}, {y:g}) m is ({_row(stress[p])}) Pa, beyond the "
         f"yield surface by {off[p]:.3g} Pa, {100 * off[p] / size[p]:.2g} % of it, as are "
-        f"{len(wrong) - 1} others: expected stress within the yield surface; beyond='return' takes the "
-        f"stress on it to which the law returns it, ({_row(returned[p])}) Pa"
+        f"{len(wrong) - 1} others: expected stress within the yield surface; beyond='return' uses "
+        f"the stress to which the law returns it, ({_row(returned[p])}) Pa"
     )
 
 

@@ -40,7 +40,7 @@ class Load(Action):
         return f"{self}{self.terms[-1].factor}{' until it fades' if self.released else ''}"
 
     def place(self) -> list[Any]:
-        """Where it acts, as JSON holds it."""
+        """Place where it acts, in the types of JSON."""
         return []
 
 
@@ -54,7 +54,7 @@ class Weight(Load):
 
     @property
     def acceleration(self) -> Array:
-        """The acceleration that the script asked for [m/s2]."""
+        """The acceleration in the driver script [m/s2]."""
         return np.array(self.terms[-1].values if not self.released else np.zeros(2), dtype=float)
 
     def __str__(self) -> str:
@@ -149,16 +149,19 @@ class Loads(Owner[Load]):
     Args:
         grid: The grid.
         volume: Volume of each particle of the body [m2].
-        activity: Time of the scene, and what it is doing.
+        activity: Time and activity of the scene.
 
     Attributes:
         all: The loads, also those that were released and have not faded.
+        unbalanced: Forces on all coefficients that keep the body in equilibrium after its particles or
+            laws have changed, and that fade as a released load does [N per metre depth]; None for none.
         version: A number that changes with every change of a load.
     """
 
     def __init__(self, grid: Grid, volume: Array, activity: Activity) -> None:
         super().__init__(activity)
         self.grid, self._volume = grid, volume
+        self.unbalanced: Array | None = None
 
     def remove(self, action: Load) -> None:
         """A released load stays until it has faded."""
@@ -201,7 +204,7 @@ class Loads(Owner[Load]):
 
     @property
     def gravity(self) -> Array:
-        """The acceleration that the script asked for, without amplitudes [m/s2]."""
+        """The acceleration in the driver script, without amplitudes [m/s2]."""
         weights = [load.acceleration for load in self.all if isinstance(load, Weight)]
         return sum(weights, np.zeros(self.grid.space.dim))
 
@@ -233,7 +236,14 @@ class Loads(Owner[Load]):
         if any_on_particles:
             sums = domain.sums(np.ones(len(particles)), on_particles)
             external[: sums.size] += sums.ravel()
+        if self.unbalanced is not None:
+            external += (1 - now.part) * self.unbalanced
         return external
+
+    def keep_balance(self, forces: Array) -> None:
+        """Add forces on all coefficients that fade from now on [N per metre depth]."""
+        self.unbalanced = forces if self.unbalanced is None else self.unbalanced + forces
+        self.changed()
 
     def _acting(self, now: Moment) -> Iterator[tuple[Load, Term, float]]:
         """The terms with their factors, but for those that are zero."""
@@ -247,6 +257,8 @@ class Loads(Owner[Load]):
         """Forces of the whole traction on all coefficients."""
         edge = traction.edge
         nodes, loaded = domain.tractions.nodes(edge), self._cells(domain, traction)
+        if not loaded.any() and traction.released:  # what it loaded was removed
+            return np.zeros(domain.layout.size)
         if not loaded.any():
             raise SupportError(
                 f"{traction}: no cell along that edge of the grid holds particles; let the grid end "
@@ -258,38 +270,43 @@ class Loads(Owner[Load]):
         return domain.tractions.forces(edge, np.where(loaded[:, None, None], at_nodes, 0.0))
 
     def _cells(self, domain: Domain, traction: Traction) -> Mask:
-        """Which cells with particles along its edge a traction loads."""
+        """Mask of the cells with particles along its edge that a traction loads."""
         part = edges.cells_between(self.grid, traction.edge, traction.between)
         mask: Mask = part[domain.tractions.cells(traction.edge)]
         return mask
 
     def accept(self, now: Moment) -> None:
-        """Later parts grow from this moment; what has faded is dropped."""
+        """Let later parts grow from this moment; drop loads that have faded."""
         super().accept(now)
         self._drop_faded()
+        if self.unbalanced is not None:
+            self.unbalanced = (1 - now.part) * self.unbalanced if now.part != 1.0 else None
 
     # -- header, identity, checkpoints ---------------------------------------
 
     @property
     def line(self) -> str:
         """The loads in words, for the header of a run."""
-        return listed(
-            [load.line for load in self.all if load.released or not load.terms[-1].is_zero]
-        )
+        lines = [load.line for load in self.all if load.released or not load.terms[-1].is_zero]
+        if self.unbalanced is not None:
+            lines.append("forces of removed particles or replaced laws until they fade")
+        return listed(lines)
 
     def identity(self) -> list[Any]:
-        """What decides the results of a run, as JSON holds it."""
+        """Facts that decide the results of a run, in the types of JSON."""
         return [[type(load).__name__, *load.place(), *load.identity()] for load in self.all]
 
-    def state(self) -> list[dict[str, Any]]:
-        """How much of each load the body carries."""
-        return [load.state() for load in self.all]
+    def state(self) -> dict[str, Any]:
+        """Share of each load that the body carries, and the forces that fade."""
+        unbalanced = np.zeros(0) if self.unbalanced is None else self.unbalanced
+        return {"all": [load.state() for load in self.all], "unbalanced": unbalanced}
 
-    def restore(self, state: list[Mapping[str, Any]]) -> None:
+    def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`state`, for the same loads.
 
         Raises:
             CheckpointError: The script has made others.
         """
-        self.all = restored("load", self.all, state)
+        self.all = restored("load", self.all, state["all"])
+        self.unbalanced = state["unbalanced"] if len(state["unbalanced"]) else None
         self.changed()

@@ -24,7 +24,7 @@ from tawami.scene.domain import Domain
 #: Size of the residual of the projection over that of its right-hand side, and most iterations. The part
 #: that iterations do not find is lost, and rounding would make it depend on the number of ranks.
 TOLERANCE, MOST_ITERATIONS = 1e-11, 200
-#: Cells that the particles travel between two projections. A body at rest is left alone.
+#: Cells that the particles travel between two projections. A body at rest is never projected.
 TRAVEL = 0.1
 
 
@@ -59,7 +59,7 @@ def _projection(domain: Domain, weight: Array, values: Array) -> Array:
 
     Conjugate gradients, preconditioned by the lumped mass. Few particles in a cell make the mass
     singular; the right-hand side is in its range, so that they converge nevertheless. A regularised mass
-    would take a small part of the stress in every step, and a body would never come to rest. All ranks
+    would dissipate a little energy in every step, and a body would never come to rest. All ranks
     have the same coefficients.
     """
 

@@ -1,9 +1,9 @@
-"""What a scene is made of: input that was checked once and never changes."""
+"""Grid, form and laws of a scene: input that was checked once and never changes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
@@ -12,9 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami import _rust
-from tawami.base import checks
-from tawami.base.arrays import Mask
-from tawami.base.errors import InputError, LockingWarning, ParameterWarning
+from tawami.base import checks, ranks
+from tawami.base.errors import CheckpointError, InputError, LockingWarning, ParameterWarning
 from tawami.base.sealed import Settings
 from tawami.base.space import Space
 from tawami.base.warn import warn
@@ -51,7 +50,7 @@ class Model:
             with the same moduli.
         density: Of each material [kg/m3]; None if the scene has no mass.
         names: Name of the group of each material; empty if the body has no names.
-        leaving: What happens to particles that leave the grid.
+        leaving: 'stop' or 'remove', for particles that leave the grid.
         num_particles: Particles of the body, on all ranks.
     """
 
@@ -71,7 +70,7 @@ class Model:
 
     @property
     def space(self) -> Space:
-        """What follows from the dimension."""
+        """Everything that follows from the dimension."""
         return self.grid.space
 
     @property
@@ -98,6 +97,23 @@ class Model:
         return [f"{name} ({history})" if history else name for name, history in histories]
 
     @property
+    def texts(self) -> list[str]:
+        """The laws with their parameters, for checkpoints."""
+        return list(map(repr, self.materials))
+
+    def check_same_laws(self, texts: Sequence[str]) -> None:
+        """Check that a checkpoint has these laws.
+
+        Raises:
+            CheckpointError: It has others.
+        """
+        if list(texts) != self.texts:
+            raise CheckpointError(
+                "laws were changed during the run (each=): expected change_material(...) between two "
+                "phases"
+            )
+
+    @property
     def least_density(self) -> float:
         """The smallest density of a material [kg/m3]; 0 if the scene has no mass."""
         return 0.0 if self.density is None else float(self.density.min())
@@ -110,7 +126,7 @@ class Model:
         return ", ".join([f"{self.form.name} in {' and '.join(self.form.fields)}", *used])
 
     def identity(self) -> dict[str, Any]:
-        """What tells it from another model, for checkpoints."""
+        """Facts that identify the model, for checkpoints."""
         laws = [] if self.law is None else [self.law.identity()]
         return (
             self.grid.identity()
@@ -118,7 +134,7 @@ class Model:
             | {
                 "basis": self.basis,
                 "parameters": {**self.parameters, **self.options},
-                "laws": [*map(repr, self.materials), *laws],
+                "laws": [*self.texts, *laws],
                 "density": None if self.density is None else self.density.tolist(),
                 "leaving": self.leaving,
                 "number of particles": self.num_particles,
@@ -160,15 +176,14 @@ def build(
     densities = assignment.densities(density, len(materials), body.names)
     if loaded.strain.finite and law is not None:
         raise InputError(
-            f"form {loaded.name} has finite strains: expected a law in Rust, a NumpyLaw has small ones "
-            "only"
+            f"form {loaded.name} has finite strains: expected a law in Rust; a NumpyLaw works at "
+            "small strain only"
         )
-    _warn_of_locking(grid, loaded, materials, particles)
-    dilates = np.array([law is not None or one.pressure_dependent for one in materials])
-    plastic_volume = bool(dilates.any())
-    compiled = compile_form(grid.comm, loaded, options, assembly, plastic_volume=plastic_volume)
+    ratios = np.array([m.bulk_modulus / m.shear_modulus for m in materials])[particles.material]
+    warn_of_locking(grid, loaded, float(ratios.max()), int(ratios.argmax()))
+    compiled = _compiled(grid, loaded, options, assembly, materials, law)
     check_used(compiled, options, parameters)
-    _check_plastic_volume(compiled, dilates, law, particles)
+    _check_plastic_volume(compiled, materials, law, particles)
     instead = "the form's parameters are fixed when a scene is made: Scene(..., {}=...)"
     used = {name: value for name, value in values.items() if name in compiled.used}
     model = Model(
@@ -177,6 +192,56 @@ def build(
         materials, law, densities, _names(body, len(materials)), leaving, len(particles),
     )  # fmt: skip
     return model, particles
+
+
+def _compiled(
+    grid: Grid,
+    form: Form,
+    options: Mapping[str, str],
+    assembly: Assembly,
+    materials: Sequence[_rust.Material],
+    law: NumpyLaw | None,
+) -> CompiledForm:
+    """The form, with the plastic volume of the laws if any of them may have one."""
+    plastic_volume = law is not None or any(one.pressure_dependent for one in materials)
+    return compile_form(grid.comm, form, options, assembly, plastic_volume=plastic_volume)
+
+
+def with_laws(
+    model: Model,
+    particles: _rust.Particles,
+    materials: Sequence[_rust.Material],
+    of: Sequence[int],
+    law: NumpyLaw | None,
+    assembly: Assembly,
+) -> Model:
+    """A model with other laws; a call for all ranks.
+
+    Args:
+        model: The model before.
+        particles: The particles of this rank, with the numbers of their new laws.
+        materials: The new laws.
+        of: Number of the old material of each, whose density and name it has.
+        law: The law in NumPy.
+        assembly: As of `Scene`.
+
+    Raises:
+        InputError: A law that does not fit the form.
+    """
+    form = model.form
+    with ranks.raise_together(model.grid.comm):
+        particles.check_materials(materials, form.kinematics.name, form.strain.finite)
+    compiled = _compiled(model.grid, form, model.options, assembly, materials, law)
+    with ranks.raise_together(model.grid.comm):
+        _check_plastic_volume(compiled, materials, law, particles)
+    return replace(
+        model,
+        compiled=compiled,
+        materials=materials,
+        law=law,
+        density=None if model.density is None else model.density[list(of)],
+        names=tuple(model.names[k] for k in of) if model.names else (),
+    )
 
 
 def _names(body: Body, materials: int) -> tuple[str, ...]:
@@ -198,7 +263,7 @@ def _particles(
 
 def _check_plastic_volume(
     compiled: CompiledForm,
-    dilates: Mask,
+    materials: Sequence[_rust.Material],
     law: NumpyLaw | None,
     particles: _rust.Particles,
 ) -> None:
@@ -210,28 +275,30 @@ def _check_plastic_volume(
     form = compiled.form
     if not form.kinematics.has_mean_stress or compiled.names("eps_p"):
         return
+    dilates = np.array([law is not None or one.pressure_dependent for one in materials])
     bad = np.flatnonzero(dilates[particles.material])
     if len(bad):
         why = "is a NumpyLaw" if law is not None else "depends on the mean stress"
         raise InputError(
-            f"the law of particle {bad[0]} {why}, so that its flow may change the volume, and form "
-            f"{form.name} has no term for that: expected eps_p in its volume equation, as "
-            "- sum_p(K * eps_p, q) in 'u_epsv'"
+            f"the law of particle {particles.number[bad[0]]} {why}, so that its flow may change the "
+            f"volume, and form {form.name} has no term for that: expected eps_p in its volume equation, "
+            "as - sum_p(K * eps_p, q) in 'u_epsv'"
         )
 
 
-def _warn_of_locking(
-    grid: Grid, form: Form, materials: Sequence[_rust.Material], particles: _rust.Particles
-) -> None:
-    """Warn of a nearly incompressible material in a form without a field for the volume."""
-    if not form.kinematics.locks or grid.comm.rank:
-        return
-    ratios = np.array([m.bulk_modulus / m.shear_modulus for m in materials])[particles.material]
-    p = int(ratios.argmax())
-    if ratios[p] < LOCKS:
+def warn_of_locking(grid: Grid, form: Form, ratio: float, number: int) -> None:
+    """Warn of a nearly incompressible material in a form without a field for the volume.
+
+    Args:
+        grid: The grid.
+        form: The form.
+        ratio: Largest K/mu of a particle.
+        number: Of this particle.
+    """
+    if not form.kinematics.locks or grid.comm.rank or ratio < LOCKS:
         return
     warn(
-        f"form {form.name} has no field for the volume, and K/mu = {ratios[p]:.3g} at particle {p}: it "
+        f"form {form.name} has no field for the volume, and K/mu = {ratio:.3g} at particle {number}: it "
         f"locks, and its mean stress is useless where K/mu is large. Expected K/mu below {LOCKS:g} "
         "(nu < 0.49); use form 'u_epsv' or 'u_epsv_finite'",
         LockingWarning,

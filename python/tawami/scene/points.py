@@ -28,6 +28,18 @@ def outside(what: str, distance: float) -> InputError:
     )
 
 
+def _distance(domain: Domain, point: Sequence[float]) -> float:
+    """Distance of a point from the nearest particle [m]; a call for all ranks."""
+    mine = np.linalg.norm(domain.particles.x - np.asarray(point), axis=1)
+    return -ranks.largest(domain.model.grid.comm, -float(mine.min(initial=np.inf)))
+
+
+def is_in_body(domain: Domain, point: Sequence[float]) -> bool:
+    """Whether a point is within half a diagonal of a cell of a particle; a call for all ranks."""
+    grid = domain.model.grid
+    return bool(_distance(domain, point) <= (0.5 + ROUND_OFF) * np.sqrt(grid.space.dim) * grid.h)
+
+
 def check_in_body(domain: Domain, point: Sequence[float], what: str) -> None:
     """Check that a point is in the body: within half a diagonal of a cell of a particle.
 
@@ -36,9 +48,6 @@ def check_in_body(domain: Domain, point: Sequence[float], what: str) -> None:
     Raises:
         InputError: It is not, or is outside the grid.
     """
-    grid = domain.model.grid
-    edges.locate_point(grid, point, what)
-    mine = np.linalg.norm(domain.particles.x - np.asarray(point), axis=1)
-    distance = -ranks.largest(grid.comm, -float(mine.min(initial=np.inf)))
-    if distance > (0.5 + ROUND_OFF) * np.sqrt(grid.space.dim) * grid.h:
-        raise outside(what, distance)
+    edges.locate_point(domain.model.grid, point, what)
+    if not is_in_body(domain, point):
+        raise outside(what, _distance(domain, point))

@@ -13,7 +13,7 @@ from tawami.base.errors import InputError
 from tawami.base.optional import optional
 from tawami.grid.grid import Grid
 from tawami.picture import style
-from tawami.picture.figure import shown_axes
+from tawami.picture.figure import lay_out, shown_axes
 from tawami.picture.particles import Corners, Squares, draw_frame, scale_of, size_of, view
 from tawami.scene.quantities import GRADIENT, Arrays, Given, Quantity, named
 from tawami.scene.scalars import pick, scalars
@@ -66,7 +66,7 @@ def checked_limits(limits: Any) -> tuple[float, float] | None:
     """
     if limits is None:
         return None
-    low, high = checks.pair("limits", limits, "two numbers, as (-1e3, 1e3)")
+    low, high = checks.pair("limits", limits, "numbers, as (-1e3, 1e3)")
     low = checks.number("limits[0]", low)
     return low, checks.number("limits[1]", high, low=np.nextafter(low, np.inf))
 
@@ -88,23 +88,21 @@ def plot(
     name, unit, values = pick(given, arrays, histories)
     x, corners = positions(arrays, moved=moved, deformed=deformed), corners_of(grid)
     lower, upper = view(x, corners)
+    new = axes is None
     if axes is None:
         axes = shown_axes(*size_of(lower, upper))
-        beside = False
     else:
         from matplotlib.axes import Axes
 
         checks.instance("plot: axes", axes, Axes, "axes of matplotlib, or None")
-        beside = True
     draw_frame(axes, lower, upper, corners)
     squares = Squares(axes, scale_of(name, unit, [values], limits))
     squares.show(x, shapes(arrays, moved=moved, deformed=deformed), values)
-    if beside:
-        squares.add_bar_beside(axes)
-    else:
-        squares.add_bar(axes)
+    (squares.add_bar if new else squares.add_bar_beside)(axes)
     factor = "at the start" if deformed == 0 else f"displacements x {deformed:g}"
     axes.set_title(name if deformed == 1 else f"{name}, {factor}")
+    if new:
+        lay_out(axes.get_figure(root=True))
     return axes
 
 

@@ -25,7 +25,7 @@ from tawami.particles import placement
 
 #: Arrays of the particles that are carried by a motion.
 CARRIED = ("velocity", "acceleration")
-#: What particles store of F - I at finite strain.
+#: The array of the particles with F - I, at finite strain.
 GRADIENT = "displacement_gradient"
 #: Components of a symmetric tensor, as labels have them.
 TENSOR = " ".join(PLANE.tensor)

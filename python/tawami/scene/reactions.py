@@ -1,4 +1,4 @@
-"""Forces of supports and walls on the body, from what is out of balance without them."""
+"""Forces of supports and walls on the body, from the forces that are out of balance without them."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def supported_edge(place: str, supported: set[str]) -> Edge:
 
 def divided(reduction: Reduction, forces: Array) -> tuple[Array, Array]:
     """Forces of supports: those of edges and walls on all displacement coefficients, and the multipliers
-    of points, which take what they can.
+    of points, which carry as much as possible.
 
     Args:
         reduction: The supports.

@@ -100,7 +100,7 @@ class Scattered:
         name: Of the file, for messages.
         x: Positions [m], points x dimensions.
         columns: Other columns.
-        outside: What particles outside the points get.
+        outside: Values of particles outside the points.
     """
 
     name: str
@@ -197,7 +197,7 @@ class Scattered:
             found = np.asarray(LinearNDInterpolator(self.x, values, rescale=True)(x))
         except QhullError:
             raise InputError(
-                f"{what}: the {len(self.x)} points of {self.name} are less than a triangle: expected "
+                f"{what}: the {len(self.x)} points of {self.name} do not form a triangle: expected "
                 "points in the plane, not on a line; for a profile pass a function with np.interp"
             ) from None
         beyond = np.flatnonzero(np.isnan(found).any(axis=1))

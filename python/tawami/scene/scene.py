@@ -1,4 +1,4 @@
-"""A scene: particles on a grid, a weak form, supports and loads; what a driver script builds."""
+"""A scene: particles on a grid, a weak form, supports and loads."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ from tawami.scene import description, initial
 from tawami.scene.absent import Elsewhere
 from tawami.scene.conditions import Conditions
 from tawami.scene.configuration import Configuration
+from tawami.scene.construction import Construction
 from tawami.scene.model import build
 from tawami.scene.solution import Solution
 from tawami.scene.sources import Source
@@ -38,7 +39,7 @@ from tawami.solve.numerics import Factorise, Numerics, SolverName
 Array = npt.NDArray[np.float64]
 
 
-class Scene(Conditions, Elsewhere, Sealed, Unique):
+class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
     """Particles on a grid with a weak form, supports and loads.
 
     By itself it is static; `ramp` applies its loads in steps, `Dynamics` sets it in motion. With a
@@ -55,27 +56,27 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
         form: Weak form: the name of a shipped one ('u_epsv', 'u_p', 'u_bbar', 'u'), the path of a
             file, a module, or a `Form`.
         basis: Basis of the displacement: 'quadratic_spline', 'bilinear' or 'biquadratic'.
-        tolerance, max_iterations, assembly, factorise, linear_solver: How a step is
-            solved; see `tawami.solve.numerics.Numerics`.
+        tolerance, max_iterations, assembly, factorise, linear_solver: Numerical settings; see
+            `tawami.solve.numerics.Numerics`.
         density: Mass density at the start [kg/m3], one for all materials or one each (a list or a
             dictionary as for the materials); gravity needs it.
-        leaving: What to do with particles that leave the grid: 'stop' with an error before they do, or
-            'remove' them; `left` says which and where.
-        parameters: What the form names: alpha, stabilisation, ...
+        leaving: Treatment of particles that leave the grid: 'stop' with an error before they do, or
+            'remove' them; `left` lists them.
+        parameters: Parameters and options of the form: alpha, stabilisation, ...
 
     Attributes:
         grid, form, basis: As given.
-        numerics: How a step is solved.
+        numerics: Numerical settings of a step.
         parameters, options: Of the form, as they are used. They cannot be changed.
         num_particles: Number of particles of the body, on all ranks.
-        stopwatch: Where the time goes.
+        stopwatch: Time of each stage of a step.
         configuration: Particles, supports and loads as the solver sees them. Its attributes may change
             between versions.
 
     Raises:
         InputError: Particles outside the grid, a body without particles, NaN, an incompressible
             material with a form that cannot take it, a parameter that is unknown or without effect.
-        FormError: A form that cannot be used as it stands.
+        FormError: A form that cannot be used.
 
     Warns:
         LockingWarning: A form without a field for the volume, and a nearly incompressible material.
@@ -124,7 +125,7 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
         self._seal()
 
     def _how_to_set(self, name: str) -> str:
-        """What to do instead of setting an attribute."""
+        """Advice for an attribute that cannot be set."""
         if name in self.form.parameters or name in self.form.options:
             return f"the form's parameters are fixed when a scene is made: Scene(..., {name}=...)"
         if name == "particles":
@@ -151,18 +152,21 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
         the body they are), which cannot be written, `volume` [m2], `stress` [Pa] (xx, yy, zz, xy;
         tension positive), `displacement` [m], and `eps_v` with forms that have that field. `strain`, as
         in `Solution`, and at finite strain `displacement_gradient` (F - I) are read only. Where
-        particles change rank or leave the grid this is another object after a step.
+        particles change rank or leave the grid this is another object after a step, and always after
+        `remove` and `change_material`.
         """
         return self.configuration.domain.particles
 
     @property
     def left(self) -> list[tuple[int, tuple[float, float], float]]:
-        """Number, position [m] and time [s] (NaN in a static scene) of the particles that left."""
+        """Number, position [m] and time [s] (NaN in a static scene) of the particles that left the grid
+        or were removed.
+        """
         return self.configuration.left
 
     @property
     def numerics(self) -> Numerics:
-        """How a step is solved."""
+        """Numerical settings of a step."""
         return self.configuration.numerics
 
     @property
@@ -188,16 +192,17 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
         """Give the particles an initial field, before anything is solved; loads and supports act on
         top of it. A call for all ranks.
 
-        'stress' is where the laws start: (xx, yy, zz, xy) [Pa], Kirchhoff's per V0 at finite strain.
-        With a field eps_v it sets that too, to sigma_m / K, the elastic part. 'eps_v' (larger than this
-        part, by plastic strain; or 0: counted from this state) and 'displacement' [m] are records that
-        enter no equation: positions stay. History variables of the laws have their own names.
+        'stress' is the stress from which the laws start: (xx, yy, zz, xy) [Pa], Kirchhoff's per V0 at
+        finite strain. With a field eps_v it sets this too, to sigma_m / K, the elastic part. 'eps_v'
+        (larger than this part, by plastic strain; or 0: counted from this state) and 'displacement' [m]
+        are records that enter no equation: positions stay. History variables of the laws have their own
+        names.
 
         Args:
             name: 'stress', 'displacement', 'eps_v', or a history variable.
             source: Numbers, the same for all or one row a particle of the body; a function f(x, y) on
                 arrays that returns the components; `tawami.table(...)` or `tawami.earlier(...)`.
-            beyond: What to do with stress beyond the yield surface: 'stop' with an error, or 'return'
+            beyond: Treatment of stress beyond the yield surface: 'stop' with an error, or 'return'
                 it to the surface as the law does.
 
         Raises:
@@ -217,14 +222,14 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
     def solve(self, *, until: float | None = None) -> Solution:
         """Find equilibrium under the present supports and loads, and store it in the particles.
 
-        May be called again after more supports or loads were added, or others changed.
+        It may be called again after supports or loads were added or changed.
 
         Args:
             until: Time for amplitudes [s], from the time of the scene on; that time by default.
 
         Raises:
             SupportError: Supports that leave a rigid motion free or contradict each other.
-            ConvergenceError: Newton did not converge; the particles are as they were.
+            ConvergenceError: Newton did not converge; the particles are unchanged.
             SingularError: The tangent cannot be solved; the message names the cells.
             SolverError: Memory for the linear system ran out.
             InputError: NaN or infinity in an array of the particles, a particle that would leave the
@@ -245,7 +250,7 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
             for support in self.configuration.supports.all:
                 if support.has_velocity:
                     raise InputError(
-                        f"{support} has a velocity, which statics does not follow: expected a value, "
+                        f"{support} has a velocity, which static steps do not follow: expected a value, "
                         "with amplitude=... and until=... if it changes in time, or Dynamics(scene)"
                     )
             self.configuration.check_coverage()
@@ -274,11 +279,11 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
         """None: a scene by itself is static."""
 
     def identity(self) -> dict[str, Any]:
-        """What tells it from another scene, for checkpoints; a call for all ranks."""
+        """Facts that identify the scene, for checkpoints; a call for all ranks."""
         return self.configuration.identity()
 
     def state(self) -> dict[str, Any]:
-        """All that is carried from one step to the next, for checkpoints; a call for all ranks."""
+        """State that passes from one step to the next, for checkpoints; a call for all ranks."""
         return self.configuration.state()
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -305,7 +310,7 @@ class Scene(Conditions, Elsewhere, Sealed, Unique):
         return self.configuration.domain.layout.split(self._coefficients(coefficients))
 
     def reduction(self) -> Reduction:
-        """What the present supports leave free: coefficients = selection @ unknowns + offset."""
+        """Unknowns that the supports leave free: coefficients = selection @ unknowns + offset."""
         return StaticStep(self.configuration, self.configuration.moment()).problem().reduction
 
     def residual(self, coefficients: Array) -> Array:

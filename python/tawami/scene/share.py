@@ -1,4 +1,4 @@
-"""How much of a load or of a prescribed displacement the body carries."""
+"""The share of a load or of a prescribed displacement that the body carries."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from tawami.scene.factor import Factor
 
 @dataclass(frozen=True)
 class Moment:
-    """Where a phase is.
+    """Position in a phase.
 
     Attributes:
-        part: Share of what is new that has been applied, from 0 to 1; 1 in dynamics.
+        part: Share of the new loads that has been applied, from 0 to 1; 1 in dynamics.
         start: Time at the start of the phase, or of the dynamic step [s].
         time: Present time [s].
     """
@@ -26,12 +26,12 @@ class Moment:
 
 @dataclass
 class Share:
-    """The factor of a value, from what the body carries to what the driver script asks for.
+    """The factor of a value, from the part that the body carries to the whole value.
 
     Attributes:
         target: 1; 0 once it was replaced or released.
-        carried: What later parts grow from: the body was in equilibrium with it.
-        applied: What the last equilibrium was found for.
+        carried: Factor from which later parts grow: the body was in equilibrium with it.
+        applied: Factor for which the last equilibrium was found.
     """
 
     target: float = 1.0
@@ -39,7 +39,7 @@ class Share:
     applied: float = 0.0
 
     def at(self, now: Moment, factor: Factor) -> float:
-        """The factor, and what differs from it at the start, which fades."""
+        """The factor, and the difference from it at the start, which fades."""
         wanted = self._wanted(factor, now.time)
         if now.part == 1.0:
             return wanted
@@ -50,7 +50,7 @@ class Share:
 
     @property
     def is_gone(self) -> bool:
-        """Whether nothing of it is wanted or carried."""
+        """Whether none of it is prescribed or carried."""
         return not (self.target or self.carried or self.applied)
 
     def state(self) -> dict[str, float]:

@@ -39,7 +39,8 @@ class Solved(Protocol):
 class Solution(Elsewhere, Sealed, Unique):
     """Equilibrium of a scene, or the end of a step.
 
-    On several ranks all of it is on every rank. Arrays of particles are in the order of their numbers.
+    On several ranks every rank has the complete solution. Arrays of particles are in the order of their
+    numbers.
 
     Attributes:
         scene: The scene.
@@ -121,7 +122,9 @@ class Solution(Elsewhere, Sealed, Unique):
         if name not in self._arrays:
             with quantities.not_modelled():  # the error says how to model it
                 quantities.array_of(self.scene.particles, name)
-            raise NotModelledError(f"{name}: this solution was found before the scene had it")
+            raise NotModelledError(
+                f"{name}: this solution is older than this quantity of the scene"
+            )
         return self._arrays[name]
 
     def _of_form(self, name: str, values: Array | None, having: str) -> Array:
@@ -262,7 +265,7 @@ class Solution(Elsewhere, Sealed, Unique):
 
     @property
     def on_points(self) -> list[tuple[tuple[float, float], Array]]:
-        """Where each point is held (x, y) [m], as the step began, and its force [N per metre depth]."""
+        """Position (x, y) [m] of each held point at the start of the step, and its force [N/m]."""
         return [
             (one.places[-1], one.force * np.eye(self._model.space.dim)[one.component])
             for one in self._reactions.at_points

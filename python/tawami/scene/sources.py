@@ -1,5 +1,5 @@
-"""Where the field of the particles comes from that a scene begins with: numbers, a function of
-position, a table of scattered points, or the particles of an earlier run.
+"""Sources of an initial field of the particles: numbers, a function of position, a table of scattered
+points, or the particles of an earlier run.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ def values(domain: Domain, name: str, source: Any, components: str, unit: str) -
 
     Args:
         domain: The particles.
-        name: What messages call the field, and its name in the file of an earlier run.
-        source: Where the values come from.
+        name: Name of the field in messages and in the file of an earlier run.
+        source: Source of the values.
         components: Of the field, as 'x y'.
-        unit: What messages say after the numbers.
+        unit: Unit in messages.
 
     Returns:
         Particles x components.

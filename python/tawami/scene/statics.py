@@ -14,12 +14,12 @@ from tawami.scene.step import Accepted, Problem
 
 @dataclass(frozen=True)
 class StaticStep:
-    """Equilibrium under a part of what is new.
+    """Equilibrium under a part of the new loads and displacements.
 
     Attributes:
-        configuration: What it starts from.
+        configuration: Configuration at its start.
         now: From part 0 to 1.
-        stressed: Whether stress may hold what supports leave free, as in a truss that snaps through.
+        stressed: Whether stress may prevent rigid motions, as in a truss that snaps through.
     """
 
     configuration: Configuration
@@ -36,7 +36,7 @@ class StaticStep:
         now, moves = self.configuration, self.configuration.model.moves
 
         def amount(term: Term) -> float:
-            """Factor of a value: all of it where coefficients are totals, what is missing elsewhere."""
+            """Factor of a value: the whole where coefficients are totals, the rest elsewhere."""
             return term.at(self.now) - (term.share.applied if moves else 0.0)
 
         with now.stopwatch("set-up"):
@@ -48,11 +48,11 @@ class StaticStep:
         return Problem(reduction, contact, external, crossings=crossings, load=self.now.part)
 
     def accept(self, accepted: Accepted) -> StaticStep:
-        """Nothing is to be prepared."""
+        """Prepare nothing."""
         return self
 
     def store(self, dissipated: float) -> None:
-        """Nothing is to be stored before the particles move."""
+        """Store nothing before the particles move."""
 
     def finish(self) -> None:
         """Record that the body is in equilibrium with this part."""

@@ -1,4 +1,4 @@
-"""One accepted step of a scene: the problem, its solution, and what is stored."""
+"""One accepted step of a scene: the problem, its solution, and the changes that are stored."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ class Problem:
     """One step to solve; see `Newton.solve`.
 
     Attributes:
-        reduction: What the supports leave free.
+        reduction: Unknowns that the supports leave free.
         contact: The walls in their present states.
         external: External forces on all coefficients [N per metre depth].
         inertia: Of a dynamic step.
         guess: Increments of all fields to start from.
-        crossings: How far supports will have moved the body across their edges [m], by the number of
-            the support.
-        path: What makes the load factor an unknown; `external` is at its start.
+        crossings: Distances by which supports will have moved the body across their edges [m], by the
+            number of the support.
+        path: Path on which the load factor is an unknown; `external` is at its start.
         load: Share of the new loads; NaN in dynamics.
     """
 
@@ -49,8 +49,8 @@ class Accepted:
     """A step that was solved, with the particles still where they were.
 
     Attributes:
-        problem: What was solved.
-        step: What Newton's method found.
+        problem: The problem.
+        step: Result of Newton's method.
         u: Increments of the displacement, functions x dim [m].
         acceleration: At the end of a dynamic step, functions x dim [m/s2].
     """
@@ -67,7 +67,7 @@ class Accepted:
 
     @property
     def forces(self) -> Array:
-        """What supports and walls exert on the body, functions x dim [N per metre depth]."""
+        """Forces of supports and walls on the body, functions x dim [N per metre depth]."""
         return self.step.forces[: self.u.size].reshape(self.u.shape)
 
     @property
@@ -85,13 +85,13 @@ class Accepted:
 
 
 class Update(Protocol):
-    """What a kind of step stores once its solution is accepted; it must not fail."""
+    """Changes that a kind of step stores once its solution is accepted; storing must not fail."""
 
     def store(self, dissipated: float) -> None:
         """After the particles have their stress and before they move.
 
         Args:
-            dissipated: What the laws dissipated on this rank [J per metre depth].
+            dissipated: Energy that the laws dissipated on this rank [J per metre depth].
         """
 
     def finish(self) -> None:
@@ -109,4 +109,4 @@ class StepKind(Protocol):
         """The problem in the present states of the walls; asked again whenever these change."""
 
     def accept(self, accepted: Accepted) -> Update:
-        """Prepare what is to be stored; may fail, and then nothing has changed."""
+        """Prepare the changes to be stored. This may fail, and then nothing has changed."""

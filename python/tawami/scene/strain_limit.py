@@ -93,7 +93,7 @@ def warn_of(domain: Domain, number: int, size: float) -> None:
         return
     warn(
         f"small strain: the displacement gradient of particle {number} is {size:.3g}, and form "
-        f"{domain.model.form.name} neglects its square: expected up to {LARGEST:g}. Take a form of "
+        f"{domain.model.form.name} neglects its square: expected up to {LARGEST:g}. Use a form of "
         "finite strain (form='u_epsv_finite'), or smaller loads",
         SmallStrainWarning,
     )

@@ -27,7 +27,7 @@ class Support(Action):
         given: The same as the driver script gave it.
         component, axis: Number and name of the component.
         between: Part of the edge [m]; None for all of it.
-        crossing: How far it has moved the body across its edge [m], where particles move.
+        crossing: Distance by which it has moved the body across its edge [m], where particles move.
     """
 
     __slots__ = ("axis", "between", "component", "crossing", "given", "place")
@@ -79,7 +79,7 @@ class Support(Action):
                 "another support for the rest"
             )
         changed = self._changed(None, None, velocity)
-        self.terms.clear()  # what moved by a velocity does not go back
+        self.terms.clear()  # a support that moved by a velocity does not move back
         self._begin(*changed)
         return None
 
@@ -101,7 +101,7 @@ class Support(Action):
     def is_ahead(self, now: Moment) -> bool:
         """Whether it prescribes a displacement that the body does not have at this moment.
 
-        An old amplitude and the new one that continues it make up for each other.
+        An old amplitude and a new one that continues it cancel.
         """
         missing = dict[tuple[Profile, ...], float]()
         for term in self.terms:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami.base import checks
-from tawami.base.errors import CheckpointError, InputError
+from tawami.base.errors import CheckpointError, InputError, SupportError
 from tawami.base.identity import text
 from tawami.base.text import listed
 from tawami.field.constraints import Held, PointHeld, held_edge, held_point
@@ -23,6 +23,7 @@ from tawami.scene.activity import Activity
 from tawami.scene.contact import ActiveSet
 from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor, InTime
+from tawami.scene.points import is_in_body
 from tawami.scene.share import Moment
 from tawami.scene.support import Place, Support
 from tawami.scene.walls import Wall, checked_friction
@@ -36,7 +37,7 @@ class Supports(Owner[Support]):
     Args:
         grid: The grid.
         basis: Basis of the displacement.
-        activity: Time of the scene, and what it is doing.
+        activity: Time and activity of the scene.
 
     Attributes:
         all: The supports along edges and at points.
@@ -50,7 +51,7 @@ class Supports(Owner[Support]):
         self.walls: list[Wall] = []
 
     def remove(self, action: Support | Wall) -> None:
-        """Take a support or a wall away."""
+        """Remove a support or a wall."""
         self.walls = [wall for wall in self.walls if wall is not action]
         super().remove(action)
 
@@ -145,7 +146,7 @@ class Supports(Owner[Support]):
         for support in self.all:
             support.apply(now)
 
-    # -- what they prescribe in a step ---------------------------------------
+    # -- prescribed values in a step -----------------------------------------
 
     def constraints(
         self,
@@ -156,14 +157,14 @@ class Supports(Owner[Support]):
         *,
         moving: bool,
     ) -> tuple[Reduction, ActiveSet]:
-        """What the supports leave free, and the walls in their present states.
+        """Unknowns that the supports leave free, and the walls in their present states.
 
         Args:
             domain: The particles where they are.
             amount: Factor of each value of a support.
             start: Coefficients at the start of the step, which the amounts include.
             before: Displacement coefficients since the start of the scene where particles do not move,
-                0 where they do: what walls measure distances from.
+                0 where they do. Walls measure distances from it.
             moving: Inertia or stress holds the body: rigid motions may be free, and edges that are
                 held at rest and that the body has left are skipped.
 
@@ -220,6 +221,26 @@ class Supports(Owner[Support]):
             _total(support, amount), domain.layout.active,
         )  # fmt: skip
 
+    def check_reach(self, before: Domain, after: Domain) -> None:
+        """Check that supports still hold something once particles were removed; a call for all ranks.
+
+        Args:
+            before, after: The particles before and after.
+
+        Raises:
+            SupportError: One would hold no particles.
+        """
+        for support in self.all:
+            if isinstance(support.place, str):
+                lost = self._is_left(after, support) and not self._is_left(before, support)
+            else:
+                lost = not is_in_body(after, support.place)
+            if lost:
+                raise SupportError(
+                    f"{support} {support.axis} would hold no particles after remove(...): expected "
+                    "supports on particles that remain; release() it before. Nothing was changed"
+                )
+
     def num_free(self, domain: Domain) -> int:
         """Number of unknowns that the supports leave."""
         zero = np.zeros(domain.layout.size)
@@ -228,9 +249,9 @@ class Supports(Owner[Support]):
     # -- where particles move ------------------------------------------------
 
     def crossings(self, amount: Callable[[Term], float]) -> dict[int, float]:
-        """How far each support will have moved the body across its edge [m], by its number.
+        """Distance by which each support will have moved the body across its edge [m], by its number.
 
-        The functions of the edge stay where they are and would soon hold nothing.
+        The functions of the edge do not move and would soon hold no particles.
 
         Raises:
             InputError: More than a quarter of a cell.
@@ -284,12 +305,12 @@ class Supports(Owner[Support]):
         return listed([*(support.line for support in self.all), *map(str, self.walls)])
 
     def identity(self) -> list[list[Any]]:
-        """What decides the results of a run, as JSON holds it."""
+        """Facts that decide the results of a run, in the types of JSON."""
         given = [[str(s.given), s.component, text(s.between), *s.identity()] for s in self.all]
         return given + [["wall", w.edge, w.friction, w.separates] for w in self.walls]
 
     def state(self) -> dict[str, Any]:
-        """Where points are, what of each support the body carries, and what touches the walls."""
+        """Positions of points, the share of each support that the body carries, and contact states."""
         return {
             "supports": [
                 support.state() | {"place": support.place, "crossing": support.crossing}

@@ -79,8 +79,8 @@ def table(path: str | Path, *columns: str, outside: Outside = "stop") -> Table:
         path: The file.
         columns: Names of the components in the order xx yy zz xy, or x y, if the file calls them
             otherwise.
-        outside: What particles outside the points get: 'stop' is an error, 'nearest' the value of the
-            nearest point.
+        outside: Treatment of particles outside the points: 'stop' raises an error, 'nearest' gives them
+            the value of the nearest point.
 
     Raises:
         InputError: The file cannot be read, a row is longer or shorter than the header, a column is

@@ -75,7 +75,7 @@ class Wall:
     Attributes:
         functions: Displacement functions along it.
         state: Their states of contact.
-        returns: How often each came back to the wall or to rest in this step.
+        returns: Number of times that each came back to the wall or to rest in this step.
     """
 
     grid: Grid
@@ -117,7 +117,7 @@ class Wall:
         owner.changed()
 
     def release(self) -> None:
-        """Take it away.
+        """Remove it.
 
         Raises:
             InputError: It was released before.
@@ -168,7 +168,7 @@ class Wall:
         return mask
 
     def held(self, active: Mask, prescribed: Mask, start: Array, before: Array) -> list[Held]:
-        """What the wall prescribes in the present states.
+        """Values that the wall prescribes in the present states.
 
         Args:
             active: Whether each displacement coefficient has particles.
@@ -187,7 +187,7 @@ class Wall:
         return supports
 
     def friction_of(self, forces: Array, prescribed: Mask) -> Array:
-        """Friction on the body (functions x dim) from what the wall has to exert to hold it."""
+        """Friction on the body (functions x dim) from the forces with which the wall would hold it."""
         across, along, inward = self._axes
         friction = np.zeros_like(forces)
         sliding = self.state.touching & (self.state.slip != 0) & ~prescribed[:, along]
@@ -200,10 +200,10 @@ class Wall:
         """Change the states that contradict a solution; returns whether there were any.
 
         A function that comes back to the wall, or to rest, more than RETURNS times in one step
-        keeps its state: otherwise the search could repeat the same states for ever.
+        keeps its state: otherwise the search could repeat the same states forever.
 
         Args:
-            forces: What supports and walls exert on the body, functions x dim.
+            forces: Forces of supports and walls on the body, functions x dim.
             u: Displacement increments, functions x dim.
             before: Displacement before them since the body touched the wall, functions x dim.
             active: Whether each function has particles.

@@ -1,4 +1,4 @@
-"""The equations of one step: what the increments have to balance."""
+"""The equations of one step."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from tawami.solve.path import Path
 
 #: Advice if a step does not converge.
 STATIC = (
-    "The load may exceed what the body carries, or what one step can reach. ramp(scene) applies it in "
+    "The load may be too large for the body, or for one step. ramp(scene) applies it in "
     "steps and returns the share that it reached; follow(scene, ...) passes a limit load"
 )
-DYNAMIC = "Take a smaller dt; run(...) does this by itself"
-ALONG_PATH = "Take shorter steps along the path"
+DYNAMIC = "Use a smaller dt; run(...) does this automatically"
+ALONG_PATH = "Use shorter steps along the path"
 
 
 @dataclass(frozen=True)
 class Equations:
-    """What `Newton.solve` is given.
+    """Arguments of `Newton.solve`.
 
     Attributes:
         reduction: Unknowns that the supports leave free.
         external: External forces on all coefficients [N per metre depth]; on a path, at its start.
         inertia: Inertia of a dynamic step.
         friction: Friction of the walls.
-        path: What makes the load factor an unknown.
+        path: Path on which the load factor is an unknown.
     """
 
     reduction: Reduction
@@ -55,12 +55,12 @@ class Equations:
 
     @property
     def at_rest(self) -> bool:
-        """Whether it is a static step at a given load without friction, which a line search serves."""
+        """Whether it is a static step at a given load without friction, which may use a line search."""
         return self.inertia is None and self.friction is None and self.path is None
 
     @property
     def advice(self) -> str:
-        """What to do if the step does not converge."""
+        """Advice for a step that does not converge."""
         if self.inertia is not None:
             return DYNAMIC
         return STATIC if self.path is None else ALONG_PATH

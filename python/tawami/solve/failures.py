@@ -30,7 +30,7 @@ def of_mumps(code: int, detail: int, stage: str, unknowns: int) -> SolverError:
     Args:
         code: INFOG(1).
         detail: INFOG(2).
-        stage: What MUMPS did, as "factorise".
+        stage: Stage of MUMPS, as "factorise".
         unknowns: Size of the tangent.
     """
     what = f"MUMPS could not {stage} the tangent of {unknowns} unknowns"
@@ -41,7 +41,7 @@ def of_mumps(code: int, detail: int, stage: str, unknowns: int) -> SolverError:
         return SolverError(f"{what}: it is too large for integers of 32 bits {found}. {ADVICE}")
     return SolverError(
         f"{what} {found}: see 'Error diagnostics' in the MUMPS users' guide. linear_solver='iterative' "
-        "does without MUMPS"
+        "does not use MUMPS"
     )
 
 

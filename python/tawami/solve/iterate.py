@@ -25,7 +25,7 @@ class Forces:
         inertia: Of a dynamic step.
         acceleration: Of each displacement coefficient at the end of a dynamic step [m/s2].
         reactions: Forces of supports and walls that would balance the others.
-        residual: Out of balance: the same without the impulse of the supports and without friction.
+        residual: Forces out of balance, without the impulse of the supports and without friction.
     """
 
     internal: Array

@@ -6,7 +6,7 @@ A full Newton step has g(0) < 0 and g(1) near 0. The sign of R_q makes g the slo
 elastic body, whose energy is least in u and largest in eps_v. Near a limit load a search that asks for a
 smaller residual costs many iterations, so this one acts only where a step overshoots: g(1) has the
 other sign, is nearly as large as g(0), and the measure of convergence rose. It serves static steps of
-small strain without friction; elsewhere it was not measured, or finds equilibria far away.
+small strain without friction. Elsewhere it was not measured, or finds equilibria far away.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the solvers of the scaled linear systems of a step share: S K S y = S r, x = S y."""
+"""The common part of the solvers of the scaled linear systems of a step: S K S y = S r, x = S y."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class LinearSolver:
         self.weak = np.empty(0)
 
     def forget(self) -> None:
-        """Free all that was made for a tangent; the next solve makes it anew."""
+        """Free all objects of a tangent; the next solve makes new ones."""
         self._handles.free()
 
     def successor(self) -> LinearSolver | None:
@@ -62,10 +62,10 @@ class LinearSolver:
         return None
 
     def record(self) -> None:
-        """Record from now on what :meth:`state` gives, independently of earlier solves."""
+        """Record the state for :meth:`state` from now on, independently of earlier solves."""
 
     def state(self) -> dict[str, Any] | None:
-        """What later solves take from earlier ones; None if this is nothing."""
+        """State that later solves use from earlier ones; None if there is none."""
         return None
 
     def restore(self, state: Mapping[str, Any], matrix: Any) -> None:

@@ -146,7 +146,7 @@ class Measures:
         return bool(prescribed == 0 or largest <= NO_STRAIN * prescribed / self._layout.grid.h)
 
     def _volume_scale(self, coefficients: Array) -> Array:
-        """What the volume equation of each particle is compared with, without its volume."""
+        """Reference value of the volume equation of each particle, without its volume."""
         bulk = self._responses.constants["K"]
         strains = self._responses.stage.volume_strains(*self._layout.split(coefficients))
         div_u, field = np.abs(strains).T

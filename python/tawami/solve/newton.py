@@ -104,13 +104,13 @@ class Newton:
         self._stored: Mapping[str, Any] | None = None
 
     def follow(self, earlier: Newton) -> None:
-        """Keep what the solver of an earlier problem has made that does not depend on its values."""
+        """Keep the objects of an earlier solver that do not depend on values of the problem."""
         self._solver = earlier._solver.successor() or self._solver
 
     # -- checkpoints -------------------------------------------------------------
 
     def record(self) -> None:
-        """Record from now on what :meth:`state` gives, independently of earlier steps."""
+        """Record the state for :meth:`state` from now on, independently of earlier steps."""
         self._stored = None
         self._solver.record()
 
@@ -136,7 +136,7 @@ class Newton:
         except Exception as error:
             raise CheckpointError(
                 f"the factorisation in the checkpoint cannot be used ({reason(error)}): its content is "
-                "not what tawami writes. Remove the checkpoint to resume from the one before it"
+                "not that of a checkpoint. Remove the checkpoint to resume from the one before it"
             ) from error
 
     # -- one step ----------------------------------------------------------------
@@ -163,7 +163,7 @@ class Newton:
             inertia: Inertia of a dynamic step.
             guess: Increments of all fields to start from; zero by default.
             friction: Friction of the walls; the tangent neglects its change.
-            path: What makes the load factor an unknown.
+            path: Path on which the load factor is an unknown.
 
         Raises:
             ConvergenceError: Newton did not reach the tolerance within `max_iterations`, or the

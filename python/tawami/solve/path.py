@@ -1,4 +1,4 @@
-"""A path of equilibria: the load factor is an unknown, and a control says how far a step goes.
+"""A path of equilibria: the load factor is an unknown, and a control defines the length of a step.
 
     R(c) - f - (lambda - lambda_0) f'  = 0,     control(c) = 0
 
@@ -24,7 +24,7 @@ LENGTH_TOLERANCE = 1e-3
 
 
 class Control(Protocol):
-    """What gives the load factor of a step."""
+    """Control of a step, which gives its load factor."""
 
     def change(self, u: Array, residual: Array, rate: Array) -> float:
         """Change of the load factor in an iteration; NaN if there is none.
@@ -106,7 +106,7 @@ class Path:
         start: Load factor at the beginning, which the external forces of the step belong to.
         guess: Load factor that belongs to a guess of the increments; that at the beginning without.
         rate: External forces per load factor, on all coefficients [N per metre depth].
-        control: What gives the load factor.
+        control: Control, which gives the load factor.
     """
 
     start: float

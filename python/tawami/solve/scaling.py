@@ -40,8 +40,8 @@ class Scaling:
         vector = matrix.getDiagonal()
         diagonal = vector.array.copy()
         vector.destroy()
-        # A softening law makes negative diagonals. A zero one (a function without stiffness) is left to
-        # the solver to report, in a scale that does not depend on units.
+        # A softening law makes negative diagonals. The solver reports a zero one (a function without
+        # stiffness), in a scale that does not depend on units.
         size = np.abs(np.where(of_u, diagonal, 0.0))
         scale: Array = 1 / np.sqrt(np.where(size > 0, size, self._responses.largest_mu))
         if self._responses.form.kinematics.volume_fields:

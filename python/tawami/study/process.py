@@ -81,8 +81,8 @@ def load(name: str) -> Run:
 
 
 def fingerprint(run: Run) -> str:
-    """Hash of what a measurement depends on besides its knobs: what the function computes (its code and
-    the values that it reads), version, machine.
+    """Hash of all that a measurement depends on besides its knobs: the code of the function and the
+    values that it reads, version, machine.
     """
     parts = (
         json.dumps(meaning(run), sort_keys=True),

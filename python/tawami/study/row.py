@@ -1,4 +1,4 @@
-"""Rows of a study: measured runs, and what changes between two settings."""
+"""Rows of a study: measured runs, and changes between two settings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ def error_of(value: Any, reference: Any) -> float:
     found, expected = (np.asarray(v, dtype=float).ravel() for v in (value, reference))
     if found.shape != expected.shape:
         raise InputError(
-            f"a quantity has {found.size} numbers and its reference {expected.size}: expected as many"
+            f"a quantity has {found.size} numbers and its reference {expected.size}: expected "
+            "the same number"
         )
     size = float(np.linalg.norm(expected))
     return float(np.linalg.norm(found - expected)) / (size or 1.0)
@@ -47,7 +48,7 @@ class Row:
         values: Quantities that are single numbers.
         errors: Error of each quantity with a reference.
         costs: wall_s, cpu_s, peak_MB, newton_iterations, steps, unknowns.
-        failure: Why the run failed and has none of these; None if it succeeded.
+        failure: Error message of a run that failed and has none of these; None if it succeeded.
     """
 
     series: str

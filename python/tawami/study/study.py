@@ -42,7 +42,7 @@ class Study:
         finest: Knobs of the run that the others are compared with.
         beside: Other series, compared with the same reference.
         colour: Knob whose values have colours in the picture.
-        folder: Where runs are stored and results are written; results/study/NAME by default.
+        folder: Folder of the stored runs and the results; results/study/NAME by default.
 
     Raises:
         InputError: A function that another process cannot find, knobs without values, or no reference.
@@ -84,7 +84,7 @@ class Study:
     def _check_types(self) -> None:
         name = checks.shown(self.name)
         if not isinstance(self.name, str) or checks.path("name", self.name).name != self.name:
-            raise InputError(f"study: name = {name}: expected text that a file can be named by")
+            raise InputError(f"study: name = {name}: expected text that can be a file name")
         for what, kind, expected in (
             ("reference", Mapping, "a mapping from quantities to values"),
             ("finest", Mapping | None, "the knobs of a run, or None"),
@@ -151,7 +151,7 @@ class Study:
         if problem is not None:
             raise InputError(
                 f"study '{self.name}': '{path}' cannot be read ({problem}): expected the runs that it "
-                "has stored; remove it to begin anew"
+                "has stored; remove it to start again"
             )
         for line in path.read_text(errors="replace").splitlines():
             try:

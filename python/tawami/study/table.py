@@ -149,9 +149,9 @@ class Table:
         neutral = [c for c in turned if c not in buys and c not in wastes]
         dominated = self.dominated(quantity, cost=cost)
         parts = [
-            ("Accuracy is bought by", [str(c) for c in buys]),
-            ("Time only is spent by", [str(c) for c in wastes]),
-            ("Neither by", [c.step for c in neutral]),
+            ("Changes that reduce the error:", [str(c) for c in buys]),
+            ("Changes that only cost time:", [str(c) for c in wastes]),
+            ("Changes without effect:", [c.step for c in neutral]),
             ("Dominated:", [f"{k} {value_text(v)}" for k, v in dominated]),
         ]
         sentences = [f"{head} {'; '.join(items)}." for head, items in parts if items]
