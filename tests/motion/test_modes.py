@@ -113,7 +113,7 @@ def test_wrong_arguments_are_named(make, message):
 def test_vibrations_that_are_not_found_raise_an_error(monkeypatch):
     scene = beam(0.3, 4)
     monkeypatch.setattr(module, "eigsh", partial(module.eigsh, ncv=41, maxiter=1, tol=1e-300))
-    with pytest.raises(tawami.ConvergenceError, match="of 40 vibrations were found. Ask for fewer"):
+    with pytest.raises(tawami.ConvergenceError, match="of 40 vibrations were found. Request fewer"):
         tawami.modes(scene, 40)
     monkeypatch.undo()
     assert len(tawami.modes(scene, 4).frequencies) == 4

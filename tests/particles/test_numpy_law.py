@@ -94,7 +94,7 @@ def test_uniaxial_strain_gives_the_stress_of_the_law():
 @pytest.mark.parametrize(
     ("respond", "message"),
     [
-        (lambda e, s: s, r"returned no pair: expected \(stress, tangent\)"),
+        (lambda e, s: s, r"did not return a pair: expected \(stress, tangent\)"),
         (lambda e, s: (s[:, :3], e), r"a stress of shape \(108, 3\): expected \(108, 4\)"),
         (lambda e, s: (s, e), r"a tangent of shape \(108, 4\): expected \(108, 4, 4\)"),
         (

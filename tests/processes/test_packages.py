@@ -101,7 +101,7 @@ def readme(language: str) -> list[str]:
 
 
 def test_examples_need_nothing_of_the_repository():
-    """Except those about the measurements in it."""
+    """Pages about the measurements in the repository are an exception."""
     about_cases = {"extremes.md", "trade.md"}
     pages = [
         page for page in (ROOT / "python" / "docs").glob("*.md") if page.name not in about_cases

@@ -63,7 +63,7 @@ def modes(scene: Scene, number: int = 6) -> Modes:
         found = eigsh(stiffness, number, mass, sigma=shift, v0=np.ones(mass.shape[0]))
     except ArpackNoConvergence as error:
         raise ConvergenceError(
-            f"modes: only {len(error.eigenvalues)} of {number} vibrations were found. Ask for fewer",
+            f"modes: only {len(error.eigenvalues)} of {number} vibrations were found. Request fewer",
             [],
         ) from None
     squares, vectors = found
@@ -89,7 +89,7 @@ def _matrices(scene: Scene) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix
             f"modes: {scene.grid.comm.size} ranks: expected one. Run it without mpirun"
         )
     if now.supports.walls:
-        raise InputError("modes: the scene has walls, and contact is not linear: expected none")
+        raise InputError("modes: the scene has walls, and contact is not linear: expected no walls")
     domain = now.domain
     size, n = domain.layout.size, domain.layout.num_displacement
     mass = np.zeros(size)

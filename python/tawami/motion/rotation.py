@@ -68,6 +68,6 @@ class Rotation:
         warn(
             f"a nearly incompressible body turns by {angle:.2g} rad in a step of {dt:.3g} s: its stress "
             f"and energy may grow without bound. Expected up to {LARGEST:g} rad with K/mu above "
-            f"{STIFF:g}: take dt = {0.95 * LARGEST / angle * dt:.2g} s or less",
+            f"{STIFF:g}: use dt = {0.95 * LARGEST / angle * dt:.2g} s or less",
             RotationWarning,
         )

@@ -162,7 +162,7 @@ class NumpyStage:
         n = len(strain)
         result = self._law.respond(strain, self._particles.stress.copy())
         if not isinstance(result, tuple) or len(result) != 2:
-            raise InputError("NumpyLaw: respond returned no pair: expected (stress, tangent)")
+            raise InputError("NumpyLaw: respond did not return a pair: expected (stress, tangent)")
         arrays = []
         for name, values, shape in (
             ("stress", result[0], (n, 4)),

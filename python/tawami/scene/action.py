@@ -236,7 +236,7 @@ class Action:
         """The reverse of :meth:`state`.
 
         Raises:
-            CheckpointError: It was changed to a function while the run went.
+            CheckpointError: It was changed to a function during the run.
         """
         known = {term.number: term for term in self.terms}
         factors = {term.since: term.factor for term in self.terms}
@@ -249,7 +249,7 @@ class Action:
             term = known.get(number)
             if factor is None or (term is None and not all(values)):
                 raise CheckpointError(
-                    f"{name} was changed to a function or another velocity while the run went (each=): "
+                    f"{name} was changed to a function or another velocity during the run (each=): "
                     "expected such changes between two phases, or an amplitude"
                 )
             given = (value[0] if len(value) == 1 else np.array(value) for value in values)
@@ -279,7 +279,7 @@ def restored(what: str, actions: Sequence[Acts], stored: Sequence[Mapping[str, A
     if [action.number for action in left] != list(states):
         raise CheckpointError(
             f"the run had {len(stored)} {what}s when it was stored, and the script made {len(left)}, or "
-            f"others. They were added or released while it ran (each=): expected {what}s to be added "
+            f"others. They were added or released during the run (each=): expected {what}s to be added "
             "and released between two phases"
         )
     for action in left:
