@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import tawami
+from tawami.base.program import AS_ROOT
 from tawami.command import information, main
 
 
@@ -74,6 +75,23 @@ def test_info_lists_what_is_installed_and_what_is_missing(capsys, monkeypatch, t
         "self test FAILED: a block under a traction, error of its stress 9.9e-03",
     ):
         assert words in said
+
+
+def test_info_lists_the_variables_that_mpirun_needs_as_root(monkeypatch):
+    monkeypatch.setattr(information.os, "geteuid", lambda: 0)
+    for name in AS_ROOT:
+        monkeypatch.delenv(name, raising=False)
+    text = dict(information.lines())["ranks"]
+    assert f"As root, mpirun needs: export {AS_ROOT[0]}=1 {AS_ROOT[1]}=1" in text
+        "As root, mpirun needs: export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1"
+        in text
+    )
+    for name in AS_ROOT:
+        monkeypatch.setenv(name, "1")
+    assert "As root" not in dict(information.lines())["ranks"]
+    monkeypatch.setattr(information.os, "geteuid", lambda: 1000)
+    monkeypatch.delenv(AS_ROOT[0])
+    assert "As root" not in dict(information.lines())["ranks"]
 
 
 @pytest.mark.parametrize("kind", ["statics", "dynamics"])

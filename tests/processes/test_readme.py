@@ -21,7 +21,7 @@ def test_the_script_prints_the_number_that_the_readme_states(tmp_path):
     path = tmp_path / "script.py"
     path.write_text(next(block for block in BLOCKS if "tawami.Scene" in block))
     run = python(path.name, cwd=tmp_path, check=True)
-    (stated,) = re.findall(r"It prints (\S+) m\.", TEXT)
+    (stated,) = re.findall(r"It prints (\S+) m\b", TEXT)
     deflection = float(run.stdout.split()[-1])
     assert deflection == pytest.approx(float(stated), abs=0.5 * 10.0 ** -len(stated.split(".")[1]))
     row, _ = mpm.solve("u_epsv", "clamped", 16, per_axis=3)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import platform
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from programs import PYTHONPATH
@@ -117,3 +119,21 @@ def test_only_leftovers_are_removed(tmp_path):
     os.utime(tmp_path / gone[1], (day_before, day_before))
     remove_leftovers(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(keep)
+
+
+def test_a_forked_process_does_not_write_with_its_parent(tmp_path):
+    """The system would give it the lock that its parent holds."""
+    held = hold(tmp_path, "parent")
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        said = pool.map_async(forked, [tmp_path]).get(60)[0]
+    assert "this process was forked" in said
+    assert held.is_locked
+
+
+def forked(folder: Path) -> str:
+    """The error message of a forked process that locks the folder."""
+    try:
+        hold(folder, "child")
+    except tawami.InputError as error:
+        return str(error)
+    return "locked"

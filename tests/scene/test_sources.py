@@ -140,6 +140,15 @@ def test_columns_of_a_table_are_found_by_name_and_converted(tmp_path, header, ro
     assert scene.particles.stress == pytest.approx(np.tile(STATE, (128, 1)), rel=1e-9)
 
 
+@pytest.mark.parametrize("unit", ["[1]", "[-]", "(1)", ""])
+def test_numbers_without_a_unit_have_several_labels(tmp_path, unit):
+    path = tmp_path / "field.csv"
+    write_table(path, CORNERS, [[0], [0.2], [0.2], [0]], f"x,y,eps_v {unit}")
+    scene = column("mohr_coulomb")
+    scene.initial("eps_v", tawami.table(path))
+    assert scene.particles.eps_v == pytest.approx(0.1 * scene.particles.x[:, 0])
+
+
 def test_positions_in_millimetres_are_converted(tmp_path):
     path = tmp_path / "field.csv"
     write_table(path, 1e3 * np.array(CORNERS), [[0], [20], [20], [0]], "x [mm],y [mm],eps_v [%]")

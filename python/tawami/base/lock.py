@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 from tawami.base.errors import InputError, OutputError
 from tawami.base.files import alive, atomic_file, host, reason, remove_leftovers, result_folder
+from tawami.base.process import check_process
 
 if TYPE_CHECKING:
     from filelock import BaseFileLock
@@ -41,9 +42,11 @@ def hold(folder: Path, what: str, patience: float = PATIENCE) -> BaseFileLock:
         patience: Longest time to wait until another process releases it [s].
 
     Raises:
-        InputError: Another process holds it; the message names its host and its number.
+        InputError: Another process holds it; the message names its host and its number. Or this process
+            was forked, and would write together with its parent.
         OutputError: The folder cannot be written, or its file system has no locks.
     """
+    check_process()  # a fork shares the lock of its parent
     from filelock import FileLock, Timeout  # here: a scene without results does not need it
 
     home = result_folder(folder).resolve()

@@ -11,15 +11,15 @@ UNITS: dict[str, dict[str, float]] = {
     "m": {"m": 1.0, "km": 1e3, "dm": 1e-1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6},
     "m/s": {"m/s": 1.0, "km/s": 1e3, "cm/s": 1e-2, "mm/s": 1e-3},
     "m2 per m": {"m2 per m": 1.0, "m2": 1.0, "cm2": 1e-4, "mm2": 1e-6},
-    "-": {"-": 1.0, "1": 1.0, "%": 1e-2},
+    "-": {"-": 1.0, "%": 1e-2, "1": 1.0},
 }  # fmt: skip
 #: Other ways of writing a unit.
 SPELLINGS = {"²": "2", "^": "", "**": "", "µ": "u", "μ": "u"}
 
 
 def known(text: str) -> bool:
-    """Whether this is a unit that is converted."""
-    return any(_plain(text) in units for units in UNITS.values())
+    """Whether this is a unit that is converted, without brackets: a number is part of the name there."""
+    return not text.strip().isdigit() and any(_plain(text) in units for units in UNITS.values())
 
 
 def factor(text: str, unit: str) -> float:
