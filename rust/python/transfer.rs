@@ -131,18 +131,20 @@ pub(super) fn densities(
     Ok(())
 }
 
-/// `sum_p w_p D_p N_i(x_p)` over the functions of a basis: functions x columns.
+/// `sum_p w_p D_p N_i(x_p)` over the functions of a basis, or with their squares: functions x columns.
 #[pyfunction]
+#[pyo3(signature = (location, weight, data, basis, squared = false))]
 pub(super) fn nodal_sums<'py>(
     py: Python<'py>,
     location: &PyLocation,
     weight: Read1<f64>,
     data: Read2<f64>,
     basis: &str,
+    squared: bool,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (weight, data) = particle_data(location, &weight, &data)?;
     let basis = basis.parse()?;
-    Ok(detached(py, || sums_of_functions(&location.0, weight, data, basis)).to_pyarray(py))
+    Ok(detached(py, || sums_of_functions(&location.0, weight, data, basis, squared)).to_pyarray(py))
 }
 
 /// `sum_p w_p D_p` over the particles of each cell of the grid: cells x columns.

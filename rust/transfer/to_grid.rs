@@ -8,7 +8,8 @@ use rayon::prelude::*;
 use crate::grid::{products, Basis, Functions, Location};
 use crate::space::{indices, Index, Point, FUNCTIONS};
 
-/// Sums `sum_p V_p D_p N_i(x_p)` for the functions of a basis: functions x columns.
+/// Sums `sum_p V_p D_p N_i(x_p)` for the functions of a basis, or with the squares of the functions:
+/// functions x columns.
 ///
 /// Each row of cells along x is summed by itself, then the rows are added in their order: the result does
 /// not depend on the number of threads.
@@ -18,6 +19,7 @@ pub fn nodal_sums(
     volume: &[f64],
     data: ArrayView2<f64>,
     basis: Basis,
+    squared: bool,
 ) -> Array2<f64> {
     let columns = data.ncols();
     let functions = Functions { basis, cells: location.grid.cells };
@@ -30,7 +32,7 @@ pub fn nodal_sums(
             let numbers = strip.on_cell(along_x(cell[0], 0));
             for &p in location.particles_of(a) {
                 let p = p as usize;
-                let weights = weighted_values(&functions, cell, location.xi[p], volume[p]);
+                let weights = weighted(&functions, cell, location.xi[p], volume[p], squared);
                 for (&function, weight) in numbers.iter().zip(weights) {
                     let of_function = &mut sums[columns * function..][..columns];
                     for (s, d) in of_function.iter_mut().zip(data.row(p)) {
@@ -65,9 +67,18 @@ fn along_x(x: usize, others: usize) -> Index {
     std::array::from_fn(|axis| if axis == 0 { x } else { others })
 }
 
-/// The functions of a cell at a position in it, times a weight.
-fn weighted_values(functions: &Functions, cell: Index, xi: Point, weight: f64) -> [f64; FUNCTIONS] {
+/// The functions of a cell at a position in it, or their squares, times a weight.
+fn weighted(
+    functions: &Functions,
+    cell: Index,
+    xi: Point,
+    weight: f64,
+    squared: bool,
+) -> [f64; FUNCTIONS] {
     let mut along = functions.at(cell, xi).map(|local| local.value);
+    if squared {
+        along.iter_mut().flatten().for_each(|value| *value *= *value);
+    }
     along[0].iter_mut().for_each(|value| *value *= weight);
     products(along.each_ref(), functions.basis.per_cell())
 }

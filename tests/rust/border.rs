@@ -91,7 +91,7 @@ proptest! {
             }
         }
         for basis in BASES {
-            prop_assert_eq!(nodal_sums(&location, &volume, data.view(), basis).ncols(), 2);
+            prop_assert_eq!(nodal_sums(&location, &volume, data.view(), basis, false).ncols(), 2);
         }
     }
 

@@ -122,8 +122,8 @@ class Responses:
                     self.stage.evaluate(u, volumetric, self._requests, self._written)
         return self.data
 
-    def sums(self, columns: Array) -> Array:
-        """Volume-weighted sums over all particles of the body on the bilinear functions.
+    def sums(self, columns: Array, *, squared: bool = False) -> Array:
+        """Volume-weighted sums over all particles of the body on bilinear functions, or their squares.
 
         A collective call.
 
@@ -131,7 +131,7 @@ class Responses:
             columns: Values of this rank's particles, particles x columns.
         """
         volume = self.particles.volume
-        sums = _rust.nodal_sums(self.location, volume, columns, "bilinear")
+        sums = _rust.nodal_sums(self.location, volume, columns, "bilinear", squared)
         return ranks.sum_of(self._comm, sums)
 
     def cell_sums(self, columns: Array) -> Array:

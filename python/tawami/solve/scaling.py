@@ -13,8 +13,9 @@ from tawami.field.rigid import rigid_motions
 from tawami.particles.responses import Responses
 from tawami.solve.linear_solver import Blocks
 
-#: Share of the area of a cell below which the volume of a function counts as zero.
-LEAST = 1e-14
+#: Share of the area of a cell below which the volume of a function counts as zero: far below that of a
+#: particle on the edge of the function, whose stiffness the assembly computes to round-off.
+LEAST = 1e-60
 
 
 class Scaling:
@@ -32,8 +33,8 @@ class Scaling:
         """Factors of this rank's unknowns; a collective call.
 
         Displacement is divided by the square root of the diagonal. eps_v and p are solved for as p/mu,
-        divided by the square root of mu times the volume of their function, or of their diagonal if that
-        is larger.
+        divided by the square root of mu sum_p V_p M^2, the size of their coupling with the scaled
+        displacement, or of their diagonal if that is larger.
         """
         own = reduction.unknowns[reduction.own]
         of_u = own < self._layout.num_displacement
@@ -61,8 +62,9 @@ class Scaling:
         has_eps_v = self._responses.form.kinematics.has_eps_v
         to_field = mu_i * over_bulk / volume if has_eps_v else mu_i
         to_field = np.where(to_field > 0, to_field, 1)
+        squares = self._responses.sums(np.ones((len(mu), 1)), squared=True)[functions, 0]
         # in a cell with little of the body the stabilisation is larger than that volume
-        size = np.maximum(mu_i * volume, to_field**2 * np.abs(diagonal))
+        size = np.maximum(mu_i * np.maximum(squares, least), to_field**2 * np.abs(diagonal))
         return np.asarray(to_field / np.sqrt(size))
 
     def blocks(self, reduction: Reduction) -> Blocks:
