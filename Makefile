@@ -155,6 +155,7 @@ $(PROCESSOR): $(STAMPS)/rust
 	@touch $@
 
 $(STAMPS)/wheel: $(STAMPS)/python $(PROCESSOR) Cargo.toml Cargo.lock $(shell find rust -name '*.rs')
+	@echo "Compiling the Rust part (about a minute)"
 	RUSTFLAGS="-C target-cpu=native" VIRTUAL_ENV=$(CURDIR)/.venv PIP_CONSTRAINT=$(CURDIR)/.venv/constraints.txt .venv/bin/maturin develop --release --locked --quiet >/dev/null
 	@touch $@
 

@@ -4,6 +4,7 @@ adds more.
 
 from __future__ import annotations
 
+import inspect
 import subprocess
 import sys
 
@@ -15,6 +16,7 @@ import tawami
 from tawami.fem import kernels
 from tawami.form import compilation
 from tawami.scene.domain import Domain
+from tawami.scene.model import KEYWORDS
 from tawami.solve.inertia import Inertia
 
 MIXED = [name for name, options in (FORMS | FINITE).items() if "epsv" in options["form"]]
@@ -255,3 +257,12 @@ def test_hasattr_is_false_for_what_is_not_modelled():
     scene = scene_of(form="u")
     assert not hasattr(scene, "velocity")
     assert hasattr(scene, "stopwatch")
+
+
+def test_a_misspelt_argument_of_a_scene_is_suggested():
+    named = inspect.signature(tawami.Scene).parameters.values()
+    assert {p.name for p in named if p.kind == p.KEYWORD_ONLY} == set(KEYWORDS)
+    with pytest.raises(
+        tawami.InputError, match="has no parameter 'densty': .*; did you mean 'density'"
+    ):
+        scene_of(densty=1000.0)

@@ -35,7 +35,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 from pathlib import Path
@@ -45,7 +45,7 @@ from typing import Any, NoReturn
 from tawami.base.checks import TEXT, number, one_of, real, shown
 from tawami.base.errors import FormError, InputError
 from tawami.base.meaning import meaning
-from tawami.base.text import quoted
+from tawami.base.text import meant, quoted
 from tawami.form.files import module_of
 from tawami.form.kinematics import (
     FIELD_UNITS,
@@ -236,13 +236,14 @@ class Form:
         }
 
     def settings(
-        self, given: Mapping[str, Any], *, static: bool = False
+        self, given: Mapping[str, Any], *, static: bool = False, others: Iterable[str] = ()
     ) -> tuple[dict[str, float], dict[str, str]]:
         """Parameters and options of this form, with the defaults of those that are not given.
 
         Args:
             given: By name.
             static: Whether the scene has no density, so that its options default to `static_options`.
+            others: Names that may have been meant instead of an unknown one.
 
         Raises:
             InputError: A name is unknown, or a value is out of its limits.
@@ -262,7 +263,8 @@ class Form:
             else:
                 known = [*parameters, *options]
                 has = f"it has {quoted(known)}" if known else "it has none"
-                raise InputError(f"form {self.name} has no parameter '{name}': {has}")
+                hint = meant(name, (*known, *others))
+                raise InputError(f"form {self.name} has no parameter '{name}': {has}{hint}")
         return {n: self._limited(n, v, options) for n, v in parameters.items()}, options
 
     def _check_limits(self) -> None:

@@ -32,6 +32,12 @@ Leaving = Literal["stop", "remove"]
 #: has 4 times the error that it has at 0.3, at 0.49995 70 times (`python -m cases.extremes`).
 LOCKS = 50.0
 
+#: Arguments of `Scene` that are not parameters of the form.
+KEYWORDS = (
+    "material_of", "form", "basis", "tolerance", "max_iterations", "assembly", "factorise",
+    "linear_solver", "density", "leaving",
+)  # fmt: skip
+
 
 @dataclass(frozen=True, eq=False)
 class Model:
@@ -169,7 +175,7 @@ def build(
             "a tawami.Body"
         )
     loaded = Form.load(form)
-    values, options = loaded.settings(parameters, static=density is None)
+    values, options = loaded.settings(parameters, static=density is None, others=KEYWORDS)
     for message in [] if grid.comm.rank else loaded.unusual(values):
         warn(message, ParameterWarning)
     particles, materials, law = _particles(body, material, material_of, loaded)
