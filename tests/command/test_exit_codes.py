@@ -16,7 +16,8 @@ from tawami.command import main
 MISUSE = """
 tawami --nonsense | tawami dance | tawami | tawami case.py
 tawami run | tawami run nowhere.py | tawami run . | tawami run text.txt | tawami run case.py --n 3
-tawami run case.py --ranks 0 | tawami run case.py --ranks two | tawami run case.py --ranks
+tawami run case.py --ranks 0 | tawami run case.py --ranks 100000 | tawami run case.py --ranks two
+tawami run case.py --ranks
 tawami run case.py -m case | tawami run case.py --resume --replace | tawami run -m no.such.module
 tawami run case.py --log-level loud | tawami run run | tawami run case.py another.py
 tawami resume | tawami resume nowhere | tawami resume . | tawami resume case.py | tawami resume run

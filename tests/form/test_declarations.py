@@ -5,11 +5,13 @@ from __future__ import annotations
 import textwrap
 
 import pytest
+import ufl
 from declared import BOTH, form_of
-from ufl import SpatialCoordinate, div, dot, grad
+from ufl import SpatialCoordinate, div, dot, grad, inner
 
 import tawami
 from tawami.form.form import Form
+from tawami.form.symbols import Symbols
 
 WRONG = [
     (lambda: Form.load("u_eps"), r"'u_eps' is not shipped: expected one of 'u', 'u_bbar'"),
@@ -41,6 +43,11 @@ def test_wrong_declarations_are_rejected(make, message):
     ("function", "message"),
     [
         (lambda w, sigma, porosity: 0, r"asks for 'porosity', which is not defined: .* 'K'"),
+        (
+            lambda u, w, mu, sum_p: sum_p(mu, dot(u, w)) + dot(u, w) * ufl.dx,
+            "a measure of UFL: expected dx, dx_c or ds as arguments",
+        ),
+        (lambda w, sigma, sum_p: sum_p(inner(sigma, grad(w))), r"as sum_p\(sigma, grad\(w\)\)"),
         (lambda w, sigma: 3.0, "residual returned float: expected a UFL form"),
         (lambda u, sum_p, K: sum_p(K, div(u)), "test function 'w' of field 'u' does not appear"),
         (lambda u, w, sum_p, K: sum_p(K, div(u)), "test function 'w' of field 'u' does not appear"),
@@ -125,3 +132,12 @@ def test_static_options_are_the_defaults_of_scenes_without_a_density():
                 options={"ghost_penalty": ("off", "on")},
                 static_options=static_options,
             )
+
+
+def test_a_parameter_in_the_place_of_a_quantity_is_named():
+    form = form_of(
+        lambda u, w, stiffness, sum_p: sum_p(stiffness, dot(u, w)),
+        parameters={"stiffness": {"default": 1.0}},
+    )
+    with pytest.raises(tawami.FormError, match=r"expected stiffness \* sum_p\(f\)"):
+        Symbols(form, {}).residual()

@@ -12,6 +12,8 @@ from programs import python
 from runs import look
 
 import tawami
+from tawami.picture import film
+from tawami.picture.particles import Corners, scale_of
 from tawami.picture.style import scaled
 from tawami.results import film as pictures
 from tawami.results import provenance
@@ -60,10 +62,20 @@ def test_a_run_is_drawn_from_its_files(scene, tmp_path):
             assert getattr(image, "n_frames", 1) == (5 if name.endswith("gif") else 1)
 
 
+def test_the_title_is_inside_the_picture():
+    x = np.array([[0.1, 0.1], [0.7, 0.2]])
+    frame = film.Frame("$t$ = 0.3 s", x, 0.1, np.array([0.0, 1.0]))
+    scale = scale_of("mean stress", "Pa", [frame.values], None)
+    grid = Corners(np.zeros(2), np.array([0.8, 0.3]))
+    made = film.Film([frame], scale, grid)
+    made.figure.canvas.draw()
+    assert made.axes.title.get_window_extent().y1 < made.figure.bbox.y1
+
+
 def test_a_movie_has_one_scale_of_colours_and_one_view(scene, tmp_path):
     run_of(tmp_path, scene, phases=("motion",))
-    film = next(path for path in plot(tmp_path) if path.suffix == ".gif")
-    with Image.open(film) as image:
+    movie = next(path for path in plot(tmp_path) if path.suffix == ".gif")
+    with Image.open(movie) as image:
         frames = []
         for k in range(image.n_frames):
             image.seek(k)

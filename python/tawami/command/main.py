@@ -246,6 +246,12 @@ def _number_of_ranks(text: str) -> int:
         number = 0
     if number < 1:
         raise argparse.ArgumentTypeError(f"'{text}': expected a whole number, at least 1")
+    processors = len(os.sched_getaffinity(0))
+    most = max(16, 4 * processors)
+    if number > most:
+        raise argparse.ArgumentTypeError(
+            f"{number} ranks on {processors} processors: expected at most {most}; start more with mpirun"
+        )
     return number
 
 

@@ -4,8 +4,9 @@ A form declares `fields` and `kinematics`, optionally `parameters`, `options`, `
 `whole_cells`, and a function `residual`. The names of its arguments select from the following:
 
 ========================= ========================================================================
-fields, test functions    u, w, eps_v, q, ... as declared in `fields`
-sigma, s, sigma_m         stress of the law in the plane, its three-dimensional deviator, mean stress
+fields, test functions    u, w, eps_v, q, ... as declared in `fields`; fields are increments of the step
+sigma, s, sigma_m         stress of the law in the plane at the end of the step, its
+                          three-dimensional deviator, mean stress
 P, P_s, tau_m, ln_J       with `strain = "finite"`, instead of these: tau f^-T, s f^-T, mean Kirchhoff
                           stress and ln det f of the step, where f = I + grad u and
                           tau = s + tau_m I is the Kirchhoff stress of the law

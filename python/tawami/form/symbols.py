@@ -136,6 +136,12 @@ class Symbols:
     def _quantity(self, quantity: Any, caller: str) -> Quantity:
         if isinstance(quantity, (int, float)):
             return ParticleScalar(repr(quantity), lambda v: quantity * ONE.evaluate(v))
+        if isinstance(quantity, ufl.Constant):
+            name = next((n for n, c in self.constants.items() if c == quantity), "c")
+            raise FormError(
+                f"form {self.form.name}: {caller}({name}, ...): {name} is a parameter, not a quantity of the "
+                f"particles: expected {name} * {caller}(f)"
+            )
         if not isinstance(quantity, (ParticleScalar, LawQuantity)):
             raise FormError(
                 f"form {self.form.name}: {caller} takes a particle quantity "
@@ -257,7 +263,12 @@ class Symbols:
         except (FormError, Warning):
             raise
         except Exception as error:
-            raise FormError(f"form {form.name}: its residual raised {error!r}") from error
+            advice = ""
+            if "LawQuantity" in str(error) or "ParticleScalar" in str(error):
+                advice = (
+                    ". Sums combine quantities of the particles with expressions, as sum_p(sigma, grad(w))"
+                )
+            raise FormError(f"form {form.name}: its residual raised {error!r}{advice}") from error
 
     def residual(self) -> Any:
         """The residual, after a check that it is a UFL form with every test function."""

@@ -39,6 +39,10 @@ def terms_of(symbols: Symbols, residual: Any) -> Terms:
     """
     name = symbols.form.name
     for part in residual.integrals():
+        if part.ufl_domain() != symbols.domain or "quadrature_degree" not in part.metadata():
+            raise FormError(
+                f"form {name}: a measure of UFL: expected dx, dx_c or ds as arguments, residual(..., dx)"
+            )
         if part.subdomain_id() != "everywhere":
             raise FormError(
                 f"form {name}: a measure with a number, as dx({part.subdomain_id()}): expected dx, dx_c "

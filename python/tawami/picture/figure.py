@@ -42,8 +42,8 @@ def shown_axes(width: float, height: float) -> Axes:
 
 
 def lay_out(figure: Figure | None) -> None:
-    """Place the parts of a figure, which takes two draws where axes have equal scales."""
-    for _ in range(2):
+    """Place the parts of a figure, which takes a few draws where axes have equal scales."""
+    for _ in range(4):
         assert figure is not None
         figure.draw_without_rendering()
 
