@@ -139,8 +139,8 @@ class Symbols:
         if isinstance(quantity, ufl.Constant):
             name = next((n for n, c in self.constants.items() if c == quantity), "c")
             raise FormError(
-                f"form {self.form.name}: {caller}({name}, ...): {name} is a parameter, not a quantity of the "
-                f"particles: expected {name} * {caller}(f)"
+                f"form {self.form.name}: {caller}({name}, ...): {name} is a parameter, no quantity of "
+                f"the particles: expected {name} * {caller}(f)"
             )
         if not isinstance(quantity, (ParticleScalar, LawQuantity)):
             raise FormError(
@@ -265,9 +265,7 @@ class Symbols:
         except Exception as error:
             advice = ""
             if "LawQuantity" in str(error) or "ParticleScalar" in str(error):
-                advice = (
-                    ". Sums combine quantities of the particles with expressions, as sum_p(sigma, grad(w))"
-                )
+                advice = ". Sums take quantities of the particles, as sum_p(sigma, grad(w))"
             raise FormError(f"form {form.name}: its residual raised {error!r}{advice}") from error
 
     def residual(self) -> Any:
