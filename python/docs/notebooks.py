@@ -37,6 +37,9 @@ def prepare() -> Path:
     profile = executed.RESULTS / "ipython" / "profile_default" / "startup"
     profile.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(Path(__file__).with_name("kernel.py"), profile / "kernel.py")
+    # warnings of the kernel itself, about its connection, are not for readers of the log
+    quiet = "get_config().IPKernelApp.log_level = 40\n"
+    (profile.parent / "ipython_kernel_config.py").write_text(quiet)
     os.environ["IPYTHONDIR"] = str(profile.parents[1])
     os.environ["PYTHONPATH"] = executed.search_path()
     os.environ.pop("MPLBACKEND", None)  # the kernel's own shows figures in the page
