@@ -6,7 +6,25 @@ import numpy as np
 import pytest
 from scenes import grid_of
 from scipy.interpolate import BSpline
-from ufl import Identity, as_vector, conditional, cos, div, dot, exp, grad, gt, inner, inv, sqrt
+from ufl import (
+    Constant,
+    Identity,
+    as_vector,
+    conditional,
+    cos,
+    det,
+    diff,
+    div,
+    dot,
+    exp,
+    grad,
+    gt,
+    inner,
+    inv,
+    ln,
+    sqrt,
+    variable,
+)  # fmt: skip
 
 import tawami
 from tawami.form.form import Form
@@ -122,3 +140,53 @@ def test_the_tangent_is_that_of_the_residual(cloud, basis, expression):
     predicted = scene.tangent(c) @ direction
     error = np.abs((ahead - behind) / (2 * step) - predicted).max()
     assert error < 1e-7 * np.abs(predicted).max()
+
+
+def test_an_energy_in_terms_of_a_variable(cloud):
+    """R(w) = sum_p V_p dW/dF : grad w, W = mu (F : F - 2 ln det F), F a variable."""
+
+    def residual(u, w, mu, sum_p):
+        F = variable(Identity(2) + 0.3 * grad(u))
+        return sum_p(mu, inner(diff(inner(F, F) - 2 * ln(det(F)), F), grad(w)))
+
+    scene = scene_of(cloud, residual)
+    c = increments(scene)
+    _, _, volume, functions = cloud
+    F = np.eye(2)[..., None] + 0.3 * gradient_of(cloud, c)
+    inverse = np.linalg.inv(F.transpose(2, 0, 1)).transpose(2, 1, 0)
+    stress = 2 * (F - inverse) * volume
+    expected = np.column_stack(
+        [functions(1, 0) @ stress[k, 0] + functions(0, 1) @ stress[k, 1] for k in range(2)]
+    ).ravel()
+    np.testing.assert_allclose(scene.residual(c), expected, atol=1e-12 * np.abs(expected).max())
+
+
+def test_terms_that_vanish_and_sums_that_are_not_used(cloud):
+    def residual(u, w, mu, s, sigma, sum_p):
+        sum_p(s, grad(w))
+        return sum_p(sigma, grad(w)) + sum_p(mu, 0 * dot(u, w))
+
+    plain = scene_of(cloud, lambda w, sigma, sum_p: sum_p(sigma, grad(w)))
+    scene = scene_of(cloud, residual)
+    c = increments(scene)
+    np.testing.assert_allclose(scene.residual(c), plain.residual(c), rtol=1e-13)
+    assert abs(scene.tangent(c) - plain.tangent(c)).max() == 0
+
+
+@pytest.mark.parametrize(
+    ("residual", "message"),
+    [
+        (
+            lambda u, w, sum_p: sum_p(inner(grad(grad(grad(u))), grad(grad(grad(w))))),
+            "at most second derivatives",
+        ),
+        (lambda w, sigma, h, sum_p, sum_c: sum_p(sigma, grad(w)) + sum_c(h), "no test function"),
+        (
+            lambda w, mu, sum_p: sum_p(mu, Constant(w.ufl_domain()) * w[0]),
+            "a Constant of UFL: expected a number",
+        ),
+    ],
+)
+def test_terms_that_cannot_be_evaluated_are_rejected(cloud, residual, message):
+    with pytest.raises(tawami.FormError, match=message):
+        scene_of(cloud, residual)

@@ -16,9 +16,10 @@ import ufl
 from ufl.algorithms import expand_derivatives
 from ufl.algorithms.expand_indices import expand_indices
 from ufl.algorithms.remove_complex_nodes import remove_complex_nodes
-from ufl.classes import Argument, Coefficient, Constant, Grad, Indexed
+from ufl.classes import Argument, Coefficient, Constant, Grad, Indexed, Variable
 from ufl.corealg.traversal import unique_pre_traversal
 
+from tawami.base.errors import FormError
 from tawami.fem import dolfinx
 
 #: Component of the fields and axes of its derivatives: (0, ()) is u_x, (1, (0,)) is du_y/dx.
@@ -51,7 +52,7 @@ def at_point(form: Any, increments: Any, data: Mapping[Any, tuple[Any, int]]) ->
             :func:`vector`), and its first component there.
     """
     (integrand, *more) = (part.integrand() for part in expand_derivatives(form).integrals())
-    integrand = expand_indices(remove_complex_nodes(sum(more, integrand)))
+    integrand = expand_indices(_without_variables(remove_complex_nodes(sum(more, integrand))))
     kinds: tuple[Any, ...] = ("fields", 0, 1)
     used: dict[Any, set[Entry]] = {kind: set() for kind in kinds}
     for node in unique_pre_traversal(integrand):
@@ -82,6 +83,16 @@ def at_point(form: Any, increments: Any, data: Mapping[Any, tuple[Any, int]]) ->
     return PointForm(ufl.replace(integrand, by_entry) * measure, *(entries[k] for k in kinds))
 
 
+def _without_variables(expression: Any) -> Any:
+    """Replace variables by their expressions: UFL expands the indices of tensor variables wrongly."""
+    while True:
+        nodes = unique_pre_traversal(expression)
+        variables = {node: node.ufl_operands[0] for node in nodes if isinstance(node, Variable)}
+        if not variables:
+            return expression
+        expression = ufl.replace(expression, variables)
+
+
 def vector(size: int, count: int, domain: Any = None) -> Any:
     """A coefficient with `size` components, at least one, on the unit interval."""
     return ufl.Coefficient(_space(size, domain or dolfinx.interval()), count=count)
@@ -104,4 +115,8 @@ def _entry(node: Any, increments: Any) -> tuple[Any, Entry]:
     if kind is None:
         return None, (0, ())
     component, *axes = map(int, index)
+    if len(axes) > 2:
+        raise FormError(
+            "a third derivative in a sum: expected at most second derivatives of fields"
+        )
     return kind, (component, tuple(sorted(axes)))

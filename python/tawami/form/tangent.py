@@ -62,10 +62,13 @@ class Linearisation:
 
     def _law_densities(self) -> list[tuple[Density, Any]]:
         """The law quantities of the residual with their placeholders."""
+        used = set(self._residual.coefficients())
         return [
             (density, symbol)
             for density, symbol in self._symbols.placeholders.items()
-            if isinstance(density.quantity, LawQuantity) and density.part == "value"
+            if isinstance(density.quantity, LawQuantity)
+            and density.part == "value"
+            and symbol in used
         ]
 
     def _direction(self, density: Density) -> Any:

@@ -8,8 +8,10 @@ from typing import Any
 
 import ufl
 from ufl import SpatialCoordinate
-from ufl.algorithms.analysis import extract_coefficients, has_type
+from ufl.algorithms import expand_derivatives
+from ufl.algorithms.analysis import extract_arguments, extract_coefficients, has_type
 from ufl.algorithms.check_arities import ArityMismatch, check_form_arity
+from ufl.classes import Zero
 
 from tawami.base.errors import FormError
 from tawami.fem.rules import Rule
@@ -43,6 +45,8 @@ def terms_of(symbols: Symbols, residual: Any) -> Terms:
             raise FormError(
                 f"form {name}: a measure of UFL: expected dx, dx_c or ds as arguments, residual(..., dx)"
             )
+        if not extract_arguments(part) and not isinstance(part.integrand(), Zero):
+            raise FormError(f"form {name}: a term has no test function: expected one in each term")
         if part.subdomain_id() != "everywhere":
             raise FormError(
                 f"form {name}: a measure with a number, as dx({part.subdomain_id()}): expected dx, dx_c "
@@ -52,6 +56,10 @@ def terms_of(symbols: Symbols, residual: Any) -> Terms:
         raise FormError(
             f"form {name}: the position x in a term: expected position-dependent data at the particles "
             "(material, volume) or in scene.traction(...)"
+        )
+    if not {*residual.constants()} <= {*symbols.constants.values()}:
+        raise FormError(
+            f"form {name}: a Constant of UFL: expected a number, or one of 'parameters'"
         )
     kinds = ("cell", "exterior_facet", "interior_facet")
     cells, edges, sides = (_of_type(residual, kind) for kind in kinds)
@@ -97,6 +105,8 @@ def at_points(form: Any, rule_of: Mapping[Any, Rule]) -> tuple[list[tuple[Rule, 
     sums: dict[Rule, list[Any]] = {}
     rest = []
     for integral in form.integrals():
+        if expand_derivatives(ufl.Form([integral])).empty():
+            continue
         rules = {rule_of[c] for c in extract_coefficients(integral) if c in rule_of} - {"mean"}
         if rules:
             (rule,) = rules
