@@ -61,6 +61,13 @@ slots that were requested by the application:
 
 Either request fewer procs for your application, or make more slots available for use.
 {DASHES}"""
+OUTDATED_5 = f"""{DASHES}A deprecated MCA variable value was specified in the environment or
+on the command line.  Deprecated MCA variables should be avoided;
+they may disappear in future releases.
+
+  Deprecated variable: rmaps_default_mapping_policy
+  New variable:        mapby
+{DASHES}"""
 OWN = f"first\n{DASHES}a table of the script\n\n{DASHES}last, without an end of line"
 REPEATED = [ABORT_4, EXIT_4, TORN_4, MORE_4, ABORT_5, EXIT_5]
 
@@ -89,6 +96,14 @@ def test_without_an_announced_error_everything_is_printed(repeated):
     assert sorted(printed(repeated + CRASH_4, 100).splitlines()) == sorted(
         (repeated + CRASH_4).splitlines()
     )
+
+
+@pytest.mark.parametrize("size", [1, 7, 100000])
+def test_a_message_about_an_outdated_variable_is_left_out(size):
+    assert printed(OUTDATED_5, size) == ""
+    for other in (OWN, CRASH_5, SLOTS):
+        assert printed(OUTDATED_5 + other, size) == other
+    assert printed(OUTDATED_5 + EXIT_5, size) == EXIT_5
 
 
 def test_a_line_that_has_not_ended_is_printed_after_a_while():

@@ -36,6 +36,8 @@ REPEATED = re.compile(
     re.VERBOSE,
 )
 FRAME = re.compile("-{60,}")
+#: First line of a block of Open MPI 5 about a variable that `program.mpirun` sets for all its versions.
+OUTDATED = re.compile("A deprecated MCA variable value was specified .*")
 #: Time after which a line that has not ended is printed [s].
 PATIENCE = 0.2
 
@@ -103,6 +105,7 @@ class Messages:
         self._begun = False  # whether the begin of this line is printed
         self._frame = b""  # a line of dashes, whose meaning the next line decides
         self._inside = False  # a block that repeats an error
+        self._outdated = False  # a block about an outdated variable
         self._repeated: list[bytes] = []
         self._announced = False
 
@@ -126,6 +129,12 @@ class Messages:
         line, ended, _ = line.partition(f"{program.ENDED}\n".encode())
         self._announced = self._announced or bool(ended)
         text = line.decode(errors="replace").strip()
+        if self._outdated:
+            self._outdated = not FRAME.fullmatch(text)
+            return b""
+        if self._frame and OUTDATED.fullmatch(text):
+            self._frame, self._outdated = b"", True
+            return b""
         if ended or self._begun:
             self._begun = False
         elif FRAME.fullmatch(text):
