@@ -138,7 +138,7 @@ print(dolfinx.__version__, ".".join(map(str, PETSc.Sys.getVersion())), ".".join(
 '
 
 counted() { # pattern log: sum over cargo's 'N passed; M failed' and pytest's 'M failed, N passed in 9.9s'
-    { grep -E '^test result:|(passed|failed|errors?)\>.* in [0-9.]+s' "$2" | grep -oE "[0-9]+ $1" || true; } |
+    { grep -aE '^test result:|(passed|failed|errors?)\>.* in [0-9.]+s' "$2" | grep -oE "[0-9]+ $1" || true; } |
         awk '{ n += $1 } END { print n + 0 }'
 }
 
