@@ -90,6 +90,15 @@ def test_messages_that_repeat_an_error_are_left_out_and_no_others(size):
         assert printed(f"progress{error}{repeated}", size).startswith("progresscase.py")
 
 
+@pytest.mark.parametrize("repeated", [ABORT_4, EXIT_4, ABORT_5, EXIT_5])
+def test_messages_that_arrive_slowly_are_left_out(repeated):
+    messages, text = Messages(), f"error\n{ENDED}\n"
+    seen = messages.passed(text.encode())
+    for line in repeated.splitlines(keepends=True):
+        seen += messages.passed(line.encode()) + messages.waiting()
+    assert seen + messages.rest() == b"error\n"
+
+
 @pytest.mark.parametrize("repeated", REPEATED)
 def test_without_an_announced_error_everything_is_printed(repeated):
     assert printed(OWN + "\n" + repeated, 11) == OWN + "\n" + repeated

@@ -182,7 +182,7 @@ def test_terms_that_vanish_and_sums_that_are_not_used(cloud):
         ),
         (lambda w, sigma, h, sum_p, sum_c: sum_p(sigma, grad(w)) + sum_c(h), "no test function"),
         (
-            lambda w, mu, sum_p: sum_p(mu, Constant(w.ufl_domain()) * w[0]),
+            lambda w, mu, sum_p: sum_p(mu, Constant(w.ufl_domain(), count=77) * w[0]),
             "a Constant of UFL: expected a number",
         ),
     ],

@@ -115,14 +115,17 @@ class Messages:
         return b"".join(self._sorted(line + b"\n") for line in lines)
 
     def waiting(self) -> bytes:
-        """Text to print if nothing more arrives for a while."""
+        """Text to print if nothing arrives for a while; a line of dashes waits for the next line."""
+        return self._all() if self._line else b""
+
+    def _all(self) -> bytes:
         text, self._frame, self._line = self._frame + self._line, b"", b""
         self._begun = self._begun or not (not text or text.endswith(b"\n"))
         return text
 
     def rest(self) -> bytes:
         """Text to print at the end."""
-        return self.waiting() + (b"" if self._announced else b"".join(self._repeated))
+        return self._all() + (b"" if self._announced else b"".join(self._repeated))
 
     def _sorted(self, line: bytes) -> bytes:
         """Text to print after this line."""
