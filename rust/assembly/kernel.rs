@@ -9,7 +9,6 @@ use super::point::{PointKernel, Points, Row};
 use crate::grid::Location;
 use crate::space::MAX_DOFS;
 use crate::transfer::cells::mean_of_cell;
-use crate::transfer::densities::Densities;
 
 /// Signature of an FFCx kernel: element tensor, coefficients, constants, coordinates of the vertices
 /// (3 each), local facet, permutations, user data.
@@ -31,8 +30,6 @@ pub type TabulateTensor = unsafe extern "C" fn(
 pub enum Slot<'a> {
     /// Values of the fields at the degrees of freedom of the cell.
     Fields,
-    /// Densities of one array of particle data.
-    Densities(Densities<'a>, ArrayView2<'a, f64>),
     /// Means over the particles of the cell.
     Means(&'a [usize], ArrayView2<'a, f64>),
 }
@@ -85,7 +82,6 @@ impl Slot<'_> {
     pub fn len(&self, cells: &Cells) -> usize {
         match self {
             Slot::Fields => cells.dofs(),
-            Slot::Densities(densities, _) => densities.len(),
             Slot::Means(columns, _) => columns.len(),
         }
     }
@@ -126,9 +122,6 @@ impl<'a> State<'a> {
                 let out = &mut packed[start..];
                 match slot {
                     Slot::Fields => nodal.values(self.coefficients, out),
-                    Slot::Densities(densities, data) => {
-                        densities.of_cell(self.location, a, self.volume, *data, out);
-                    }
                     Slot::Means(columns, data) => {
                         mean_of_cell(self.location, a, self.volume, *data, columns, out);
                     }

@@ -1,10 +1,11 @@
 //! Element kernels over the active cells, straight into the reduced matrix.
 //!
-//! A kernel is the C function that FFCx made of one integral of the form: quadratic displacement and a linear
-//! field on one cell. For each cell this module gathers the coefficients of the kernel (fields and
-//! densities), calls it, transforms its result to the coefficients of the basis (`T^T A T`, T the
-//! extraction of the cell) and adds that to known entries of a matrix in compressed rows. The result is
-//! `P^T K P` without P, K or their product.
+//! A kernel is the C function that FFCx made of a part of the form: of the integrand of sums over particles at
+//! one point (`point`), or of an integral over a cell with quadratic displacement and a linear field. For
+//! each cell this module gathers the coefficients of the kernels, calls them, brings their results to the
+//! coefficients of the basis (with the functions at the point, or `T^T A T`, T the extraction of the
+//! cell) and adds that to known entries of a matrix in compressed rows. The result is `P^T K P` without P, K
+//! or their product.
 //!
 //! Rows of cells along x are treated in colours. No two rows of one colour share a function, so they can
 //! run at the same time; the order of summation does not depend on the number of threads.

@@ -106,10 +106,9 @@ impl Entries {
                 distinct.len() - 1
             })
         };
-        let [fields, test, trial] =
+        let [fields, test, trial]: [Vec<usize>; 3] =
             [fields, test, trial].map(|entries| entries.iter().map(&mut place).collect());
         let second = distinct.iter().any(|entry| entry.derivative > DIM);
-        let [fields, test, trial]: [Vec<usize>; 3] = [fields, test, trial];
         let component = |i: usize| distinct[test[i]].component;
         let mut components: Vec<Range<usize>> = Vec::new();
         for i in 0..test.len() {

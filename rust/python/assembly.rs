@@ -10,19 +10,18 @@ use pyo3::prelude::*;
 use super::array::{Read1, Read2, Write1};
 use super::grid::PyLocation;
 use super::threads::detached;
-use super::transfer::{check_data, points_per_axis};
+use super::transfer::check_data;
 use super::{require, view, InputError};
 use crate::assembly::{
     self, Bilinear, Cells, Entries, Entry, Kernel, Kernels, Pattern, Place, PointKernel, PointSlot,
     Selection, Slot, State, TabulateTensor,
 };
-use crate::grid::{Grid, Location, Rule};
+use crate::grid::{Grid, Location};
 use crate::space::{Index, NODES, NODES_1D, VERTICES};
-use crate::transfer::densities::Densities;
 
-/// Coefficient of a kernel: number of the array of particle data, points of the rule (none for means over
-/// cells), whether these are the vertices rather than Gauss points, and columns.
-type SlotOf = (usize, Vec<Index>, bool, Vec<usize>);
+/// Coefficient of a kernel: number of the array of particle data, whether it is its means over cells, and
+/// columns.
+type SlotOf = (usize, bool, Vec<usize>);
 
 /// Component of the fields and axes of its derivatives.
 type EntryOf = (usize, Vec<usize>);
@@ -44,12 +43,10 @@ struct Plan {
     point: Option<(Place, Entries)>,
 }
 
-/// Densities or means of some columns of an array of particle data.
+/// Some columns of an array of particle data, or their means over cells.
 struct Source {
     array: usize,
-    /// Points of a tensor rule by their positions along the axes; none for means over cells.
-    points: Vec<Index>,
-    rule: Option<Rule>,
+    means: bool,
     columns: Vec<usize>,
 }
 
@@ -62,19 +59,9 @@ pub(super) struct PyKernels {
 }
 
 impl Source {
-    fn new((array, points, vertices, columns): SlotOf) -> PyResult<Self> {
+    fn new((array, means, columns): SlotOf) -> PyResult<Self> {
         require(!columns.is_empty(), "columns")?;
-        let rule = match points_per_axis(&points, vertices)? {
-            0 => None,
-            _ if vertices => Some(Rule::ends()),
-            n => Some(Rule::gauss(n)),
-        };
-        Ok(Self { array, points, rule, columns })
-    }
-
-    /// Number of packed coefficients.
-    fn len(&self) -> usize {
-        self.points.len().max(1) * self.columns.len()
+        Ok(Self { array, means, columns })
     }
 
     fn data<'a>(
@@ -96,21 +83,16 @@ impl Source {
         data: &'a [Read2<f64>],
     ) -> PyResult<PointSlot<'a>> {
         let data = self.data(location, data)?;
-        Ok(match self.rule {
-            None => PointSlot::Means(&self.columns, data),
-            Some(_) => PointSlot::Data(&self.columns, data),
+        Ok(if self.means {
+            PointSlot::Means(&self.columns, data)
+        } else {
+            PointSlot::Data(&self.columns, data)
         })
     }
 
-    fn slot<'a>(&'a self, location: &Location, data: &'a [Read2<f64>]) -> PyResult<Slot<'a>> {
-        let data = self.data(location, data)?;
-        Ok(match &self.rule {
-            None => Slot::Means(&self.columns, data),
-            Some(rule) => {
-                let (points, columns) = (&self.points, &self.columns);
-                Slot::Densities(Densities { rule, points, columns }, data)
-            }
-        })
+    fn on_cells<'a>(&'a self, location: &Location, data: &'a [Read2<f64>]) -> PyResult<Slot<'a>> {
+        require(self.means, "an integral over cells that reads particles")?;
+        Ok(Slot::Means(&self.columns, self.data(location, data)?))
     }
 }
 
@@ -125,14 +107,8 @@ impl PyKernels {
             let fields = point.as_ref().map_or(dofs, |(_, entries)| entries.num_fields());
             let source = |slot: Option<SlotOf>| slot.map(Source::new).transpose();
             let slots: Vec<_> = slots.into_iter().map(source).collect::<PyResult<_>>()?;
-            let len = |source: &Source| {
-                if point.is_some() {
-                    source.columns.len()
-                } else {
-                    source.len()
-                }
-            };
-            let packed: usize = slots.iter().map(|slot| slot.as_ref().map_or(fields, len)).sum();
+            let packed: usize =
+                slots.iter().map(|s| s.as_ref().map_or(fields, |s| s.columns.len())).sum();
             require(packed == width, "a kernel of other coefficients")?;
             // SAFETY: the address is that of an FFCx kernel, which its owner keeps loaded. Rank and
             // number of coefficients are checked against what the caller says of it.
@@ -194,7 +170,7 @@ impl PyKernels {
             } else {
                 let slot = |source: &'a Option<Source>| match source {
                     None => Ok(Slot::Fields),
-                    Some(source) => source.slot(location, data),
+                    Some(source) => source.on_cells(location, data),
                 };
                 let slots = plan.slots.iter().map(slot).collect::<PyResult<_>>()?;
                 kernels.cells.push(Kernel { tabulate, slots, constants });

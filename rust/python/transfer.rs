@@ -66,7 +66,7 @@ pub(super) fn gradients<'py>(
 }
 
 /// Points per axis of a tensor rule with these points; 0 for means over cells, which have no points.
-pub(super) fn points_per_axis(points: &[Index], vertices: bool) -> PyResult<usize> {
+fn points_per_axis(points: &[Index], vertices: bool) -> PyResult<usize> {
     let most = (0..=MAX_POINTS).find(|n| n.pow(DIM as u32) == points.len());
     let tensor = most.filter(|&n| points.iter().flatten().all(|&i| i < n));
     let Some(n) = tensor else {

@@ -6,9 +6,9 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any
 
 import scipy.sparse as sp
 
@@ -17,23 +17,28 @@ from tawami.base.arrays import Array
 from tawami.base.petsc import rows_of
 from tawami.fem.rules import Rule
 from tawami.field.attachment import Attachment
+from tawami.field.ghost import GhostPenalty
 from tawami.field.layout import Layout
 from tawami.field.reduction import Reduction
 
 
-class Assembly(Protocol):
+class Assembly(ABC):
     """Residual and tangent of a form on the active cells of a grid.
+
+    Args:
+        attachment: The form and the active cells.
 
     Attributes:
         attachment: The form and the active cells.
         reduction: The reduction of the last tangent; None before the first.
     """
 
-    attachment: Attachment
     reduction: Reduction | None = None
 
     def __init__(self, attachment: Attachment) -> None:
-        """Assemble over the active cells of an attachment."""
+        self.attachment = attachment
+        self._compiled, self._stopwatch = attachment.compiled, attachment.stopwatch
+        self._ghost = GhostPenalty(attachment)
 
     @property
     def layout(self) -> Layout:
@@ -56,7 +61,7 @@ class Assembly(Protocol):
         The next call overwrites it. It is the same object as long as the unknowns are the same.
         """
 
-    def follow(self, earlier: Assembly) -> None:
+    def follow(self, earlier: Assembly) -> None:  # noqa: B027 (by default there is nothing to use)
         """Use what an earlier assembly made for its matrix, if the cells and unknowns are the same.
 
         Args:

@@ -20,7 +20,6 @@ from tawami.fem import dolfinx
 from tawami.fem.rules import Rule
 from tawami.field.assembly import Assembly
 from tawami.field.attachment import Attachment
-from tawami.field.ghost import GhostPenalty
 from tawami.field.matrix import ReducedMatrix
 from tawami.field.reduction import Reduction
 from tawami.form.integral import Integral
@@ -34,9 +33,7 @@ class PointAssembly(Assembly):
     """
 
     def __init__(self, attachment: Attachment) -> None:
-        self.attachment = attachment
-        self._compiled, self._stopwatch = attachment.compiled, attachment.stopwatch
-        self._ghost = GhostPenalty(attachment)
+        super().__init__(attachment)
         self._matrix = ReducedMatrix(attachment.grid.comm)
 
     def follow(self, earlier: Assembly) -> None:
@@ -65,8 +62,7 @@ class PointAssembly(Assembly):
                 slots.append(None)
                 continue
             assert slot.source != "traction"  # compilation rejects it in integrals over cells
-            points, vertices = self.attachment.points[slot.source], slot.source == "vertex"
-            slots.append((rules.index(slot.data), points, vertices, slot.columns))
+            slots.append((rules.index(slot.data), slot.source == "mean", slot.columns))
         kernel, constants = integral.kernel, self.attachment.constants(integral).tolist()
         point = None
         if integral.points is not None:

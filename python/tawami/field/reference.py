@@ -15,7 +15,6 @@ from tawami.fem import mesh
 from tawami.fem.rules import Rule
 from tawami.field.assembly import Assembly
 from tawami.field.attachment import Attachment
-from tawami.field.ghost import GhostPenalty
 from tawami.field.reduction import Reduction
 from tawami.form.integral import Integral
 
@@ -28,10 +27,8 @@ class ReferenceAssembly(Assembly):
     """
 
     def __init__(self, attachment: Attachment) -> None:
-        self.attachment = attachment
+        super().__init__(attachment)
         self._space, self._cells = attachment.space, attachment.cells
-        self._compiled, self._stopwatch = attachment.compiled, attachment.stopwatch
-        self._ghost = GhostPenalty(attachment)
         self._packed: dict[int, Array] = {}
         self._petsc = Handles(self, attachment.grid.comm)
 

@@ -42,7 +42,7 @@ class CompiledForm:
     residual: tuple[Integral, ...]
     edges: Callable[[], Integral] | None
     tangent: tuple[Integral, ...]
-    couplings: tuple[tuple[Integral, ...], ...]
+    couplings: tuple[tuple[Integral, Integral], ...]
     ghost: Integral | None
     densities: Mapping[Rule, Mapping[Density, int]]
     used: frozenset[str]
@@ -115,6 +115,10 @@ def _compile(comm: Any, symbols: Symbols) -> CompiledForm:
         kernels = [builder.at_points(part, rule) for rule, part in sums]
         return (*kernels, *map(integral, by_rule(rest)))
 
+    def of_pair(pair: tuple[Any, Any]) -> tuple[Integral, Integral]:
+        (left,), (right,) = map(integrals, pair)
+        return left, right
+
     return CompiledForm(
         form=form,
         element=symbols.element,
@@ -122,7 +126,7 @@ def _compile(comm: Any, symbols: Symbols) -> CompiledForm:
         edges=None if edges is None else lambda: integral(edges, "exterior_facet"),
         tangent=integrals(tangent),
         ghost=None if ghost is None else integral(ghost, "interior_facet"),
-        couplings=tuple((*integrals(left), *integrals(right)) for left, right in couplings),
+        couplings=tuple(map(of_pair, couplings)),
         densities=builder.densities,
         used=_named(symbols, residual),
     )

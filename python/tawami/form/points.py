@@ -13,10 +13,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import ufl
-from ufl.algorithms import expand_derivatives
 from ufl.algorithms.expand_indices import expand_indices
 from ufl.algorithms.remove_complex_nodes import remove_complex_nodes
-from ufl.classes import Argument, Coefficient, Constant, Grad, Indexed, Variable
+from ufl.classes import Argument, Constant, Grad, Indexed, Variable
 from ufl.corealg.traversal import unique_pre_traversal
 
 from tawami.base.errors import FormError
@@ -46,41 +45,36 @@ def at_point(form: Any, increments: Any, data: Mapping[Any, tuple[Any, int]]) ->
     """The integrand of a form as a function of the fields at a point.
 
     Args:
-        form: Integrals over cells with one quadrature rule.
+        form: Integrals over cells with one quadrature rule and with expanded derivatives.
         increments: Coefficient of the fields.
         data: Of each other coefficient, the vector coefficient on the interval that replaces it (see
             :func:`vector`), and its first component there.
     """
-    (integrand, *more) = (part.integrand() for part in expand_derivatives(form).integrals())
+    integrand, *more = (part.integrand() for part in form.integrals())
     integrand = expand_indices(_without_variables(remove_complex_nodes(sum(more, integrand))))
-    kinds: tuple[Any, ...] = ("fields", 0, 1)
-    used: dict[Any, set[Entry]] = {kind: set() for kind in kinds}
+    domain, kinds = dolfinx.interval(), ("fields", 0, 1)
+    replaced: dict[Any, Any] = {}
+    of_fields: dict[Any, tuple[Any, Entry]] = {}
     for node in unique_pre_traversal(integrand):
-        if isinstance(node, Indexed):
-            kind, entry = _entry(node, increments)
-            if kind is not None:
-                used[kind].add(entry)
-    entries = {kind: tuple(sorted(of_kind)) for kind, of_kind in used.items()}
-    domain = dolfinx.interval()
+        if isinstance(node, Constant):
+            replaced[node] = ufl.Constant(domain, count=node.count())
+        elif isinstance(node, Indexed):
+            symbol, index = node.ufl_operands
+            if symbol in data:
+                to, first = data[symbol]
+                replaced[node] = to[first + int(index[0])]
+            elif (found := _entry(node, increments)) is not None:
+                of_fields[node] = found
+    used = set(of_fields.values())
+    entries = {kind: tuple(sorted(e for k, e in used if k == kind)) for kind in kinds}
     vectors: dict[Any, Any] = {
         n: ufl.Argument(_space(len(entries[n]), domain), n) for n in (0, 1) if entries[n]
     }
     vectors["fields"] = vector(len(entries["fields"]), 0, domain)
-
-    by_entry: dict[Any, Any] = {}
-    for node in unique_pre_traversal(integrand):
-        if isinstance(node, Constant):
-            by_entry[node] = ufl.Constant(domain, count=node.count())
-        elif isinstance(node, Indexed):
-            kind, entry = _entry(node, increments)
-            symbol, index = node.ufl_operands
-            if kind is not None:
-                by_entry[node] = vectors[kind][entries[kind].index(entry)]
-            elif symbol in data:
-                to, first = data[symbol]
-                by_entry[node] = to[first + int(index[0])]
+    for node, (kind, entry) in of_fields.items():
+        replaced[node] = vectors[kind][entries[kind].index(entry)]
     measure = ufl.dx(domain=domain, metadata={"quadrature_degree": 0})
-    return PointForm(ufl.replace(integrand, by_entry) * measure, *(entries[k] for k in kinds))
+    return PointForm(ufl.replace(integrand, replaced) * measure, *(entries[k] for k in kinds))
 
 
 def _without_variables(expression: Any) -> Any:
@@ -102,21 +96,17 @@ def _space(size: int, domain: Any) -> Any:
     return ufl.FunctionSpace(domain, dolfinx.on_interval(max(size, 1)))
 
 
-def _entry(node: Any, increments: Any) -> tuple[Any, Entry]:
-    """Origin of a component: the fields, argument 0 or 1, or (None, ...) for anything else."""
+def _entry(node: Any, increments: Any) -> tuple[Any, Entry] | None:
+    """Kind ('fields', or the number of an argument) and entry of a component; None for anything else."""
     symbol, index = node.ufl_operands
     while isinstance(symbol, Grad):
         (symbol,) = symbol.ufl_operands
-    kind = None
-    if isinstance(symbol, Argument):
-        kind = symbol.number()
-    elif isinstance(symbol, Coefficient) and symbol == increments:
-        kind = "fields"
-    if kind is None:
-        return None, (0, ())
+    if symbol != increments and not isinstance(symbol, Argument):
+        return None
     component, *axes = map(int, index)
     if len(axes) > 2:
         raise FormError(
             "a third derivative in a sum: expected at most second derivatives of fields"
         )
+    kind = symbol.number() if isinstance(symbol, Argument) else "fields"
     return kind, (component, tuple(sorted(axes)))

@@ -96,7 +96,7 @@ def by_rule(form: Any) -> list[Any]:
 
 
 def at_points(form: Any, rule_of: Mapping[Any, Rule]) -> tuple[list[tuple[Rule, Any]], Any]:
-    """The sums over particles of a form, by the place of their points, and its integrals over cells.
+    """Sums over particles of a form by place, with expanded derivatives, and integrals over cells.
 
     Args:
         form: Integrals over cells.
@@ -105,12 +105,13 @@ def at_points(form: Any, rule_of: Mapping[Any, Rule]) -> tuple[list[tuple[Rule, 
     sums: dict[Rule, list[Any]] = {}
     rest = []
     for integral in form.integrals():
-        if expand_derivatives(ufl.Form([integral])).empty():
+        expanded = expand_derivatives(ufl.Form([integral]))
+        if expanded.empty():
             continue
         rules = {rule_of[c] for c in extract_coefficients(integral) if c in rule_of} - {"mean"}
         if rules:
             (rule,) = rules
-            sums.setdefault(rule, []).append(integral)
+            sums.setdefault(rule, []).extend(expanded.integrals())
         else:
             rest.append(integral)
     return [(rule, ufl.Form(parts)) for rule, parts in sums.items()], ufl.Form(rest)
