@@ -3,16 +3,16 @@
 use super::kinematics::Kinematics;
 use super::request::{Operator, Part, Request};
 use super::stage::PlasticVolume;
-use crate::space::{DIM, SYMMETRIC};
-use crate::tensor::{dot, Moduli, Stress, Sym, IN_SPACE, UNIT, UNIT_DEVIATORS};
+use crate::space::Geometry;
+use crate::tensor::{dot, Moduli, Stress, Sym, MAX_STRAINS, STRAINS, UNIT, UNIT_DEVIATORS};
 
 /// Components of an operator from a deviator `s` and a mean `m` of the stress, or of their derivatives.
 fn components(operator: Operator, s: &Sym, m: f64, out: &mut [f64]) {
     match operator {
         Operator::Sigma => {
-            IN_SPACE.iter().zip(out).for_each(|(&i, o)| *o = s[i] + m * UNIT[i]);
+            STRAINS.iter().zip(out).for_each(|(&i, o)| *o = s[i] + m * UNIT[i]);
         }
-        Operator::Deviator => IN_SPACE.iter().zip(out).for_each(|(&i, o)| *o = s[i]),
+        Operator::Deviator => STRAINS.iter().zip(out).for_each(|(&i, o)| *o = s[i]),
         Operator::Mean => out[0] = m,
         _ => {}
     }
@@ -21,6 +21,7 @@ fn components(operator: Operator, s: &Sym, m: f64, out: &mut [f64]) {
 /// Write the requested quantity from its first column on.
 pub(super) fn write(
     request: &Request,
+    geometry: Geometry,
     kinematics: Kinematics,
     stress: &Stress,
     c: &Moduli,
@@ -39,22 +40,22 @@ pub(super) fn write(
         }
         return;
     }
-    let n = request.operator.components();
+    let (n, strains) = (request.operator.components(geometry), geometry.strains());
     match request.part {
         Part::Value => components(request.operator, &stress.deviator, stress.mean, out),
         Part::Volume => components(request.operator, &c.dev_vol, c.mean_vol, out),
         Part::Gradient => {}
         Part::Strain => {
-            for (j, e) in UNIT_DEVIATORS.iter().enumerate() {
+            for (j, e) in UNIT_DEVIATORS[..strains].iter().enumerate() {
                 let mut ds: Sym = std::array::from_fn(|i| dot(&c.dev_dev[i], e));
                 let mut dm = dot(&c.mean_dev, e);
-                if kinematics == Kinematics::Displacement && j < DIM {
+                if kinematics == Kinematics::Displacement && UNIT[STRAINS[j]] > 0.0 {
                     ds.iter_mut().zip(&c.dev_vol).for_each(|(d, v)| *d += v);
                     dm += c.mean_vol;
                 }
-                let mut column = [0.0; SYMMETRIC];
+                let mut column = [0.0; MAX_STRAINS];
                 components(request.operator, &ds, dm, &mut column[..n]);
-                (0..n).for_each(|i| out[SYMMETRIC * i + j] = column[i]);
+                (0..n).for_each(|i| out[strains * i + j] = column[i]);
             }
         }
     }

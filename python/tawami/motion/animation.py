@@ -46,10 +46,10 @@ class Camera:
             self._last, self._taken = max(multiple, self._last), time
             scene, arrays = self._motion.scene, body_arrays(self._motion)
             histories = scene.particles.history_names
-            self.name, self.unit, values = pick(self._quantity, arrays, histories)
+            self.name, self.unit, values = pick(self._quantity, arrays, histories, scene.grid.space)
             moved, deformed = scene.form.strain.finite, self._deformed
             x = positions(arrays, moved=moved, deformed=deformed)
-            shape = shapes(arrays, moved=moved, deformed=deformed)
+            shape = shapes(arrays, scene.grid.space, moved=moved, deformed=deformed)
             self.frames.append(film.Frame(f"$t$ = {time:.4g} s", x, shape, values))
 
 

@@ -178,7 +178,7 @@ def build(
     values, options = loaded.settings(parameters, static=density is None, others=KEYWORDS)
     for message in [] if grid.comm.rank else loaded.unusual(values):
         warn(message, ParameterWarning)
-    particles, materials, law = _particles(body, material, material_of, loaded)
+    particles, materials, law = _particles(grid, body, material, material_of, loaded)
     densities = assignment.densities(density, len(materials), body.names)
     if loaded.strain.finite and law is not None:
         raise InputError(
@@ -256,15 +256,42 @@ def _names(body: Body, materials: int) -> tuple[str, ...]:
 
 
 def _particles(
-    body: Body, material: assignment.Given, material_of: npt.ArrayLike | None, form: Form
+    grid: Grid,
+    body: Body,
+    material: assignment.Given,
+    material_of: npt.ArrayLike | None,
+    form: Form,
 ) -> tuple[_rust.Particles, list[_rust.Material], NumpyLaw | None]:
-    """All particles of the body with their materials and history variables."""
+    """All particles of the body with their materials and history variables.
+
+    In axisymmetry the volume of a particle is 2 pi r_p times its area (Pappus): the exact volume of the
+    ring of which the particle is the centroid.
+    """
     x, volume = checks.array("x", body.x, 2), checks.array("volume", body.volume, 1)
+    if grid.space.hoop and len(x) == len(volume) and x.shape[1] == grid.space.dim:
+        _check_right_of_axis(x)
+        volume = volume * grid.space.thickness(x)
     assigned = assignment.assigned(material, material_of, body, len(x))
     particles = _rust.Particles(x, volume, assigned.number)
     particles.check_materials(assigned.materials, form.kinematics.name, form.strain.finite)
     particles.add_history(assigned.materials)
     return particles, assigned.materials, assigned.law
+
+
+def _check_right_of_axis(x: Array) -> None:
+    """Check that particles have a distance from the axis.
+
+    Raises:
+        InputError: One lies on the axis or left of it.
+    """
+    left = np.flatnonzero(x[:, 0] <= 0)
+    if len(left):
+        p = left[0]
+        raise InputError(
+            f"geometry='axisymmetric': {len(left)} of {len(x)} particles are on the axis or left of it, "
+            f"the first is {p} at ({x[p, 0]:g}, {x[p, 1]:g}) m: expected x > 0, the distance from the "
+            "axis; keep the right half of the body"
+        )
 
 
 def _check_plastic_volume(

@@ -11,6 +11,7 @@ from tawami.base import checks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.optional import optional
+from tawami.base.space import Space
 from tawami.grid.grid import Grid
 from tawami.picture import style
 from tawami.picture.figure import lay_out, shown_axes
@@ -42,18 +43,19 @@ def positions(arrays: Arrays, *, moved: bool, deformed: float) -> Array:
     return np.asarray(arrays["x"] + (deformed - moved) * arrays["displacement"])
 
 
-def shapes(arrays: Arrays, *, moved: bool, deformed: float) -> Array:
-    """Sides of squares with the volumes of the particles [m]; at finite strain the edges of the
+def shapes(arrays: Arrays, space: Space, *, moved: bool, deformed: float) -> Array:
+    """Sides of squares with the areas of the particles [m]; at finite strain the edges of the
     parallelograms that these have become, as columns.
 
     Args:
         arrays, moved, deformed: As in :func:`positions`.
+        space: The space of the grid.
     """
-    dim = arrays["x"].shape[1]
-    side = np.asarray(arrays["volume"] ** (1 / dim))
+    dim, start = space.dim, positions(arrays, moved=moved, deformed=0.0)
+    side = np.asarray((arrays["volume"] / space.thickness(start)) ** (1 / dim))
     if not moved:
         return side
-    f = np.eye(dim) + deformed * arrays[GRADIENT]
+    f = np.eye(dim) + deformed * space.in_space(arrays[GRADIENT])
     f[np.linalg.norm(f, 2, axis=(1, 2)) > MOST_STRETCH] = np.eye(dim)
     return np.asarray(side[:, None, None] * f)
 
@@ -85,7 +87,7 @@ def plot(
 ) -> Axes:
     """Draw particles; see `Solution.plot`."""
     deformed, limits = checks.number("deformed", deformed), checked_limits(limits)
-    name, unit, values = pick(given, arrays, histories)
+    name, unit, values = pick(given, arrays, histories, grid.space)
     x, corners = positions(arrays, moved=moved, deformed=deformed), corners_of(grid)
     lower, upper = view(x, corners)
     new = axes is None
@@ -97,7 +99,7 @@ def plot(
         checks.instance("plot: axes", axes, Axes, "axes of matplotlib, or None")
     draw_frame(axes, lower, upper, corners)
     squares = Squares(axes, scale_of(name, unit, [values], limits))
-    squares.show(x, shapes(arrays, moved=moved, deformed=deformed), values)
+    squares.show(x, shapes(arrays, grid.space, moved=moved, deformed=deformed), values)
     (squares.add_bar if new else squares.add_bar_beside)(axes)
     factor = "at the start" if deformed == 0 else f"displacements x {deformed:g}"
     axes.set_title(name if deformed == 1 else f"{name}, {factor}")
@@ -107,11 +109,15 @@ def plot(
 
 
 def columns(
-    arrays: Arrays, given: Iterable[Given], usual: Iterable[str], histories: Iterable[str]
+    arrays: Arrays,
+    given: Iterable[Given],
+    usual: Iterable[str],
+    histories: Iterable[str],
+    space: Space,
 ) -> dict[str, Array]:
     """Columns "x [m]", "y [m]", "stress xx [Pa]", ...: one number for each particle."""
     found = {"x [m]": arrays["x"]}
-    for quantity in _chosen(given, usual, histories):
+    for quantity in _chosen(given, usual, histories, space):
         found[quantity.label] = quantity.values(arrays)
     table = scalars(found, sizes=False)
     return {
@@ -121,9 +127,9 @@ def columns(
 
 
 def _chosen(
-    given: Iterable[Given], usual: Iterable[str], histories: Iterable[str]
+    given: Iterable[Given], usual: Iterable[str], histories: Iterable[str], space: Space
 ) -> list[Quantity]:
-    known = named(histories)
+    known = named(histories, space)
     chosen = list(given) or list(usual)
     for one in chosen:
         if not isinstance(one, Quantity) and not checks.one_of(one, known):
@@ -140,10 +146,14 @@ def to_pandas(table: dict[str, Array], number: Array) -> Any:
 
 
 def fields(
-    arrays: Arrays, given: Iterable[Given], usual: Iterable[str], histories: Iterable[str]
+    arrays: Arrays,
+    given: Iterable[Given],
+    usual: Iterable[str],
+    histories: Iterable[str],
+    space: Space,
 ) -> dict[str, Array]:
     """Fields by label, vectors with a third component 0, as VTK expects them."""
-    found = {q.label: q.values(arrays) for q in _chosen(given, usual, histories)}
+    found = {q.label: q.values(arrays) for q in _chosen(given, usual, histories, space)}
     return {label: in_space(values) for label, values in found.items()}
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,7 +19,7 @@ from tawami import _rust
 from tawami.base import checks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError, NotModelledError
-from tawami.base.space import PLANE
+from tawami.base.space import PLANE, Space
 from tawami.base.text import meant
 from tawami.particles import placement
 
@@ -142,6 +142,10 @@ def _deviatoric_stress(p: Arrays) -> Array:
     return np.asarray(np.sqrt(1.5 * ((s**2).sum(axis=1) + 2 * (stress[:, 3:] ** 2).sum(axis=1))))
 
 
+def _volume(space: Space) -> str:
+    return f"volume [{space.unit(space.volume)}]"
+
+
 #: Quantities that follow from arrays of the particles.
 DERIVED = {"mean stress": _mean_stress, "deviatoric stress q": _deviatoric_stress}
 #: Quantities of the particles. History variables of the laws, which are strains, are added to them.
@@ -151,7 +155,7 @@ PARTICLES = {
     "mean stress": Quantity("mean stress [Pa]", _mean_stress),
     "deviatoric stress q": Quantity("deviatoric stress q [Pa]", _deviatoric_stress),
     "strain": Quantity(f"strain {TENSOR} [-]", _stored("strain")),
-    "volume": Quantity("volume [m2 per m]", _stored("volume"), nodal=False),
+    "volume": Quantity(_volume(PLANE), _stored("volume"), nodal=False),
     "eps_v": Quantity("eps_v [-]", _stored("eps_v")),
     "velocity": Quantity("velocity [m/s]", _stored("velocity"), nodal=False),
     "acceleration": Quantity("acceleration [m/s2]", _stored("acceleration"), nodal=False),
@@ -221,9 +225,10 @@ def body_arrays(subject: Subject) -> Arrays:
     return Arrays(lambda name: gather(_present(subject, name)))
 
 
-def named(histories: Iterable[str]) -> dict[str, Quantity]:
-    """Quantities by name, with those of history variables."""
-    return PARTICLES | {name: history(name) for name in histories}
+def named(histories: Iterable[str], space: Space) -> dict[str, Quantity]:
+    """Quantities by name with the units of a space, and with those of history variables."""
+    volume = replace(PARTICLES["volume"], label=_volume(space))
+    return PARTICLES | {"volume": volume} | {name: history(name) for name in histories}
 
 
 # -- by name -----------------------------------------------------------------
@@ -236,7 +241,7 @@ def of_particles(given: Iterable[Given], subject: Subject) -> list[Quantity]:
         NotModelledError: The scene does not have one; the message names the switch that adds it.
         InputError: An unknown name, or a function of the driver script that fails.
     """
-    known = named(subject.scene.particles.history_names)
+    known = named(subject.scene.particles.history_names, subject.scene.grid.space)
     found = []
     for one in given:
         if isinstance(one, Quantity):

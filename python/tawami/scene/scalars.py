@@ -9,7 +9,7 @@ import numpy as np
 from tawami.base import checks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError
-from tawami.base.space import PLANE
+from tawami.base.space import PLANE, Space
 from tawami.scene.quantities import (
     HISTORY,
     PARTICLES,
@@ -46,7 +46,9 @@ def scalars(fields: Mapping[str, Array], *, sizes: bool = True) -> dict[str, tup
     return found
 
 
-def pick(given: Given, arrays: Arrays, histories: Iterable[str]) -> tuple[str, str, Array]:
+def pick(
+    given: Given, arrays: Arrays, histories: Iterable[str], space: Space
+) -> tuple[str, str, Array]:
     """Name, unit and values of a quantity with one number for each particle.
 
     Args:
@@ -54,12 +56,13 @@ def pick(given: Given, arrays: Arrays, histories: Iterable[str]) -> tuple[str, s
             'displacement y'.
         arrays: Of the particles.
         histories: Names of the history variables of the laws.
+        space: Whose units the quantities have.
 
     Raises:
         NotModelledError: The scene does not have it.
         InputError: An unknown name, or a tensor without a component.
     """
-    known = named(histories)
+    known = named(histories, space)
     if isinstance(given, Quantity):
         quantity, name = given, given.name
     else:

@@ -13,6 +13,7 @@ from tawami.base import checks, html
 from tawami.base.errors import InputError, NotModelledError
 from tawami.base.process import Unique
 from tawami.base.sealed import Sealed
+from tawami.base.space import Space
 from tawami.field.constraints import LEAST_SHARE
 from tawami.form.kinematics import KINEMATICS
 from tawami.grid import edges
@@ -231,12 +232,12 @@ class Solution(Elsewhere, Sealed, Unique):
         data = presentation.fields(self.arrays, names, *self._usual())
         return presentation.to_pyvista(presentation.in_space(self.x), data)
 
-    def _usual(self) -> tuple[list[str], list[str]]:
-        """Quantities of a table without names, and the history variables among them."""
+    def _usual(self) -> tuple[list[str], list[str], Space]:
+        """Quantities of a table without names, the history variables among them, and the space."""
         histories = self.scene.particles.history_names
         known = {*self._arrays, "strain"} - {"number"}
         stored = [name for name in quantities.PARTICLES if name in known]
-        return [*stored, *quantities.DERIVED, *histories], histories
+        return [*stored, *quantities.DERIVED, *histories], histories, self._model.space
 
     def _repr_html_(self) -> str:
         momentum, volume = zip(*self.history, strict=True)

@@ -42,6 +42,7 @@ class Supports(Owner[Support]):
     Attributes:
         all: The supports along edges and at points.
         walls: The walls.
+        axis: In axisymmetry, u_x = 0 along the axis if it is an edge of the grid; else none.
         version: A number that changes with every change of a support or wall by the driver script.
     """
 
@@ -49,6 +50,10 @@ class Supports(Owner[Support]):
         super().__init__(activity)
         self.grid, self.basis = grid, basis
         self.walls: list[Wall] = []
+        self.axis: list[Support] = []
+        if grid.space.hoop and grid.origin[0] == 0:
+            zero = Factor("the axis")
+            self.axis.append(Support(self, "left", 0, "x", 0.0, zero))
 
     def remove(self, action: Support | Wall) -> None:
         """Remove a support or a wall."""
@@ -171,14 +176,11 @@ class Supports(Owner[Support]):
         Raises:
             SupportError: The body has left an edge with a prescribed motion, or a point.
         """
-        layout, held, points = (
-            domain.layout,
-            list[Held](),
-            list[PointHeld](),
-        )
-        for support in self.all:
+        layout, held, points = domain.layout, list[Held](), list[PointHeld]()
+        for support in [*self.all, *self.axis]:
             if isinstance(support.place, str):
-                if not (moving and not support.moves and self._is_left(domain, support)):
+                may_be_left = support in self.axis or (moving and not support.moves)
+                if not (may_be_left and self._is_left(domain, support)):
                     held.append(self._on_edge(domain, support, amount))
             else:
                 points.append(self._at_point(domain, support, amount))
@@ -258,10 +260,8 @@ class Supports(Owner[Support]):
         """
         crossings = {}
         for number, support in enumerate(self.all):
-            if (
-                isinstance(support.place, str)
-                and self.grid.edge(support.place)[0] == support.component
-            ):
+            place = support.place
+            if isinstance(place, str) and self.grid.edge(place)[0] == support.component:
                 crossings[number] = support.crossing + _total(support, amount)
                 profiled = any(callable(term.values[0]) for term in support.terms)
                 if abs(crossings[number]) > 0.25 * self.grid.h and not profiled:
@@ -302,7 +302,9 @@ class Supports(Owner[Support]):
     @property
     def line(self) -> str:
         """The supports in words, for the header of a run."""
-        return listed([*(support.line for support in self.all), *map(str, self.walls)])
+        given = [support.line for support in self.all]
+        axis = [f"axis of symmetry ({support.axis} = 0)" for support in self.axis]
+        return listed([*given, *axis, *map(str, self.walls)])
 
     def identity(self) -> list[list[Any]]:
         """Facts that decide the results of a run, in the types of JSON."""

@@ -71,5 +71,6 @@ class Scaling:
         """Fields of this rank's unknowns, with the rigid motions at the Greville points."""
         own = reduction.unknowns[reduction.own]
         of_u = own < self._layout.num_displacement
-        points = self._layout.greville - self._layout.grid.origin
-        return Blocks(of_u, rigid_motions(points)[own[of_u]])
+        grid = self._layout.grid
+        points = self._layout.greville - grid.origin
+        return Blocks(of_u, rigid_motions(points, grid.space)[own[of_u]])
