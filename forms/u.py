@@ -2,8 +2,9 @@
 
 from ufl import dot, grad
 
-fields = {"u": ("displacement", "w")}
-kinematics = "displacement"
+from tawami.form import vector
+
+fields = {"u": vector("w")}
 
 
 def residual(w, sigma, t, sum_p, ds):

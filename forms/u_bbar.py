@@ -5,7 +5,9 @@ Talbot et al. 2024; the three-dimensional (factor 1/3) form of plane strain.
 
 from ufl import div, dot, grad
 
-fields = {"u": ("displacement", "w")}
+from tawami.form import vector
+
+fields = {"u": vector("w")}
 kinematics = "cell"
 
 

@@ -6,7 +6,9 @@ The deviator is tested at the particle, the mean stress with tr(grad w f_c^-1) a
 
 from ufl import Identity, dot, grad, inner, inv
 
-fields = {"u": ("displacement", "w")}
+from tawami.form import vector
+
+fields = {"u": vector("w")}
 kinematics = "cell"
 strain = "finite"
 parameters = {"k": {"default": 0.01, "minimum": 0.0}}

@@ -17,8 +17,9 @@ u, whose first is continuous for splines, and of the first of eps_v, on the side
 
 from ufl import Identity, div, dot, grad, inner, sym
 
-fields = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
-kinematics = "mixed"
+from tawami.form import scalar, vector
+
+fields = {"u": vector("w"), "eps_v": scalar("q", role="volumetric_strain")}
 parameters = {
     "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0, "maximum": {"residual_based": 0.14}},
     "k": {"default": 0.01, "minimum": 0.0},

@@ -9,8 +9,9 @@ mass of eps_v: a single particle in a cell makes the consistent mass singular. C
 
 from ufl import dot, grad, inner
 
-fields = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
-kinematics = "mixed"
+from tawami.form import scalar, vector
+
+fields = {"u": vector("w"), "eps_v": scalar("q", role="volumetric_strain")}
 strain = "finite"
 parameters = {
     "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0},

@@ -5,8 +5,9 @@
 
 from ufl import dot, grad, inner
 
-fields = {"u": ("displacement", "w")}
-kinematics = "displacement"
+from tawami.form import vector
+
+fields = {"u": vector("w")}
 strain = "finite"
 parameters = {"k": {"default": 0.01, "minimum": 0.0}}
 options = {"ghost_penalty": ("off", "on")}

@@ -6,8 +6,9 @@ the new deviator and the old mean stress. eps_p is the plastic volumetric strain
 
 from ufl import div, dot, grad
 
-fields = {"u": ("displacement", "w"), "p": ("pressure", "q")}
-kinematics = "deviatoric"
+from tawami.form import scalar, vector
+
+fields = {"u": vector("w"), "p": scalar("q", role="pressure")}
 parameters = {"alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0}}
 
 

@@ -10,21 +10,22 @@ from declared import BOTH, form_of
 from ufl import SpatialCoordinate, div, dot, grad, inner
 
 import tawami
+from tawami.form import vector
 from tawami.form.form import Form
 from tawami.form.symbols import Symbols
 
 WRONG = [
     (lambda: Form.load("u_eps"), r"'u_eps' is not shipped: expected one of 'u', 'u_bbar'"),
     (lambda: Form.load("nowhere.py"), "'nowhere.py' cannot be read"),
-    (lambda: Form.load(textwrap), "'textwrap' declares no 'fields', 'kinematics', 'residual'"),
+    (lambda: Form.load(textwrap), "'textwrap' declares no 'fields', 'residual'"),
     (lambda: form_of(None, {"u": ("velocity", "w")}), "kind 'velocity': expected one of"),
     (lambda: form_of(None, {"u": "displacement"}), r"expected \(kind, test function\)"),
     (lambda: form_of(None, parameters={"a": {}}), "parameter 'a' has no \"default\""),
     (lambda: form_of(None, parameters={"h": {"default": 1}}), "'h' has two meanings"),
-    (lambda: form_of(None, {"u": ("displacement", "K")}), "'K' has two meanings"),
+    (lambda: form_of(None, {"u": vector("K")}), "'K' has two meanings"),
     (lambda: Form.load(3), "form = 3: expected the name of a shipped form"),
     (lambda: form_of(None, kinematics="large"), "kinematics = 'large': expected one of"),
-    (lambda: form_of(None, kinematics="mixed"), "'mixed' needs fields of the kinds"),
+    (lambda: form_of(None), "'mixed' needs fields of the kinds"),
     (lambda: form_of(None, BOTH), "'displacement' needs fields of the kinds 'displacement'"),
     (
         lambda: form_of(None, parameters={"a": {"default": 1, "min": 0}}),
@@ -106,7 +107,7 @@ def test_b_bar_takes_deviators_at_particles_and_means_at_centres(random_scene):
 
 
 def test_a_missing_test_function_is_named(random_scene):
-    form = form_of(lambda w, q, sigma, sum_p: sum_p(sigma, grad(w)), BOTH, "mixed")
+    form = form_of(lambda w, q, sigma, sum_p: sum_p(sigma, grad(w)), BOTH)
     with pytest.raises(tawami.FormError, match="'q' of field 'eps_v' does not appear"):
         random_scene(form=form)
 
@@ -126,7 +127,7 @@ def test_static_options_are_the_defaults_of_scenes_without_a_density():
     for static_options in ({"ghost": "on"}, {"ghost_penalty": "perhaps"}):
         with pytest.raises(tawami.FormError, match="expected one of the option's values"):
             tawami.Form(
-                {"u": ("displacement", "w")},
+                {"u": vector("w")},
                 "displacement",
                 lambda w, sigma, sum_p: sum_p(sigma, w),
                 options={"ghost_penalty": ("off", "on")},

@@ -72,7 +72,7 @@ class Symbols:
         self.fields = self._split(self.increments)
         self.trials = self._split(self.trial)
         tests = self._split(test)
-        self.tests = {form.fields[name][1]: tests[name] for name in form.fields}
+        self.tests = {field.test: tests[name] for name, field in form.fields.items()}
         self.traction = ufl.Coefficient(
             ufl.FunctionSpace(domain, dolfinx.lagrange(2, PLANE.dim)), count=1
         )
@@ -276,8 +276,8 @@ class Symbols:
                 f"form {self.form.name}: residual returned {type(residual).__name__}: expected a UFL "
                 "form (sums of sum_p(...) and of expressions * dx or * ds)"
             )
-        for unknown, (_, test) in self.form.fields.items():
-            components = 2 if self.fields[unknown].ufl_shape else 1
+        for unknown, field in self.form.fields.items():
+            test, components = field.test, field.components
             space = ufl.FunctionSpace(self.domain, dolfinx.lagrange(1, components))
             stranger = ufl.Coefficient(space, count=PLACEHOLDERS - 1)
             named = test in inspect.signature(self.form.residual).parameters

@@ -102,7 +102,7 @@ class Solution(Elsewhere, Sealed, Unique):
         Raises:
             InputError: The form has neither.
         """
-        return self._of_form("volumetric", self._volumetric, "volume_fields")
+        return self._of_form("volumetric", self._volumetric, "has_mean_stress")
 
     @property
     def eps_v(self) -> Array:

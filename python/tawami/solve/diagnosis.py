@@ -157,7 +157,7 @@ class Diagnosis:
     def _incompressible(self) -> str:
         K, mu = (self._responses.constants[name] for name in ("K", "mu"))
         ratio = self._comm.allreduce(float((K / mu).max(initial=0.0)), op=MPI.MAX)
-        if ratio < NO_DIGITS or self._responses.form.kinematics.volume_fields:
+        if ratio < NO_DIGITS or self._responses.form.kinematics.has_mean_stress:
             return ""
         return (
             f"K/mu is {ratio:.1e}: a form without a field for the volume has no digits left; use form "

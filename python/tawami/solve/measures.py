@@ -108,7 +108,7 @@ class Measures:
         )
         momentum = 0.0 if at_rest or scale == 0 else norm(free[of_u]) / scale
         volume = None
-        if self._responses.form.kinematics.volume_fields:
+        if self._responses.form.kinematics.has_mean_stress:
             sums = self._responses.sums(self._volume_scale(coefficients)[:, None])
             volume = float(
                 np.divide(norm(free[~of_u]), norm(sums.ravel()))

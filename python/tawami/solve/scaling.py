@@ -45,7 +45,7 @@ class Scaling:
         # stiffness), in a scale that does not depend on units.
         size = np.abs(np.where(of_u, diagonal, 0.0))
         scale: Array = 1 / np.sqrt(np.where(size > 0, size, self._responses.largest_mu))
-        if self._responses.form.kinematics.volume_fields:
+        if self._responses.form.kinematics.has_mean_stress:
             functions = own[~of_u] - self._layout.num_displacement
             scale[~of_u] = self._of_volume(functions, diagonal[~of_u])
         return scale
