@@ -10,7 +10,7 @@ from declared import BOTH, form_of
 from ufl import SpatialCoordinate, div, dot, grad, inner
 
 import tawami
-from tawami.form import vector
+from tawami.form import scalar, vector
 from tawami.form.form import Form
 from tawami.form.symbols import Symbols
 
@@ -18,15 +18,32 @@ WRONG = [
     (lambda: Form.load("u_eps"), r"'u_eps' is not shipped: expected one of 'u', 'u_bbar'"),
     (lambda: Form.load("nowhere.py"), "'nowhere.py' cannot be read"),
     (lambda: Form.load(textwrap), "'textwrap' declares no 'fields', 'residual'"),
-    (lambda: form_of(None, {"u": ("velocity", "w")}), "kind 'velocity': expected one of"),
-    (lambda: form_of(None, {"u": "displacement"}), r"expected \(kind, test function\)"),
+    (
+        lambda: form_of(None, {"u": ("velocity", "w")}),
+        r"field 'u' is \('velocity', 'w'\): expected vector\('w'\)",
+    ),
+    (lambda: form_of(None, {"u": "displacement"}), "field 'u' is 'displacement': expected vector"),
     (lambda: form_of(None, parameters={"a": {}}), "parameter 'a' has no \"default\""),
     (lambda: form_of(None, parameters={"h": {"default": 1}}), "'h' has two meanings"),
     (lambda: form_of(None, {"u": vector("K")}), "'K' has two meanings"),
     (lambda: Form.load(3), "form = 3: expected the name of a shipped form"),
     (lambda: form_of(None, kinematics="large"), "kinematics = 'large': expected one of"),
-    (lambda: form_of(None), "'mixed' needs fields of the kinds"),
-    (lambda: form_of(None, BOTH), "'displacement' needs fields of the kinds 'displacement'"),
+    (lambda: form_of(None, kinematics="mixed"), "'mixed' does not take the roles of its fields"),
+    (lambda: form_of(None, BOTH, kinematics="cell"), "'cell' does not take the roles"),
+    (lambda: form_of(None, {"p": scalar("q")}), "the first of its fields is not the displacement"),
+    (lambda: form_of(None, {**BOTH, "v": vector("z")}), "'u', 'v' have the roles 'displacement'"),
+    (
+        lambda: form_of(None, {**BOTH, "p": scalar("r", role="pressure")}),
+        "'eps_v', 'p' have the roles 'pressure', 'volumetric_strain'",
+    ),
+    (
+        lambda: scalar("q", role="damage"),
+        "role='damage'.*: expected 'volumetric_strain', 'pressure'",
+    ),
+    (lambda: scalar("q", basis="cubic"), "basis='cubic'.*: expected one of 'bilinear'"),
+    (lambda: scalar("q", role="pressure", unit="kPa"), "unit='kPa'.*: expected 'Pa', or no unit"),
+    (lambda: scalar("q", scale=-1), "scale = -1: expected a finite number above 0"),
+    (lambda: vector(3), "test function 3: expected a name"),
     (
         lambda: form_of(None, parameters={"a": {"default": 1, "min": 0}}),
         "'a' declares 'min': expected among 'default', 'minimum', 'maximum', 'usual'",
