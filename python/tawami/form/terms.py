@@ -78,7 +78,7 @@ def _check(symbols: Symbols, part: Any) -> None:
     if not extract_arguments(part) and not isinstance(part.integrand(), Zero):
         raise FormError(f"{where}: a term has no test function: expected one in each term")
     with symbols.lines.errors(ufl.Form([part])):
-        check_form_arity(expand_derivatives(ufl.Form([part])), part.arguments())
+        check_form_arity(expand_derivatives(ufl.Form([part])), ufl.Form([part]).arguments())
     if part.subdomain_id() != "everywhere":
         raise FormError(
             f"{where}: a measure with a number, as dx({part.subdomain_id()}): expected dx, dx_c and ds "
