@@ -11,7 +11,7 @@ import ufl
 from ufl.algorithms.check_arities import ArityMismatch, check_form_arity
 
 from tawami.base.errors import FormError, TawamiError
-from tawami.fem import dolfinx, kernels
+from tawami.fem import kernels
 from tawami.fem.kernels import Kernel, Kind
 from tawami.fem.rules import DEGREE, Rule, rule_points
 from tawami.form import points
@@ -154,10 +154,9 @@ class KernelBuilder:
 
     def _field_slots(self) -> dict[Any, Slot]:
         """Slots of the increments and of the traction."""
-        displacement, bilinear = dolfinx.DISPLACEMENT_DOFS, dolfinx.BILINEAR_DOFS
-        num_bilinear = len(self._symbols.form.fields) - 1
+        displacement, *others = (f.num_dofs for f in self._symbols.form.fields.values())
         return {
-            self._symbols.increments: Slot("fields", displacement + bilinear * num_bilinear),
+            self._symbols.increments: Slot("fields", displacement + sum(others)),
             self._symbols.traction: Slot("traction", displacement),
         }
 

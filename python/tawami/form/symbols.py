@@ -15,6 +15,7 @@ from tawami.base.space import PLANE
 from tawami.base.text import quoted
 from tawami.fem import dolfinx
 from tawami.fem.rules import DEGREE, FAMILY, Rule
+from tawami.form.fields import element_of
 from tawami.form.form import Form
 from tawami.form.quantities import (
     MU,
@@ -62,8 +63,7 @@ class Symbols:
         self.form, self.assembly = form, assembly
         self._plastic_volume = plastic_volume
         domain = dolfinx.domain()
-        elements = [dolfinx.lagrange(2, PLANE.dim)] + [dolfinx.lagrange(1)] * (len(form.fields) - 1)
-        self.element = elements[0] if len(elements) == 1 else dolfinx.mixed(elements)
+        self.element = element_of(form.fields)
         space = ufl.FunctionSpace(domain, self.element)
         self.domain = domain
         self.increments = ufl.Coefficient(space, count=0)
