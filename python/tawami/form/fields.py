@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from tawami.base.checks import LEAST, number, one_of, shown
 from tawami.base.errors import FormError, InputError
 from tawami.base.space import PLANE
 from tawami.base.text import quoted
+from tawami.fem import dolfinx
 
 #: What the law receives of a field with this role, and the unit of the field.
 ROLES: Mapping[str, str] = {"displacement": "m", "volumetric_strain": "-", "pressure": "Pa"}
@@ -39,9 +41,24 @@ class Field:
     scale: float | None = None
 
     @property
+    def degree(self) -> int:
+        """Degree along each axis of its Lagrange element on the mesh."""
+        return 1 if self.basis == "bilinear" else 2
+
+    @property
+    def num_dofs(self) -> int:
+        """Number of degrees of freedom of that element."""
+        return self.components * len(dolfinx.reference_nodes(self.degree))
+
+    @property
     def own(self) -> bool:
         """Whether it is a field of the user's, which no law receives."""
         return self.role is None
+
+
+def element_of(fields: Mapping[str, Field]) -> Any:
+    """Element of all fields on the mesh."""
+    return dolfinx.element_of([(field.degree, field.components) for field in fields.values()])
 
 
 def vector(test: str) -> Field:

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import ufl
 from ufl.algorithms.check_arities import check_form_arity
 
-from tawami.fem import dolfinx, kernels
+from tawami.fem import kernels
 from tawami.fem.kernels import Kernel, Kind
 from tawami.fem.rules import DEGREE, Rule, rule_points
 from tawami.form import points
@@ -155,9 +155,8 @@ class KernelBuilder:
 
     def _field_slots(self) -> dict[Any, Slot]:
         """Slots of the increments and of the traction."""
-        displacement, bilinear = dolfinx.DISPLACEMENT_DOFS, dolfinx.BILINEAR_DOFS
-        num_bilinear = len(self._symbols.form.fields) - 1
+        displacement, *others = (f.num_dofs for f in self._symbols.form.fields.values())
         return {
-            self._symbols.increments: Slot("fields", displacement + bilinear * num_bilinear),
+            self._symbols.increments: Slot("fields", displacement + sum(others)),
             self._symbols.traction: Slot("traction", displacement),
         }

@@ -15,6 +15,7 @@ from tawami.base.space import PLANE, Space
 from tawami.base.text import meant, quoted
 from tawami.fem import dolfinx
 from tawami.fem.rules import DEGREE, FAMILY, Rule
+from tawami.form.fields import element_of
 from tawami.form.form import Form
 from tawami.form.lines import Lines, Measure
 from tawami.form.operators import Operators
@@ -63,8 +64,7 @@ class Symbols:
         self.lines = Lines(form.name, form.residual)
         self.domain = domain = dolfinx.domain()
         self.operators = Operators(space, domain)
-        elements = [dolfinx.lagrange(2, PLANE.dim)] + [dolfinx.lagrange(1)] * (len(form.fields) - 1)
-        self.element = elements[0] if len(elements) == 1 else dolfinx.mixed(elements)
+        self.element = element_of(form.fields)
         functions = ufl.FunctionSpace(domain, self.element)
         self.increments, self.old = (ufl.Coefficient(functions, count=k) for k in (0, 2))
         self.trial = ufl.TrialFunction(functions)
