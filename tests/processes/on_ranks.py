@@ -18,6 +18,7 @@ from cases.showcase.collapse.pile import build as pile_of_rods
 from cases.verification.cantilever import fem, mpm
 from tawami import _rust
 from tawami.base.ranks import allgathered
+from tawami.form import vector
 from tawami.form.form import Form
 from tawami.results import write_grid, write_particles
 from tawami.solve.newton import Newton
@@ -75,7 +76,7 @@ def nonlinear() -> dict[str, np.ndarray]:
     def stiff(u, w, sigma, mu, sum_p, t, ds):
         return sum_p(sigma, grad(w)) + sum_p(3e3 * mu, div(u) ** 3 * div(w)) - dot(t, w) * ds
 
-    form = Form({"u": ("displacement", "w")}, "displacement", stiff)
+    form = Form({"u": vector("w")}, stiff)
     found = {}
     for path in ("points", "dolfinx"):
         grid = grid_of()

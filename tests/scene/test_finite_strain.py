@@ -10,6 +10,7 @@ from scipy.optimize import root
 
 import tawami
 from cases.verification import self_weight
+from tawami.form import vector
 from tawami.form.form import Form
 
 
@@ -240,11 +241,11 @@ def test_unsupported_combinations_are_rejected(random_scene):
     with pytest.raises(
         tawami.FormError, match="strain = 'huge': expected one of 'small', 'finite'"
     ):
-        Form({"u": ("displacement", "w")}, "displacement", lambda w: w, strain="huge")
+        Form({"u": vector("w")}, lambda w: w, strain="huge")
     with pytest.raises(
-        tawami.FormError, match="strain = 'finite' with the kinematics 'deviatoric'"
+        tawami.FormError, match="strain = 'finite' with a field of the role 'pressure'"
     ):
-        Form({"u": ("displacement", "w")}, "deviatoric", lambda w: w, strain="finite")
+        Form({"u": vector("w")}, lambda w: w, strain="finite")
     law = tawami.NumpyLaw(lambda e, s: (s, np.zeros((len(e), 4, 4))), K=1.0, mu=1.0)
     grid = grid_of()
     body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)

@@ -21,8 +21,8 @@ from tawami.grid.grid import Grid
 
 #: Sum over the particles of a spline below which round-off of the assembly hides its stiffness: that of
 #: a particle 4e-7 of a cell inside the support. Such a spline follows its neighbour, as if the particle
-#: had not arrived. A ghost penalty gives it a stiffness instead. Lagrange functions need no tie: their
-#: gradients do not vanish with them, and biquadratic ones have negative sums as well.
+#: had not arrived. A ghost penalty gives the displacement a stiffness instead. Lagrange functions need
+#: no tie: their gradients do not vanish with them, and biquadratic ones have negative sums as well.
 UNRESOLVED = 1e-13
 
 
@@ -61,18 +61,23 @@ class Attachment:
         self.grid, self.compiled, self.stopwatch = grid, compiled, stopwatch
         self.location, self.volume = location, volume
         self.values = {"h": grid.h, **parameters}
-        self.space = grid.function_space(len(compiled.form.fields), compiled.element)
+        self.space = grid.function_space(compiled.element)
         number = grid.cell_numbers(grid.rectangle.ij)
         active: Mask = np.zeros(grid.cells[::-1], dtype=bool)
         active.ravel()[location.active] = True
         self.cells = np.flatnonzero(active.ravel()[number]).astype(np.int32)
         self.rows = np.searchsorted(location.active, number[self.cells]).astype(np.uint32)
         self.active = ranks.any_of(grid.comm, active)
-        self.layout = Layout(grid, basis, self.space, self.active)
-        if compiled.ghost is None and basis == "quadratic_spline":
+        self.layout = Layout(grid, basis, compiled.form.fields, self.space, self.active)
+        weak = [
+            name
+            for name, place in self.layout.fields.items()
+            if place.basis == "quadratic_spline" and (place.start > 0 or compiled.ghost is None)
+        ]
+        if weak:
             once = np.ones(len(volume))
-            sums = _rust.nodal_sums(location, once, once[:, None], basis)
-            self.layout.tie(self.summed(sums)[:, 0], UNRESOLVED)
+            sums = _rust.nodal_sums(location, once, once[:, None], "quadratic_spline")
+            self.layout.tie(weak, self.summed(sums)[:, 0], UNRESOLVED)
         self.points: dict[Rule, list[tuple[int, ...]]] = {
             rule: _point_indices(rule, swapped=grid.rectangle.swapped)
             for rule in compiled.densities

@@ -16,6 +16,7 @@ import numpy as np
 
 from tawami import _rust
 from tawami.base.arrays import Array
+from tawami.base.errors import FormError
 from tawami.fem import dolfinx
 from tawami.fem.rules import Rule
 from tawami.field.assembly import Assembly
@@ -30,10 +31,21 @@ class PointAssembly(Assembly):
 
     Args:
         attachment: The form and the active cells.
+
+    Raises:
+        FormError: The fields have too many functions on a cell.
     """
 
     def __init__(self, attachment: Attachment) -> None:
         super().__init__(attachment)
+        on_cell, _ = self.layout.on_cell(np.zeros(self.layout.grid.space.dim, dtype=np.int64))
+        count = len(on_cell)
+        if count > _rust.MAX_COEFFICIENTS:
+            raise FormError(
+                f"form {attachment.compiled.form.name}: too many fields: they have {count} coefficients "
+                f"on a cell: expected at most {_rust.MAX_COEFFICIENTS}. Use fewer fields, or "
+                "basis='bilinear' for some of them"
+            )
         self._matrix = ReducedMatrix(attachment.grid.comm)
 
     def follow(self, earlier: Assembly) -> None:
@@ -48,10 +60,8 @@ class PointAssembly(Assembly):
             np.rint(degree * to_grid(dolfinx.reference_nodes(degree))).astype(int).tolist()
             for degree in (2, 1)
         )
-        bilinear = len(self._compiled.form.fields) > 1
-        return _rust.Assembler(
-            self.attachment.location, self.layout.basis, nodes, vertices, bilinear
-        )
+        fields = [(f.basis, f.components, f.degree) for f in self.layout.fields.values()]
+        return _rust.Assembler(self.attachment.location, fields, nodes, vertices)
 
     def _kernel(self, integral: Integral) -> tuple[Any, ...]:
         """An integral as `_rust.Kernels` reads it."""
@@ -86,11 +96,20 @@ class PointAssembly(Assembly):
 
     def residual(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
         """See `Assembly.residual`."""
+        forces = self._vector(coefficients, data, absolute=False)
+        return self._ghost.add_forces(forces, coefficients, data)
+
+    def magnitude(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
+        """See `Assembly.magnitude`."""
+        return self._vector(coefficients, data, absolute=True)
+
+    def _vector(self, coefficients: Array, data: Mapping[Rule, Array], *, absolute: bool) -> Array:
         with self._stopwatch("residual"):
             arrays, volume = list(data.values()), self.attachment.volume
-            of_cells = self._assembler.vector(self._of_residual, arrays, volume, coefficients)
-            forces = self.attachment.summed(of_cells)
-        return self._ghost.add_forces(forces, coefficients, data)
+            of_cells = self._assembler.vector(
+                self._of_residual, arrays, volume, coefficients, absolute
+            )
+            return self.attachment.summed(of_cells)
 
     def tangent(self, coefficients: Array, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
         """See `Assembly.tangent`."""

@@ -150,15 +150,15 @@ class NewmarkStep:
         """First iterate: u = dt v, eps_v the lumped projection of its div u (ln det f)."""
         domain = self._now.domain
         guess = np.zeros(domain.layout.size)
-        n = u.size
-        guess[:n] = u
+        guess[: u.size] = u
         if domain.model.form.kinematics.has_eps_v:
-            ln_j = domain.stage.volume_strains(guess[:n], None)[:, 0]
+            ln_j = domain.stage.volume_strains(guess[: u.size], None)[:, 0]
             weight = domain.constants["K"] * domain.particles.volume
             # a guess that halves a particle or inverts it is limited
             data = np.column_stack([np.fmax(ln_j, np.log(0.5)), np.ones(len(weight))])
             sums = domain.sums(weight, data, "bilinear")
-            guess[n:] = divided(sums[:, 0], sums[:, 1])
+            assert domain.layout.volumetric is not None
+            guess[domain.layout.volumetric.slice] = divided(sums[:, 0], sums[:, 1])
         return guess
 
     def accept(self, accepted: Accepted) -> NewmarkUpdate:

@@ -11,7 +11,6 @@ import scipy.sparse as sp
 from tawami import _rust
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError, NotModelledError
-from tawami.form.kinematics import FIELD_UNITS
 from tawami.grid import edges
 from tawami.grid.basis import extraction, greville_1d, values_1d
 from tawami.motion.observer import Snapshot, Subject
@@ -92,8 +91,8 @@ def _of_grid(scene: Scene) -> dict[str, GridQuantity]:
         ),
     }
     if not scene.form.strain.finite:  # else the grid has only that of the last step
-        for name, (kind, _) in list(scene.form.fields.items())[1:]:
-            found[name] = GridQuantity(f"{name} [{FIELD_UNITS[kind]}]", _bilinear)
+        for name, field in list(scene.form.fields.items())[1:]:
+            found[name] = GridQuantity(f"{name} [{field.unit}]", _bilinear)
     return found
 
 

@@ -302,7 +302,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         return self.configuration.domain.layout.size
 
     def split(self, coefficients: Array) -> tuple[Array, Array | None]:
-        """Coefficients of the displacement and of the bilinear field (None if there is none).
+        """Coefficients of the displacement, and of eps_v or p (None if the form has neither).
 
         Raises:
             InputError: Not the coefficients of all fields.
@@ -317,8 +317,8 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         """The form's integrals over particles and cells, for every test function, before supports.
 
         Args:
-            coefficients: Increments of all fields: displacement (two per function, x fastest),
-                then the bilinear field, as `split` separates them.
+            coefficients: Increments of all fields one after the other, in the order of the form; each
+                with its components for every function, x fastest.
         """
         self.configuration.activity.check_between_steps("residual(...)")
         return self.configuration.domain.newton.internal(self._coefficients(coefficients))

@@ -50,7 +50,8 @@ class Solution(Elsewhere, Sealed, Unique):
         unknowns: Number of reduced unknowns.
         load: Share of the new loads and displacements that it is in equilibrium with; NaN in dynamics.
         iterations: Newton iterations of the last step.
-        history: (momentum, volume) measures of every residual of the last step.
+        history: (momentum, volume) measures of every residual of the last step; with fields without a
+            role, the largest of theirs as well.
         krylov: FGMRES iterations of every linear solve of the last step; 0 where the tangent was
             factorised.
         number: Numbers of the particles in the body, ascending: all, unless some have left.
@@ -103,7 +104,7 @@ class Solution(Elsewhere, Sealed, Unique):
         Raises:
             InputError: The form has neither.
         """
-        return self._of_form("volumetric", self._volumetric, "volume_fields")
+        return self._of_form("volumetric", self._volumetric, "has_mean_stress")
 
     @property
     def eps_v(self) -> Array:
@@ -240,7 +241,7 @@ class Solution(Elsewhere, Sealed, Unique):
         return [*stored, *quantities.DERIVED, *histories], histories, self._model.space
 
     def _repr_html_(self) -> str:
-        momentum, volume = zip(*self.history, strict=True)
+        momentum, volume, *others = zip(*self.history, strict=True)
         rows = {
             "form": self._model.form_line,
             "particles": str(len(self.number)),
@@ -250,6 +251,8 @@ class Solution(Elsewhere, Sealed, Unique):
             "momentum": ", ".join(f"{measure:.1e}" for measure in momentum),
             "volume": ", ".join(f"{measure:.1e}" for measure in volume if measure is not None),
         }
+        if others:
+            rows["other fields"] = ", ".join(f"{measure:.1e}" for measure in others[0])
         return html.table("Solution", rows)
 
     # -- forces --------------------------------------------------------------
