@@ -182,8 +182,8 @@ class Assembler:
 @final
 class Kernels:
     # of each kernel: owner of the code, address, rank, number of packed coefficients, these in packed
-    # order (none for the fields; else number of the array of particle data, whether it is its
-    # means over cells, columns), constants, points
+    # order ('fields', 'position', or number of the array of particle data, whether it is its means
+    # over cells, columns), constants, whether it reads the position, points
     def __new__(
         cls, assembler: Assembler, rank: int, kernels: Sequence[tuple[Any, ...]]
     ) -> Kernels: ...

@@ -210,7 +210,9 @@ def _compiled(
 ) -> CompiledForm:
     """The form, with the plastic volume of the laws if any of them may have one."""
     plastic_volume = law is not None or any(one.pressure_dependent for one in materials)
-    return compile_form(grid.comm, form, options, assembly, plastic_volume=plastic_volume)
+    return compile_form(
+        grid.comm, form, options, assembly, plastic_volume=plastic_volume, space=grid.space
+    )
 
 
 def with_laws(
