@@ -84,9 +84,11 @@ class Space:
         return components.reshape(-1, self.dim)
 
     def tensors(self, components: Array) -> Array:
-        """Tensors of their components in one array, as :meth:`vectors`: n x rows x rows, where the hoop
-        direction has a row too.
-        """
+        """Tensors, n x dim x dim, of their components in one array, as :meth:`vectors`."""
+        return components.reshape(-1, self.dim, self.dim)
+
+    def gradients(self, components: Array) -> Array:
+        """Gradients of displacements, n x rows x rows: the hoop direction has a row too."""
         rows = self.dim + self.hoop
         return components.reshape(-1, rows, rows)
 

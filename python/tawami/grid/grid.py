@@ -98,6 +98,11 @@ class Grid(Unique):
         return cast(Position, tuple(corner))
 
     @property
+    def on_axis(self) -> bool:
+        """Whether its left edge is the axis of axisymmetry."""
+        return self.space.hoop and self.origin[0] == 0
+
+    @property
     def extent(self) -> str:
         """Its range along each axis [m], as text."""
         ends = zip(self.origin, self.upper, strict=True)

@@ -185,7 +185,7 @@ class Domain:
         """The same with the row and the column of the hoop direction where there is one."""
         flat = np.ascontiguousarray(values).ravel()
         gradients = _rust.gradients(self.location, self.layout.basis, flat)
-        return self.model.space.tensors(np.asarray(gradients))
+        return self.model.space.gradients(np.asarray(gradients))
 
     @property
     def particles_per_cell(self) -> npt.NDArray[np.int64]:

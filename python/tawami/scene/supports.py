@@ -51,7 +51,7 @@ class Supports(Owner[Support]):
         self.grid, self.basis = grid, basis
         self.walls: list[Wall] = []
         self.axis: list[Support] = []
-        if grid.space.hoop and grid.origin[0] == 0:
+        if grid.on_axis:
             zero = Factor("the axis")
             self.axis.append(Support(self, "left", 0, "x", 0.0, zero))
 
