@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from time import perf_counter
 from typing import Literal
 
@@ -113,7 +114,7 @@ def solve(base: Base, n: int, form: str = "u_epsv", step: float = 0.05) -> Run:
 
 def extrapolate(runs: Sequence[Run]) -> None:
     """Remove the error of the radius from each run but the first; n doubles from run to run."""
-    for coarse, fine in zip(runs, runs[1:], strict=False):
+    for coarse, fine in pairwise(runs):
         fine.extrapolated = (2 * fine.last**0.5 - coarse.last**0.5) ** 2
 
 

@@ -115,7 +115,9 @@ def _caps(grid: Grid, middle: Array, r: float, ends: Array) -> Points:
     (t, wt), (s, ws) = _rust.gauss(ALONG), _rust.gauss(ACROSS)
     span = np.diff(ends)
     right = middle[0] + r * np.cos(ends[:-1] + span / 2) > 0
-    large = np.flatnonzero(right & (span**3 > ROUND_OFF * 1e-2))  # smaller caps are round-off of r^2
+    large = np.flatnonzero(
+        right & (span**3 > ROUND_OFF * 1e-2)
+    )  # smaller caps are round-off of r^2
     begin, span = ends[large, None], span[large, None]
 
     def at(angle: Array) -> Array:
