@@ -1,4 +1,4 @@
-"""What a form reads besides the state of the particles: data, parameters, time, dt and gravity."""
+"""Inputs of a form besides the state of the particles: data, parameters, time, dt and gravity."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from tawami.form.form import UNIT
 from tawami.scene import sources
 from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor
-from tawami.scene.model import Model, by_kind
+from tawami.scene.model import Model
+from tawami.scene.parameters import by_kind
 
 
 class FormInputs:
