@@ -148,9 +148,7 @@ right = tangent.Linearisation._direction
         ),
         (tawami.Form(ALONE, lambda u: 3.0), "arguments", "expected a UFL form"),
         (
-            tawami.Form(
-                ALONE, "displacement", lambda w: 0, parameters={"a": {"default": -1, "minimum": 0}}
-            ),
+            tawami.Form(ALONE, lambda w: 0, parameters={"a": {"default": -1, "minimum": 0}}),
             "parameters",
             "a = -1.0: expected",
         ),

@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from declared import BOTH, form_of
 from scenes import FINITE, FORMS, grid_of
-from ufl import div, dot, grad, inner, sym
+from ufl import div, dot, grad, inner, sqrt, sym
 
 import tawami
 from tawami.base.errors import InexactSumWarning
 from tawami.form import scalar, vector
 from tawami.form.files import shipped
 from tawami.form.form import Form
-from tawami.form.quantities import ParticleScalar
+from tawami.form.symbols import Symbols
 
 # A form in a driver script: this module is one. It is the shipped u_epsv, written differently.
 fields = {"v": vector("w"), "theta": scalar("r", role="volumetric_strain")}
@@ -48,6 +48,7 @@ def test_a_form_in_a_file_works_like_a_shipped_one(random_scene, tmp_path):
         textwrap.dedent(
             """
             from ufl import dot, grad
+            from tawami.form import vector
             fields = {"u": vector("w")}
             def residual(w, sigma, t, sum_p, ds):
                 return sum_p(sigma, grad(w)) - dot(t, w) * ds
@@ -177,6 +178,7 @@ def test_an_edited_and_reloaded_module_is_another_form(random_scene, tmp_path, m
     path = tmp_path / "edited_form.py"
     text = """
 from ufl import grad
+from tawami.form import vector
 fields = {"u": vector("w")}
 def residual(w, sigma, sum_p):
     return FACTOR * sum_p(sigma, grad(w))
@@ -220,14 +222,16 @@ def test_parameters_change_without_compiling_again(random_scene):
 
 
 def test_constants_of_particles_have_arithmetic():
-    values = {"a": np.array([1.0, 2.0]), "b": np.array([4.0, 0.5])}
-    a, b = (ParticleScalar(n, lambda v, n=n: v[n]) for n in "ab")
-    expression = (2 * a + b**2 / a - 1) / (3 - b) + 1 / a
-    x, y = values["a"], values["b"]
-    expected = (2 * x + y**2 / x - 1) / (3 - y) + 1 / x
-    np.testing.assert_allclose(expression.evaluate(values), expected)
-    assert a * b == a * b
-    assert a * b != a / b
+    def residual(w, K, mu, sum_v):
+        return sum_v((2 * K + sqrt(mu) ** 2 / K - 1) / (3 - mu) + 1 / K, w[0])
+
+    symbols = Symbols(Form({"u": vector("w")}, residual), {})
+    symbols.residual()
+    (quantity,) = (d.quantity for d in symbols.data.placeholders if d.rule == "vertex")
+    K, mu = np.array([1.0, 2.0, 1.0]), np.array([4.0, 0.5, 4.0])
+    expected = (2 * K + mu / K - 1) / (3 - mu) + 1 / K
+    np.testing.assert_allclose(quantity.evaluate({"K": K, "mu": mu}), expected)
+    assert "sqrt(mu)" in quantity.text
 
 
 def test_alpha_of_the_residual_based_stabilisation_is_limited():

@@ -36,6 +36,7 @@ from __future__ import annotations
 
 import functools
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
@@ -56,22 +57,30 @@ from tawami.form.kinematics import (
     StrainMeasure,
     kinematics_of,
 )
-from tawami.form.quantities import COMPONENTS
 
 #: Default of declarations that are optional.
 NOTHING: Mapping[str, Any] = {}
 #: Declarations of a form besides its residual; the first is required.
 DECLARATIONS = (
-    "fields", "kinematics", "parameters", "options", "static_options", "strain", "whole_cells"
+    "fields", "kinematics", "data", "parameters", "options", "static_options", "strain", "whole_cells"
 )  # fmt: skip
+#: The unit at the end of the meaning of data.
+UNIT = re.compile(r"\[([^\[\]]+)\]$")
 #: Keys that a parameter may declare.
 LIMITS = ("default", "minimum", "maximum", "usual")
 #: Names that every form has.
 RESERVED = frozenset(
     (
-        *COMPONENTS, "K", "mu", "t", "h", "dx", "dx_c", "ds", "dG", "sum_p", "sum_c", "sum_v",
-        "cell_mean", "facet_mean", "jump_n", "jump_nn",
+        *STRAIN_MEASURES["small"].quantities, *STRAIN_MEASURES["finite"].quantities,
+        "K", "mu", "rho", "x", "time", "dt", "b", "t", "h", "old", "dx", "dx_c", "ds", "dG",
+        "grad", "div", "eps", "I", "dim", "sum_p", "sum_c", "sum_v", "cell_mean", "facet_mean",
+        "jump_n", "jump_nn",
     )
+)  # fmt: skip
+#: Arrays of the particles that no field and no data may be called after.
+ARRAYS = frozenset(
+    ("volume", "material", "number", "stress", "displacement", "strain", "velocity", "acceleration",
+     "velocity_gradient", "acceleration_gradient", "displacement_gradient")
 )  # fmt: skip
 
 
@@ -86,6 +95,8 @@ class Form:
         kinematics: Strain that the material law receives. It follows from the roles of the fields:
             'displacement' without a role, 'mixed' with 'volumetric_strain', 'deviatoric' with
             'pressure'. Only 'cell' (B-bar) must be given. The attribute is a `Kinematics`.
+        data: Numbers of each particle that a scene gives with `scene.data(name, ...)`: name -> what they
+            are with their unit, as {"kappa": "permeability [m2]"}.
         parameters: Numbers that may change without another compilation: name -> {"default": ...,
             "minimum": ..., "maximum": ..., "usual": ...}. Only the default is required. A maximum may
             depend on an option: {option: maximum}. A scene warns of a value above the usual one.
@@ -103,6 +114,7 @@ class Form:
     fields: Mapping[str, Field]
     residual: Callable[..., Any]
     kinematics: Kinematics
+    data: Mapping[str, str]
     parameters: Mapping[str, Mapping[str, Any]]
     options: Mapping[str, tuple[str, ...]]
     strain: StrainMeasure
@@ -115,6 +127,7 @@ class Form:
         fields: Mapping[str, Field],
         residual: Callable[..., Any],
         kinematics: str | Kinematics | None = None,
+        data: Mapping[str, str] = NOTHING,
         parameters: Mapping[str, Mapping[str, Any]] = NOTHING,
         options: Mapping[str, tuple[str, ...]] = NOTHING,
         strain: str | StrainMeasure = "small",
@@ -123,8 +136,9 @@ class Form:
         name: str = "of the driver script",
     ) -> None:
         declared = {
-            "fields": fields, "residual": residual, "parameters": parameters, "options": options,
-            "whole_cells": whole_cells, "static_options": static_options, "name": name,
+            "fields": fields, "residual": residual, "data": data, "parameters": parameters,
+            "options": options, "whole_cells": whole_cells, "static_options": static_options,
+            "name": name,
         }  # fmt: skip
         for attribute, value in declared.items():
             object.__setattr__(self, attribute, value)
@@ -140,10 +154,13 @@ class Form:
     def _check_names(self) -> None:
         """Check that no name is declared twice."""
         names = [*self.fields, *(field.test for field in self.fields.values())]
-        names += [*self.parameters, *self.options, *RESERVED]
+        names += [*self.data, *self.parameters, *self.options, *RESERVED]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             self._fail(f"{quoted(twice)} has two meanings: expected another name for one of them")
+        taken = sorted(ARRAYS.intersection((*self.own_fields, *self.data)))
+        if taken:
+            self._fail(f"{quoted(taken)} is an array that particles have: expected another name")
 
     def _check_fields(self) -> None:
         """Check the fields: the displacement first, and no role twice."""
@@ -202,10 +219,16 @@ class Form:
 
     def _check_declarations(self) -> None:
         """Check the types of all declarations."""
-        for what in ("fields", "parameters", "options", "static_options"):
+        for what in ("fields", "data", "parameters", "options", "static_options"):
             declared = getattr(self, what)
             if not isinstance(declared, Mapping) or not all(isinstance(n, str) for n in declared):
                 self._fail(f"{what} = {shown(declared)}: expected a mapping from names")
+        for name, what in self.data.items():
+            if not isinstance(what, str) or not UNIT.search(what):
+                self._fail(
+                    f"data '{name}' is {shown(what)}: expected its meaning with a unit in brackets, as "
+                    "'permeability [m2]'"
+                )
         for name, limits in self.parameters.items():
             if not isinstance(limits, Mapping) or "default" not in limits:
                 self._fail(f"parameter '{name}' has no \"default\"")

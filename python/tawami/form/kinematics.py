@@ -7,19 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import combinations, product
-from typing import Any
 
 import numpy as np
 import scipy.linalg as la
-import ufl
 
 from tawami.base.arrays import Array
-from tawami.base.space import PLANE
 from tawami.form.fields import Field
 from tawami.form.quantities import Part
-
-AXES = range(PLANE.dim)
 
 
 @dataclass(frozen=True)
@@ -81,21 +75,6 @@ class StrainMeasure:
 
     def __str__(self) -> str:
         return self.name
-
-    def direction(self, du: Any) -> tuple[Any, ...]:
-        """Components of a change of displacement (UFL) that :attr:`gradient_part` multiplies."""
-        if self.finite:
-            g = ufl.grad(du)
-            return tuple(g[i, j] for i, j in product(AXES, repeat=2))
-        e = ufl.sym(ufl.grad(du))
-        shear = (2 * e[i, j] for i, j in combinations(AXES, 2))
-        return (*(e[i, i] for i in AXES), *shear)
-
-    def volume_change(self, u: Any, du: Any) -> Any:
-        """Change of div u (small strain) or ln det f (finite strain) with du, in UFL."""
-        if self.finite:
-            return ufl.inner(ufl.inv(ufl.Identity(PLANE.dim) + ufl.grad(u)).T, ufl.grad(du))
-        return ufl.div(du)
 
     def metric_change(self, gradient: Array) -> Array:
         """Twice the strain that vanishes for rigid motions; `gradient` is (n x dim x dim)."""

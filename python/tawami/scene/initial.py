@@ -137,7 +137,8 @@ def _returned(domain: Domain) -> Array:
     fields = layout.split(np.zeros(layout.size))
     strain = domain.model.form.strain
     wanted = [(strain.mean, "value", 0, None), (strain.stress, "value", 1, None)]
-    data = np.zeros((len(domain.particles), 1 + quantities.COMPONENTS[strain.stress]))
+    size = quantities.components(quantities.LawQuantity(strain.stress), domain.model.space)
+    data = np.zeros((len(domain.particles), 1 + size))
     domain.total_strain_stage.evaluate(*fields, _rust.Requests([wanted]), [data])
     mean, components = data[:, 0], data[:, 1:]
     xx, yy, xy = components[:, strain.stress_xx_yy_xy].T
