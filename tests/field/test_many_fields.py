@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heated
 import numpy as np
 import pytest
 from particle_sums import Sum
@@ -12,42 +13,16 @@ from ufl import div, dot, grad
 import tawami
 from tawami.form import Form, scalar, vector
 
-#: Capacity, conductivity, thermal expansion, strength of the source, heat of compression.
-PARAMETERS = {"c": 0.7, "k": 0.3, "beta": 0.2, "source": 0.4, "a": 0.5}
-
-
-def heat(u, theta, w, r, K, sum_p, c, k, beta, source, a):
-    """Conduction, expansion, and heat of compression: linear, with all blocks."""
-    expansion = -sum_p(K, beta * theta * div(w))
-    return expansion + sum_p(
-        c * theta * r + k * dot(grad(theta), grad(r)) + a * div(u) * r - source * r
-    )
-
-
-def heated(u, theta, eps_v, w, r, q, sigma, K, t, sum_p, ds, c, k, beta, source, a):
-    volume = sum_p(K, q * (div(u) - eps_v))
-    momentum = sum_p(sigma, grad(w)) - dot(t, w) * ds
-    return momentum + volume + heat(u, theta, w, r, K, sum_p, c, k, beta, source, a)
-
 
 def with_cells(
     u, theta, eps_v, w, r, q, sigma, K, t, sum_p, ds, c, k, beta, source, a, dx, cell_mean
 ):
     """Nonlinear terms over cells as well, which both assemblies integrate alike."""
-    linear = heated(u, theta, eps_v, w, r, q, sigma, K, t, sum_p, ds, c, k, beta, source, a)
+    linear = heated.residual(
+        u, theta, eps_v, w, r, q, sigma, K, t, sum_p, ds, c, k, beta, source, a
+    )
     power = cell_mean(K) * theta**2 * div(u)
     return linear + (power * r + theta * eps_v * q + theta * dot(u, w)) * dx
-
-
-def form_of(residual=heated, basis="bilinear", scale=None, **values) -> Form:
-    """The volumetric strain is the last field: its role decides, not its position."""
-    fields = {
-        "u": vector("w"),
-        "theta": scalar("r", basis=basis, unit="K", scale=scale),
-        "eps_v": scalar("q", role="volumetric_strain"),
-    }
-    parameters = {n: {"default": v} for n, v in (PARAMETERS | values).items()}
-    return Form(fields, residual, parameters=parameters)
 
 
 def close(a, b, tolerance=1e-12):
@@ -57,7 +32,7 @@ def close(a, b, tolerance=1e-12):
 @pytest.mark.parametrize("theta", ["bilinear", "quadratic_spline"])
 @pytest.mark.parametrize("basis", BASES)
 def test_both_assemblies_agree(basis, theta):
-    form = form_of(with_cells, theta)
+    form = heated.form_of(with_cells, theta)
     scenes = [
         random_scene(150, basis=basis, form=form, assembly=path) for path in ("points", "dolfinx")
     ]
@@ -101,7 +76,7 @@ class WithHeat(Sum):
         whole = np.zeros((len(two) + m,) * 2)
         others = np.r_[:n, n + m : len(whole)]
         whole[np.ix_(others, others)] = two
-        c, k, beta, _, a = PARAMETERS.values()
+        c, k, beta, _, a = heated.PARAMETERS.values()
         for p in range(len(self.cells)):
             volume, bulk, divergence, value, gradient = self.parts(p)
             conduction = c * np.outer(value, value) + k * gradient.T @ gradient
@@ -112,7 +87,7 @@ class WithHeat(Sum):
 
     def magnitude(self, u, theta):
         """Sums of the absolute values of the contributions to the equation of theta."""
-        c, k, _, source, a = PARAMETERS.values()
+        c, k, _, source, a = heated.PARAMETERS.values()
         total = 0.0
         for p in range(len(self.cells)):
             volume, _, divergence, value, gradient = self.parts(p)
@@ -131,10 +106,10 @@ class WithHeat(Sum):
 )
 def test_the_tangent_is_that_of_a_sum_over_particles(basis, theta):
     for path in ("points", "dolfinx"):
-        scene = random_scene(30, basis=basis, form=form_of(basis=theta), assembly=path)
+        scene = random_scene(30, basis=basis, form=heated.form_of(basis=theta), assembly=path)
         reference = WithHeat(scene, theta)
         close(scene.tangent(np.zeros(scene.num_coefficients)).toarray(), reference.matrix())
-    scene = random_scene(30, basis=basis, form=form_of(basis=theta))
+    scene = random_scene(30, basis=basis, form=heated.form_of(basis=theta))
     domain = scene.configuration.domain
     place = domain.layout.fields["theta"]
     c = np.random.default_rng(1).standard_normal(scene.num_coefficients)
@@ -168,7 +143,7 @@ def solved(unit=1.0, equation=1.0, scale=None, assembly="points", theta="bilinea
     }  # fmt: skip
     grid = grid_of()
     body = tawami.box(grid, grid.origin, (0.5, 1.5))
-    form = form_of(basis=theta, scale=scale, **values)
+    form = heated.form_of(basis=theta, scale=scale, **values)
     scene = tawami.Scene(
         grid, body, tawami.linear_elastic(E=1e7, nu=0.499), form=form, assembly=assembly
     )
