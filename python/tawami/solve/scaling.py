@@ -104,4 +104,5 @@ class Scaling:
         own = reduction.unknowns[reduction.own]
         of_u = own < self._layout.num_displacement
         points = self._layout.greville - self._layout.grid.origin
-        return Blocks(of_u, rigid_motions(points)[own[of_u]])
+        fields = [self._layout.fields[name].holds(own) for name in self._responses.form.own_fields]
+        return Blocks(of_u, rigid_motions(points)[own[of_u]], fields)
