@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import heated
 import numpy as np
 from mpi4py import MPI
 from scenes import BASES, FORMS, grid_of
@@ -66,6 +67,31 @@ def random_clouds() -> dict[str, np.ndarray]:
                 c = random.standard_normal(scene.num_coefficients)
                 found[f"cloud {name} {basis} {path} residual"] = scene.residual(c)
                 found[f"cloud {name} {basis} {path} tangent"] = scene.tangent(c).toarray()
+    return found
+
+
+def fields() -> dict[str, np.ndarray]:
+    """A form of three fields: residual, tangent, and a solution; some ranks have no particle."""
+    found = {}
+    for path, theta in (
+        ("points", "quadratic_spline"),
+        ("points", "bilinear"),
+        ("dolfinx", "bilinear"),
+    ):
+        grid, random = grid_of((6, 5)), np.random.default_rng(0)
+        body = tawami.box(grid, grid.origin, (0.5, 2.0))
+        law = tawami.linear_elastic(E=2.0, nu=0.3)
+        form = heated.form_of(basis=theta)
+        scene = tawami.Scene(grid, body, law, form=form, assembly=path, tolerance=1e-11)
+        c = random.standard_normal(scene.num_coefficients)
+        found[f"fields {theta} {path} residual"] = scene.residual(c)
+        found[f"fields {theta} {path} tangent"] = scene.tangent(c).toarray()
+        scene.fix("bottom", "x")
+        scene.fix("bottom", "y")
+        solution = scene.solve()
+        found[f"fields {theta} {path} u"] = solution.u
+        found[f"fields {theta} {path} all"] = scene.configuration.total
+        found[f"fields {theta} {path} measure"] = np.array(solution.history[0][2])
     return found
 
 
@@ -311,7 +337,7 @@ def output(folder: Path) -> dict[str, np.ndarray]:
 
 def results(folder: Path) -> dict[str, Any]:
     """Results of all scenes; files are written to the folder."""
-    found = beams() | random_clouds() | nonlinear() | singular() | motion() | initial()
+    found = beams() | random_clouds() | fields() | nonlinear() | singular() | motion() | initial()
     found |= construction()
     return found | errors() | inverted() | few_cells() | output(folder)
 

@@ -110,7 +110,7 @@ KINEMATICS: Mapping[str, Kinematics] = {
 
 def kinematics_of(fields: Mapping[str, Field]) -> str:
     """Name of the kinematics that follow from the roles of the fields."""
-    roles = {field.role for field in fields.values()}
+    roles = {field.role for field in fields.values()} - {None}
     return next((k.name for k in KINEMATICS.values() if k.role in roles), "displacement")
 
 

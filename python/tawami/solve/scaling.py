@@ -105,4 +105,5 @@ class Scaling:
         of_u = own < self._layout.num_displacement
         grid = self._layout.grid
         points = self._layout.greville - grid.origin
-        return Blocks(of_u, rigid_motions(points, grid.space)[own[of_u]])
+        fields = [self._layout.fields[name].holds(own) for name in self._responses.form.own_fields]
+        return Blocks(of_u, rigid_motions(points, grid.space)[own[of_u]], fields)
