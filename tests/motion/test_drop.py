@@ -21,7 +21,7 @@ def drop(form, nu, transfer):
 
 @pytest.mark.parametrize("form", ["u_finite", "u_epsv_finite"])
 def test_a_drop_falls_and_bounces_with_its_momentum(form):
-    scene, motion = drop(form, 0.3 if form == "u_finite" else 0.49, "affine_flip")
+    scene, motion = drop(form, 0.3 if form == "u_finite" else 0.45, "affine_flip")
     scene.gravity((0.0, -G))
     scene.wall("bottom")
     mass = scene.mass.sum()
