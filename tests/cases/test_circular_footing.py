@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+import tawami
 from cases.verification import circular_footing as case
 
 
@@ -28,5 +29,5 @@ def test_the_plateau_is_that_of_the_limit_theorems(base):
 
 @pytest.mark.slow
 def test_displacement_alone_locks():
-    with pytest.warns(Warning):
+    with pytest.warns(tawami.LockingWarning):
         assert case.solve("rough", 2, form="u").error > 200
