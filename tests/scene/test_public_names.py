@@ -14,8 +14,8 @@ OF_A_RUN = {"scene", "motion", "state", "restore", "identity", "header"}
 SCENE = {
     "grid", "form", "basis", "parameters", "options", "numerics", "particles", "num_particles",
     "laws", "mass", "particles_per_cell", "left", "stopwatch", "configuration",
-    "initial", "data", "parameter", "flux", "fix", "hold", "wall", "release", "traction", "load", "gravity", "remove",
-    "change_material",
+    "initial", "data", "parameter", "flux", "fix", "hold", "wall", "release", "traction", "load",
+    "gravity", "remove", "change_material",
     "time", "solve", "solve_part", "advanced",
     "residual", "tangent", "reduction", "split", "num_coefficients",
 }  # fmt: skip
