@@ -45,7 +45,8 @@ class Attachment:
         rows: Position of each of them in `location.active`.
         layout: Places of the coefficients.
         points: Indices along the axes of the points of each rule; none for means over cells.
-        values: Values of h and of the parameters of the form.
+        values: Values of h, time, dt, b and the parameters of the form; :meth:`change` replaces them.
+        version: A number that changes with them.
     """
 
     def __init__(
@@ -60,7 +61,10 @@ class Attachment:
     ) -> None:
         self.grid, self.compiled, self.stopwatch = grid, compiled, stopwatch
         self.location, self.volume = location, volume
-        self.values = {"h": grid.h, **parameters}
+        dim = grid.space.dim
+        self.values: dict[str, Any] = {"h": grid.h, "time": 0.0, "dt": 0.0, "b": np.zeros(dim)}
+        self.values |= parameters
+        self.version = 0
         self.space = grid.function_space(compiled.element)
         number = grid.cell_numbers(grid.rectangle.ij)
         active: Mask = np.zeros(grid.cells[::-1], dtype=bool)
@@ -84,8 +88,15 @@ class Attachment:
         }
 
     def constants(self, integral: Integral) -> Array:
-        """Values of the constants that an integral names."""
-        return np.array([self.values[name] for name in integral.constants], dtype=float)
+        """Values of the constants that an integral names, one after the other."""
+        values = [np.ravel(self.values[name]) for name in integral.constants]
+        return np.asarray(np.concatenate([np.zeros(0), *values]), dtype=float)
+
+    def change(self, values: Mapping[str, Any]) -> None:
+        """Replace values of constants."""
+        if any(np.any(self.values[name] != value) for name, value in values.items()):
+            self.values |= values
+            self.version += 1
 
     def summed(self, of_cells: Any) -> Array:
         """The sum over all ranks of arrays from their cells."""

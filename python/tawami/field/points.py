@@ -47,6 +47,9 @@ class PointAssembly(Assembly):
                 "basis='bilinear' for some of them"
             )
         self._matrix = ReducedMatrix(attachment.grid.comm)
+        #: Kernels, which hold the values of the constants, with the version of these.
+        self._residual: tuple[int, _rust.Kernels] | None = None
+        self._tangent: tuple[int, _rust.Kernels, _rust.Kernels] | None = None
 
     def follow(self, earlier: Assembly) -> None:
         """See `Assembly.follow`."""
@@ -84,15 +87,21 @@ class PointAssembly(Assembly):
     def _kernels(self, rank: int, integrals: Sequence[Integral]) -> _rust.Kernels:
         return _rust.Kernels(self._assembler, rank, list(map(self._kernel, integrals)))
 
-    @functools.cached_property
+    @property
     def _of_residual(self) -> _rust.Kernels:
-        return self._kernels(1, self._compiled.residual)
+        if self._residual is None or self._residual[0] != self.attachment.version:
+            kernels = self._kernels(1, self._compiled.residual)
+            self._residual = self.attachment.version, kernels
+        return self._residual[1]
 
-    @functools.cached_property
+    @property
     def _of_tangent(self) -> tuple[_rust.Kernels, _rust.Kernels]:
         """Kernels of rank 2, and the pairs of kernels of rank 1 whose products are added."""
-        pairs = [integral for pair in self._compiled.couplings for integral in pair]
-        return self._kernels(2, self._compiled.tangent), self._kernels(1, pairs)
+        if self._tangent is None or self._tangent[0] != self.attachment.version:
+            pairs = [integral for pair in self._compiled.couplings for integral in pair]
+            kernels = self._kernels(2, self._compiled.tangent), self._kernels(1, pairs)
+            self._tangent = self.attachment.version, *kernels
+        return self._tangent[1:]
 
     def residual(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
         """See `Assembly.residual`."""

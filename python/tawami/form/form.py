@@ -1,35 +1,8 @@
 """The contract of a weak form: the declarations of a file in `forms/`.
 
-A form declares `fields` and `kinematics`, optionally `parameters`, `options`, `strain` and
-`whole_cells`, and a function `residual`. The names of its arguments select from the following:
-
-========================= ========================================================================
-fields, test functions    u, w, eps_v, q, ... as declared in `fields`; fields are increments of the step
-sigma, s, sigma_m         stress of the law in the plane at the end of the step, its
-                          three-dimensional deviator, mean stress
-P, P_s, tau_m, ln_J       with `strain = "finite"`, instead of these: tau f^-T, s f^-T, mean Kirchhoff
-                          stress and ln det f of the step, where f = I + grad u and
-                          tau = s + tau_m I is the Kirchhoff stress of the law
-eps_p                     plastic volumetric strain of the step, with the kinematics 'mixed' and
-                          'deviatoric': the field is elastic, div u (ln_J) = eps_v + eps_p
-K, mu                     bulk and shear modulus of the particle, also in K**2 / mu, 1 / K, K * ln_J
-sum_p(D, f), sum_p(f)     sum over particles of V_p D_p : f(x_p), and of V_p f(x_p), for any f of the
-                          fields, their first and their second derivatives
-sum_c(D, f), sum_c(f)     the same, with f at the centre of the particle's cell
-sum_v(D, f), sum_v(f)     the same, with f at the vertices of the particle's cell, interpolated by the
-                          bilinear functions: q eps_v is row-sum lumped
-cell_mean(D)              volume-weighted mean over the particles of each cell
-dx, dx_c, ds              area of the cells with particles (full rule, one point); loaded edges
-dG, facet_mean(D)         sides of partially filled cells, and cell_mean(D) there
-jump_n(f), jump_nn(f)     jump across these sides of the first and second normal derivative of a field
-                          or test function, for ghost penalties that are linear in the fields
-t, h                      traction [Pa], cell size [m]
-parameters, options       alpha, ... as declared
-========================= ========================================================================
-
-The integrand of `sum_p` is evaluated at the particles (`tawami.form.points`). With assembly='dolfinx'
-particle data enter as densities at the points of a fixed rule, which is exact for f up to degree 4 along
-x and along y (docs: theory). The tangent is derived (`tawami.form.tangent`).
+A form declares `fields`, optionally `kinematics`, `data`, `parameters`, `options`, `strain` and
+`whole_cells`, and a function `residual`. The names of its arguments select from those of
+`tawami.form.symbols` (docs: forms).
 """
 
 from __future__ import annotations

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import ufl
-from ufl.algorithms.check_arities import check_form_arity
 
 from tawami.fem import kernels
 from tawami.fem.kernels import Kernel, Kind
 from tawami.fem.rules import DEGREE, Rule, rule_points
 from tawami.form import points
+from tawami.form.arity import check_arity
 from tawami.form.lines import without_line
 from tawami.form.points import Integrand, PointForm
 from tawami.form.quantities import Density
@@ -142,7 +142,7 @@ class KernelBuilder:
         symbols = self._symbols
         with symbols.lines.errors(form):
             # newer versions of FFCx leave their cache locked if they find the error themselves
-            check_form_arity(ufl.algorithms.expand_derivatives(form), form.arguments())
+            check_arity(form, symbols.lines.text(None))
             kernel = kernels.compile_kernel(self._comm, form, kind)
         order = form.coefficients()
         names = {constant.count(): name for name, constant in symbols.constants.items()}

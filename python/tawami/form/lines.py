@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from typing import Any
 
 import ufl
-from ufl.algorithms.check_arities import ArityMismatch
 
 from tawami.base.errors import FormError, TawamiError
 
@@ -71,11 +70,8 @@ class Lines:
             if str(error).startswith("form "):
                 raise
             raise type(error)(f"{where}: {error}") from error
-        except (Exception, ArityMismatch) as error:  # the second is no Exception in newer UFL
-            advice = ""
-            if isinstance(error, ArityMismatch):
-                advice = ". Each term must be linear in one test function"
-            raise FormError(f"{where}: UFL or FFCx rejected it: {error}{advice}") from error
+        except Exception as error:
+            raise FormError(f"{where}: UFL or FFCx rejected it: {error}") from error
 
 
 class Measure(ufl.Measure):  # type: ignore[misc]

@@ -88,7 +88,7 @@ class Symbols:
         histories: Collection[str],
         fields_of_particles: Collection[str],
     ) -> dict[str, Callable[[], Any]]:
-        """What makes the symbol of each name; particle data are read only if the residual asks."""
+        """Function that makes the symbol of each name: particle data are read only if asked for."""
         form, data = self.form, self.data
         sums = Sums(form, data, self.lines, self.measure, reference=self.assembly == "dolfinx")
         ready = {

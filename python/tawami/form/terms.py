@@ -19,6 +19,7 @@ from ufl.classes import Zero
 
 from tawami.base.errors import FormError
 from tawami.fem.rules import Rule
+from tawami.form.arity import check_arity
 from tawami.form.lines import line_of
 from tawami.form.particle_data import PLACEHOLDERS
 from tawami.form.symbols import Symbols
@@ -78,7 +79,7 @@ def _check(symbols: Symbols, part: Any) -> None:
     if not extract_arguments(part) and not isinstance(part.integrand(), Zero):
         raise FormError(f"{where}: a term has no test function: expected one in each term")
     with symbols.lines.errors(ufl.Form([part])):
-        check_form_arity(expand_derivatives(ufl.Form([part])), ufl.Form([part]).arguments())
+        check_arity(ufl.Form([part]), where)
     if part.subdomain_id() != "everywhere":
         raise FormError(
             f"{where}: a measure with a number, as dx({part.subdomain_id()}): expected dx, dx_c and ds "

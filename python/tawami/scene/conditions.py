@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from tawami.base import checks
 from tawami.base.errors import InputError
-from tawami.grid.edges import Component, Interval, Profile
+from tawami.grid.edges import Interval, Profile
 from tawami.grid.grid import Edge
 from tawami.scene import selection
 from tawami.scene.configuration import Configuration
@@ -37,18 +37,19 @@ class Conditions:
     def fix(
         self,
         edge: Edge,
-        component: Component,
+        component: str,
         value: Profile = 0.0,
         *,
         amplitude: InTime | None = None,
         velocity: InTime | None = None,
         between: Interval | None = None,
     ) -> Support:
-        """Prescribe a displacement component along an edge of the grid.
+        """Prescribe a displacement component, or another field of the form, along an edge of the grid.
 
         Args:
             edge: 'left', 'right', 'bottom' or 'top'.
-            component: 'x' or 'y'.
+            component: 'x' or 'y', or the name of a field without a role, as 'p_w'. The value is then
+                that of the field, in its unit.
             value: Displacement [m] from now on (at small strain from the start of the scene): a
                 number, or a function f(x, y) on arrays, which is projected in L2 on the functions of
                 the edge.
@@ -65,7 +66,7 @@ class Conditions:
     def hold(
         self,
         point: Sequence[float],
-        component: Component,
+        component: str,
         value: float = 0.0,
         *,
         amplitude: InTime | None = None,
@@ -99,7 +100,7 @@ class Conditions:
         """
         return self.configuration.supports.wall(edge, friction, separates)
 
-    def release(self, place: Edge | Sequence[float], component: Component | None = None) -> None:
+    def release(self, place: Edge | Sequence[float], component: str | None = None) -> None:
         """Remove supports that `fix`, `hold` or `wall` made, as their `release()` does.
 
         Args:

@@ -22,9 +22,10 @@ from tawami.base.process import check_process
 from tawami.base.program import leave_together
 from tawami.base.timing import Stopwatch
 from tawami.particles import placement
-from tawami.scene import coverage, mean_stress, quantities, softening, strain_limit
+from tawami.scene import coverage, mean_stress, own_fields, quantities, softening, strain_limit
 from tawami.scene.activity import Activity
 from tawami.scene.domain import Domain
+from tawami.scene.form_inputs import FormInputs
 from tawami.scene.loads import Loads
 from tawami.scene.model import Model
 from tawami.scene.reactions import Reactions
@@ -70,6 +71,7 @@ class Configuration:
     Attributes:
         domain: The particles where they are; another object after a step that moves them.
         supports, loads: As the driver script made them.
+        inputs: Parameters and data of the form.
         activity: Time and activity of the scene.
         total: Coefficients of all fields since the start, where particles do not move.
         left: Number, position [m] and time [s] of the particles that left the grid or were removed.
@@ -85,11 +87,16 @@ class Configuration:
         if model.form.kinematics.has_eps_v:
             mine.add_eps_v()
         mine.add_strain(finite=model.moves)
+        own_fields.carry(model.form, mine, model.space.dim)
         self._attach(mine, location)
         self.activity = Activity()
-        self.supports = Supports(model.grid, model.basis, self.activity)
+        units = {name: field.unit for name, field in model.form.own_fields.items()}
+        self.supports = Supports(model.grid, model.basis, units, self.activity)
         self.loads = Loads(model.grid, np.array(particles.volume), self.activity)
         self.total = np.zeros(self.domain.layout.size)
+        self.inputs = FormInputs(model, self.activity.time)
+        self.inputs.begin(model, self.domain)
+        self._latest = self.activity.time
         self.left = list[tuple[int, tuple[float, float], float]]()
         self.removed = np.zeros(2)
         self.begun = self._coverage_checked = False
@@ -105,6 +112,24 @@ class Configuration:
     def before(self) -> Array:
         """Coefficients since the start where particles do not move, 0 where they do."""
         return np.zeros_like(self.total) if self.model.moves else self.total
+
+    @property
+    def old(self) -> Array:
+        """Fields without a role as coefficients, 0 for the others; a call for all ranks."""
+        return own_fields.on_grid(self.domain) if self.model.moves else self.total
+
+    def prepare(self, now: Moment, dt: float | None = None) -> None:
+        """Hand the form what it reads in a step that ends at a moment; a call for all ranks.
+
+        Args:
+            now: The end of the step.
+            dt: Length of the step [s]; by default since the last one.
+
+        Raises:
+            InputError: Data that are missing, or a form that reads dt where no time passes.
+        """
+        passed = now.time - self._latest if dt is None else dt
+        self.inputs.prepare(self.domain, now.time, passed, self.loads.acceleration(now))
 
     def moment(self, part: float = 1.0, until: float | None = None) -> Moment:
         """A part of a static phase that ends at a time [s], that of the scene by default.
@@ -162,6 +187,7 @@ class Configuration:
         committed = False
         try:
             with leave_together():  # laws and other functions of the driver script are called here
+                self.prepare(kind.moment)
                 accepted = self._solve(kind)
             if not self.model.moves:
                 strain_limit.check_digits(self.domain, accepted.step, self.numerics.tolerance)
@@ -172,8 +198,10 @@ class Configuration:
                 with self.stopwatch("commit"), ranks.raise_together(self.model.grid.comm):
                     fields = self.domain.layout.split(accepted.step.coefficients)
                     dissipated = self.domain.stage.commit(*fields)
+                    own_fields.accept(self.domain, accepted.step.coefficients)
                 committed = True
                 update.store(dissipated)
+                self._latest = kind.moment.time
                 outcome = self._store(accepted, moved, kind.end)
                 update.finish()
                 return outcome
@@ -212,8 +240,9 @@ class Configuration:
             path = None if path is None else replace(path, guess=last.factor)
         friction = problem.contact.friction if problem.contact.walls else None
         found = self.domain.newton.solve(
-            problem.reduction, problem.external, problem.inertia, guess, friction, path
-        )
+            problem.reduction, problem.external, problem.inertia, guess, friction, path,
+            self.old if self.model.form.own_fields else None,
+        )  # fmt: skip
         if last is None:
             return found
         history, krylov = last.history + found.history[1:], last.krylov + found.krylov
@@ -312,6 +341,8 @@ class Configuration:
         return {
             "particles": placement.gathered(self.model.grid, self.domain.particles),
             "time": self.activity.time,
+            "latest": self._latest,
+            "inputs": self.inputs.state(),
             "total": self.total,
             "left": self.left,
             "removed": [*self.removed],
@@ -341,7 +372,8 @@ class Configuration:
         self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
         self.removed = np.reshape(state["removed"], 2)
         self._coverage_checked, self.begun = state["coverage_checked"], True
-        self._travel = state["travel"]
+        self._travel, self._latest = state["travel"], state["latest"]
+        self.inputs.restore(state["inputs"])
         self.supports.restore(state["supports"])
         self.loads.restore(state["loads"])
         self._attach(particles, location)

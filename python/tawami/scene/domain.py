@@ -23,6 +23,7 @@ from tawami.form.kinematics import KINEMATICS, Kinematics
 from tawami.grid.basis import Basis
 from tawami.particles.numpy_law import NumpyStage
 from tawami.particles.responses import Responses
+from tawami.particles.values import ParticleValues
 from tawami.scene.model import Model
 from tawami.solve.newton import Newton
 from tawami.solve.numerics import Numerics
@@ -84,7 +85,8 @@ class Domain:
 
         def responses_of(stage: _rust.Stage | NumpyStage) -> Responses:
             return Responses(
-                model.compiled, particles, location, stage, _constants(model, particles),
+                model.compiled, particles, location, stage,
+                ParticleValues(model.form, particles, model.moduli, model.density),
                 model.grid.comm, stopwatch,
             )  # fmt: skip
 
@@ -126,7 +128,7 @@ class Domain:
     @property
     def constants(self) -> dict[str, Array]:
         """K and mu [Pa] of each particle."""
-        return _constants(self.model, self.particles)
+        return self.responses.constants
 
     @property
     def is_elastic(self) -> npt.NDArray[np.bool_]:
@@ -223,8 +225,3 @@ def _stage(
 ) -> _rust.Stage | NumpyStage:
     rust = _rust_stage(model, particles, location, kinematics, model.materials)
     return rust if model.law is None else NumpyStage(rust, particles, model.law, kinematics)
-
-
-def _constants(model: Model, particles: _rust.Particles) -> dict[str, Array]:
-    of_particle = model.moduli[particles.material]
-    return {"K": of_particle[:, 0].copy(), "mu": of_particle[:, 1].copy()}

@@ -208,6 +208,14 @@ class Loads(Owner[Load]):
         weights = [load.acceleration for load in self.all if isinstance(load, Weight)]
         return sum(weights, np.zeros(self.grid.space.dim))
 
+    def acceleration(self, now: Moment) -> Array:
+        """Acceleration of all weights at a moment [m/s2]."""
+        total = np.zeros(self.grid.space.dim)
+        for load, term, factor in self._acting(now):
+            if isinstance(load, Weight):
+                total += factor * np.array(term.values, dtype=float)
+        return total
+
     @property
     def vary(self) -> bool:
         """Whether any load follows an amplitude in time."""
