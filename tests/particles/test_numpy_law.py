@@ -28,6 +28,71 @@ def stiffening(strain, stress):
     return stress + factor[:, None] * linear, tangent
 
 
+SIGMA_Y, HARDENING = 30.0, 200.0
+
+
+def von_mises(strain, stress, history, hardening=HARDENING):
+    """Radial return with linear hardening (Simo and Hughes 1998, box 3.2), in their symbols."""
+    one, I_dev = UNIT, np.diag([1, 1, 1, 0.5]) - np.outer(UNIT, UNIT) / 3
+    alpha = history["plastic_strain"]
+    trial = stress + strain @ ELASTIC
+    p = trial[:, :3].mean(axis=1)[:, None]
+    xi = trial - p * one
+    norm = np.sqrt((xi**2 * [1, 1, 1, 2]).sum(axis=1))
+    f = norm - np.sqrt(2 / 3) * (SIGMA_Y + hardening * alpha)
+    gamma = np.maximum(f, 0.0) / (2 * MU) / (1 + hardening / (3 * MU))
+    n = xi / np.maximum(norm, 1e-300)[:, None]
+    theta = 1 - 2 * MU * gamma / np.maximum(norm, 1e-300)
+    theta_bar = np.where(f > 0, 1 / (1 + hardening / (3 * MU)) - (1 - theta), 0.0)
+    C = K * np.outer(one, one) + 2 * MU * (
+        theta[:, None, None] * I_dev - theta_bar[:, None, None] * n[:, :, None] * n[:, None, :]
+    )
+    stress = p * one + xi - 2 * MU * gamma[:, None] * n
+    return stress, C, {"plastic_strain": alpha + np.sqrt(2 / 3) * gamma}
+
+
+def without_tangent(strain, stress, history):
+    stress, _, history = von_mises(strain, stress, history)
+    return stress, history
+
+
+RUST = tawami.von_mises(
+    tawami.linear_elastic(K=K, mu=MU), yield_stress=SIGMA_Y, hardening=HARDENING
+)
+NUMPY = tawami.NumpyLaw(von_mises, K, MU, history=("plastic_strain",))
+DIFFERENCES = tawami.NumpyLaw(without_tangent, K, MU, history=("plastic_strain",))
+
+
+def block(material, form="u_epsv", **options):
+    """A block between two walls on a rough floor, to be loaded on its top."""
+    grid = grid_of((4, 6), h=0.25)
+    body = tawami.box(grid, (-1.0, 0.5), (0.0, 1.5), per_axis=2)
+    scene = tawami.Scene(grid, body, material, form=form, tolerance=1e-10, **options)
+    scene.fix("left", "x")
+    scene.fix("bottom", "x")
+    scene.fix("bottom", "y")
+    return scene
+
+
+def pressed(scene, force=40.0, steps=2):
+    """Solutions while a part of the top is loaded; the block yields there."""
+    load = scene.load(lambda x, y: (y > 1.25) & (x < -0.5), (0.0, 0.0))
+    solutions = []
+    for k in range(1, steps + 1):
+        load.change((0.0, -force * k / steps))
+        solutions.append(scene.solve())
+    return solutions
+
+
+def assert_same(mine, other, share):
+    """Whether two solutions are equal, as a share of the largest number."""
+    names = ("stress", "displacement", "strain")
+    pairs = [(getattr(s.scene.particles, name) for s in (mine, other)) for name in names]
+    pairs.append(s.scene.particles.history("plastic_strain") for s in (mine, other))
+    for one, two in pairs:
+        np.testing.assert_allclose(one, two, rtol=0, atol=share * np.abs(two).max())
+
+
 def scene_with(material, form="u_epsv", **options):
     grid = grid_of()
     body = tawami.box(grid, grid.origin, grid.upper, per_axis=3)
@@ -92,25 +157,64 @@ def test_uniaxial_strain_gives_the_stress_of_the_law():
 
 
 @pytest.mark.parametrize(
-    ("respond", "message"),
+    ("respond", "history", "message"),
     [
-        (lambda e, s: s, r"did not return a pair: expected \(stress, tangent\)"),
-        (lambda e, s: (s[:, :3], e), r"a stress of shape \(108, 3\): expected \(108, 4\)"),
-        (lambda e, s: (s, e), r"a tangent of shape \(108, 4\): expected \(108, 4, 4\)"),
+        (lambda e, s: (s, e, s), (), "returned 3 values for 108 particles from 0 on: expected .stress"),
+        (lambda e, s: None, (), "stress that respond returned: expected an array of real numbers"),
+        (lambda e, s: (s[:, :3], e), (), r"stress of shape \(108, 3\) for 108 .*expected \(108, 4\)"),
+        (lambda e, s: (s, e), (), r"tangent of shape \(108, 4\) for .*: expected \(108, 4, 4\)"),
         (
-            lambda e, s: (s * np.nan, e),
-            r"a stress that is not finite at 108 particles, the first is 0",
+            lambda e, s: (np.where(np.arange(len(s)) % 50 == 7, np.nan, s.T).T, e), (),
+            "stress that is not finite at 3 particles, the first is 7: nan at the strain",
         ),
+        (lambda e, s, h: (s, e), ("kappa",), "an array of shape .* as history of 108 particles"),
+        (lambda e, s, h: (s, e, {}), ("kappa",), "a dictionary with nothing as .*with 'kappa' behind"),
+        (
+            lambda e, s, h: (s, {"kappa": h["kappa"][:3]}), ("kappa",),
+            r"kappa of shape \(3,\) for 108 particles from 0 on: expected \(108,\)",
+        ),
+        (lambda e, s, h: (s, {"kappa": h["kappa"] / 0}), ("kappa",), "kappa that is not finite at 108"),
     ],
-)
-def test_wrong_results_of_a_law_are_rejected(respond, message):
-    scene = scene_with(tawami.NumpyLaw(respond, K, MU))
-    with pytest.raises(tawami.InputError, match=message):
+)  # fmt: skip
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
+def test_wrong_results_of_a_law_are_rejected(respond, history, message):
+    scene = scene_with(tawami.NumpyLaw(respond, K, MU, history))
+    with pytest.raises(tawami.InputError, match=rf"NumpyLaw\(lambda\): .*{message}"):
         scene.solve()
     assert not scene.particles.stress.any()
 
 
 @pytest.mark.parametrize(("bulk", "mu"), [(0.0, 1.0), (1.0, -1.0), (np.inf, 1.0), ("a", 1.0)])
 def test_wrong_moduli_are_rejected(bulk, mu):
-    with pytest.raises(tawami.InputError, match="NumpyLaw: "):
+    with pytest.raises(tawami.InputError, match=r"NumpyLaw\(elastic\): "):
         tawami.NumpyLaw(elastic, bulk, mu)
+
+
+@pytest.mark.parametrize(
+    ("history", "message"),
+    [
+        ("kappa", "history = 'kappa': expected at most 8 different names"),
+        (("kappa", "kappa"), "expected at most 8 different names"),
+        (tuple("abcdefghi"), "expected at most 8 different names"),
+        (("plastic strain",), "history variable 'plastic strain': expected a name of letters"),
+        ((3,), "history variable 3: expected a name of letters"),
+        (("stress",), "that particles do not have already"),
+    ],
+)
+def test_wrong_names_of_history_variables_are_rejected(history, message):
+    with pytest.raises(tawami.InputError, match=message):
+        tawami.NumpyLaw(elastic, K, MU, history)
+    tawami.NumpyLaw(elastic, K, MU, history=("plastic_strain",))  # the advice
+
+
+@pytest.mark.parametrize(
+    "form", ["u", "u_epsv", "u_p", "u_finite", "u_bbar_finite", "u_epsv_finite"]
+)
+@pytest.mark.parametrize("law", [NUMPY, DIFFERENCES], ids=["tangent", "differences"])
+@pytest.mark.filterwarnings("ignore::tawami.TangentWarning")
+def test_von_mises_in_numpy_is_that_in_rust(form, law):
+    (*_, mine), (*_, other) = (pressed(block(one, form)) for one in (law, RUST))
+    plastic = other.scene.particles.history("plastic_strain")
+    assert plastic.max() > 0.01
+    assert plastic.min() == 0
+    assert_same(mine, other, 1e-9)
