@@ -16,7 +16,7 @@ IGNORED = 1e-6
 
 
 def warned(domain: Domain, coefficients: Array) -> bool:
-    """Whether a particle softens, with a warning; a call for all ranks, with the arguments of `_found`."""
+    """Warn of the particle that softens most, if any does; arguments as of `_found`."""
     soft = _found(domain, coefficients)
     if soft is not None:
         _warn_of(domain, *soft)
