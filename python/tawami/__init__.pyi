@@ -25,6 +25,7 @@ from tawami.base.errors import (
     SofteningWarning,
     SolverError,
     SupportError,
+    TangentWarning,
     TawamiError,
     TawamiWarning,
 )
@@ -102,6 +103,7 @@ __all__ = [
     "Study",
     "SupportError",
     "TableOutput",
+    "TangentWarning",
     "TawamiError",
     "TawamiWarning",
     "box",

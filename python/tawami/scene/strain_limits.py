@@ -1,14 +1,15 @@
-"""Warnings of strains that the model of a scene does not take, each given once."""
+"""Warnings of a step about strains and laws, each given once."""
 
 from __future__ import annotations
 
 from tawami.base.arrays import Array
 from tawami.scene import softening, strain_limit
 from tawami.scene.domain import Domain
+from tawami.scene.tangents import warn_of_differences
 
 
 class StrainLimits:
-    """Displacement gradients beyond small strain, and softening.
+    """Displacement gradients beyond small strain, softening, and laws without a tangent.
 
     Args:
         small: Whether the strains of the scene are small.
@@ -16,6 +17,7 @@ class StrainLimits:
 
     def __init__(self, *, small: bool) -> None:
         self._small, self._softens = small, False
+        self._without_tangent = set[str]()
 
     def warn(self, domain: Domain, total: Array, coefficients: Array) -> None:
         """Warn of a step; a call for all ranks.
@@ -32,7 +34,5 @@ class StrainLimits:
                 self._small = False
                 strain_limit.warn_of(domain, *large)
         if not self._softens:
-            soft = softening.found(domain, coefficients)
-            if soft is not None:
-                self._softens = True
-                softening.warn_of(domain, *soft)
+            self._softens = softening.warned(domain, coefficients)
+        warn_of_differences(domain, self._without_tangent)
