@@ -25,6 +25,7 @@ from tawami.base.errors import (
     SofteningWarning,
     SolverError,
     SupportError,
+    TangentWarning,
     TawamiError,
     TawamiWarning,
 )
@@ -103,6 +104,7 @@ __all__ = [
     "Study",
     "SupportError",
     "TableOutput",
+    "TangentWarning",
     "TawamiError",
     "TawamiWarning",
     "box",

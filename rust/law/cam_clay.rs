@@ -29,7 +29,7 @@ pub(super) const MAKER: Maker = Maker {
         Parameter::Required("lambda_star"),
         Parameter::Required("kappa_star"),
         Parameter::Required("preconsolidation"),
-        Parameter::Optional("tension", 1e-3),
+        Parameter::Optional("tension", 0.01),
     ],
     make: |elastic, given| {
         let [m, lambda_star, kappa_star, p_c, tension] = std::array::from_fn(|i| given[i]);
@@ -296,7 +296,8 @@ impl Law for CamClay {
         (Stress { deviator, mean: -flow.p }, moduli)
     }
 
-    /// Beyond half the tensile strength the answer is the one there, and the clay opens (see [`SOFT`]).
+    /// Beyond half the tensile strength, p + p_t = p_t/2, the deviator is the one there, and the clay opens as
+    /// in [`SOFT`]. To this the slope of the plastic volume is added, which is near 1 / sqrt(p + p_t).
     fn respond_at_mean(
         &self,
         increment: &Sym,
@@ -330,11 +331,13 @@ impl Law for CamClay {
             (0..COMPONENTS).for_each(|i| answer.dev_dev[i][i] = elastic[i]);
         }
         if mean > limit {
-            let opened = (mean - limit) / (SOFT * mu);
-            new[0] = (new[0] * (-opened / self.theta).exp()).max(LEAST * self.preconsolidation);
-            answer.plastic_volume += opened;
+            let x = mean - limit;
+            let soft = 1.0 / (SOFT * mu) + answer.plastic_volume / self.tension;
+            new[0] = (new[0] * (-soft * x / self.theta).exp()).max(LEAST * self.preconsolidation);
+            answer.plastic_volume += soft * x;
+            answer.volume_dev = answer.volume_dev.map(|v| v * (1.0 + x / self.tension));
             answer.dev_mean = [0.0; COMPONENTS];
-            answer.volume_mean = 1.0 / (SOFT * mu);
+            answer.volume_mean = soft;
         }
         answer
     }

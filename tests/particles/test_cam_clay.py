@@ -12,7 +12,7 @@ import tawami
 
 K, MU, M, THETA = 5e6, 3e6, 1.1, 0.04
 P_C, P_T = 1e5, 100.0  # [Pa]
-CLAY = {"M": M, "lambda_star": 0.05, "kappa_star": 0.01, "preconsolidation": P_C}
+CLAY = {"M": M, "lambda_star": 0.05, "kappa_star": 0.01, "preconsolidation": P_C, "tension": 1e-3}
 ONE = np.array([1.0, 1.0, 1.0, 0.0])
 MIXED = ("u_epsv", "u_p")
 SMALL = ("u", "u_bbar", *MIXED)

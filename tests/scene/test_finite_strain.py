@@ -245,11 +245,6 @@ def test_unsupported_combinations_are_rejected(random_scene):
         tawami.FormError, match="strain = 'finite' with the kinematics 'deviatoric'"
     ):
         Form({"u": ("displacement", "w")}, "deviatoric", lambda w: w, strain="finite")
-    law = tawami.NumpyLaw(lambda e, s: (s, np.zeros((len(e), 4, 4))), K=1.0, mu=1.0)
-    grid = grid_of()
-    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
-    with pytest.raises(tawami.InputError, match="expected a law in Rust"):
-        tawami.Scene(grid, body, law, form="u_finite")
     with pytest.raises(tawami.InputError, match=r"gravity\(...\) needs Scene\(..., density=...\)"):
         random_scene().gravity((0, -10))
     with pytest.raises(tawami.InputError, match="density = -1.0: expected a finite number"):

@@ -150,7 +150,7 @@ def cam_clay(
     lambda_star: float,
     kappa_star: float,
     preconsolidation: float,
-    tension: float = 1e-3,
+    tension: float = 0.01,
 ) -> _rust.Material:
     """Modified Cam-Clay: `q^2 / M^2 + (p + p_t) (p - p_c) <= 0`, associated flow.
 
@@ -166,7 +166,8 @@ def cam_clay(
         lambda_star: Slope - d ln(volume) / d ln p of virgin compression.
         kappa_star: The same slope of swelling, smaller than lambda_star.
         preconsolidation: p_c [Pa] of particles that scene.initial("preconsolidation", ...) gave none.
-        tension: Isotropic tensile strength as a share of preconsolidation, above 0 and at most 1.
+        tension: Isotropic tensile strength as a share of preconsolidation, above 0 and at most 1. With a
+            small share, mixed forms need more iterations where the clay opens.
 
     History: `preconsolidation`, p_c [Pa], where 0 stands for the parameter; `plastic_strain`, the sum of
     sqrt(2/3 e : e) over the steps, e the plastic deviatoric strain of a step.

@@ -31,6 +31,7 @@ from tawami.scene.reactions import Reactions
 from tawami.scene.share import Moment
 from tawami.scene.step import Accepted, Problem, StepKind
 from tawami.scene.supports import Supports
+from tawami.scene.tangents import warn_of_differences
 from tawami.solve.newton import Converged
 from tawami.solve.numerics import Numerics
 
@@ -95,6 +96,7 @@ class Configuration:
         self.begun = self._coverage_checked = False
         self.projected = self._travel = 0.0
         self._small_strain, self._softens = not model.moves, False
+        self._without_tangent = set[str]()
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
         earlier: Domain | None = getattr(self, "domain", None)
@@ -234,7 +236,7 @@ class Configuration:
         return moved
 
     def _warn_of_strain(self, accepted: Accepted) -> None:
-        """Warn, once each, of displacement gradients beyond small strain and of softening."""
+        """Warn, once each, of large displacement gradients, of softening, of laws without a tangent."""
         coefficients, n = accepted.step.coefficients, self.domain.layout.num_displacement
         if self._small_strain:
             large = strain_limit.exceeded(self.domain, self.total[:n] + coefficients[:n])
@@ -242,10 +244,8 @@ class Configuration:
                 self._small_strain = False
                 strain_limit.warn_of(self.domain, *large)
         if not self._softens:
-            soft = softening.found(self.domain, coefficients)
-            if soft is not None:
-                self._softens = True
-                softening.warn_of(self.domain, *soft)
+            self._softens = softening.warned(self.domain, coefficients)
+        warn_of_differences(self.domain, self._without_tangent)
 
     def _store(self, accepted: Accepted, moved: Array | None, time: float) -> Outcome:
         """Store a step that the laws have committed, and move the particles."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
@@ -24,7 +25,7 @@ from tawami.form.symbols import Assembly
 from tawami.grid.basis import BASES, Basis
 from tawami.grid.grid import Grid
 from tawami.particles import assignment
-from tawami.particles.numpy_law import NumpyLaw
+from tawami.particles.assignment import Law
 
 Array = npt.NDArray[np.float64]
 Leaving = Literal["stop", "remove"]
@@ -51,9 +52,7 @@ class Model:
         values: Every number that the form declares (alpha, ...).
         parameters: Those that this choice of options uses.
         options: Choices that the form offers.
-        materials: The material laws.
-        law: The law in NumPy, if that is what the scene has; `materials` then holds the elastic law
-            with the same moduli.
+        given: The material laws, in Rust or in NumPy.
         density: Of each material [kg/m3]; None if the scene has no mass.
         names: Name of the group of each material; empty if the body has no names.
         leaving: 'stop' or 'remove', for particles that leave the grid.
@@ -67,8 +66,7 @@ class Model:
     values: Mapping[str, float]
     parameters: Settings[float]
     options: Settings[str]
-    materials: Sequence[_rust.Material]
-    law: NumpyLaw | None
+    given: Sequence[Law]
     density: Array | None
     names: tuple[str, ...]
     leaving: Leaving
@@ -84,6 +82,11 @@ class Model:
         """Whether particles move with the body: strains are finite and each step resets the grid."""
         return self.form.strain.finite
 
+    @cached_property
+    def materials(self) -> list[_rust.Material]:
+        """The laws as the Rust part knows them: name, moduli, history variables."""
+        return assignment.materials_of(self.given)
+
     @property
     def moduli(self) -> Array:
         """K and mu [Pa] of each material, materials x 2."""
@@ -91,14 +94,13 @@ class Model:
 
     @property
     def without_history(self) -> npt.NDArray[np.bool_]:
-        """Whether each material is elastic: its law has no history variables."""
-        return np.array([self.law is None and not m.history_names for m in self.materials])
+        """Whether each material is elastic: a law in Rust that has no history variables."""
+        laws = zip(self.given, self.materials, strict=True)
+        return np.array([given is m and not m.history_names for given, m in laws])
 
     @property
     def laws(self) -> list[str]:
         """Names of the laws, each with its history variables."""
-        if self.law is not None:
-            return ["NumpyLaw"]
         histories = [(m.name, ", ".join(m.history_names)) for m in self.materials]
         return [f"{name} ({history})" if history else name for name, history in histories]
 
@@ -133,7 +135,7 @@ class Model:
 
     def identity(self) -> dict[str, Any]:
         """Facts that identify the model, for checkpoints."""
-        laws = [] if self.law is None else [self.law.identity()]
+        laws = [law.identity() for law in assignment.in_numpy(self.given).values()]
         return (
             self.grid.identity()
             | self.form.identity()
@@ -178,24 +180,20 @@ def build(
     values, options = loaded.settings(parameters, static=density is None, others=KEYWORDS)
     for message in [] if grid.comm.rank else loaded.unusual(values):
         warn(message, ParameterWarning)
-    particles, materials, law = _particles(body, material, material_of, loaded)
+    particles, laws = _particles(body, material, material_of, loaded)
+    materials = assignment.materials_of(laws)
     densities = assignment.densities(density, len(materials), body.names)
-    if loaded.strain.finite and law is not None:
-        raise InputError(
-            f"form {loaded.name} has finite strains: expected a law in Rust; a NumpyLaw works at "
-            "small strain only"
-        )
     ratios = np.array([m.bulk_modulus / m.shear_modulus for m in materials])[particles.material]
     warn_of_locking(grid, loaded, float(ratios.max()), int(ratios.argmax()))
-    compiled = _compiled(grid, loaded, options, assembly, materials, law)
+    compiled = _compiled(grid, loaded, options, assembly, materials)
     check_used(compiled, options, parameters)
-    _check_plastic_volume(compiled, materials, law, particles)
+    _check_plastic_volume(compiled, laws, particles)
     instead = "the form's parameters are fixed when a scene is made: Scene(..., {}=...)"
     used = {name: value for name, value in values.items() if name in compiled.used}
     model = Model(
         grid, loaded, compiled, basis, values,
         Settings(used, instead.format("alpha")), Settings(options, instead.format("stabilisation")),
-        materials, law, densities, _names(body, len(materials)), leaving, len(particles),
+        laws, densities, _names(body, len(materials)), leaving, len(particles),
     )  # fmt: skip
     return model, particles
 
@@ -206,19 +204,17 @@ def _compiled(
     options: Mapping[str, str],
     assembly: Assembly,
     materials: Sequence[_rust.Material],
-    law: NumpyLaw | None,
 ) -> CompiledForm:
     """The form, with the plastic volume of the laws if any of them may have one."""
-    plastic_volume = law is not None or any(one.pressure_dependent for one in materials)
+    plastic_volume = any(one.pressure_dependent for one in materials)
     return compile_form(grid.comm, form, options, assembly, plastic_volume=plastic_volume)
 
 
 def with_laws(
     model: Model,
     particles: _rust.Particles,
-    materials: Sequence[_rust.Material],
+    laws: Sequence[Law],
     of: Sequence[int],
-    law: NumpyLaw | None,
     assembly: Assembly,
 ) -> Model:
     """A model with other laws; a call for all ranks.
@@ -226,25 +222,23 @@ def with_laws(
     Args:
         model: The model before.
         particles: The particles of this rank, with the numbers of their new laws.
-        materials: The new laws.
+        laws: The new laws.
         of: Number of the old material of each, whose density and name it has.
-        law: The law in NumPy.
         assembly: As of `Scene`.
 
     Raises:
         InputError: A law that does not fit the form.
     """
-    form = model.form
+    form, materials = model.form, assignment.materials_of(laws)
     with ranks.raise_together(model.grid.comm):
         particles.check_materials(materials, form.kinematics.name, form.strain.finite)
-    compiled = _compiled(model.grid, form, model.options, assembly, materials, law)
+    compiled = _compiled(model.grid, form, model.options, assembly, materials)
     with ranks.raise_together(model.grid.comm):
-        _check_plastic_volume(compiled, materials, law, particles)
+        _check_plastic_volume(compiled, laws, particles)
     return replace(
         model,
         compiled=compiled,
-        materials=materials,
-        law=law,
+        given=laws,
         density=None if model.density is None else model.density[list(of)],
         names=tuple(model.names[k] for k in of) if model.names else (),
     )
@@ -257,20 +251,20 @@ def _names(body: Body, materials: int) -> tuple[str, ...]:
 
 def _particles(
     body: Body, material: assignment.Given, material_of: npt.ArrayLike | None, form: Form
-) -> tuple[_rust.Particles, list[_rust.Material], NumpyLaw | None]:
+) -> tuple[_rust.Particles, list[Law]]:
     """All particles of the body with their materials and history variables."""
     x, volume = checks.array("x", body.x, 2), checks.array("volume", body.volume, 1)
     assigned = assignment.assigned(material, material_of, body, len(x))
     particles = _rust.Particles(x, volume, assigned.number)
-    particles.check_materials(assigned.materials, form.kinematics.name, form.strain.finite)
-    particles.add_history(assigned.materials)
-    return particles, assigned.materials, assigned.law
+    materials = assignment.materials_of(assigned.laws)
+    particles.check_materials(materials, form.kinematics.name, form.strain.finite)
+    particles.add_history(materials)
+    return particles, assigned.laws
 
 
 def _check_plastic_volume(
     compiled: CompiledForm,
-    materials: Sequence[_rust.Material],
-    law: NumpyLaw | None,
+    laws: Sequence[Law],
     particles: _rust.Particles,
 ) -> None:
     """Check that the form has the plastic volume of the laws in its volume equation.
@@ -281,10 +275,11 @@ def _check_plastic_volume(
     form = compiled.form
     if not form.kinematics.has_mean_stress or compiled.names("eps_p"):
         return
-    dilates = np.array([law is not None or one.pressure_dependent for one in materials])
+    dilates = np.array([one.pressure_dependent for one in assignment.materials_of(laws)])
     bad = np.flatnonzero(dilates[particles.material])
     if len(bad):
-        why = "is a NumpyLaw" if law is not None else "depends on the mean stress"
+        own = laws[particles.material[bad[0]]]
+        why = "depends on the mean stress" if isinstance(own, _rust.Material) else f"is {own.name}"
         raise InputError(
             f"the law of particle {particles.number[bad[0]]} {why}, so that its flow may change the "
             f"volume, and form {form.name} has no term for that: expected eps_p in its volume equation, "
