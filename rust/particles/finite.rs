@@ -1,13 +1,13 @@
 //! Requested quantities at finite strain.
 
 use super::request::{Operator, Part, Request};
-use super::stage::PlasticVolume;
+use super::stage::Scalar;
 use crate::space::{Geometry, COMPONENTS};
 use crate::tensor::hencky::Trial;
 use crate::tensor::{Gradient, Moduli, Stress};
 
 /// Write the requested quantity from its first column on. The volume follows ln J_f, or has a field of its
-/// `own`.
+/// `own`. `scalar` is the plastic volume or the history variable.
 #[allow(clippy::too_many_arguments)]
 pub(super) fn write(
     request: &Request,
@@ -16,7 +16,7 @@ pub(super) fn write(
     own: bool,
     tau: &Stress,
     c: &Moduli,
-    plastic: &PlasticVolume,
+    scalar: &Scalar,
     out: &mut [f64],
 ) {
     let (mut tau, mut c, n) = (*tau, *c, geometry.gradients());
@@ -44,10 +44,14 @@ pub(super) fn write(
         (Operator::MeanKirchhoff, Part::Gradient) => {
             (0..n).for_each(|k| out[k] = trial.change(&c.mean_dev, &Gradient::unit(k)));
         }
-        (Operator::PlasticVolume, Part::Value) => out[0] = plastic.value,
-        (Operator::PlasticVolume, Part::Volume) => out[0] = plastic.field,
-        (Operator::PlasticVolume, Part::Gradient) => {
-            (0..n).for_each(|k| out[k] = trial.change(&plastic.deviator, &Gradient::unit(k)));
+        (Operator::PlasticVolume | Operator::History(_), Part::Value) => out[0] = scalar.value,
+        (Operator::PlasticVolume | Operator::History(_), Part::Volume) => out[0] = scalar.field,
+        (Operator::PlasticVolume | Operator::History(_), Part::Gradient) => {
+            for (k, o) in out.iter_mut().enumerate() {
+                let dg = Gradient::unit(k);
+                let dv = if own { 0.0 } else { trial.volume_change(&dg) };
+                *o = trial.change(&scalar.deviator, &dg) + scalar.field * dv;
+            }
         }
         (Operator::LnJ, Part::Value) => out[0] = trial.ln_j,
         (Operator::LnJ, Part::Volume) => out[0] = 0.0,

@@ -37,7 +37,7 @@ def at_particles(domain: Domain, basis: Basis, coefficients: Array) -> Array:
     first = np.zeros((len(flat), dim))
     first[:, 0] = flat
     gradient = np.asarray(_rust.gradients(location, basis, first.ravel()))
-    return np.hstack([value, gradient.reshape(len(value), -1)[:, :dim]])
+    return np.hstack([value, gradient[:, :dim]])
 
 
 def on_grid(domain: Domain) -> Array:
