@@ -27,7 +27,7 @@ def test_shipped_forms_can_be_used(name):
     if name.startswith(("u_bbar", "u_finite")) or name == "u":
         expected.add("stability")  # no field for the volume
     if name.startswith("u_bbar"):
-        expected.add("patch test, loaded")
+        expected |= {"patch test, loaded", "axisymmetry"}
     if name in ("u", "u_finite"):
         expected.add("locking")
     if name == "u_epsv_residual_based":
@@ -43,6 +43,17 @@ def test_b_bar_fails_the_loaded_patch_test_as_known():
     assert (exact.verdict, miss.verdict) == ("ok", "note")
     assert "documentation, Limits" in miss.words
     assert "quadratic splines: 2.0e-01" in miss.words
+
+
+def test_a_form_with_the_gradient_of_ufl_is_for_plane_strain_only():
+    def residual(w, sigma, sum_p):
+        return sum_p(sigma, grad(w))
+
+    report = tawami.check_form(tawami.Form(ALONE, residual))
+    line = report.line("axisymmetry")
+    assert line.verdict == "note"
+    assert "for plane strain only: form of the driver script, line" in line.words
+    assert r"shape (3, 3) and an expression of shape (2, 2)" in line.words
 
 
 def test_the_inf_sup_constant_of_taylor_hood():

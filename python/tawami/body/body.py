@@ -27,7 +27,7 @@ class Body:
 
     Attributes:
         x: Positions [m], particles x 2.
-        volume: Volumes per metre depth [m2], one per particle. In axisymmetry, areas in the plane: the scene
+        volume: Volumes per metre depth [m2], one per particle. In axisymmetry, areas: the scene
             multiplies them by 2 pi r.
         material_of: Number of the material of each particle. None: all have the first material.
         names: Names of the materials, in the order of their numbers. Empty: they have no names.
@@ -43,9 +43,7 @@ class Body:
 
     def __repr__(self) -> str:
         materials = f", materials {', '.join(self.names)}" if self.names else ""
-        return (
-            f"Body({len(self.x)} particles, {np.sum(self.volume):g} m2{materials})"
-        )
+        return f"Body({len(self.x)} particles, {np.sum(self.volume):g} m2{materials})"
 
     def named(self, name: str) -> Body:
         """The same body as one group, to which a scene gives a material by this name.
