@@ -99,8 +99,8 @@ impl Field {
 
 impl Cells {
     /// From the fields and the positions of the nodes of both elements, counted from 0 along each axis of a
-    /// cell; `None` if there are more coefficients on a cell than [`MAX_COEFFICIENTS`], or if functions of a
-    /// linear element are not linear.
+    /// cell; `None` if there are more coefficients on a cell than [`MAX_COEFFICIENTS`], or if a field is
+    /// neither a scalar nor a vector, or linear on the mesh alone.
     #[must_use]
     pub fn new(
         fields: Vec<Field>,
@@ -123,8 +123,11 @@ impl Cells {
             }));
             first += functions * step;
         }
-        let linear = |field: &Field| field.quadratic || field.basis == Basis::Bilinear;
-        let fits = first <= MAX_COEFFICIENTS && fields.iter().all(linear);
+        let known = |field: &Field| {
+            let linear = field.quadratic || field.basis == Basis::Bilinear;
+            linear && (field.components == 1 || field.components == DIM)
+        };
+        let fits = first <= MAX_COEFFICIENTS && fields.iter().all(known);
         fits.then_some(Self { fields, nodes, vertices, bases, components })
     }
 

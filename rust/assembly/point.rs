@@ -19,7 +19,7 @@ use std::ops::Range;
 
 use ndarray::ArrayView2;
 
-use super::cell::{Cells, Component, Local};
+use super::cell::{Cells, Local};
 use super::kernel::{State, TabulateTensor};
 use crate::grid::{products_of, Functions};
 use crate::space::{Index, Point, DIM, FUNCTIONS, FUNCTIONS_1D, SYMMETRIC, VERTICES};
@@ -444,10 +444,11 @@ impl<const P: usize> Points<P> {
             let component = &components[entry.component];
             let functions = &self.tables[component.basis][entry.derivative];
             // constant numbers of functions, so that the loops are unrolled
-            if component.functions == FUNCTIONS {
-                place::<FUNCTIONS, P>(functions, component, row);
-            } else {
-                place::<VERTICES, P>(functions, component, row);
+            match (component.functions, component.step) {
+                (FUNCTIONS, DIM) => place::<FUNCTIONS, DIM, P>(functions, component.first, row),
+                (FUNCTIONS, _) => place::<FUNCTIONS, 1, P>(functions, component.first, row),
+                (_, DIM) => place::<VERTICES, DIM, P>(functions, component.first, row),
+                _ => place::<VERTICES, 1, P>(functions, component.first, row),
             }
         }
         let lines = self.result.chunks_exact(entries.trial.len());
@@ -466,41 +467,46 @@ impl<const P: usize> Points<P> {
             for (functions, &e) in functions.iter_mut().zip(test) {
                 *functions = &table[distinct[e].derivative];
             }
-            if component.functions == FUNCTIONS {
-                add_rows::<FUNCTIONS, P>(&functions, half, component, out);
-            } else {
-                add_rows::<VERTICES, P>(&functions, half, component, out);
+            match (component.functions, component.step) {
+                (FUNCTIONS, DIM) => {
+                    add_rows::<FUNCTIONS, DIM, P>(&functions, half, component.first, out)
+                }
+                (FUNCTIONS, _) => {
+                    add_rows::<FUNCTIONS, 1, P>(&functions, half, component.first, out)
+                }
+                (_, DIM) => add_rows::<VERTICES, DIM, P>(&functions, half, component.first, out),
+                _ => add_rows::<VERTICES, 1, P>(&functions, half, component.first, out),
             }
         }
     }
 }
 
-/// Put the values of `F` functions to the coefficients of a component.
+/// Put the values of `F` functions to the coefficients of a component, one of `S` of its field.
 #[inline(always)]
-fn place<const F: usize, const P: usize>(
+fn place<const F: usize, const S: usize, const P: usize>(
     functions: &[f64; FUNCTIONS],
-    component: &Component,
+    first: usize,
     row: &mut Row<P>,
 ) {
-    let places = row.0[component.first..].iter_mut().step_by(component.step);
-    places.zip(&functions[..F]).for_each(|(place, b)| *place = *b);
+    let places = &mut row.0[first..][..S * (F - 1) + 1];
+    (0..F).for_each(|f| places[S * f] = functions[f]);
 }
 
-/// Add `sum_k functions_k half_k` to the rows of the `F` functions of a component.
+/// Add `sum_k functions_k half_k` to the rows of the `F` functions of a component, one of `S` of its field.
 #[inline(always)]
-fn add_rows<const F: usize, const P: usize>(
+fn add_rows<const F: usize, const S: usize, const P: usize>(
     functions: &[&[f64; FUNCTIONS]; DERIVATIVES],
     half: &[Row<P>],
-    component: &Component,
+    first: usize,
     out: &mut [Row<P>],
 ) {
-    let lines = out[component.first..].iter_mut().step_by(component.step);
-    for (f, out) in (0..F).zip(lines) {
-        let mut sum = *out;
+    let lines = &mut out[first..][..S * (F - 1) + 1];
+    for f in 0..F {
+        let mut sum = lines[S * f];
         for (functions, half) in functions.iter().zip(half) {
             sum.add(functions[f], half);
         }
-        *out = sum;
+        lines[S * f] = sum;
     }
 }
 
