@@ -469,10 +469,10 @@ impl<const P: usize> Points<P> {
             }
             match (component.functions, component.step) {
                 (FUNCTIONS, DIM) => {
-                    add_rows::<FUNCTIONS, DIM, P>(&functions, half, component.first, out)
+                    add_rows::<FUNCTIONS, DIM, P>(&functions, half, component.first, out);
                 }
                 (FUNCTIONS, _) => {
-                    add_rows::<FUNCTIONS, 1, P>(&functions, half, component.first, out)
+                    add_rows::<FUNCTIONS, 1, P>(&functions, half, component.first, out);
                 }
                 (_, DIM) => add_rows::<VERTICES, DIM, P>(&functions, half, component.first, out),
                 _ => add_rows::<VERTICES, 1, P>(&functions, half, component.first, out),
@@ -488,7 +488,7 @@ fn place<const F: usize, const S: usize, const P: usize>(
     first: usize,
     row: &mut Row<P>,
 ) {
-    let places = &mut row.0[first..][..S * (F - 1) + 1];
+    let places = &mut row.0[first..][..=S * (F - 1)];
     (0..F).for_each(|f| places[S * f] = functions[f]);
 }
 
@@ -500,7 +500,7 @@ fn add_rows<const F: usize, const S: usize, const P: usize>(
     first: usize,
     out: &mut [Row<P>],
 ) {
-    let lines = &mut out[first..][..S * (F - 1) + 1];
+    let lines = &mut out[first..][..=S * (F - 1)];
     for f in 0..F {
         let mut sum = lines[S * f];
         for (functions, half) in functions.iter().zip(half) {
