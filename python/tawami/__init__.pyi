@@ -25,6 +25,7 @@ from tawami.base.errors import (
     SofteningWarning,
     SolverError,
     SupportError,
+    TangentWarning,
     TawamiError,
     TawamiWarning,
 )
@@ -43,6 +44,7 @@ from tawami.motion.modes import Modes, modes
 from tawami.motion.path import follow
 from tawami.motion.stepping import ramp, settle
 from tawami.particles.laws import (
+    cam_clay,
     drucker_prager,
     law,
     linear_elastic,
@@ -102,9 +104,11 @@ __all__ = [
     "Study",
     "SupportError",
     "TableOutput",
+    "TangentWarning",
     "TawamiError",
     "TawamiWarning",
     "box",
+    "cam_clay",
     "check_form",
     "disc",
     "drucker_prager",

@@ -130,6 +130,8 @@ class Material:
     def linear_elastic_e_one_minus_2nu(e: float, one_minus_2nu: float) -> Material: ...
     @staticmethod
     def of(name: str, elastic: tuple[float, float], parameters: Sequence[float]) -> Material: ...
+    @staticmethod
+    def external(name: str, elastic: tuple[float, float], history: Sequence[str]) -> Material: ...
     @property
     def name(self) -> str: ...
     @property
@@ -145,6 +147,8 @@ class Material:
 
 # law quantity, value or derivative, first column, factor of each particle
 _Request = tuple[str, str, int, _Floats | None]
+# stress, tangent, plastic volumetric strain, history, d history / d strain
+_Given = tuple[_Floats, _Floats, _Floats, _Floats, _Floats]
 _Starts = npt.NDArray[np.int32]
 _Selection = tuple[_Starts, _Starts, _Floats, npt.NDArray[np.int64]]
 
@@ -196,6 +200,8 @@ class Pattern:
 @final
 class Requests:
     def __new__(cls, arrays: Sequence[Sequence[_Request]]) -> Requests: ...
+    @property
+    def history_slopes(self) -> bool: ...
 
 @final
 class Stage:
@@ -214,13 +220,13 @@ class Stage:
         volumetric: _Floats | None,
         requests: Requests,
         data: Sequence[_Floats],
-        given: tuple[_Floats, _Floats, _Floats] | None = None,
+        given: _Given | None = None,
     ) -> None: ...
     def commit(
         self,
         u: _Floats,
         volumetric: _Floats | None,
-        given: tuple[_Floats, _Floats, _Floats] | None = None,
+        given: _Given | None = None,
     ) -> float: ...
     def elastic_energy(self) -> float: ...
     def strains(self, u: _Floats, volumetric: _Floats | None) -> _Floats: ...

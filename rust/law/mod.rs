@@ -8,8 +8,10 @@ use std::sync::Arc;
 use crate::error::Result;
 use crate::tensor::{deviatoric_stiffness, AtMean, Moduli, Strain, Stress, Sym};
 
+mod external;
 mod friction;
 
+pub use external::{interned, External};
 pub use friction::Friction;
 
 /// The modules of the laws, and the list of their makers.
@@ -28,6 +30,7 @@ laws! {
     von_mises::VonMises,
     drucker_prager::DruckerPrager,
     mohr_coulomb::MohrCoulomb,
+    cam_clay::CamClay,
 }
 
 /// A law, shared by the particles that have it.
@@ -114,8 +117,13 @@ pub trait Law: Elastic {
         false
     }
 
+    /// Whether the caller computes its responses, as for a law in NumPy.
+    fn external(&self) -> bool {
+        false
+    }
+
     /// Names of the history variables, which are zero at first; at most [`MAX_HISTORY`].
-    fn history(&self) -> &'static [&'static str] {
+    fn history(&self) -> &[&'static str] {
         &[]
     }
 

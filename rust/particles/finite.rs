@@ -1,7 +1,7 @@
 //! Requested quantities at finite strain.
 
 use super::request::{Operator, Part, Request};
-use super::stage::PlasticVolume;
+use super::stage::Scalar;
 use crate::space::{COMPONENTS, DIM, GRADIENT};
 use crate::tensor::hencky::Trial;
 use crate::tensor::{Matrix, Moduli, Stress};
@@ -14,14 +14,14 @@ fn unit(k: usize) -> Matrix {
 }
 
 /// Write the requested quantity from its first column on. The volume follows ln J_f, or has a field of its
-/// `own`.
+/// `own`. `scalar` is the plastic volume or the history variable.
 pub(super) fn write(
     request: &Request,
     trial: &Trial,
     own: bool,
     tau: &Stress,
     c: &Moduli,
-    plastic: &PlasticVolume,
+    scalar: &Scalar,
     out: &mut [f64],
 ) {
     let (mut tau, mut c) = (*tau, *c);
@@ -49,10 +49,13 @@ pub(super) fn write(
         (Operator::MeanKirchhoff, Part::Gradient) => {
             (0..GRADIENT).for_each(|k| out[k] = trial.change(&c.mean_dev, &unit(k)));
         }
-        (Operator::PlasticVolume, Part::Value) => out[0] = plastic.value,
-        (Operator::PlasticVolume, Part::Volume) => out[0] = plastic.field,
-        (Operator::PlasticVolume, Part::Gradient) => {
-            (0..GRADIENT).for_each(|k| out[k] = trial.change(&plastic.deviator, &unit(k)));
+        (Operator::PlasticVolume | Operator::History(_), Part::Value) => out[0] = scalar.value,
+        (Operator::PlasticVolume | Operator::History(_), Part::Volume) => out[0] = scalar.field,
+        (Operator::PlasticVolume | Operator::History(_), Part::Gradient) => {
+            for (k, o) in out.iter_mut().enumerate() {
+                let dv = if own { 0.0 } else { trial.volume_change(&unit(k)) };
+                *o = trial.change(&scalar.deviator, &unit(k)) + scalar.field * dv;
+            }
         }
         (Operator::LnJ, Part::Value) => out[0] = trial.ln_j,
         (Operator::LnJ, Part::Volume) => out[0] = 0.0,

@@ -4,6 +4,8 @@
 
 pub mod column;
 mod finite;
+pub mod given;
+mod history;
 pub mod kinematics;
 pub mod request;
 mod small;

@@ -3,6 +3,7 @@
 use std::str::FromStr;
 
 use crate::error::Error;
+use crate::law::interned;
 use crate::space::{GRADIENT, SYMMETRIC};
 
 /// A quantity of the law that a form may name.
@@ -24,6 +25,8 @@ pub enum Operator {
     LnJ,
     /// Plastic volumetric strain of the step, where the form has a field for the mean stress.
     PlasticVolume,
+    /// A history variable of the laws at the end of the step, by its name; 0 with laws that do not have it.
+    History(&'static str),
 }
 
 impl Operator {
@@ -33,7 +36,11 @@ impl Operator {
         match self {
             Self::Nominal | Self::NominalDeviator => GRADIENT,
             Self::Sigma | Self::Deviator => SYMMETRIC,
-            Self::Mean | Self::MeanKirchhoff | Self::LnJ | Self::PlasticVolume => 1,
+            Self::Mean
+            | Self::MeanKirchhoff
+            | Self::LnJ
+            | Self::PlasticVolume
+            | Self::History(_) => 1,
         }
     }
 
@@ -41,7 +48,7 @@ impl Operator {
     #[must_use]
     pub fn finite(self) -> Option<bool> {
         match self {
-            Self::PlasticVolume => None,
+            Self::PlasticVolume | Self::History(_) => None,
             _ => Some(!matches!(self, Self::Sigma | Self::Deviator | Self::Mean)),
         }
     }
@@ -93,6 +100,12 @@ impl Request {
         Self { operator, part, column, factor: None }
     }
 
+    /// Whether it is a derivative of a history variable.
+    #[must_use]
+    pub fn history_slope(&self) -> bool {
+        matches!(self.operator, Operator::History(_)) && self.part != Part::Value
+    }
+
     /// Number of columns that are written.
     #[must_use]
     pub fn width(&self) -> usize {
@@ -104,6 +117,9 @@ impl FromStr for Operator {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self, Error> {
+        if let Some(variable) = name.strip_prefix("history:") {
+            return Ok(Self::History(interned(variable)));
+        }
         Ok(match name {
             "sigma" => Self::Sigma,
             "s" => Self::Deviator,
@@ -117,7 +133,8 @@ impl FromStr for Operator {
                 return Err(Error::UnknownName {
                     what: "operator",
                     name: name.to_owned(),
-                    expected: "'sigma', 's', 'sigma_m', 'P', 'P_s', 'tau_m', 'ln_J', 'eps_p'",
+                    expected: "'sigma', 's', 'sigma_m', 'P', 'P_s', 'tau_m', 'ln_J', 'eps_p', \
+                               'history:<variable>'",
                 })
             }
         })

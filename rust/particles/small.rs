@@ -2,7 +2,7 @@
 
 use super::kinematics::Kinematics;
 use super::request::{Operator, Part, Request};
-use super::stage::PlasticVolume;
+use super::stage::Scalar;
 use crate::space::{DIM, SYMMETRIC};
 use crate::tensor::{dot, Moduli, Stress, Sym, IN_SPACE, UNIT, UNIT_DEVIATORS};
 
@@ -18,23 +18,26 @@ fn components(operator: Operator, s: &Sym, m: f64, out: &mut [f64]) {
     }
 }
 
-/// Write the requested quantity from its first column on.
+/// Write the requested quantity from its first column on; `scalar` is the plastic volume or the history
+/// variable.
 pub(super) fn write(
     request: &Request,
     kinematics: Kinematics,
     stress: &Stress,
     c: &Moduli,
-    plastic: &PlasticVolume,
+    scalar: &Scalar,
     out: &mut [f64],
 ) {
-    if request.operator == Operator::PlasticVolume {
+    if matches!(request.operator, Operator::PlasticVolume | Operator::History(_)) {
         match request.part {
-            Part::Value => out[0] = plastic.value,
-            Part::Volume => out[0] = plastic.field,
-            Part::Strain => out
-                .iter_mut()
-                .zip(&UNIT_DEVIATORS)
-                .for_each(|(o, e)| *o = dot(&plastic.deviator, e)),
+            Part::Value => out[0] = scalar.value,
+            Part::Volume => out[0] = scalar.field,
+            Part::Strain => {
+                for (j, (o, e)) in out.iter_mut().zip(&UNIT_DEVIATORS).enumerate() {
+                    let with_volume = kinematics == Kinematics::Displacement && j < DIM;
+                    *o = dot(&scalar.deviator, e) + if with_volume { scalar.field } else { 0.0 };
+                }
+            }
             Part::Gradient => {}
         }
         return;

@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::given::Given;
 use super::kinematics::{Increments, Kinematics};
-use super::request::Request;
+use super::request::{Operator, Request};
 use super::{finite, small, Particles, Role, GRADIENT};
 use crate::error::{Error, Result};
 use crate::grid::Location;
@@ -14,30 +15,7 @@ use crate::law::{Law, MAX_HISTORY};
 use crate::space::{self, COMPONENTS, DIM};
 use crate::tensor::hencky::Trial;
 use crate::tensor::matrix::{det_minus_one, flat, matrix, multiply, trace};
-use crate::tensor::{dot, mean, symmetric_part, AtMean, Moduli, Strain, Stress, Sym, UNIT};
-
-/// Source of stress and tangent.
-#[derive(Clone, Copy)]
-pub enum Response<'a> {
-    /// The laws; the material numbers of the particles count them from 0.
-    Laws(&'a [Arc<dyn Law>]),
-    /// Computed by the caller; the laws are elastic ones with its K and mu.
-    Given(Given<'a>, &'a [Arc<dyn Law>]),
-}
-
-/// Stress and tangent of a law of the total strain, computed by the caller.
-///
-/// Where the form has a field for the mean stress, they belong to the volumetric strain with which the law
-/// has that mean stress.
-#[derive(Clone, Copy)]
-pub struct Given<'a> {
-    /// 4 numbers per particle, in the order of [`crate::tensor`].
-    pub stress: &'a [f64],
-    /// d stress / d strain, 16 numbers per particle, strain fastest.
-    pub tangent: &'a [f64],
-    /// Volumetric strain increment of each particle that is not elastic; 0 in other forms.
-    pub plastic_volume: &'a [f64],
-}
+use crate::tensor::{dot, symmetric_part, AtMean, Moduli, Strain, Stress, Sym, UNIT};
 
 /// One array of particle data: the requests that are written into its columns.
 pub struct Output<'a> {
@@ -54,8 +32,10 @@ pub struct Output<'a> {
 pub struct Stage<'a> {
     /// Where the particles are.
     pub location: &'a Location,
-    /// The laws, or their responses.
-    pub response: Response<'a>,
+    /// The laws; the material numbers of the particles count them from 0.
+    pub laws: &'a [Arc<dyn Law>],
+    /// Responses of the external ones, if there are any.
+    pub given: Option<Given<'a>>,
     /// How the strain follows from the increments.
     pub kinematics: Kinematics,
     /// Whether strains are finite.
@@ -68,49 +48,68 @@ pub struct Stage<'a> {
 const BLOCK: usize = 64;
 
 /// State of the particles at the start of the step.
-struct Old<'a> {
-    material: &'a [u32],
-    stress: &'a [f64],
+pub(super) struct Old<'a> {
+    pub material: &'a [u32],
+    pub stress: &'a [f64],
     /// History variables of each law.
-    history: Vec<Vec<&'a [f64]>>,
+    pub history: Vec<Vec<&'a [f64]>>,
 }
 
 impl Old<'_> {
     fn stress_of(&self, p: usize) -> Sym {
         std::array::from_fn(|i| self.stress[COMPONENTS * p + i])
     }
+
+    /// History variables of the law of particle `p`.
+    pub(super) fn history_of(&self, p: usize) -> [f64; MAX_HISTORY] {
+        let mut values = [0.0; MAX_HISTORY];
+        for (value, column) in values.iter_mut().zip(&self.history[self.material[p] as usize]) {
+            *value = column[p];
+        }
+        values
+    }
+}
+
+/// Strain that a law receives.
+struct Received {
+    strain: Strain,
+    /// Stress that it starts from.
+    start: Stress,
+    /// Volumetric strain increment, without the plastic part where the form has a field for the mean stress.
+    volume: f64,
+    trial: Option<Trial>,
 }
 
 /// Stress, tangent and plastic volume of a particle.
 struct OfMean {
     stress: Stress,
     moduli: Moduli,
-    plastic: PlasticVolume,
+    plastic: Scalar,
 }
 
 /// Response of a particle to the increments.
-struct Answer {
+pub(super) struct Answer {
     /// Volumetric strain increment, elastic and plastic.
-    volume: f64,
+    pub volume: f64,
     /// Its plastic part; 0 where the law received the total strain.
-    plastic: PlasticVolume,
+    pub plastic: Scalar,
     /// In u-p without the increment p.
-    stress: Stress,
-    moduli: Moduli,
-    trial: Option<Trial>,
-    history: [f64; MAX_HISTORY],
+    pub stress: Stress,
+    pub moduli: Moduli,
+    pub trial: Option<Trial>,
+    pub history: [f64; MAX_HISTORY],
     /// Strain that the law got, and the stress that it starts from.
-    strain: Strain,
-    start: Stress,
+    pub strain: Strain,
+    pub start: Stress,
 }
 
-/// Plastic volumetric strain with its derivatives.
+/// A number that a law gives, with its derivatives: the plastic volumetric strain, or a history variable.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct PlasticVolume {
+pub(super) struct Scalar {
     pub value: f64,
     /// With respect to the deviatoric strain.
     pub deviator: Sym,
-    /// With respect to the volumetric field of the form.
+    /// With respect to the volumetric field of the form, or to the volume where it has none.
     pub field: f64,
 }
 
@@ -137,10 +136,7 @@ impl Stage<'_> {
     /// Places of the history variables of each law.
     fn history(&self, particles: &Particles) -> Vec<Vec<usize>> {
         let of_law = |law: &Arc<dyn Law>| particles.history_of(law.history()).unwrap_or_default();
-        match self.response {
-            Response::Laws(laws) => laws.iter().map(of_law).collect(),
-            Response::Given(..) => Vec::new(),
-        }
+        self.laws.iter().map(of_law).collect()
     }
 
     /// Whether the volumetric field of the form determines the mean stress.
@@ -160,7 +156,7 @@ impl Stage<'_> {
             mean_dev: [0.0; COMPONENTS],
             mean_vol: if with_field { slope } else { 0.0 },
         };
-        let plastic = PlasticVolume {
+        let plastic = Scalar {
             value: answer.plastic_volume,
             deviator: answer.volume_dev,
             field: slope * answer.volume_mean,
@@ -168,103 +164,101 @@ impl Stage<'_> {
         OfMean { stress, moduli, plastic }
     }
 
-    /// The new mean stress and its derivative with respect to the field; `elastic` is the strain whose
-    /// volume is elastic, as the law of particle `p` receives it.
-    fn mean_stress(&self, bulk: f64, start: f64, elastic: f64, p: usize) -> (f64, f64) {
-        if self.kinematics == Kinematics::Deviatoric {
-            return (start + self.increments.volumetric_at(self.location, p), 1.0);
+    /// The new mean stress and its derivative with respect to the field, where the form has one for it. The
+    /// volume of the strain that the law of particle `p` receives is then elastic.
+    pub(super) fn mean_stress(
+        &self,
+        law: &dyn Law,
+        start: &Stress,
+        strain: &Strain,
+        p: usize,
+    ) -> Option<(f64, f64)> {
+        match self.kinematics {
+            Kinematics::Displacement | Kinematics::Cell => None,
+            Kinematics::Deviatoric => {
+                Some((start.mean + self.increments.volumetric_at(self.location, p), 1.0))
+            }
+            Kinematics::Mixed => {
+                let bulk = law.bulk_modulus();
+                let change = if strain.volume == 0.0 { 0.0 } else { bulk * strain.volume };
+                Some((start.mean + change, bulk))
+            }
         }
-        (start + if elastic == 0.0 { 0.0 } else { bulk * elastic }, bulk)
+    }
+
+    /// The strain that the law of particle `p` receives; `None` if the particle is turned inside out.
+    fn received(&self, law: &dyn Law, old: &Old, p: usize) -> Option<Received> {
+        let stress = Stress::from(&old.stress_of(p));
+        if !self.finite {
+            let strain = self.increments.strain(self.kinematics, self.location, p);
+            return Some(Received { strain, start: stress, volume: strain.volume, trial: None });
+        }
+        let own = match self.kinematics {
+            Kinematics::Displacement => None,
+            Kinematics::Mixed => Some(self.increments.volumetric_at(self.location, p)),
+            Kinematics::Cell => {
+                let g = self.increments.grad_u_of_cell(self.location, p);
+                let change = det_minus_one(&g);
+                Some((change > -1.0).then(|| change.ln_1p())?)
+            }
+            Kinematics::Deviatoric => Some(0.0),
+        };
+        let g = self.increments.grad_u(self.location, p);
+        let trial = Trial::new(&g, own, &law.elastic_strain(&stress))?;
+        // the law gets the total elastic strain and starts from zero stress
+        Some(Received {
+            strain: trial.strain,
+            start: Stress::default(),
+            volume: own.unwrap_or(trial.ln_j),
+            trial: Some(trial),
+        })
     }
 
     /// Strain, stress and tangent of particle `p`; `None` if it is turned inside out.
     fn respond(&self, old: &Old, p: usize) -> Option<Answer> {
-        match self.response {
-            Response::Laws(laws) => {
-                let number = old.material[p] as usize;
-                self.of_law(&*laws[number], &old.history[number], old, p)
-            }
-            Response::Given(given, laws) => {
-                let bulk = laws[old.material[p] as usize].bulk_modulus();
-                Some(self.of_given(&given, bulk, old, p))
-            }
-        }
-    }
-
-    fn of_given(&self, given: &Given, bulk: f64, old: &Old, p: usize) -> Answer {
-        let strain = self.increments.strain(self.kinematics, self.location, p);
-        let stress: Sym = std::array::from_fn(|i| given.stress[COMPONENTS * p + i]);
-        let at = COMPONENTS * COMPONENTS * p;
-        let row = |i: usize| std::array::from_fn(|j| given.tangent[at + COMPONENTS * i + j]);
-        let (stress, moduli) = (Stress::from(&stress), Moduli::from(&std::array::from_fn(row)));
-        let mut of = OfMean { stress, moduli, plastic: PlasticVolume::default() };
-        if self.has_mean_stress() {
-            let at = AtMean::of_total(stress.deviator, given.plastic_volume[p], &moduli, bulk);
-            let start = mean(&old.stress_of(p));
-            let (mean, slope) = self.mean_stress(bulk, start, strain.volume, p);
-            of = self.at_mean(&at, start, mean, slope);
-        }
-        let OfMean { stress, moduli, plastic } = of;
-        Answer {
-            volume: strain.volume + plastic.value,
-            plastic,
-            stress,
-            moduli,
-            trial: None,
-            history: [0.0; MAX_HISTORY],
-            strain,
-            start: Stress::default(),
-        }
-    }
-
-    fn of_law(&self, law: &dyn Law, history: &[&[f64]], old: &Old, p: usize) -> Option<Answer> {
-        let (mut before, mut after) = ([0.0; MAX_HISTORY], [0.0; MAX_HISTORY]);
-        for (value, column) in before.iter_mut().zip(history) {
-            *value = column[p];
-        }
-        let stress = Stress::from(&old.stress_of(p));
-        let (strain, start, volume, trial);
-        if self.finite {
-            let own = match self.kinematics {
-                Kinematics::Displacement => None,
-                Kinematics::Mixed => Some(self.increments.volumetric_at(self.location, p)),
-                Kinematics::Cell => {
-                    let g = self.increments.grad_u_of_cell(self.location, p);
-                    let change = det_minus_one(&g);
-                    Some((change > -1.0).then(|| change.ln_1p())?)
+        let number = old.material[p] as usize;
+        let law = &*self.laws[number];
+        let Received { strain, start, volume, trial } = self.received(law, old, p)?;
+        let mean = self.mean_stress(law, &start, &strain, p);
+        let mut history = [0.0; MAX_HISTORY];
+        let new = &mut history[..old.history[number].len()];
+        let of = match &self.given {
+            Some(given) if law.external() => {
+                given.history_of(p, new);
+                let (stress, moduli) = given.stress_of(p);
+                match mean {
+                    None => OfMean { stress, moduli, plastic: Scalar::default() },
+                    Some((mean, slope)) => {
+                        let (s, plastic) = (stress.deviator, given.plastic_volume[p]);
+                        let at = AtMean::of_total(s, plastic, &moduli, law.bulk_modulus());
+                        self.at_mean(&at, start.mean, mean, slope)
+                    }
                 }
-                Kinematics::Deviatoric => Some(0.0),
-            };
-            let g = self.increments.grad_u(self.location, p);
-            let of_step = Trial::new(&g, own, &law.elastic_strain(&stress))?;
-            // the law gets the total elastic strain and starts from zero stress
-            (strain, start) = (of_step.strain, Stress::default());
-            volume = own.unwrap_or(of_step.ln_j);
-            trial = Some(of_step);
-        } else {
-            strain = self.increments.strain(self.kinematics, self.location, p);
-            (start, volume, trial) = (stress, strain.volume, None);
-        }
-        let (before, new) = (&before[..history.len()], &mut after[..history.len()]);
-        let of = if self.has_mean_stress() {
-            let (mean, slope) = self.mean_stress(law.bulk_modulus(), start.mean, strain.volume, p);
-            let (e, s) = (&strain.deviator, &start.deviator);
-            let answer = law.respond_at_mean(e, s, mean, before, new);
-            self.at_mean(&answer, start.mean, mean, slope)
-        } else {
-            let (stress, moduli) = law.respond(&strain, &start, before, new);
-            OfMean { stress, moduli, plastic: PlasticVolume::default() }
+            }
+            _ => {
+                let before = &old.history_of(p)[..new.len()];
+                match mean {
+                    None => {
+                        let (stress, moduli) = law.respond(&strain, &start, before, new);
+                        OfMean { stress, moduli, plastic: Scalar::default() }
+                    }
+                    Some((mean, slope)) => {
+                        let (e, s) = (&strain.deviator, &start.deviator);
+                        let at = law.respond_at_mean(e, s, mean, before, new);
+                        self.at_mean(&at, start.mean, mean, slope)
+                    }
+                }
+            }
         };
         let OfMean { stress, moduli, plastic } = of;
         let volume = volume + plastic.value;
-        Some(Answer { volume, plastic, stress, moduli, trial, history: after, strain, start })
+        Some(Answer { volume, plastic, stress, moduli, trial, history, strain, start })
     }
 
-    /// Work of the stress on the plastic strain of the step [J/m3]; zero for laws without history.
+    /// Work of the stress on the plastic strain of the step [J/m3]; zero for laws of this crate without history.
     fn dissipated(&self, particles: &Particles, p: usize, answer: &Answer) -> f64 {
-        let Response::Laws(laws) = self.response else { return 0.0 };
-        let law = &laws[particles.material()[p] as usize];
-        if law.history().is_empty() {
+        let law = &self.laws[particles.material()[p] as usize];
+        if law.history().is_empty() && !law.external() {
             return 0.0;
         }
         let Answer { strain, stress, .. } = answer;
@@ -278,11 +272,20 @@ impl Stage<'_> {
         dot(&stress.deviator, &std::array::from_fn(plastic)) + stress.mean * volume
     }
 
-    /// Strain increment of particle `p` as one tensor; small strain.
-    #[must_use]
-    pub fn strain(&self, p: usize) -> Sym {
-        let strain = self.increments.strain(self.kinematics, self.location, p);
-        std::array::from_fn(|i| strain.deviator[i] + strain.volume / 3.0 * UNIT[i])
+    /// Strain that the law of each particle receives.
+    ///
+    /// # Errors
+    /// [`Error::Inverted`] with the first such particle.
+    pub fn strains(&self, particles: &Particles) -> Result<Vec<Strain>> {
+        let old = self.old(particles);
+        let of = |p: usize| {
+            let received = self.received(&*self.laws[old.material[p] as usize], &old, p);
+            let index = particles.number()[p] as usize;
+            received.map(|of| of.strain).ok_or(Error::Inverted { index })
+        };
+        // the first error, as in a loop
+        let all: Vec<Result<Strain>> = (0..particles.len()).into_par_iter().map(of).collect();
+        all.into_iter().collect()
     }
 
     /// div u (ln J_f at finite strain) at particle `p`.
@@ -321,7 +324,7 @@ impl Stage<'_> {
                 match self.respond(&old, p) {
                     Some(answer) => {
                         for output in &mut outputs {
-                            self.write(&answer, p, row, output);
+                            self.write(&old, &answer, p, row, output);
                         }
                     }
                     None => inverted = inverted.or(Some(p)),
@@ -334,15 +337,19 @@ impl Stage<'_> {
     }
 
     /// Write the requests of particle `p` into its row of an array.
-    fn write(&self, answer: &Answer, p: usize, row: usize, output: &mut Output) {
+    fn write(&self, old: &Old, answer: &Answer, p: usize, row: usize, output: &mut Output) {
         let own = self.kinematics != Kinematics::Displacement;
         let row = &mut output.data[output.columns * row..][..output.columns];
         let Answer { stress, moduli, plastic, trial, .. } = answer;
         for request in output.requests {
             let out = &mut row[request.column..][..request.width()];
+            let scalar = match request.operator {
+                Operator::History(name) => &self.variable(name, request.part, old, answer, p),
+                _ => plastic,
+            };
             match trial {
-                Some(trial) => finite::write(request, trial, own, stress, moduli, plastic, out),
-                None => small::write(request, self.kinematics, stress, moduli, plastic, out),
+                Some(trial) => finite::write(request, trial, own, stress, moduli, scalar, out),
+                None => small::write(request, self.kinematics, stress, moduli, scalar, out),
             }
             if let Some(factor) = &request.factor {
                 for value in out {

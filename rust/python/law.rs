@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
 use super::{require, InputError};
-use crate::law::{Law, LinearElastic, Parameter, LAWS};
+use crate::law::{External, Law, LinearElastic, Parameter, LAWS, MAX_HISTORY};
 
 #[pyclass(name = "Material", frozen, module = "tawami._rust")]
 pub(super) struct PyMaterial {
@@ -20,6 +20,8 @@ enum Made {
     Elastic(&'static str, f64, f64),
     /// Name, K and mu of the elastic part [Pa], and the values of the parameters.
     Law(&'static str, (f64, f64), Vec<f64>),
+    /// Name, K and mu [Pa], and the history variables of a law whose responses are given.
+    External(String, (f64, f64), Vec<String>),
 }
 
 impl PyMaterial {
@@ -54,6 +56,15 @@ impl PyMaterial {
         Ok(Self { law, made: Made::Law(maker.name, elastic, parameters) })
     }
 
+    /// A law whose responses are given, with K and mu of its elastic part and the names of its history
+    /// variables.
+    #[staticmethod]
+    fn external(name: String, elastic: (f64, f64), history: Vec<String>) -> PyResult<Self> {
+        require(history.len() <= MAX_HISTORY, "a law with too many history variables")?;
+        let law = External::new(&name, LinearElastic::from_k_mu(elastic.0, elastic.1)?, &history);
+        Ok(Self { law: Arc::new(law), made: Made::External(name, elastic, history) })
+    }
+
     /// Arguments for a copy, here or in another process.
     fn __reduce__<'py>(
         &self,
@@ -65,6 +76,9 @@ impl PyMaterial {
             }
             Made::Law(name, elastic, parameters) => {
                 ("of", (*name, *elastic, parameters.clone()).into_pyobject(py)?)
+            }
+            Made::External(name, elastic, history) => {
+                ("external", (name.clone(), *elastic, history.clone()).into_pyobject(py)?)
             }
         };
         Ok((py.get_type::<Self>().getattr(function)?, given))

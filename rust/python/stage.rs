@@ -15,11 +15,12 @@ use super::threads::detached;
 use super::transfer::field;
 use crate::grid::{Basis, Location};
 use crate::law::{Law, MAX_HISTORY};
+use crate::particles::given::Given;
 use crate::particles::kinematics::{Increments, Kinematics};
 use crate::particles::request::Request;
-use crate::particles::stage::{Given, Output, Response, Stage};
+use crate::particles::stage::{Output, Stage};
 use crate::space::COMPONENTS;
-use crate::tensor::{Stress, Sym};
+use crate::tensor::{Strain, Stress, Sym};
 
 /// The law quantities that a form reads, array by array; parsed once.
 #[pyclass(name = "Requests", frozen, module = "tawami._rust")]
@@ -53,6 +54,12 @@ impl PyRequests {
         require(same, "requests of small and of finite strain")?;
         Ok(Self { arrays, finite })
     }
+
+    /// Whether there are derivatives of history variables.
+    #[getter]
+    fn history_slopes(&self) -> bool {
+        self.arrays.iter().flatten().any(Request::history_slope)
+    }
 }
 
 impl PyRequests {
@@ -83,10 +90,29 @@ pub(super) struct PyStage {
     basis: Basis,
 }
 
-/// Stress, tangent and plastic volumetric strain that were computed in Python, flat.
-type GivenArrays<'py> = (Read1<'py, f64>, Read1<'py, f64>, Read1<'py, f64>);
+/// Responses that were computed in Python, flat: stress, tangent, plastic volumetric strain, history
+/// variables, and their derivatives (empty if none are requested).
+type GivenArrays<'py> =
+    (Read1<'py, f64>, Read1<'py, f64>, Read1<'py, f64>, Read1<'py, f64>, Read1<'py, f64>);
 
 impl PyStage {
+    fn given<'a>(&self, arrays: &'a GivenArrays) -> PyResult<Given<'a>> {
+        let (stress, tangent, plastic, history, slopes) = arrays;
+        let (stress, tangent) = (stress.as_slice()?, tangent.as_slice()?);
+        let (plastic_volume, n) = (plastic.as_slice()?, self.location.len());
+        let (history, slopes) = (history.as_slice()?, slopes.as_slice()?);
+        let variables = history.len() / n.max(1);
+        let external = self.materials.iter().filter(|law| law.external());
+        let fits = stress.len() == COMPONENTS * n
+            && tangent.len() == COMPONENTS * COMPONENTS * n
+            && plastic_volume.len() == n
+            && history.len() == variables * n
+            && external.into_iter().all(|law| n == 0 || law.history().len() <= variables)
+            && (slopes.is_empty() || slopes.len() == COMPONENTS * history.len());
+        require(fits, "responses of other particles")?;
+        Ok(Given { stress, tangent, plastic_volume, variables, history, slopes })
+    }
+
     fn stage<'a>(
         &'a self,
         u: &'a Read1<f64>,
@@ -94,29 +120,24 @@ impl PyStage {
         given: Option<&'a GivenArrays>,
     ) -> PyResult<Stage<'a>> {
         let grid = self.location.grid;
-        let response = match given {
-            None => Response::Laws(&self.materials),
-            Some((stress, tangent, plastic)) => {
-                let (stress, tangent) = (stress.as_slice()?, tangent.as_slice()?);
-                let (plastic_volume, n) = (plastic.as_slice()?, self.location.len());
-                let fits = stress.len() == COMPONENTS * n
-                    && tangent.len() == COMPONENTS * COMPONENTS * n
-                    && plastic_volume.len() == n;
-                require(fits, "stress and tangent of other particles")?;
-                Response::Given(Given { stress, tangent, plastic_volume }, &self.materials)
-            }
-        };
         let increments = Increments {
             u: field(grid, self.basis, u)?,
             volumetric: volumetric.map(|v| field(grid, Basis::Bilinear, v)).transpose()?,
         };
         Ok(Stage {
             location: &self.location,
-            response,
+            laws: &self.materials,
+            given: given.map(|arrays| self.given(arrays)).transpose()?,
             kinematics: self.kinematics,
             finite: self.finite,
             increments,
         })
+    }
+
+    /// Check that the responses of external laws are given.
+    fn check_given(&self, stage: &Stage) -> PyResult<()> {
+        let given = stage.given.is_some() || !self.materials.iter().any(|law| law.external());
+        require(given, "an external law without its responses")
     }
 
     /// Rows of `N` numbers, one per particle.
@@ -193,6 +214,12 @@ impl PyStage {
             return Ok(());
         }
         let stage = self.stage(&u, volumetric.as_ref(), given.as_ref())?;
+        self.check_given(&stage)?;
+        let slopes = !requests.history_slopes()
+            || stage
+                .given
+                .is_none_or(|given| given.slopes.len() == COMPONENTS * given.history.len());
+        require(slopes, "no derivatives of history variables")?;
         Ok(detached(py, || stage.evaluate(particles, outputs))?)
     }
 
@@ -209,6 +236,7 @@ impl PyStage {
         let mut particles = self.particles.try_borrow_mut(py)?;
         let particles = &mut particles.0;
         let stage = self.stage(&u, volumetric.as_ref(), given.as_ref())?;
+        self.check_given(&stage)?;
         Ok(detached(py, || stage.commit(particles))?)
     }
 
@@ -224,7 +252,7 @@ impl PyStage {
         Ok(particles.stress().chunks_exact(COMPONENTS).enumerate().map(of).sum())
     }
 
-    /// Strain increments at the particles (xx, yy, zz, gamma_xy): n x 4.
+    /// Strain that the law of each particle receives: deviator (xx, yy, zz, gamma_xy) and volume, n x 5.
     #[pyo3(signature = (u, volumetric))]
     fn strains<'py>(
         &self,
@@ -232,8 +260,12 @@ impl PyStage {
         u: Read1<f64>,
         volumetric: Option<Read1<f64>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let particles = &self.particles.try_borrow(py)?.0;
         let stage = self.stage(&u, volumetric.as_ref(), None)?;
-        self.each(py, |p| stage.strain(p))
+        let strains = detached(py, || stage.strains(particles))?;
+        let row = |strain: &Strain| strain.deviator.into_iter().chain([strain.volume]);
+        let flat: Vec<f64> = strains.iter().flat_map(row).collect();
+        flat.to_pyarray(py).reshape([strains.len(), COMPONENTS + 1])
     }
 
     /// div u (ln J_f at finite strain) and the linear field (0 if there is none) at the particles: n x 2.

@@ -174,7 +174,6 @@ def test_parameters_and_inexact_sums_are_reported():
     assert "alpha = 2: expected at most 1" in str(tawami.check_form("u_epsv", alpha=2.0))
     form = tawami.Form(
         ALONE,
-        "displacement",
         lambda u, w, sigma, mu, sum_p: sum_p(sigma, grad(w)) + sum_p(mu, div(u) ** 3 * div(w)),
     )
     line = tawami.check_form(form).line("dolfinx")

@@ -12,6 +12,7 @@ from typing import Any
 import heated
 import numpy as np
 from mpi4py import MPI
+from numpy_laws import von_mises
 from scenes import BASES, FORMS, grid_of
 
 import tawami
@@ -183,7 +184,8 @@ def construction() -> dict[str, np.ndarray]:
         scene.load("fill", forces[body.material_of == 1])
         scene.solve()
         removed = scene.remove(lambda x, y: (y > 0.9) & (x > 1.0))
-        scene.change_material(lambda x, y: x < 0.6, tawami.von_mises(law, yield_stress=5e3))
+        weaker = von_mises(law.bulk_modulus, law.shear_modulus, 5e3, tangent=False)
+        scene.change_material(lambda x, y: x < 0.6, weaker)
         tawami.ramp(scene, 0.5)
         block = tawami.Dynamics(scene, velocity=(0.0, 0.01))
         block.step(1e-3)

@@ -46,21 +46,10 @@ def several(request, tmp_path_factory) -> Found:
     return Found(number, folder, dict(np.load(folder / "results.npz")))
 
 
-@pytest.mark.parametrize(
-    "subject",
-    [
-        "beam",
-        "cloud",
-        "fields",
-        "nonlinear",
-        "fem",
-        "singular",
-        "motion",
-        "initial",
-        "inverted",
-        "few",
-    ],
-)
+@pytest.mark.parametrize("subject", [
+    "beam", "cloud", "fields", "nonlinear", "fem", "singular", "motion", "construction", "initial",
+    "inverted", "few",
+])  # fmt: skip
 def test_results_do_not_depend_on_the_number_of_ranks(alone, several, subject):
     names = [name for name in alone.results if name.startswith(subject)]
     assert names

@@ -8,7 +8,7 @@ use ndarray::{Array1, Array2};
 use tawami::grid::{Basis, Grid};
 use tawami::law::{Law, LinearElastic};
 use tawami::particles::kinematics::{Increments, Kinematics};
-use tawami::particles::stage::{Response, Stage};
+use tawami::particles::stage::Stage;
 use tawami::particles::Particles;
 use tawami::transfer::to_particles::Field;
 
@@ -56,7 +56,8 @@ fn accepting_a_step_holds_no_tangents() {
     for finite in [false, true] {
         let stage = Stage {
             location: &location,
-            response: Response::Laws(&[Arc::clone(&law)]),
+            laws: &[Arc::clone(&law)],
+            given: None,
             kinematics: Kinematics::Displacement,
             finite,
             increments: Increments {

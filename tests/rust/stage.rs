@@ -9,7 +9,7 @@ use tawami::grid::{Basis, Grid};
 use tawami::law::{Law, LinearElastic, NeoHookean};
 use tawami::particles::kinematics::{Increments, Kinematics};
 use tawami::particles::request::{Operator, Part, Request};
-use tawami::particles::stage::{check_materials, Output, Response, Stage};
+use tawami::particles::stage::{check_materials, Output, Stage};
 use tawami::particles::{Particles, Role};
 use tawami::transfer::to_particles::Field;
 
@@ -86,7 +86,8 @@ fn one_particle(kinematics: Kinematics, p: f64) -> Particles {
     let location = grid.locate(&[[0.3, 0.9]]).unwrap();
     let stage = Stage {
         location: &location,
-        response: Response::Laws(&materials),
+        laws: &materials,
+        given: None,
         kinematics,
         finite: false,
         increments: Increments {

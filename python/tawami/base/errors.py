@@ -29,6 +29,7 @@ TawamiWarning             base of warnings about results that should not be trus
   RotationWarning         a nearly incompressible body that turns too far in a step
   SmallStrainWarning      displacement gradients too large for a form of small strain
   SofteningWarning        a material that softens: results depend on the grid
+  TangentWarning          a law without a tangent, whose differences take time
 ========================= ========================================================================
 
 When a step fails, the particles are unchanged.
@@ -101,6 +102,10 @@ class SofteningWarning(TawamiWarning):
     """A material that softens without a length scale: results depend on the grid."""
 
 
+class TangentWarning(TawamiWarning):
+    """A law in NumPy that returns no tangent: its central differences take time."""
+
+
 class SingularError(TawamiError):
     """A singular tangent; the message names the cells."""
 
@@ -165,6 +170,7 @@ __all__ = [
     "SofteningWarning",
     "SolverError",
     "SupportError",
+    "TangentWarning",
     "TawamiError",
     "TawamiWarning",
 ]

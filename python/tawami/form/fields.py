@@ -18,7 +18,7 @@ ROLES: Mapping[str, str] = {"displacement": "m", "volumetric_strain": "-", "pres
 BASES = ("bilinear", "quadratic_spline")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Field:
     """One unknown of a form; made by :func:`vector` or :func:`scalar`.
 
@@ -49,6 +49,15 @@ class Field:
     def num_dofs(self) -> int:
         """Number of degrees of freedom of that element."""
         return self.components * len(dolfinx.reference_nodes(self.degree))
+
+    def __repr__(self) -> str:
+        """As a form declares it."""
+        if self.role == "displacement":
+            return f"vector({self.test!r})"
+        given = {"role": self.role, "basis": self.basis, "unit": self.unit, "scale": self.scale}
+        usual = {"role": None, "basis": "bilinear", "unit": ROLES.get(self.role or "", "-")}
+        said = [f"{name}={value!r}" for name, value in given.items() if value != usual.get(name)]
+        return f"scalar({', '.join([repr(self.test), *said])})"
 
     @property
     def own(self) -> bool:

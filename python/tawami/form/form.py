@@ -165,7 +165,7 @@ class Form:
             self._fail("strain = 'finite' with a field of the role 'pressure': expected 'small'")
         fits = kinematics_of(self.fields)
         if fits != str(self.kinematics) and not (
-            self.kinematics.volume_at_centre and self.no_volume
+            self.kinematics.volume_at_centre and not self.volume_field
         ):
             self._fail(
                 f"kinematics '{self.kinematics}' does not take the roles of its fields, which make it "
@@ -175,15 +175,15 @@ class Form:
             self._fail(f"residual = {shown(self.residual)}: expected a function")
 
     @property
-    def no_volume(self) -> bool:
-        """Whether no field has the role of the volumetric strain or of a pressure."""
-        return self.volume_field is None
-
-    @property
     def volume_field(self) -> str | None:
         """Name of the field with the role of the volumetric strain or of a pressure."""
         roles = ("volumetric_strain", "pressure")
         return next((name for name, field in self.fields.items() if field.role in roles), None)
+
+    def data_unit(self, name: str) -> str:
+        """Unit of data."""
+        match = UNIT.search(self.data[name])
+        return match.group(1) if match else "-"
 
     @property
     def own_fields(self) -> dict[str, Field]:

@@ -25,7 +25,7 @@ from tawami.scene.configuration import Configuration
 from tawami.scene.contact import ActiveSet
 from tawami.scene.share import Moment
 from tawami.scene.step import Accepted, Problem
-from tawami.scene.supports import Fields
+from tawami.scene.step_values import Fields
 from tawami.solve.inertia import Inertia
 
 Array = npt.NDArray[np.float64]

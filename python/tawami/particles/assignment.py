@@ -16,8 +16,10 @@ from tawami.base.errors import InputError
 from tawami.body.body import Body
 from tawami.particles.numpy_law import NumpyLaw
 
-#: A material for all particles, one for each number, or one for each name of the body.
-Given = _rust.Material | Sequence[_rust.Material] | Mapping[str, _rust.Material] | NumpyLaw
+#: A law of particles.
+Law = _rust.Material | NumpyLaw
+#: A law for all particles, one for each number, or one for each name of the body.
+Given = Law | Sequence[Law] | Mapping[str, Law]
 
 
 @dataclass(frozen=True)
@@ -25,13 +27,11 @@ class Assignment:
     """The materials of a body.
 
     Attributes:
-        materials: The laws.
-        law: The law in NumPy, if there is one; `materials` then contains its elastic law.
+        laws: The laws.
         number: Number of the law of each particle.
     """
 
-    materials: list[_rust.Material]
-    law: NumpyLaw | None
+    laws: list[Law]
     number: npt.NDArray[np.uint32]
 
 
@@ -39,7 +39,7 @@ def assigned(material: Given, material_of: npt.ArrayLike | None, body: Body, n: 
     """Assign materials to n particles.
 
     Args:
-        material: Material, list or dictionary of materials, or a `NumpyLaw`.
+        material: Material or `NumpyLaw`, or a list or dictionary of these.
         material_of: Number of the material of each particle.
         body: The body, with names and numbers of its own.
         n: Number of particles.
@@ -47,7 +47,6 @@ def assigned(material: Given, material_of: npt.ArrayLike | None, body: Body, n: 
     Raises:
         InputError: There is no material, names of body and materials differ, or numbers do not fit.
     """
-    law = material if isinstance(material, NumpyLaw) else None
     numbers = body.material_of if material_of is None else material_of
     if isinstance(material, Mapping):
         if material_of is not None:
@@ -56,8 +55,6 @@ def assigned(material: Given, material_of: npt.ArrayLike | None, body: Body, n: 
                 "names of the body, or a list of materials with material_of"
             )
         materials = _by_name("material", material, body.names)
-    elif law is not None:
-        materials, numbers = [law.elastic()], material_of
     else:
         materials = list(material) if isinstance(material, Sequence) else [material]
         if material_of is None and len(body.names) > 1 and len(materials) != len(body.names):
@@ -67,13 +64,23 @@ def assigned(material: Given, material_of: npt.ArrayLike | None, body: Body, n: 
                 "this order or a dictionary from names to materials; one for all of it with "
                 "material_of=np.zeros(len(body.x))"
             )
-    if not materials or not all(isinstance(m, _rust.Material) for m in materials):
+    if not materials or not all(isinstance(m, Law) for m in materials):
         raise InputError(
             f"material = {checks.shown(material)}: expected a material as linear_elastic(...) makes "
-            "it, a list or a dictionary of these, or a NumpyLaw"
+            "it, a NumpyLaw, or a list or a dictionary of these"
         )
     number = checks.numbering("material_of", np.zeros(n) if numbers is None else numbers, n)
-    return Assignment(materials, law, number)
+    return Assignment(materials, number)
+
+
+def materials_of(laws: Sequence[Law]) -> list[_rust.Material]:
+    """The laws as the Rust part knows them."""
+    return [law.material if isinstance(law, NumpyLaw) else law for law in laws]
+
+
+def in_numpy(laws: Sequence[Law]) -> dict[int, NumpyLaw]:
+    """The laws in NumPy, by their numbers."""
+    return {number: law for number, law in enumerate(laws) if isinstance(law, NumpyLaw)}
 
 
 def densities(

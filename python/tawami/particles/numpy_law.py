@@ -1,9 +1,11 @@
-"""Material laws in NumPy, to test a law before it is written in Rust."""
+"""Material laws in NumPy, to try a law before it is written in Rust."""
 
 from __future__ import annotations
 
+import keyword
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,203 +16,244 @@ from tawami.base import checks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.identity import text
-from tawami.form.kinematics import Kinematics
 
-#: Stress, tangent and plastic volumetric strain of the particles, flat.
-Given = tuple[Array, Array, Array]
-#: Share by which the mean stress of a law may differ from that of the form, and share of K below which
-#: its derivative with respect to the volume counts as zero.
-REACHED, FLAT = 1e-13, 1e-9
-#: Iterations for the volume at which a law has a mean stress.
-MOST_ITERATIONS = 60
+#: Most history variables of a law, as in `rust/law/mod.rs`.
+MOST_VARIABLES = 8
+#: Names of other arrays and quantities of particles.
+TAKEN = {
+    "x", "volume", "material", "number", "stress", "strain", "displacement", "displacement_gradient",
+    "eps_v", "velocity", "acceleration", "velocity_gradient", "acceleration_gradient", "mean_stress",
+    "deviatoric_stress_q",
+}  # fmt: skip
+#: Step of a difference relative to the strain, and least size of a strain. The step balances the error
+#: of a central difference, step^2, and the round-off, epsilon / step.
+STEP, LEAST = 6e-6, 1e-4
+
+WithoutHistory = Callable[[Array, Array], Any]
+WithHistory = Callable[[Array, Array, dict[str, Array]], Any]
 
 
 @dataclass(frozen=True)
 class NumpyLaw:
-    """A law for all particles of a scene at once.
+    """A material law as a function of a driver script, for any of the particles of a scene.
 
-    Components are xx, yy, zz, xy, as in the stress of the particles, tension positive. A strain contains
-    gamma_xy = 2 eps_xy, so that tangent[:, i, j] = d stress_i / d strain_j.
+    `respond(strain, stress)` or, with history variables, `respond(strain, stress, history)` is called
+    with all n particles that have the law, on several ranks with those of the rank. It returns the state
+    at the end of the step:
+
+    ===================  ==============================  =========================================
+    of the law           it returns                      or, without a tangent
+    ===================  ==============================  =========================================
+    without history      `stress, tangent`               `stress`
+    with history         `stress, tangent, history`      `stress, history`
+    ===================  ==============================  =========================================
+
+    Components are xx, yy, zz, xy, tension positive. A strain contains gamma_xy = 2 eps_xy.
+
+    - `strain` (n x 4): increment of the strain in the step. At finite strain: the elastic trial strain,
+      logarithmic (Hencky), counted from the stress-free state.
+    - `stress` (n x 4) [Pa]: at the start of the step, and the returned one at its end. At finite strain:
+      the Kirchhoff stress, and 0 at the start, because the strain is the total elastic one.
+    - `history`: dictionary from each name to its values (n), at the start and at the end of the step.
+    - `tangent` (n x 4 x 4) [Pa]: consistent, tangent[:, i, j] = d stress_i / d strain_j.
+
+    A small-strain law that adds C : strain to the stress, with the isotropic C of K and mu, and returns
+    the sum to a yield surface, is thereby a finite-strain law (Simo and Hughes 1998, chapter 9). If its
+    elasticity is not that of K and mu, use it at small strain only.
+
+    Without a tangent, its derivatives are central differences: each evaluation calls `respond` 9 times
+    instead of once, and the scene warns of it (`TangentWarning`). The response of a particle must not
+    depend on the other particles.
 
     Args:
-        respond: Function of the strain increment (n x 4) and the old stress (n x 4) [Pa]. It returns
-            the new stress (n x 4) [Pa] and the consistent tangent (n x 4 x 4) [Pa], and must not change
-            its arguments.
-        K: Bulk modulus in forms and in the scaling [Pa]; finite.
-        mu: Shear modulus in forms and in the scaling [Pa].
+        respond: The function.
+        K: Bulk modulus in forms, in the scaling and in the elastic energy [Pa]; finite.
+        mu: Shear modulus there [Pa].
+        history: Names of the history variables, at most 8. They are 0 at first; `scene.initial` sets
+            other values, and `scene.particles.history(name)` reads them.
 
     Raises:
-        InputError: K or mu is not a positive, finite number.
+        InputError: K or mu is not a positive, finite number, or a name is not possible.
     """
 
-    respond: Callable[[Array, Array], tuple[npt.ArrayLike, npt.ArrayLike]]
+    respond: WithoutHistory | WithHistory
     K: float
     mu: float
+    history: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         if not callable(self.respond):
             raise InputError(
                 f"NumpyLaw: respond = {checks.shown(self.respond)}: expected a function of strain and "
-                "stress"
+                "stress, and of the history if there is one"
             )
-        self.elastic()
+        object.__setattr__(self, "history", _names(self.name, self.history))
+        _ = self.material
+
+    @property
+    def name(self) -> str:
+        """Name of the law in messages, with that of its function."""
+        function = getattr(self.respond, "__name__", type(self.respond).__name__)
+        return f"NumpyLaw({str(function).strip('<>')})"
 
     def identity(self) -> Any:
-        """Facts that identify the law, besides K and mu, for checkpoints."""
+        """Facts that identify the law, besides its material, for checkpoints."""
         return text(self.respond)
 
-    def elastic(self) -> _rust.Material:
-        """The elastic law of K and mu, for uses that need only these."""
+    @cached_property
+    def material(self) -> _rust.Material:
+        """Name, moduli and history variables, as the Rust part knows the law."""
         try:
             K, mu = checks.real("K", self.K), checks.real("mu", self.mu)
-            return _rust.Material.of("linear_elastic", (K, mu), [])
+            return _rust.Material.external(self.name, (K, mu), list(self.history))
         except InputError as error:
-            raise InputError(f"NumpyLaw: {error}") from None
+            raise InputError(f"{self.name}: {error}") from None
 
 
-class NumpyStage:
-    """`_rust.Stage` with a law in NumPy.
+@dataclass(frozen=True)
+class Response:
+    """State of particles at the end of a step.
 
-    Args:
-        stage: The stage in Rust, which gives the strains.
-        particles: The particles, with the old stress.
-        law: The law.
-        kinematics: Of the form. Where it has a field for the mean stress, the volumetric strain of a
-            particle is that with which the law has this mean stress.
+    Attributes:
+        stress: n x 4 [Pa].
+        tangent: n x 4 x 4 [Pa]; None if the law did not return it.
+        history: n x variables.
     """
 
-    def __init__(
-        self,
-        stage: _rust.Stage,
-        particles: _rust.Particles,
-        law: NumpyLaw,
-        kinematics: Kinematics,
-    ) -> None:
-        self._stage, self._particles, self._law = stage, particles, law
-        self._kinematics = kinematics
-        self.volume_strains, self.elastic_energy = stage.volume_strains, stage.elastic_energy
-        self._latest: tuple[tuple[Array, ...], Given] | None = None
+    stress: Array
+    tangent: Array | None
+    history: Array
 
-    def _given(self, u: Array, volumetric: Array | None) -> Given:
-        """Stress, tangent and plastic volume, flat; those of the last call are reused, as when a step is
-        accepted.
-        """
-        state = (u, np.empty(0) if volumetric is None else volumetric, self._particles.stress)
-        if self._latest is not None and all(map(np.array_equal, state, self._latest[0])):
-            return self._latest[1]
-        strain = np.asarray(self._stage.strains(u, volumetric))
-        if len(strain) == 0:  # a rank without particles
-            return np.empty(0), np.empty(0), np.empty(0)
-        if self._kinematics.has_mean_stress:
-            field = np.asarray(self._stage.volume_strains(u, volumetric))[:, 1]
-            stress, tangent, plastic = self._at_mean(strain, field)
-        else:
-            (stress, tangent), plastic = self._respond(strain), np.zeros(len(strain))
-        given = stress.ravel(), tangent.ravel(), plastic
-        self._latest = (tuple(part.copy() for part in state), given)
-        return given
 
-    def _at_mean(self, strain: Array, field: Array) -> tuple[Array, Array, Array]:
-        """Stress and tangent where the law has the mean stress of the field, and the plastic volume.
+@dataclass(frozen=True)
+class Start:
+    """State of the particles of a law at the start of a step.
 
-        Args:
-            strain: Strain increments, n x 4; their volume is not used.
-            field: eps_v or p at the particles.
+    Args:
+        law: The law.
+        stress: n x 4 [Pa].
+        history: n x variables.
+        number: Numbers of the particles, for messages.
+    """
+
+    law: NumpyLaw
+    stress: Array
+    history: Array
+    number: npt.NDArray[Any]
+
+    def respond(self, strain: Array) -> Response:
+        """Response of the law to strains, n x 4.
 
         Raises:
-            InputError: The law does not reach the mean stress of a particle, or its tangent has no mean
-                part.
+            InputError: It returned something else, or numbers that are not finite.
         """
-        K, with_p = self._law.K, self._kinematics.deviatoric
-        elastic = field / K if with_p else field
-        old = _mean(self._particles.stress)
-        wanted = old + (field if with_p else K * field)
-        deviator = strain - _volumes(strain[:, :3].sum(axis=1))
-        total = elastic.copy()
-        for _ in range(MOST_ITERATIONS):
-            whole = deviator + _volumes(total)
-            stress, tangent = self._respond(whole)
-            slope = tangent[:, :3, :3].mean(axis=(1, 2))
-            missing = wanted - _mean(stress)
-            size = np.abs(wanted) + np.abs(old) + K * np.abs(whole).max(axis=1)
-            off = np.abs(missing) > REACHED * size
-            flat = slope < FLAT * K
-            if not off.any():
-                self._check(
-                    flat, "a tangent without a mean part (d mean stress / d volume)", strain, slope
-                )
-                return stress, tangent, total - elastic
-            # where the slope is zero, go back towards it with the elastic one
-            total[off] += (missing / np.where(flat, K, slope))[off]
-        self._check(off, "no mean stress of the size that the field has", strain, wanted)
-        raise AssertionError
-
-    def _check(self, bad: npt.NDArray[np.bool_], what: str, strain: Array, value: Array) -> None:
-        """Raise an error if the law has no response at the mean stress of the form."""
-        if not bad.any():
-            return
-        p = int(np.flatnonzero(bad)[0])
-        raise InputError(
-            f"NumpyLaw: respond returned {what} at {bad.sum()} particles, the first is "
-            f"{self._particles.number[p]}, with {value[p]:.4g} Pa and the strain increment {strain[p]}. "
-            "A form with a field for the mean stress needs one: expected a law whose mean stress grows "
-            "with the volume, or form 'u' or 'u_bbar'"
+        law, n = self.law, len(strain)
+        arguments: list[Any] = [strain.copy(), self.stress.copy()]
+        if law.history:
+            arguments.append(
+                {name: self.history[:, k].copy() for k, name in enumerate(law.history)}
+            )
+        stress, tangent, history = self._parts(law.respond(*arguments))
+        new = np.empty((n, len(law.history)))
+        for k, name in enumerate(law.history):
+            new[:, k] = self._checked(name, history[name], (n,), strain)
+        return Response(
+            self._checked("stress", stress, (n, 4), strain),
+            None if tangent is None else self._checked("tangent", tangent, (n, 4, 4), strain),
+            new,
         )
 
-    def _respond(self, strain: Array) -> tuple[Array, Array]:
-        """Stress (n x 4) and tangent (n x 4 x 4) of the law at total strain increments."""
-        n = len(strain)
-        result = self._law.respond(strain, self._particles.stress.copy())
-        if not isinstance(result, tuple) or len(result) != 2:
-            raise InputError("NumpyLaw: respond did not return a pair: expected (stress, tangent)")
-        arrays = []
-        for name, values, shape in (
-            ("stress", result[0], (n, 4)),
-            ("tangent", result[1], (n, 4, 4)),
-        ):
-            what = f"NumpyLaw: the {name} that respond returned"
-            raw = checks.any_array(what, values)
-            array = checks.array(what, raw, raw.ndim)
-            if array.shape != shape:
+    def _parts(self, result: Any) -> tuple[Any, Any, dict[str, Any]]:
+        """Stress, tangent or None, and history, as they were returned."""
+        law = self.law
+        parts = list(result) if isinstance(result, tuple) else [result]
+        history: Any = {}
+        if law.history:
+            *parts, history = parts
+            listed = ", ".join(map(repr, law.history))
+            if not isinstance(history, dict) or set(history) != set(law.history):
+                came = _described(history)
                 raise InputError(
-                    f"NumpyLaw: respond returned a {name} of shape {array.shape}: expected {shape}"
+                    f"{law.name}: respond returned {came} as history of {self._who}: expected a "
+                    f"dictionary with {listed} behind stress and tangent"
                 )
-            bad = np.flatnonzero(~np.isfinite(array.reshape(n, -1)).all(axis=1))
-            if len(bad):
-                raise InputError(
-                    f"NumpyLaw: respond returned a {name} that is not finite at {len(bad)} "
-                    f"particles, the first is {self._particles.number[bad[0]]}, with the strain "
-                    f"increment {strain[bad[0]]}"
-                )
-            arrays.append(array)
-        return arrays[0], arrays[1]
+        if len(parts) not in (1, 2):
+            more = ", history" if law.history else ""
+            raise InputError(
+                f"{law.name}: respond returned {_described(result)} for {self._who}: expected (stress, "
+                f"tangent{more}), or {'(stress, history)' if more else 'the stress'} without a tangent"
+            )
+        return parts[0], parts[1] if len(parts) == 2 else None, history
 
-    def evaluate(
-        self,
-        u: Array,
-        volumetric: Array | None,
-        requests: _rust.Requests,
-        data: Sequence[Array],
-    ) -> None:
-        """See `_rust.Stage.evaluate`."""
-        self._stage.evaluate(u, volumetric, requests, data, self._given(u, volumetric))
+    def _checked(self, name: str, values: Any, shape: tuple[int, ...], strain: Array) -> Array:
+        what = f"{self.law.name}: {name} that respond returned"
+        raw = checks.any_array(what, values)
+        array = checks.array(what, raw, raw.ndim)
+        if array.shape != shape:
+            raise InputError(
+                f"{self.law.name}: respond returned {name} of shape {array.shape} for {self._who}: "
+                f"expected {shape}"
+            )
+        bad = np.flatnonzero(~np.isfinite(array.reshape(len(array), -1)).all(axis=1))
+        if len(bad):
+            p = bad[0]
+            row = array[p].ravel()
+            raise InputError(
+                f"{self.law.name}: respond returned {name} that is not finite at {len(bad)} particles, "
+                f"the first is {self.number[p]}: {row[~np.isfinite(row)][0]} at the strain {strain[p]} "
+                f"and the old stress {self.stress[p]} Pa; expected finite numbers"
+            )
+        return array
 
-    def tangent(self, u: Array, volumetric: Array | None) -> Array:
-        """Tangent of the law (n x 4 x 4) [Pa] at increments of the fields."""
-        return self._given(u, volumetric)[1].reshape(-1, 4, 4).copy()
+    @property
+    def _who(self) -> str:
+        n = len(self.number)
+        return f"particle {self.number[0]}" if n == 1 else f"{n} particles from {self.number[0]} on"
 
-    def commit(self, u: Array, volumetric: Array | None) -> float:
-        """See `_rust.Stage.commit`."""
-        dissipated = self._stage.commit(u, volumetric, self._given(u, volumetric))
-        self._latest = None
-        return dissipated
+    def differences(self, strain: Array) -> tuple[Array, Array]:
+        """Central differences of stress (n x 4 x 4) [Pa] and history (n x variables x 4) with strain."""
+        tangent = np.empty((*strain.shape, strain.shape[1]))
+        slopes = np.empty((*self.history.shape, strain.shape[1]))
+        for j, unit in enumerate(np.eye(strain.shape[1])):
+            tangent[:, :, j], slopes[:, :, j] = self.slope(strain, unit)
+        return tangent, slopes
+
+    def slope(self, strain: Array, direction: Array) -> tuple[Array, Array]:
+        """Derivative of stress [Pa] and history along a direction of strain: n x 4, n x variables."""
+        elastic = np.abs(self.stress).max(axis=1) / self.law.mu
+        step = STEP * np.maximum(np.maximum(np.abs(strain).max(axis=1), elastic), LEAST)[:, None]
+        more, less = (self.respond(strain + sign * step * direction) for sign in (1.0, -1.0))
+        return (more.stress - less.stress) / (2 * step), (more.history - less.history) / (2 * step)
 
 
-def _mean(stress: Array) -> Array:
-    """Mean stress of each row."""
-    return np.asarray(stress[:, :3].mean(axis=1))
+def _described(value: Any) -> str:
+    """A value that was returned, for a message."""
+    if isinstance(value, dict):
+        return f"a dictionary with {', '.join(map(repr, value)) or 'nothing'}"
+    if isinstance(value, tuple):
+        return f"{len(value)} values"
+    shape = getattr(value, "shape", None)
+    return checks.shown(value) if shape is None else f"an array of shape {shape}"
 
 
-def _volumes(volume: Array) -> Array:
-    """Isotropic strains with these volumes, n x 4."""
-    return np.asarray(volume[:, None] / 3 * [1.0, 1.0, 1.0, 0.0])
+def _names(law: str, given: Any) -> tuple[str, ...]:
+    """Names of history variables.
+
+    Raises:
+        InputError: They cannot be that.
+    """
+    several = isinstance(given, list | tuple) and len(given) <= MOST_VARIABLES
+    if not several or len(set(map(repr, given))) < len(given):
+        raise InputError(
+            f"{law}: history = {checks.shown(given)}: expected at most {MOST_VARIABLES} different "
+            "names, as history=('plastic_strain',)"
+        )
+    for name in given:
+        usable = isinstance(name, str) and name.isidentifier() and not keyword.iskeyword(name)
+        if not usable or name in TAKEN:
+            why = " that particles do not have already" if usable else ""
+            raise InputError(
+                f"{law}: history variable {checks.shown(name)}: expected a name of letters, digits and _"
+                f"{why}, as 'plastic_strain'"
+            )
+    return tuple(given)

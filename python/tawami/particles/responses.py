@@ -15,7 +15,7 @@ from tawami.base.timing import Stopwatch
 from tawami.fem.rules import Rule
 from tawami.form.compilation import CompiledForm
 from tawami.form.quantities import Density, LawQuantity, ParticleScalar
-from tawami.particles.numpy_law import NumpyStage
+from tawami.particles.numpy_stage import NumpyStage
 
 #: K/mu beyond which a larger bulk modulus makes forces no larger.
 LOCKED = 1e4

@@ -22,7 +22,7 @@ from tawami.base.process import check_process
 from tawami.base.program import leave_together
 from tawami.base.timing import Stopwatch
 from tawami.particles import placement
-from tawami.scene import coverage, mean_stress, own_fields, quantities, softening, strain_limit
+from tawami.scene import coverage, mean_stress, own_fields, quantities, strain_limit
 from tawami.scene.activity import Activity
 from tawami.scene.domain import Domain
 from tawami.scene.form_inputs import FormInputs
@@ -31,6 +31,7 @@ from tawami.scene.model import Model
 from tawami.scene.reactions import Reactions
 from tawami.scene.share import Moment
 from tawami.scene.step import Accepted, Problem, StepKind
+from tawami.scene.strain_limits import StrainLimits
 from tawami.scene.supports import Supports
 from tawami.solve.newton import Converged
 from tawami.solve.numerics import Numerics
@@ -90,18 +91,16 @@ class Configuration:
         own_fields.carry(model.form, mine, model.space.dim)
         self._attach(mine, location)
         self.activity = Activity()
-        units = {name: field.unit for name, field in model.form.own_fields.items()}
-        self.supports = Supports(model.grid, model.basis, units, self.activity)
+        self.supports = Supports(model.grid, model.basis, model.form.own_fields, self.activity)
         self.loads = Loads(model.grid, np.array(particles.volume), self.activity)
         self.total = np.zeros(self.domain.layout.size)
         self.inputs = FormInputs(model, self.activity.time)
         self.inputs.begin(model, self.domain)
         self._latest = self.activity.time
-        self.left = list[tuple[int, tuple[float, float], float]]()
-        self.removed = np.zeros(2)
+        self.left, self.removed = list[tuple[int, tuple[float, float], float]](), np.zeros(2)
         self.begun = self._coverage_checked = False
-        self.projected = self._travel = 0.0
-        self._small_strain, self._softens = not model.moves, False
+        self.projected = 0.0
+        self._travel, self._limits = mean_stress.Travel(), StrainLimits(small=not model.moves)
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
         earlier: Domain | None = getattr(self, "domain", None)
@@ -192,7 +191,7 @@ class Configuration:
             if not self.model.moves:
                 strain_limit.check_digits(self.domain, accepted.step, self.numerics.tolerance)
             moved = self._moved(accepted, kind.end)
-            self._warn_of_strain(accepted)
+            self._limits.warn(self.domain, self.total, accepted.step.coefficients)
             update = kind.accept(accepted)
             with signals.deferred():
                 with self.stopwatch("commit"), ranks.raise_together(self.model.grid.comm):
@@ -262,20 +261,6 @@ class Configuration:
         placement.check_staying(self.model.grid, particles, moved, time, stop=stop)
         return moved
 
-    def _warn_of_strain(self, accepted: Accepted) -> None:
-        """Warn, once each, of displacement gradients beyond small strain and of softening."""
-        coefficients, n = accepted.step.coefficients, self.domain.layout.num_displacement
-        if self._small_strain:
-            large = strain_limit.exceeded(self.domain, self.total[:n] + coefficients[:n])
-            if large is not None:
-                self._small_strain = False
-                strain_limit.warn_of(self.domain, *large)
-        if not self._softens:
-            soft = softening.found(self.domain, coefficients)
-            if soft is not None:
-                self._softens = True
-                softening.warn_of(self.domain, *soft)
-
     def _store(self, accepted: Accepted, moved: Array | None, time: float) -> Outcome:
         """Store a step that the laws have committed, and move the particles."""
         self.begun = True
@@ -285,7 +270,7 @@ class Configuration:
             return self._outcome(accepted, coefficients)
         problem, grid = accepted.problem, self.model.grid
         self.supports.follow(accepted.u, problem.reduction.points, problem.crossings)
-        projects = self._must_project(moved)
+        projects = self._travel.must_project(self.domain, moved)
         self.domain.particles.move_to(moved)
         outcome = self._outcome(accepted, coefficients)
         outside = placement.outside(grid, self.domain.particles.x)
@@ -298,25 +283,9 @@ class Configuration:
                 self.projected = mean_stress.project(self.domain)
         return outcome
 
-    def _must_project(self, moved: Array) -> bool:
-        """Count the way to new positions, and whether the mean stress must be projected there."""
-        if not self.model.form.kinematics.has_eps_v:
-            return False
-        self._travel += mean_stress.travel(self.domain, moved)
-        if self._travel <= mean_stress.TRAVEL:
-            return False
-        self._travel = 0.0
-        return True
-
     def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:
-        particles, comm = self.domain.particles, self.model.grid.comm
-        in_order = placement.in_order(comm, particles.number)
-        arrays = {
-            name: in_order(quantities.array_of(particles, name))
-            for name in quantities.arrays_of(particles)
-        }
-        reactions = Reactions.of(accepted, self.supports)
-        return Outcome(accepted, coefficients, reactions, arrays)
+        arrays = quantities.of_body(self.model.grid.comm, self.domain.particles)
+        return Outcome(accepted, coefficients, Reactions.of(accepted, self.supports), arrays)
 
     # -- checkpoints ---------------------------------------------------------
 
@@ -347,7 +316,7 @@ class Configuration:
             "left": self.left,
             "removed": [*self.removed],
             "laws": self.model.texts,
-            "travel": self._travel,
+            "travel": self._travel.cells,
             "coverage_checked": self._coverage_checked,
             "supports": self.supports.state(),
             "loads": self.loads.state(),
@@ -372,7 +341,7 @@ class Configuration:
         self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
         self.removed = np.reshape(state["removed"], 2)
         self._coverage_checked, self.begun = state["coverage_checked"], True
-        self._travel, self._latest = state["travel"], state["latest"]
+        self._travel.cells, self._latest = state["travel"], state["latest"]
         self.inputs.restore(state["inputs"])
         self.supports.restore(state["supports"])
         self.loads.restore(state["loads"])

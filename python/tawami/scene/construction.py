@@ -16,8 +16,8 @@ from tawami import _rust
 from tawami.base import checks, ranks
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import InputError
-from tawami.particles import placement
-from tawami.particles.numpy_law import NumpyLaw
+from tawami.particles import assignment, placement
+from tawami.particles.assignment import Law
 from tawami.scene import selection
 from tawami.scene.configuration import Configuration
 from tawami.scene.domain import Domain
@@ -75,7 +75,7 @@ class Construction:
         chosen = selection.numbers(now.domain, "remove(...): where", where)
         return _remove(now, np.isin(now.domain.particles.number, chosen))
 
-    def change_material(self, where: Where, material: _rust.Material | NumpyLaw) -> None:
+    def change_material(self, where: Where, material: Law) -> None:
         """Replace the material law of particles.
 
         Stress and density stay. A law of the same name keeps its history variables; those of another
@@ -85,7 +85,7 @@ class Construction:
 
         Args:
             where: The particles, as in `load`.
-            material: Their new law. A `NumpyLaw` can only replace another one, for all particles.
+            material: Their new law.
 
         Raises:
             InputError: No particle, a law that does not fit the form, or a call from within a step;
@@ -162,30 +162,18 @@ def _replace(now: Configuration, after: Domain) -> None:
     now.loads.changed()
 
 
-def _change_material(
-    now: Configuration, mask: Mask, material: _rust.Material | NumpyLaw, number: int
-) -> None:
+def _change_material(now: Configuration, mask: Mask, material: Law, number: int) -> None:
     """Replace the law of particles of this rank, given a mask and a number of one of all ranks."""
     model, particles = now.model, now.domain.particles
-    law: NumpyLaw | None
-    if isinstance(material, NumpyLaw):
-        law, new = material, material.elastic()
-    elif isinstance(material, _rust.Material):
-        law, new = None, material
-    else:
+    if not isinstance(material, Law):
         raise InputError(
             f"change_material(...): material = {checks.shown(material)}: expected a material as "
             "linear_elastic(...) makes it, or a NumpyLaw"
         )
-    every = not ranks.any_of(model.grid.comm, np.array([not mask.all()]))[0]
-    if (law is None) != (model.law is None) or (law is not None and not every):
-        raise InputError(
-            "change_material(...): a NumpyLaw is the law of all particles: expected another NumpyLaw "
-            "for all of them, in a scene that was made with one"
-        )
-    materials, of, numbers = _renumbered(model, np.asarray(particles.material), mask, new)
+    [new] = assignment.materials_of([material])
+    laws, of, numbers = _renumbered(model, np.asarray(particles.material), mask, material)
     changed = _with_numbers(model, particles, numbers, mask, new)
-    other = with_laws(model, changed, materials, of, law, now.numerics.assembly)
+    other = with_laws(model, changed, laws, of, now.numerics.assembly)
     after = Domain.attach(other, changed, now.domain.location, now.numerics, now.stopwatch)
     warn_of_locking(model.grid, model.form, new.bulk_modulus / new.shear_modulus, number)
     _replace(now, after)
@@ -193,24 +181,24 @@ def _change_material(
 
 
 def _renumbered(
-    model: Model, number: Any, mask: Mask, material: _rust.Material
-) -> tuple[list[_rust.Material], list[int], Any]:
-    """The materials with a new one for some particles, the old number of each, and those of particles.
+    model: Model, number: Any, mask: Mask, law: Law
+) -> tuple[list[Law], list[int], Any]:
+    """The laws with a new one for some particles, the old number of each, and those of particles.
 
-    A material that no particle keeps is replaced; else the new one is added.
+    A law that no particle keeps is replaced; else the new one is added.
     """
-    count = len(model.materials)
+    count = len(model.given)
     sums = np.array([np.bincount(number[m], minlength=count) for m in (mask, ~mask)])
     chosen, kept = ranks.sum_of(model.grid.comm, sums)
-    materials, of, numbers = list(model.materials), list(range(count)), number.copy()
+    laws, of, numbers = list(model.given), list(range(count)), number.copy()
     for old in np.flatnonzero(chosen):
         if kept[old]:
-            numbers[mask & (number == old)] = len(materials)
-            materials.append(material)
+            numbers[mask & (number == old)] = len(laws)
+            laws.append(law)
             of.append(int(old))
         else:
-            materials[old] = material
-    return materials, of, numbers
+            laws[old] = law
+    return laws, of, numbers
 
 
 def _with_numbers(

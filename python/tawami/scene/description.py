@@ -80,9 +80,9 @@ def _not_modelled(now: Configuration, motion: str) -> Iterator[str]:
         yield f"inertia (Dynamics(scene){density})"
     if not form.strain.finite:
         yield f"finite strain (form='{STRAIN_MEASURES['finite'].mixed_form}')"
-    if not now.domain.particles.history_names and model.law is None:
-        yield "plasticity (von_mises(...), drucker_prager(...), mohr_coulomb(...))"
-    if form.no_volume:
+    if model.without_history.all():
+        yield "plasticity (von_mises(...), drucker_prager(...), mohr_coulomb(...), cam_clay(...))"
+    if form.volume_field is None:
         yield f"a field for the volume (form='{form.strain.mixed_form}')"
     if model.options.get("ghost_penalty") == "off":
         yield "ghost penalty (ghost_penalty='on')"

@@ -21,7 +21,8 @@ from tawami.field.reference import ReferenceAssembly
 from tawami.field.tractions import Tractions
 from tawami.form.kinematics import KINEMATICS, Kinematics
 from tawami.grid.basis import Basis
-from tawami.particles.numpy_law import NumpyStage
+from tawami.particles import assignment
+from tawami.particles.numpy_stage import NumpyStage
 from tawami.particles.responses import Responses
 from tawami.particles.values import ParticleValues
 from tawami.scene.model import Model
@@ -224,4 +225,7 @@ def _stage(
     model: Model, particles: _rust.Particles, location: _rust.Location, kinematics: Kinematics
 ) -> _rust.Stage | NumpyStage:
     rust = _rust_stage(model, particles, location, kinematics, model.materials)
-    return rust if model.law is None else NumpyStage(rust, particles, model.law, kinematics)
+    laws = assignment.in_numpy(model.given)
+    if not laws:
+        return rust
+    return NumpyStage(rust, particles, laws, kinematics, finite=model.form.strain.finite)

@@ -11,7 +11,6 @@ from tawami.base import checks, ranks
 from tawami.base.errors import InputError
 from tawami.base.sealed import Settings
 from tawami.base.text import meant, quoted
-from tawami.form.form import UNIT
 from tawami.scene import sources
 from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor
@@ -39,7 +38,7 @@ class FormInputs:
     def parameters(self) -> Settings[float]:
         """Present values of the parameters that are numbers."""
         known = {n: v for n, v in self._values.items() if n in self._numbers}
-        return Settings(known, "expected scene.parameter('alpha', ...), between two steps")
+        return Settings(known, "expected scene.parameter(name, value), between two steps")
 
     def begin(self, model: Model, domain: Domain) -> None:
         """Give the particles of a new scene the parameters with one number each."""
@@ -56,8 +55,7 @@ class FormInputs:
                 f"data({checks.shown(name)}, ...): form {self._form.name} declares no such data: "
                 f"expected one of {known}{meant(str(name), declared)}"
             )
-        match = UNIT.search(declared[name])
-        unit = match.group(1) if match else ""
+        unit = self._form.data_unit(name)
         with ranks.raise_together(domain.model.grid.comm):
             found = sources.values(domain, name, source, "value", unit)
         domain.particles.carry(name, 1)

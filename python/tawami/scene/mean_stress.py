@@ -25,11 +25,30 @@ from tawami.scene.least_squares import least_squares
 TRAVEL = 0.1
 
 
-def travel(domain: Domain, moved: Array) -> float:
-    """Root mean square of the distances to new positions, in cells; a call for all ranks."""
-    squares = ((moved - domain.particles.x) ** 2).sum(axis=1) / domain.model.grid.h**2
-    sums = ranks.sum_of(domain.model.grid.comm, np.array([squares.sum(), len(squares)]))
-    return float(np.sqrt(sums[0] / max(sums[1], 1.0)))
+class Travel:
+    """Distance of the particles since the last projection.
+
+    Attributes:
+        cells: Sum over the steps of the root mean square of the distances [cells].
+    """
+
+    def __init__(self) -> None:
+        self.cells = 0.0
+
+    def must_project(self, domain: Domain, moved: Array) -> bool:
+        """Add the way to new positions, and whether the mean stress must be projected there.
+
+        A call for all ranks.
+        """
+        if not domain.model.form.kinematics.has_eps_v:
+            return False
+        squares = ((moved - domain.particles.x) ** 2).sum(axis=1) / domain.model.grid.h**2
+        sums = ranks.sum_of(domain.model.grid.comm, np.array([squares.sum(), len(squares)]))
+        self.cells += float(np.sqrt(sums[0] / max(sums[1], 1.0)))
+        if self.cells <= TRAVEL:
+            return False
+        self.cells = 0.0
+        return True
 
 
 def project(domain: Domain) -> float:

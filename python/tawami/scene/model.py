@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
@@ -26,7 +27,7 @@ from tawami.form.symbols import Assembly
 from tawami.grid.basis import BASES, Basis
 from tawami.grid.grid import Grid
 from tawami.particles import assignment
-from tawami.particles.numpy_law import NumpyLaw
+from tawami.particles.assignment import Law
 from tawami.scene.parameters import by_kind
 
 Array = npt.NDArray[np.float64]
@@ -56,9 +57,7 @@ class Model:
         in_time: Parameters that are functions of time [s].
         in_space: Sources of the parameters that are numbers of each particle.
         options: Choices that the form offers.
-        materials: The material laws.
-        law: The law in NumPy, if that is what the scene has; `materials` then holds the elastic law
-            with the same moduli.
+        given: The material laws, in Rust or in NumPy.
         density: Of each material [kg/m3]; None if the scene has no mass.
         names: Name of the group of each material; empty if the body has no names.
         leaving: 'stop' or 'remove', for particles that leave the grid.
@@ -74,8 +73,7 @@ class Model:
     in_time: Mapping[str, Callable[[float], float]]
     in_space: Mapping[str, Any]
     options: Settings[str]
-    materials: Sequence[_rust.Material]
-    law: NumpyLaw | None
+    given: Sequence[Law]
     density: Array | None
     names: tuple[str, ...]
     leaving: Leaving
@@ -91,6 +89,11 @@ class Model:
         """Whether particles move with the body: strains are finite and each step resets the grid."""
         return self.form.strain.finite
 
+    @cached_property
+    def materials(self) -> list[_rust.Material]:
+        """The laws as the Rust part knows them: name, moduli, history variables."""
+        return assignment.materials_of(self.given)
+
     @property
     def moduli(self) -> Array:
         """K and mu [Pa] of each material, materials x 2."""
@@ -98,14 +101,13 @@ class Model:
 
     @property
     def without_history(self) -> npt.NDArray[np.bool_]:
-        """Whether each material is elastic: its law has no history variables."""
-        return np.array([self.law is None and not m.history_names for m in self.materials])
+        """Whether each material is elastic: a law in Rust that has no history variables."""
+        laws = zip(self.given, self.materials, strict=True)
+        return np.array([given is m and not m.history_names for given, m in laws])
 
     @property
     def laws(self) -> list[str]:
         """Names of the laws, each with its history variables."""
-        if self.law is not None:
-            return ["NumpyLaw"]
         histories = [(m.name, ", ".join(m.history_names)) for m in self.materials]
         return [f"{name} ({history})" if history else name for name, history in histories]
 
@@ -142,7 +144,7 @@ class Model:
 
     def identity(self) -> dict[str, Any]:
         """Facts that identify the model, for checkpoints."""
-        laws = [] if self.law is None else [self.law.identity()]
+        laws = [law.identity() for law in assignment.in_numpy(self.given).values()]
         return (
             self.grid.identity()
             | self.form.identity()
@@ -190,29 +192,25 @@ def build(
     values, options = loaded.settings(numbers, static=density is None, others=KEYWORDS)
     for message in [] if grid.comm.rank else loaded.unusual(values):
         warn(message, ParameterWarning)
-    particles, materials, law = _particles(body, material, material_of, loaded)
+    particles, laws = _particles(body, material, material_of, loaded)
+    materials = assignment.materials_of(laws)
     densities = assignment.densities(density, len(materials), body.names)
-    if loaded.strain.finite and law is not None:
-        raise InputError(
-            f"form {loaded.name} has finite strains: expected a law in Rust; a NumpyLaw works at "
-            "small strain only"
-        )
     ratios = np.array([m.bulk_modulus / m.shear_modulus for m in materials])[particles.material]
     warn_of_locking(grid, loaded, float(ratios.max()), int(ratios.argmax()))
-    compiled = _compiled(grid, loaded, options, assembly, materials, law, in_space)
+    compiled = _compiled(grid, loaded, options, assembly, laws, in_space)
     if "rho" in compiled.used and densities is None:
         raise InputError(
             f"form {loaded.name} reads the density rho: expected Scene(..., density=...) [kg/m3]"
         )
     check_used(compiled, options, parameters)
-    _check_plastic_volume(compiled, materials, law, particles)
+    _check_plastic_volume(compiled, laws, particles)
     fixed = "options of the form are fixed when a scene is made: Scene(..., stabilisation=...)"
     changing = {*in_time, *in_space}
     used = {n: value for n, value in values.items() if n in compiled.used and n not in changing}
     model = Model(
         grid, loaded, compiled, basis, values,
         used, in_time, in_space, Settings(options, fixed),
-        materials, law, densities, _names(body, len(materials)), leaving, len(particles),
+        laws, densities, _names(body, len(materials)), leaving, len(particles),
     )  # fmt: skip
     return model, particles
 
@@ -222,12 +220,12 @@ def _compiled(
     form: Form,
     options: Mapping[str, str],
     assembly: Assembly,
-    materials: Sequence[_rust.Material],
-    law: NumpyLaw | None,
+    laws: Sequence[Law],
     in_space: Iterable[str],
 ) -> CompiledForm:
     """The form, with the plastic volume of the laws if any of them may have one."""
-    plastic_volume = law is not None or any(one.pressure_dependent for one in materials)
+    materials = assignment.materials_of(laws)
+    plastic_volume = any(one.pressure_dependent for one in materials)
     histories = [name for one in materials for name in one.history_names]
     return compile_form(
         grid.comm, form, options, assembly, plastic_volume=plastic_volume, space=grid.space,
@@ -238,9 +236,8 @@ def _compiled(
 def with_laws(
     model: Model,
     particles: _rust.Particles,
-    materials: Sequence[_rust.Material],
+    laws: Sequence[Law],
     of: Sequence[int],
-    law: NumpyLaw | None,
     assembly: Assembly,
 ) -> Model:
     """A model with other laws; a call for all ranks.
@@ -248,25 +245,23 @@ def with_laws(
     Args:
         model: The model before.
         particles: The particles of this rank, with the numbers of their new laws.
-        materials: The new laws.
+        laws: The new laws.
         of: Number of the old material of each, whose density and name it has.
-        law: The law in NumPy.
         assembly: As of `Scene`.
 
     Raises:
         InputError: A law that does not fit the form.
     """
-    form = model.form
+    form, materials = model.form, assignment.materials_of(laws)
     with ranks.raise_together(model.grid.comm):
         particles.check_materials(materials, form.kinematics.name, form.strain.finite)
-    compiled = _compiled(model.grid, form, model.options, assembly, materials, law, model.in_space)
+    compiled = _compiled(model.grid, form, model.options, assembly, laws, model.in_space)
     with ranks.raise_together(model.grid.comm):
-        _check_plastic_volume(compiled, materials, law, particles)
+        _check_plastic_volume(compiled, laws, particles)
     return replace(
         model,
         compiled=compiled,
-        materials=materials,
-        law=law,
+        given=laws,
         density=None if model.density is None else model.density[list(of)],
         names=tuple(model.names[k] for k in of) if model.names else (),
     )
@@ -279,20 +274,20 @@ def _names(body: Body, materials: int) -> tuple[str, ...]:
 
 def _particles(
     body: Body, material: assignment.Given, material_of: npt.ArrayLike | None, form: Form
-) -> tuple[_rust.Particles, list[_rust.Material], NumpyLaw | None]:
+) -> tuple[_rust.Particles, list[Law]]:
     """All particles of the body with their materials and history variables."""
     x, volume = checks.array("x", body.x, 2), checks.array("volume", body.volume, 1)
     assigned = assignment.assigned(material, material_of, body, len(x))
     particles = _rust.Particles(x, volume, assigned.number)
-    particles.check_materials(assigned.materials, form.kinematics.name, form.strain.finite)
-    particles.add_history(assigned.materials)
-    return particles, assigned.materials, assigned.law
+    materials = assignment.materials_of(assigned.laws)
+    particles.check_materials(materials, form.kinematics.name, form.strain.finite)
+    particles.add_history(materials)
+    return particles, assigned.laws
 
 
 def _check_plastic_volume(
     compiled: CompiledForm,
-    materials: Sequence[_rust.Material],
-    law: NumpyLaw | None,
+    laws: Sequence[Law],
     particles: _rust.Particles,
 ) -> None:
     """Check that the form has the plastic volume of the laws in its volume equation.
@@ -303,10 +298,11 @@ def _check_plastic_volume(
     form = compiled.form
     if not form.kinematics.has_mean_stress or compiled.names("eps_p"):
         return
-    dilates = np.array([law is not None or one.pressure_dependent for one in materials])
+    dilates = np.array([one.pressure_dependent for one in assignment.materials_of(laws)])
     bad = np.flatnonzero(dilates[particles.material])
     if len(bad):
-        why = "is a NumpyLaw" if law is not None else "depends on the mean stress"
+        own = laws[particles.material[bad[0]]]
+        why = "depends on the mean stress" if isinstance(own, _rust.Material) else f"is {own.name}"
         raise InputError(
             f"the law of particle {particles.number[bad[0]]} {why}, so that its flow may change the "
             f"volume, and form {form.name} has no term for that: expected eps_p in its volume equation, "

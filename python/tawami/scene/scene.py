@@ -50,8 +50,8 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         grid: The background grid.
         body: Positions and volumes of the particles, as `box(...)` or `Body(x, volume)`; the same on
             every rank.
-        material: The material law, or several as a list or, by the names of the body, as a dictionary;
-            or one `NumpyLaw` for all particles.
+        material: The material law, in Rust or a `NumpyLaw`, or several as a list or, by the names of
+            the body, as a dictionary.
         material_of: Number of the law of each particle; that of the body by default, or the first.
         form: Weak form: the name of a shipped one ('u_epsv', 'u_p', 'u_bbar', 'u'), the path of a
             file, a module, or a `Form`.

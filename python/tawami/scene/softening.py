@@ -1,4 +1,4 @@
-"""Whether the law in NumPy of a scene softens, so that results depend on the grid."""
+"""Whether a law in NumPy of a scene softens, so that results depend on the grid."""
 
 from __future__ import annotations
 
@@ -8,14 +8,22 @@ from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import SofteningWarning
 from tawami.base.warn import warn
-from tawami.particles.numpy_law import NumpyStage
+from tawami.particles.numpy_stage import NumpyStage
 from tawami.scene.domain import Domain
 
 #: Eigenvalue, and asymmetry, of a tangent that are ignored, relative to the shear modulus.
 IGNORED = 1e-6
 
 
-def found(domain: Domain, coefficients: Array) -> tuple[int, float] | None:
+def warned(domain: Domain, coefficients: Array) -> bool:
+    """Warn of the particle that softens most, if any does; arguments as of `_found`."""
+    soft = _found(domain, coefficients)
+    if soft is not None:
+        _warn_of(domain, *soft)
+    return soft is not None
+
+
+def _found(domain: Domain, coefficients: Array) -> tuple[int, float] | None:
     """Number of the particle that softens most, and the least eigenvalue of its tangent [Pa].
 
     A tangent without symmetry is ignored: the law may be non-associated. A call for all ranks.
@@ -41,7 +49,7 @@ def found(domain: Domain, coefficients: Array) -> tuple[int, float] | None:
     return int(numbers[least.argmin()]), float(least.min())
 
 
-def warn_of(domain: Domain, number: int, least: float) -> None:
+def _warn_of(domain: Domain, number: int, least: float) -> None:
     """Warn of a particle and the eigenvalue of its tangent."""
     if domain.model.grid.comm.rank:
         return

@@ -12,12 +12,14 @@ from tawami.base import checks
 from tawami.base.errors import CheckpointError, InputError, SupportError
 from tawami.base.identity import text
 from tawami.base.text import listed, quoted
-from tawami.field.constraints import Held, PointHeld, held_edge, held_point
+from tawami.field.constraints import Held, PointHeld
 from tawami.field.reduction import Reduction
+from tawami.form.fields import Field
 from tawami.grid import edges
 from tawami.grid.basis import Basis
 from tawami.grid.edges import Interval, Profile
 from tawami.grid.grid import Edge, Grid
+from tawami.scene import step_values
 from tawami.scene.action import Owner, Term, restored
 from tawami.scene.activity import Activity
 from tawami.scene.contact import ActiveSet
@@ -29,9 +31,6 @@ from tawami.scene.support import Place, Support
 from tawami.scene.walls import Wall, checked_friction
 
 Array = npt.NDArray[np.float64]
-#: Fields without a role at the start of a step, on all coefficients, and the factor of each value that
-#: is prescribed for them at its end.
-Fields = tuple[Array, Callable[[Term], float]]
 
 
 class Supports(Owner[Support]):
@@ -40,7 +39,7 @@ class Supports(Owner[Support]):
     Args:
         grid: The grid.
         basis: Basis of the displacement.
-        fields: Units of the fields without a role, by name.
+        fields: The fields without a role.
         activity: Time and activity of the scene.
 
     Attributes:
@@ -50,7 +49,7 @@ class Supports(Owner[Support]):
     """
 
     def __init__(
-        self, grid: Grid, basis: Basis, fields: Mapping[str, str], activity: Activity
+        self, grid: Grid, basis: Basis, fields: Mapping[str, Field], activity: Activity
     ) -> None:
         super().__init__(activity)
         self.grid, self.basis, self._fields = grid, basis, fields
@@ -113,7 +112,7 @@ class Supports(Owner[Support]):
                 raise InputError(f"{where}: expected a value or a velocity, not both")
             value = 1.0
         factor = Factor(where, amplitude, velocity, time=self.activity.time)
-        unit = self._fields[axis] if isinstance(axis, str) else "m"
+        unit = self._fields[axis].unit if isinstance(axis, str) else "m"
         support = Support(self, place, axis, unit, value, factor, between)
         self.all.append(support)
         return support
@@ -178,7 +177,7 @@ class Supports(Owner[Support]):
         before: Array,
         *,
         moving: bool,
-        fields: Fields | None = None,
+        fields: step_values.Fields | None = None,
     ) -> tuple[Reduction, ActiveSet]:
         """Unknowns that the supports leave free, and the walls in their present states.
 
@@ -203,12 +202,12 @@ class Supports(Owner[Support]):
         )
         for support in self.all:
             if isinstance(support.component, str):
-                held.append(self._of_field(domain, support, start, fields))
+                held.append(step_values.of_field(domain, support, start, fields))
             elif isinstance(support.place, str):
-                if not (moving and not support.moves and self._is_left(domain, support)):
-                    held.append(self._on_edge(domain, support, amount))
+                if not (moving and not support.moves and step_values.is_left(domain, support)):
+                    held.append(step_values.on_edge(domain, support, amount))
             else:
-                points.append(self._at_point(domain, support, amount))
+                points.append(step_values.at_point(domain, support, amount))
         fixed = np.zeros(layout.size, dtype=bool)
         for edge in held:
             fixed[edge.indices] = True
@@ -222,47 +221,6 @@ class Supports(Owner[Support]):
         contact = ActiveSet(self.walls, prescribed)
         return Reduction(layout, held, points, start, moving=moving), contact
 
-    def _of_field(
-        self, domain: Domain, support: Support, start: Array, fields: Fields | None
-    ) -> Held:
-        """Prescribed values of a field, counted as the coefficients at the start."""
-        old, amount = fields or (start, lambda _: 0.0)
-        held = self._on_edge(domain, support, amount)
-        at_start = start[held.indices]
-        increments = held.values - old[held.indices] if fields else np.zeros_like(at_start)
-        return Held(held.indices, at_start + increments, held.where)
-
-    def _is_left(self, domain: Domain, support: Support) -> bool:
-        """Whether no cell along the support's edge holds particles."""
-        assert isinstance(support.place, str)
-        part = edges.cells_between(self.grid, support.place, support.between)
-        return not part[domain.tractions.cells(support.place)].any()
-
-    def _on_edge(self, domain: Domain, support: Support, amount: Callable[[Term], float]) -> Held:
-        assert isinstance(support.place, str)
-        indices, values = np.empty(0, dtype=np.int64), np.zeros(1)
-        places = domain.layout.fields
-        place, component = next(iter(places.values())), support.component
-        if isinstance(component, str):
-            place, component = places[component], 0
-        for term in support.terms:
-            edge = held_edge(
-                self.grid, place, domain.active, support.place, component, term.values[0],
-                support.between,
-            )  # fmt: skip
-            indices, values = edge.indices, values + amount(term) * edge.values
-        return Held(indices, values, support.line)
-
-    def _at_point(
-        self, domain: Domain, support: Support, amount: Callable[[Term], float]
-    ) -> PointHeld:
-        assert not isinstance(support.place, str)
-        assert not isinstance(support.component, str)
-        return held_point(
-            self.grid, self.basis, domain.active, support.place, support.component,
-            _total(support, amount), domain.layout.active,
-        )  # fmt: skip
-
     def check_reach(self, before: Domain, after: Domain) -> None:
         """Check that supports still hold something once particles were removed; a call for all ranks.
 
@@ -274,7 +232,9 @@ class Supports(Owner[Support]):
         """
         for support in self.all:
             if isinstance(support.place, str):
-                lost = self._is_left(after, support) and not self._is_left(before, support)
+                lost = step_values.is_left(after, support) and not step_values.is_left(
+                    before, support
+                )
             else:
                 lost = not is_in_body(after, support.place)
             if lost:
@@ -304,7 +264,7 @@ class Supports(Owner[Support]):
                 isinstance(support.place, str)
                 and self.grid.edge(support.place)[0] == support.component
             ):
-                crossings[number] = support.crossing + _total(support, amount)
+                crossings[number] = support.crossing + step_values.total(support, amount)
                 profiled = any(callable(term.values[0]) for term in support.terms)
                 if abs(crossings[number]) > 0.25 * self.grid.h and not profiled:
                     raise InputError(
@@ -381,9 +341,3 @@ class Supports(Owner[Support]):
         for wall, values in zip(self.walls, state["walls"], strict=True):
             wall.restore(values)
         self.changed()
-
-
-def _total(support: Support, amount: Callable[[Term], float]) -> float:
-    """A prescribed displacement [m], with 1 for each function of position."""
-    values = ((1.0 if callable(v) else v, amount(t)) for t in support.terms for v in t.values)
-    return sum(value * factor for value, factor in values)
