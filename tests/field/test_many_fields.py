@@ -229,6 +229,21 @@ def test_the_message_of_a_step_names_the_field():
         scene.solve()
 
 
+def test_a_field_without_stiffness_is_named():
+    def residual(u, p, w, r, sigma, sum_p, source):
+        return sum_p(sigma, grad(w)) + sum_p(dot(grad(p), grad(r)) - source * r)
+
+    fields = {"u": vector("w"), "p": scalar("r")}
+    form = Form(fields, residual, parameters={"source": {"default": 1.0}})
+    grid = grid_of()
+    body = tawami.box(grid, grid.origin, grid.upper)
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.2), form=form)
+    scene.fix("bottom", "x")
+    scene.fix("bottom", "y")
+    with pytest.raises(tawami.SingularError, match=r"\d\) with \d+ particles in field 'p'"):
+        scene.solve()
+
+
 def test_too_many_fields_are_rejected():
     def residual(u, w, sigma, sum_p, p0, q0, p1, q1, p2, q2, p3, q3, p4, q4, p5, q5):
         extra = p0 * q0 + p1 * q1 + p2 * q2 + p3 * q3 + p4 * q4 + p5 * q5
