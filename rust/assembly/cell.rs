@@ -5,7 +5,7 @@ use crate::grid::{extraction, Basis, Functions, Location};
 use crate::space::{number_of, Index, Point, DIM, FUNCTIONS, NODES, NODES_1D, VERTICES};
 
 /// Coordinates of a vertex that a kernel reads, also in the plane.
-const COORDINATES: usize = 3;
+pub(super) const COORDINATES: usize = 3;
 
 /// Degrees of freedom of the displacement alone, and with one linear field.
 const DISPLACEMENT: usize = DIM * NODES;
@@ -186,8 +186,7 @@ impl Cells {
         &self.vertices
     }
 
-    /// Vertices of a cell relative to its corner. No form names the position, and far from the origin the
-    /// size of the cell would be rounded.
+    /// Vertices of a cell relative to its corner. Far from the origin the size of the cell would be rounded.
     pub(super) fn vertices(&self, h: f64) -> Vertices {
         let mut x = [0.0; COORDINATES * VERTICES];
         for (vertex, x) in self.vertices.iter().zip(x.chunks_exact_mut(COORDINATES)) {
