@@ -145,7 +145,7 @@ ELASTIC = tawami.linear_elastic(E=1e3, nu=0.3)
 FRICTION = {"phi": 30.0, "c": 1.0, "psi": 0.0, "eps_v_max": math.inf, "tiny_angle": False}
 
 
-def law(strain: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def law(strain: np.ndarray, stress: np.ndarray, history: Any = None) -> tuple[Any, Any]:
     return stress + strain, np.tile(np.eye(4), (len(strain), 1, 1))
 
 
@@ -261,7 +261,7 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "von_mises": (tawami.von_mises, {"elastic": ELASTIC, "yield_stress": 1.0, "hardening": 0.0}),
     "drucker_prager": (tawami.drucker_prager, {"elastic": ELASTIC, **FRICTION}),
     "mohr_coulomb": (tawami.mohr_coulomb, {"elastic": ELASTIC, **FRICTION}),
-    "NumpyLaw": (tawami.NumpyLaw, {"respond": law, "K": 1.0, "mu": 1.0}),
+    "NumpyLaw": (tawami.NumpyLaw, {"respond": law, "K": 1.0, "mu": 1.0, "history": ("kappa",)}),
     "Form": (lambda **a: scene_of(form=tawami.Form(**a)), {
         "fields": {"u": ("displacement", "w")}, "kinematics": "displacement", "residual": residual,
         "parameters": {}, "options": {}, "strain": "small", "whole_cells": (), "name": "own"}),

@@ -155,6 +155,15 @@ def test_wrong_moduli_are_rejected(bulk, mu):
         tawami.NumpyLaw(elastic, bulk, mu)
 
 
+def test_a_function_of_other_arguments_is_rejected():
+    with pytest.raises(
+        tawami.InputError, match=r"takes \(strain, stress\): expected .*stress, history"
+    ):
+        tawami.NumpyLaw(elastic, K, MU, history=("kappa",))
+    with pytest.raises(tawami.InputError, match="stress; with history variables NumpyLaw"):
+        tawami.NumpyLaw(NUMPY.respond, K, MU)
+
+
 @pytest.mark.parametrize(
     ("history", "message"),
     [
@@ -168,8 +177,8 @@ def test_wrong_moduli_are_rejected(bulk, mu):
 )
 def test_wrong_names_of_history_variables_are_rejected(history, message):
     with pytest.raises(tawami.InputError, match=message):
-        tawami.NumpyLaw(elastic, K, MU, history)
-    tawami.NumpyLaw(elastic, K, MU, history=("plastic_strain",))  # the advice
+        tawami.NumpyLaw(NUMPY.respond, K, MU, history)
+    tawami.NumpyLaw(NUMPY.respond, K, MU, history=("plastic_strain",))  # the advice
 
 
 @pytest.mark.parametrize(
