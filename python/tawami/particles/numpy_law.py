@@ -64,8 +64,8 @@ class NumpyLaw:
 
     Without a tangent, its derivatives are central differences: each evaluation calls `respond` 9 times
     instead of once, and the scene warns of it (`TangentWarning`). A form with a field for the mean
-    stress finds the volume at which the law has that mean stress: this takes 1 call in each iteration, and
-    3 without a tangent. The response of a particle must not depend on the other particles.
+    stress finds the volume at which the law has that mean stress: this takes 1 call in each iteration,
+    and 3 without a tangent. The response of a particle must not depend on the other particles.
 
     Args:
         respond: The function.
