@@ -26,6 +26,7 @@ from tawami.form.form import Form
 E, NU, RHO, G = 1e6, 0.3, 1000.0, -9.81  # [Pa], [-], [kg/m3], [m/s2]
 PRESSED, CELL = 0.01, 0.25  # [m], [m]
 STEP = 1e-3  # [s]
+CLAY = {"M": 1.0, "lambda_star": 0.1, "kappa_star": 0.02, "preconsolidation": 1e4}
 TIMES = ("static", "dynamic")
 #: Forms with their options, and bases.
 FORMS: dict[str, dict[str, Any]] = {
@@ -67,6 +68,7 @@ LAWS: dict[str, Callable[[], Any]] = {
     "von_mises": lambda: tawami.von_mises(_elastic(), yield_stress=2e3),
     "drucker_prager": lambda: tawami.drucker_prager(_elastic(), phi=30.0, c=1e3),
     "mohr_coulomb": lambda: tawami.mohr_coulomb(_elastic(), phi=30.0, c=1e3),
+    "cam_clay": lambda: tawami.cam_clay(_elastic(), **CLAY),
     "neo_hookean": lambda: tawami.neo_hookean(E=E, nu=NU),
     "NumpyLaw": _numpy_law,
 }
@@ -151,7 +153,7 @@ def _positions(scene: tawami.Scene) -> Any:
 
 
 def _check_flow(scene: tawami.Scene, law: str) -> None:
-    if law in ("von_mises", "drucker_prager", "mohr_coulomb"):
+    if law in ("von_mises", "drucker_prager", "mohr_coulomb", "cam_clay"):
         flowed = float(np.max(scene.particles.history("plastic_strain"), initial=0.0))
         assert MPI.COMM_WORLD.allreduce(flowed, op=MPI.MAX) > 0, law
 

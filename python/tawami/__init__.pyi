@@ -44,6 +44,7 @@ from tawami.motion.modes import Modes, modes
 from tawami.motion.path import follow
 from tawami.motion.stepping import ramp, settle
 from tawami.particles.laws import (
+    cam_clay,
     drucker_prager,
     law,
     linear_elastic,
@@ -107,6 +108,7 @@ __all__ = [
     "TawamiError",
     "TawamiWarning",
     "box",
+    "cam_clay",
     "check_form",
     "disc",
     "drucker_prager",

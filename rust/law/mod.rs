@@ -30,6 +30,7 @@ laws! {
     von_mises::VonMises,
     drucker_prager::DruckerPrager,
     mohr_coulomb::MohrCoulomb,
+    cam_clay::CamClay,
 }
 
 /// A law, shared by the particles that have it.

@@ -261,6 +261,9 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "von_mises": (tawami.von_mises, {"elastic": ELASTIC, "yield_stress": 1.0, "hardening": 0.0}),
     "drucker_prager": (tawami.drucker_prager, {"elastic": ELASTIC, **FRICTION}),
     "mohr_coulomb": (tawami.mohr_coulomb, {"elastic": ELASTIC, **FRICTION}),
+    "cam_clay": (tawami.cam_clay, {
+        "elastic": ELASTIC, "M": 1.0, "lambda_star": 0.2, "kappa_star": 0.05,
+        "preconsolidation": 0.1, "tension": 1e-3}),
     "NumpyLaw": (tawami.NumpyLaw, {"respond": law, "K": 1.0, "mu": 1.0, "history": ("kappa",)}),
     "Form": (lambda **a: scene_of(form=tawami.Form(**a)), {
         "fields": {"u": ("displacement", "w")}, "kinematics": "displacement", "residual": residual,

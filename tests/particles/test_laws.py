@@ -20,6 +20,12 @@ ELASTIC = tawami.linear_elastic(E=1e6, nu=0.3)
             tawami.mohr_coulomb(ELASTIC, phi=30.0, psi=5.0),
         ),
         (
+            tawami.law(
+                "cam_clay", ELASTIC, M=1.0, lambda_star=0.2, kappa_star=0, preconsolidation=2.0
+            ),
+            tawami.cam_clay(ELASTIC, M=1.0, lambda_star=0.2, kappa_star=0, preconsolidation=2.0),
+        ),
+        (
             tawami.law("drucker_prager", ELASTIC, phi=1.0, tiny_angle=True, c=1.0),
             tawami.drucker_prager(ELASTIC, phi=1.0, c=1.0, tiny_angle=True),
         ),

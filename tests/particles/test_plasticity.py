@@ -53,6 +53,7 @@ def test_the_tangent_is_the_difference_of_the_residual(options, path):
         tawami.drucker_prager(ELASTIC, phi=30.0, c=0.2, psi=10.0),
         tawami.mohr_coulomb(ELASTIC, phi=30.0, c=0.2, psi=10.0),
         tawami.mohr_coulomb(ELASTIC, phi=0.0, c=0.2),
+        tawami.cam_clay(ELASTIC, M=1.0, lambda_star=0.1, kappa_star=0.02, preconsolidation=0.4),
     ]
     body = tawami.Body(x, np.full(80, 0.05))
     numbers = random.integers(0, len(laws), 80)

@@ -46,6 +46,9 @@ LAWS = [
     tawami.von_mises(ELASTIC, yield_stress=300.0, hardening=1e3),
     tawami.drucker_prager(ELASTIC, **FRICTION),
     tawami.mohr_coulomb(ELASTIC, **FRICTION),
+    tawami.cam_clay(
+        ELASTIC, M=1.0, lambda_star=0.2, kappa_star=0.05, preconsolidation=1e3, tension=0.5
+    ),
 ]
 
 

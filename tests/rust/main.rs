@@ -4,6 +4,7 @@ mod active;
 mod at_mean;
 mod basis;
 mod border;
+mod cam_clay;
 mod hencky;
 mod linear_elastic;
 mod location;

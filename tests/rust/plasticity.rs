@@ -43,6 +43,7 @@ pub fn laws() -> Vec<Box<dyn Law>> {
         Box::new(VonMises::new(elastic(), 0.5, 0.7).unwrap()),
     ];
     laws.extend(frictions.into_iter().flat_map(|f| frictional(elastic(), f)));
+    laws.push(Box::new(super::cam_clay::clay()));
     laws
 }
 
@@ -106,8 +107,10 @@ fn limit_shear(law: &dyn Law) -> f64 {
     0.5 * (stress.deviator[0] - stress.deviator[1])
 }
 
-fn history_of(law: &dyn Law) -> Vec<f64> {
-    vec![0.01; law.history().len()]
+/// Some history; for Cam-Clay p_c is between the stresses of the tests.
+pub fn history_of(law: &dyn Law) -> Vec<f64> {
+    let value = |name: &&str| if *name == "preconsolidation" { 0.5 } else { 0.01 };
+    law.history().iter().map(value).collect()
 }
 
 prop_compose! {
@@ -242,7 +245,12 @@ fn parameters_out_of_range_are_named() {
 fn makers_have_the_names_of_their_laws() {
     let elastic = tawami::law::LinearElastic::from_k_mu(2.0, 1.0).unwrap();
     for maker in tawami::law::LAWS {
-        let law = (maker.make)(elastic, &[30.0, 1.0, 0.0, 1.0, 0.0]).unwrap();
+        let given = if maker.name == "cam_clay" {
+            [1.0, 0.2, 0.05, 1.0, 1e-3]
+        } else {
+            [30.0, 1.0, 0.0, 1.0, 0.0]
+        };
+        let law = (maker.make)(elastic, &given).unwrap();
         assert_eq!(law.name(), maker.name);
         assert_eq!(tawami::law::LAWS.iter().filter(|other| other.name == law.name()).count(), 1);
     }

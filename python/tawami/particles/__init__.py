@@ -1,6 +1,7 @@
 """Particles: their material laws, their cells and ranks, and their responses to an increment."""
 
 from tawami.particles.laws import (
+    cam_clay,
     drucker_prager,
     law,
     linear_elastic,
@@ -14,6 +15,7 @@ from tawami.particles.responses import Responses
 __all__ = [
     "NumpyLaw",
     "Responses",
+    "cam_clay",
     "drucker_prager",
     "law",
     "linear_elastic",

@@ -143,6 +143,42 @@ def mohr_coulomb(
     return law("mohr_coulomb", elastic, c=c, eps_v_max=eps_v_max, **angles)
 
 
+def cam_clay(
+    elastic: _rust.Material,
+    *,
+    M: float,
+    lambda_star: float,
+    kappa_star: float,
+    preconsolidation: float,
+    tension: float = 0.01,
+) -> _rust.Material:
+    """Modified Cam-Clay: `q^2 / M^2 + (p + p_t) (p - p_c) <= 0`, associated flow.
+
+    p is the mean stress, compression positive, q = sqrt(3/2 s : s), p_t = tension * preconsolidation.
+    With plastic compression v, d ln p_c = d v / (lambda_star - kappa_star) (Roscoe and Burland 1968;
+    Butterfield 1979). Dry of critical, 2 p < p_c - p_t, the clay softens: results depend on the grid.
+
+    Args:
+        elastic: Elastic part, a material of linear_elastic(...) with nu < 0.5. K and mu are constant:
+            kappa_star occurs only in the difference to lambda_star. K = p / kappa_star at the pressure p
+            where both should agree.
+        M: Slope q / p of the critical state line.
+        lambda_star: Slope - d ln(volume) / d ln p of virgin compression.
+        kappa_star: The same slope of swelling, smaller than lambda_star.
+        preconsolidation: p_c [Pa] of particles that scene.initial("preconsolidation", ...) gave none.
+        tension: Isotropic tensile strength as a share of preconsolidation, above 0 and at most 1. With a
+            small share, mixed forms need more iterations where the clay opens.
+
+    History: `preconsolidation`, p_c [Pa], where 0 stands for the parameter; `plastic_strain`, the sum of
+    sqrt(2/3 e : e) over the steps, e the plastic deviatoric strain of a step.
+
+    Raises:
+        InputError: A parameter is out of its range.
+    """
+    slopes = {"M": M, "lambda_star": lambda_star, "kappa_star": kappa_star}
+    return law("cam_clay", elastic, preconsolidation=preconsolidation, tension=tension, **slopes)
+
+
 def law(name: str, elastic: _rust.Material, **parameters: float) -> _rust.Material:
     """A law by its name: how a driver script uses a law that was added in Rust.
 

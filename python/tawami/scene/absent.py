@@ -11,7 +11,7 @@ INERTIA = (
     "needs Scene(..., density=...)"
 )
 HISTORY = (
-    "a history variable of plastic laws, as von_mises(...), drucker_prager(...) or mohr_coulomb(...): "
+    "a history variable of plastic laws, as von_mises(...), mohr_coulomb(...) or cam_clay(...): "
     "expected scene.particles.history('plastic_strain')"
 )
 GRADIENT = (

@@ -83,7 +83,7 @@ def _not_modelled(now: Configuration, motion: str) -> Iterator[str]:
     if not form.strain.finite:
         yield f"finite strain (form='{STRAIN_MEASURES['finite'].mixed_form}')"
     if model.without_history.all():
-        yield "plasticity (von_mises(...), drucker_prager(...), mohr_coulomb(...))"
+        yield "plasticity (von_mises(...), drucker_prager(...), mohr_coulomb(...), cam_clay(...))"
     if len(form.fields) == 1:
         yield f"a field for the volume (form='{form.strain.mixed_form}')"
     if model.options.get("ghost_penalty") == "off":

@@ -44,10 +44,10 @@ def set_field(now: Configuration, name: str, given: Source, beyond: Beyond) -> N
         found = sources.values(domain, name, given, *COMPONENTS.get(name, ("value", "")))
         if name == "eps_v" and not isinstance(given, Earlier):
             _check_volume(domain, found[:, 0])
-        if name == "plastic_strain" and (found < 0).any():
+        if name in ("plastic_strain", "preconsolidation") and (found < 0).any():
             p = int(found[:, 0].argmin())
             raise InputError(
-                f"plastic_strain of particle {domain.particles.number[p]} is {found[p, 0]:g}: expected "
+                f"{name} of particle {domain.particles.number[p]} is {found[p, 0]:g}: expected "
                 "0 or more"
             )
     array = _array(domain, name)

@@ -158,8 +158,8 @@ PARTICLES = {
     "material": Quantity("material [-]", _stored("material"), nodal=False),
     "number": Quantity("number [-]", _stored("number"), nodal=False),
 }
-#: History variables of the laws of tawami.
-HISTORY = ("plastic_strain", "dilatancy")
+#: History variables of the laws of tawami, and their units.
+HISTORY = {"plastic_strain": "-", "dilatancy": "-", "preconsolidation": "Pa"}
 #: Names, or quantities of the driver script.
 Given = str | Quantity
 
@@ -174,7 +174,7 @@ class Subject(Protocol):
 
 def history(name: str) -> Quantity:
     """The quantity of a history variable."""
-    return Quantity(f"{name} [-]", _stored(name))
+    return Quantity(f"{name} [{HISTORY.get(name, '-')}]", _stored(name))
 
 
 # -- arrays of particles -----------------------------------------------------
