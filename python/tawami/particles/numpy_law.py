@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import keyword
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -71,8 +71,9 @@ class NumpyLaw:
         respond: The function.
         K: Bulk modulus in forms, in the scaling and in the elastic energy [Pa]; finite.
         mu: Shear modulus there [Pa].
-        history: Names of the history variables, at most 8. They are 0 at first; `scene.initial` sets
-            other values, and `scene.particles.history(name)` reads them.
+        history: Names of the history variables, at most 8, or a dictionary with their units, as
+            {"p_c": "Pa"}. They are 0 at first; `scene.initial` sets other values, and
+            `scene.particles.history(name)` reads them.
 
     Raises:
         InputError: K or mu is not a positive, finite number, a name is not possible, or respond takes
@@ -82,7 +83,7 @@ class NumpyLaw:
     respond: WithoutHistory | WithHistory
     K: float
     mu: float
-    history: Sequence[str] = ()
+    history: Sequence[str] | Mapping[str, str] = ()
 
     def __post_init__(self) -> None:
         if not callable(self.respond):
@@ -99,6 +100,12 @@ class NumpyLaw:
         """Name of the law in messages, with that of its function."""
         function = getattr(self.respond, "__name__", type(self.respond).__name__)
         return f"NumpyLaw({str(function).strip('<>')})"
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the history variables."""
+        given = self.history
+        return dict(given) if isinstance(given, Mapping) else dict.fromkeys(given, "-")
 
     def identity(self) -> Any:
         """Facts that identify the law, besides its material, for checkpoints."""
@@ -256,17 +263,17 @@ def _described(value: Any) -> str:
     return checks.shown(value) if shape is None else f"an array of shape {shape}"
 
 
-def _names(law: str, given: Any) -> tuple[str, ...]:
-    """Names of history variables.
+def _names(law: str, given: Any) -> Any:
+    """Names of history variables, or a dictionary with their units.
 
     Raises:
         InputError: They cannot be that.
     """
-    several = isinstance(given, list | tuple) and len(given) <= MOST_VARIABLES
+    several = isinstance(given, list | tuple | dict) and len(given) <= MOST_VARIABLES
     if not several or len(set(map(repr, given))) < len(given):
         raise InputError(
             f"{law}: history = {checks.shown(given)}: expected at most {MOST_VARIABLES} different "
-            "names, as history=('plastic_strain',)"
+            "names, as history=('plastic_strain',), or a dictionary with units, as {'p_c': 'Pa'}"
         )
     for name in given:
         usable = isinstance(name, str) and name.isidentifier() and not keyword.iskeyword(name)
@@ -276,4 +283,11 @@ def _names(law: str, given: Any) -> tuple[str, ...]:
                 f"{law}: history variable {checks.shown(name)}: expected a name of letters, digits and _"
                 f"{why}, as 'plastic_strain'"
             )
-    return tuple(given)
+    if not isinstance(given, dict):
+        return tuple(given)
+    for name, unit in given.items():
+        if not isinstance(unit, str) or not unit or "]" in unit:
+            raise InputError(
+                f"{law}: unit of {name} = {checks.shown(unit)}: expected text, as 'Pa', or '-' for none"
+            )
+    return dict(given)

@@ -19,12 +19,12 @@ from tawami.motion.transfer import to_grid
 from tawami.results.projection import Projection, nodal, vertices
 from tawami.scene.quantities import (
     HISTORY,
-    PARTICLES,
     Given,
     Quantity,
     body_arrays,
-    history,
+    histories_of,
     local_arrays,
+    named,
     of_particles,
     unknown,
 )
@@ -56,8 +56,8 @@ def on_grid(
     """
     scene = subject.scene
     own = _of_grid(scene)
-    histories = {name: history(name) for name in scene.particles.history_names}
-    projected = [name for name, quantity in (PARTICLES | histories).items() if quantity.nodal]
+    known = named(histories_of(scene))
+    projected = [name for name, quantity in known.items() if quantity.nodal]
     found = []
     for name in names:
         if isinstance(name, Quantity):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -81,7 +81,7 @@ def plot(
     moved: bool,
     deformed: float,
     limits: tuple[float, float] | None,
-    histories: Iterable[str],
+    histories: Mapping[str, str],
 ) -> Axes:
     """Draw particles; see `Solution.plot`."""
     deformed, limits = checks.number("deformed", deformed), checked_limits(limits)
@@ -107,7 +107,7 @@ def plot(
 
 
 def columns(
-    arrays: Arrays, given: Iterable[Given], usual: Iterable[str], histories: Iterable[str]
+    arrays: Arrays, given: Iterable[Given], usual: Iterable[str], histories: Mapping[str, str]
 ) -> dict[str, Array]:
     """Columns "x [m]", "y [m]", "stress xx [Pa]", ...: one number for each particle."""
     found = {"x [m]": arrays["x"]}
@@ -121,7 +121,7 @@ def columns(
 
 
 def _chosen(
-    given: Iterable[Given], usual: Iterable[str], histories: Iterable[str]
+    given: Iterable[Given], usual: Iterable[str], histories: Mapping[str, str]
 ) -> list[Quantity]:
     known = named(histories)
     chosen = list(given) or list(usual)
@@ -140,7 +140,7 @@ def to_pandas(table: dict[str, Array], number: Array) -> Any:
 
 
 def fields(
-    arrays: Arrays, given: Iterable[Given], usual: Iterable[str], histories: Iterable[str]
+    arrays: Arrays, given: Iterable[Given], usual: Iterable[str], histories: Mapping[str, str]
 ) -> dict[str, Array]:
     """Fields by label, vectors with a third component 0, as VTK expects them."""
     found = {q.label: q.values(arrays) for q in _chosen(given, usual, histories)}

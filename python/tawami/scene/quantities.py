@@ -7,7 +7,7 @@ does not model gives an error that says how to model it; an unknown name gives t
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -21,7 +21,7 @@ from tawami.base.arrays import Array
 from tawami.base.errors import InputError, NotModelledError
 from tawami.base.space import PLANE
 from tawami.base.text import meant
-from tawami.particles import placement
+from tawami.particles import assignment, placement
 
 #: Arrays of the particles that are carried by a motion.
 CARRIED = ("velocity", "acceleration")
@@ -172,9 +172,18 @@ class Subject(Protocol):
         """The scene."""
 
 
-def history(name: str) -> Quantity:
+def history(name: str, unit: str = "-") -> Quantity:
     """The quantity of a history variable."""
-    return Quantity(f"{name} [{HISTORY.get(name, '-')}]", _stored(name))
+    return Quantity(f"{name} [{unit}]", _stored(name))
+
+
+def histories_of(scene: Any) -> dict[str, str]:
+    """Units of the history variables of a scene, by their names."""
+    names = scene.particles.history_names
+    units = {name: HISTORY.get(name, "-") for name in names}
+    for law in assignment.in_numpy(scene.configuration.model.given).values():
+        units |= law.units
+    return {name: units[name] for name in names}
 
 
 # -- arrays of particles -----------------------------------------------------
@@ -221,9 +230,9 @@ def body_arrays(subject: Subject) -> Arrays:
     return Arrays(lambda name: gather(_present(subject, name)))
 
 
-def named(histories: Iterable[str]) -> dict[str, Quantity]:
-    """Quantities by name, with those of history variables."""
-    return PARTICLES | {name: history(name) for name in histories}
+def named(histories: Mapping[str, str]) -> dict[str, Quantity]:
+    """Quantities by name, with those of history variables, given their units."""
+    return PARTICLES | {name: history(name, unit) for name, unit in histories.items()}
 
 
 # -- by name -----------------------------------------------------------------
@@ -236,7 +245,7 @@ def of_particles(given: Iterable[Given], subject: Subject) -> list[Quantity]:
         NotModelledError: The scene does not have one; the message names the switch that adds it.
         InputError: An unknown name, or a function of the driver script that fails.
     """
-    known = named(subject.scene.particles.history_names)
+    known = named(histories_of(subject.scene))
     found = []
     for one in given:
         if isinstance(one, Quantity):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -46,14 +46,14 @@ def scalars(fields: Mapping[str, Array], *, sizes: bool = True) -> dict[str, tup
     return found
 
 
-def pick(given: Given, arrays: Arrays, histories: Iterable[str]) -> tuple[str, str, Array]:
+def pick(given: Given, arrays: Arrays, histories: Mapping[str, str]) -> tuple[str, str, Array]:
     """Name, unit and values of a quantity with one number for each particle.
 
     Args:
         given: A quantity, or a name as 'mean stress', 'stress xx', 'displacement' (its size) or
             'displacement y'.
         arrays: Of the particles.
-        histories: Names of the history variables of the laws.
+        histories: Units of the history variables of the laws, by their names.
 
     Raises:
         NotModelledError: The scene does not have it.

@@ -201,7 +201,7 @@ class Solution(Elsewhere, Sealed, Unique):
         """
         return presentation.plot(
             self.arrays, self._model.grid, quantity, axes, moved=self._model.moves, deformed=deformed,
-            limits=limits, histories=self.scene.particles.history_names,
+            limits=limits, histories=quantities.histories_of(self.scene),
         )  # fmt: skip
 
     def to_pandas(self, *names: Given) -> Any:
@@ -231,9 +231,9 @@ class Solution(Elsewhere, Sealed, Unique):
         data = presentation.fields(self.arrays, names, *self._usual())
         return presentation.to_pyvista(presentation.in_space(self.x), data)
 
-    def _usual(self) -> tuple[list[str], list[str]]:
-        """Quantities of a table without names, and the history variables among them."""
-        histories = self.scene.particles.history_names
+    def _usual(self) -> tuple[list[str], dict[str, str]]:
+        """Quantities of a table without names, and units of the history variables among them."""
+        histories = quantities.histories_of(self.scene)
         known = {*self._arrays, "strain"} - {"number"}
         stored = [name for name in quantities.PARTICLES if name in known]
         return [*stored, *quantities.DERIVED, *histories], histories
