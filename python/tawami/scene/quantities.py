@@ -7,7 +7,7 @@ does not model gives an error that says how to model it; an unknown name gives t
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -172,18 +172,24 @@ class Subject(Protocol):
         """The scene."""
 
 
+def of_scene(scene: Any) -> dict[str, Quantity]:
+    """The quantities that the laws and the form of a scene add: history variables, fields and data."""
+    form, particles = scene.form, scene.particles
+    units = dict(HISTORY)
+    for law in assignment.in_numpy(scene.configuration.model.given).values():
+        units |= law.units
+    found = {name: history(name, units.get(name, "-")) for name in particles.history_names}
+    found |= {
+        name: Quantity(f"{name} [{field.unit}]", _stored(name))
+        for name, field in form.own_fields.items()
+    }
+    given = {name: form.data_unit(name) for name in form.data if name in dict(particles.arrays)}
+    return found | {n: Quantity(f"{n} [{unit}]", _stored(n)) for n, unit in given.items()}
+
+
 def history(name: str, unit: str = "-") -> Quantity:
     """The quantity of a history variable."""
     return Quantity(f"{name} [{unit}]", _stored(name))
-
-
-def histories_of(scene: Any) -> dict[str, str]:
-    """Units of the history variables of a scene, by their names."""
-    names = scene.particles.history_names
-    units = {name: HISTORY.get(name, "-") for name in names}
-    for law in assignment.in_numpy(scene.configuration.model.given).values():
-        units |= law.units
-    return {name: units[name] for name in names}
 
 
 # -- arrays of particles -----------------------------------------------------
@@ -191,9 +197,16 @@ def histories_of(scene: Any) -> dict[str, str]:
 
 def arrays_of(particles: _rust.Particles) -> list[str]:
     """Names of the arrays that particles store, without those of a motion that are gradients."""
-    stored = dict(particles.arrays)
+    stored = [name for name, _ in particles.arrays]
     names = [name for name in ("x", *PARTICLES, GRADIENT) if name in stored]
-    return [*names, *particles.history_names]
+    return [*names, *particles.history_names, *_of_form(particles)]
+
+
+def _of_form(particles: _rust.Particles) -> list[str]:
+    """Names of the fields and data of a form that particles store."""
+    others = {"x", *PARTICLES, GRADIENT, *particles.history_names}
+    others |= {"velocity_gradient", "acceleration_gradient"}
+    return [name for name, _ in particles.arrays if name not in others]
 
 
 def array_of(particles: _rust.Particles, name: str) -> npt.NDArray[Any]:
@@ -202,14 +215,23 @@ def array_of(particles: _rust.Particles, name: str) -> npt.NDArray[Any]:
     Raises:
         InputError: The particles do not have it; the message names what models it.
     """
-    known = dict.fromkeys(["x", *PARTICLES, GRADIENT, *HISTORY, *particles.history_names])
+    of_form = _of_form(particles)
+    known = ["x", *PARTICLES, GRADIENT, *HISTORY, *particles.history_names, *of_form]
+    if name in of_form:  # of a field, the gradient is behind the value
+        return particles.carried(name)[:, 0]
     if name not in known:
-        raise unknown("arrays of the particles", name, known)
+        raise unknown("arrays of the particles", name, dict.fromkeys(known))
     if name in CARRIED:
         return particles.carried(name)
     if name not in (*PARTICLES, GRADIENT, "x"):
         return particles.history(name)
     return np.asarray(getattr(particles, name))
+
+
+def of_body(comm: Any, particles: _rust.Particles) -> dict[str, npt.NDArray[Any]]:
+    """All arrays of the particles of the body, in the order of the numbers; a call for all ranks."""
+    in_order = placement.in_order(comm, particles.number)
+    return {name: in_order(array_of(particles, name)) for name in arrays_of(particles)}
 
 
 def local_arrays(subject: Subject) -> Arrays:
@@ -230,11 +252,6 @@ def body_arrays(subject: Subject) -> Arrays:
     return Arrays(lambda name: gather(_present(subject, name)))
 
 
-def named(histories: Mapping[str, str]) -> dict[str, Quantity]:
-    """Quantities by name, with those of history variables, given their units."""
-    return PARTICLES | {name: history(name, unit) for name, unit in histories.items()}
-
-
 # -- by name -----------------------------------------------------------------
 
 
@@ -245,7 +262,7 @@ def of_particles(given: Iterable[Given], subject: Subject) -> list[Quantity]:
         NotModelledError: The scene does not have one; the message names the switch that adds it.
         InputError: An unknown name, or a function of the driver script that fails.
     """
-    known = named(histories_of(subject.scene))
+    known = PARTICLES | of_scene(subject.scene)
     found = []
     for one in given:
         if isinstance(one, Quantity):
@@ -269,7 +286,7 @@ def usual_of_particles(subject: Any) -> tuple[str, ...]:
     scene, names = subject.scene, ["displacement", "stress", "mean stress"]
     names += ["eps_v"] if scene.form.kinematics.has_eps_v else []
     names += ["velocity"] if subject.motion is not None else []
-    return (*names, *scene.particles.history_names)
+    return (*names, *of_scene(scene))
 
 
 def unknown(place: str, name: str, known: Iterable[str]) -> InputError:
