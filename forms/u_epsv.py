@@ -15,10 +15,11 @@ projection      Dohrmann and Bochev 2004: the part of eps_v that varies within a
 u, whose first is continuous for splines, and of the first of eps_v, on the sides that they share.
 """
 
-from ufl import Identity, div, dot, grad, inner, sym
+from ufl import dot, inner
 
-fields = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
-kinematics = "mixed"
+from tawami.form import scalar, vector
+
+fields = {"u": vector("w"), "eps_v": scalar("q", role="volumetric_strain")}
 parameters = {
     "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0, "maximum": {"residual_based": 0.14}},
     "k": {"default": 0.01, "minimum": 0.0},
@@ -31,8 +32,8 @@ whole_cells = ("residual_based",)
 
 
 def residual(
-    u, eps_v, w, q, sigma, eps_p, K, mu, t, h, sum_p, cell_mean, dx, dx_c, ds, dG, facet_mean, jump_n,
-    jump_nn, alpha, k, stabilisation, ghost_penalty,
+    u, eps_v, w, q, sigma, eps_p, K, mu, t, h, grad, div, eps, I, sum_p, cell_mean, dx, dx_c, ds,
+    dG, facet_mean, jump_n, jump_nn, alpha, k, stabilisation, ghost_penalty,
 ):  # fmt: skip
     """R_u = sum_p V_p sigma_p : grad w - int t . w ds
     R_q = sum_p V_p K_p q (div u - eps_v - eps_p) - S.
@@ -47,6 +48,6 @@ def residual(
         return R_u + R_q - c * q * eps_v * dx + c * q * eps_v * dx_c
     S = sum_p(K**2 / mu, alpha * h**2 * dot(grad(q), grad(eps_v)))
     if stabilisation == "residual_based":
-        s_over_mu = 2 * (sym(grad(u)) - div(u) / 3 * Identity(2))
+        s_over_mu = 2 * (eps(u) - div(u) / 3 * I)
         S += sum_p(K, alpha * h**2 * dot(grad(q), div(s_over_mu)))
     return R_u + R_q - S

@@ -7,10 +7,11 @@ mass of eps_v: a single particle in a cell makes the consistent mass singular. C
 `ghost_penalty` as in `u_epsv`.
 """
 
-from ufl import dot, grad, inner
+from ufl import dot, inner
 
-fields = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
-kinematics = "mixed"
+from tawami.form import scalar, vector
+
+fields = {"u": vector("w"), "eps_v": scalar("q", role="volumetric_strain")}
 strain = "finite"
 parameters = {
     "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0},
@@ -22,8 +23,8 @@ static_options = {"ghost_penalty": "on"}
 
 
 def residual(
-    u, eps_v, w, q, P, ln_J, eps_p, K, mu, t, h, sum_p, sum_v, ds, dG, facet_mean, jump_n, jump_nn,
-    alpha, theta, k, ghost_penalty,
+    u, eps_v, w, q, P, ln_J, eps_p, K, mu, t, h, grad, sum_p, sum_v, ds, dG, facet_mean, jump_n,
+    jump_nn, alpha, theta, k, ghost_penalty,
 ):  # fmt: skip
     """R_u = sum_p V0_p (tau_p f^-T) : grad w - int t . w ds
     R_q = sum_p V0_p K_p { q (ln J_f - eps_p - (1 - theta) eps_v) - theta q_i eps_v,i (lumped)

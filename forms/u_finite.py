@@ -3,17 +3,18 @@
 `ghost_penalty` as in `u_epsv`.
 """
 
-from ufl import dot, grad, inner
+from ufl import dot, inner
 
-fields = {"u": ("displacement", "w")}
-kinematics = "displacement"
+from tawami.form import vector
+
+fields = {"u": vector("w")}
 strain = "finite"
 parameters = {"k": {"default": 0.01, "minimum": 0.0}}
 options = {"ghost_penalty": ("off", "on")}
 static_options = {"ghost_penalty": "on"}
 
 
-def residual(u, w, P, mu, t, h, sum_p, ds, dG, facet_mean, jump_nn, k, ghost_penalty):
+def residual(u, w, P, mu, t, h, grad, sum_p, ds, dG, facet_mean, jump_nn, k, ghost_penalty):
     """R_u(w) = sum_p V0_p (tau_p f^-T) : grad w - int t . w ds, P = tau f^-T."""
     R_u = sum_p(P, grad(w)) - dot(t, w) * ds
     if ghost_penalty == "on":

@@ -4,14 +4,15 @@ p is the increment of the pressure-like mean stress; sigma is the law's stress w
 the new deviator and the old mean stress. eps_p is the plastic volumetric strain of the law.
 """
 
-from ufl import div, dot, grad
+from ufl import dot
 
-fields = {"u": ("displacement", "w"), "p": ("pressure", "q")}
-kinematics = "deviatoric"
+from tawami.form import scalar, vector
+
+fields = {"u": vector("w"), "p": scalar("q", role="pressure")}
 parameters = {"alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0}}
 
 
-def residual(u, p, w, q, sigma, eps_p, K, mu, t, h, sum_p, ds, alpha):
+def residual(u, p, w, q, sigma, eps_p, K, mu, t, h, grad, div, sum_p, ds, alpha):
     """R_u = sum_p V_p (sigma_p + p I) : grad w - int t . w ds
     R_q = sum_p V_p { q (div u - p/K - eps_p) - alpha h^2/mu grad q . grad p }.
     """

@@ -38,17 +38,11 @@ pub const ROWS: usize = FUNCTIONS_1D.pow(DIM as u32 - 1);
 /// Nodes of a quadratic Lagrange cell along one axis.
 pub const NODES_1D: usize = 3;
 
-/// Nodes of a quadratic Lagrange cell: those of the displacement in a form's kernels.
+/// Nodes of a quadratic Lagrange cell.
 pub const NODES: usize = NODES_1D.pow(DIM as u32);
 
-/// Vertices of a cell: the nodes of the linear field in a form's kernels.
+/// Vertices of a cell: the nodes of a linear Lagrange cell.
 pub const VERTICES: usize = 1 << DIM;
-
-/// Degrees of freedom of the displacement in a form's kernels.
-pub const DISPLACEMENT_DOFS: usize = DIM * NODES;
-
-/// Degrees of freedom of a form's kernels with both fields.
-pub const MAX_DOFS: usize = DISPLACEMENT_DOFS + VERTICES;
 
 /// A position or a vector.
 pub type Point = [f64; DIM];

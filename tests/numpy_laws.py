@@ -42,6 +42,33 @@ def von_mises(K, mu, yield_stress, hardening=0.0, *, tangent=True):
     return tawami.NumpyLaw(respond, K, mu, history=("plastic_strain",))
 
 
+def drucker_prager(K, mu, phi, psi, c):
+    """The cone of rust/law/drucker_prager.rs below its apex, without a tangent; angles in degrees."""
+    sin_phi, cos_phi, tan_psi = (
+        np.sin(np.radians(phi)),
+        np.cos(np.radians(phi)),
+        np.tan(np.radians(psi)),
+    )
+    Ab = 3 * tan_psi / np.sqrt(9 + 12 * tan_psi**2)
+    d = np.sqrt(1 - Ab**2 / 3) + Ab * sin_phi / 3
+    A, B = sin_phi / d, cos_phi / d
+
+    def respond(strain, stress, history):
+        trial = stress + strain @ hooke(K, mu)
+        p = trial[:, :3].mean(axis=1)
+        s = trial - p[:, None] * ONE
+        root = np.sqrt((s**2 * [1, 1, 1, 2]).sum(axis=1) / 2)
+        F = root + A * p - c * B
+        gamma = np.maximum(F, 0.0) / (mu + K * A * Ab)
+        share = 1 - mu * gamma / np.maximum(root, 1e-300)
+        p = p - K * Ab * gamma
+        return p[:, None] * ONE + share[:, None] * s, {
+            "dilatancy": history["dilatancy"] + Ab * gamma
+        }
+
+    return tawami.NumpyLaw(respond, K, mu, history=("dilatancy",))
+
+
 def stiffening(K, mu):
     """sigma = (1 + 50 eps:eps) C eps: nonlinear, without history."""
     C = hooke(K, mu)

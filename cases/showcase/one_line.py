@@ -24,6 +24,7 @@ import tawami
 from cases.common.figure import add_bar, draw_particles, save
 from cases.common.program import Program
 from cases.showcase.collapse.pile import roughness
+from tawami.form import scalar, vector
 
 PROGRAM = Program("cases.showcase.one_line", __doc__)
 H, LOAD = 1 / 16, 1e3  # [m], [Pa]
@@ -46,8 +47,8 @@ def stable(u, eps_v, w, q, sigma, K, mu, t, h, sum_p, ds):  # type: ignore[no-un
 
 def solve(residual) -> tawami.Solution:  # type: ignore[no-untyped-def]
     """The block with a weak form."""
-    fields = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
-    form = tawami.Form(fields=fields, kinematics="mixed", residual=residual)
+    fields = {"u": vector("w"), "eps_v": scalar("q", role="volumetric_strain")}
+    form = tawami.Form(fields=fields, residual=residual)
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(-1, 0), h=H, cells=(32, 16))
     block = tawami.box(grid, (-1, 0), (1, 1), per_axis=3, gauss=True)
     rubber = tawami.linear_elastic(E=1e6, nu=0.4999)

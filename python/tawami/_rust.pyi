@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 __all__ = [
+    "MAX_COEFFICIENTS",
     "Active",
     "Assembler",
     "Grid",
@@ -40,6 +41,8 @@ _Integers = npt.NDArray[np.int64]
 
 #: Of Cargo.toml, from which pip takes the version of the package too.
 __version__: str
+#: Most coefficients of all fields on a cell.
+MAX_COEFFICIENTS: int
 
 class TawamiError(Exception):
     """Base of every error that tawami raises."""
@@ -154,13 +157,17 @@ class Assembler:
     def __new__(
         cls,
         location: Location,
-        basis: str,
+        fields: Sequence[tuple[str, int, int]],  # basis, components, degree of the element
         nodes: Sequence[Sequence[int]],
         vertices: Sequence[Sequence[int]],
-        linear: bool,
     ) -> Assembler: ...
     def vector(
-        self, kernels: Kernels, data: Sequence[_Floats], volume: _Floats, coefficients: _Floats
+        self,
+        kernels: Kernels,
+        data: Sequence[_Floats],
+        volume: _Floats,
+        coefficients: _Floats,
+        absolute: bool = False,
     ) -> _Floats: ...
     def pattern(self, selection: _Selection) -> Pattern: ...
     def matrix(

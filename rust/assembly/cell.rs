@@ -1,7 +1,8 @@
-//! One cell: the degrees of freedom of the kernels and the coefficients behind them.
+//! One cell: its fields, the degrees of freedom of the kernels and the coefficients behind them.
 
-use crate::grid::{extraction, Basis, Extraction, Functions, Location};
-use crate::space::{Index, Point, DIM, DISPLACEMENT_DOFS, MAX_DOFS, NODES, NODES_1D, VERTICES};
+use super::MAX_COEFFICIENTS;
+use crate::grid::{Basis, Functions, Location};
+use crate::space::{Index, Point, DIM, FUNCTIONS, NODES, NODES_1D, VERTICES};
 
 /// Coordinates of a vertex that a kernel reads, also in the plane.
 const COORDINATES: usize = 3;
@@ -9,110 +10,168 @@ const COORDINATES: usize = 3;
 /// Coordinates of all vertices of a cell, in the order of the kernels.
 pub(super) type Vertices = [f64; COORDINATES * VERTICES];
 
-/// Positions of the kernels' degrees of freedom in a cell, and the fields behind them.
+/// One field of a form.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Field {
+    /// Its functions.
+    pub basis: Basis,
+    /// Its components, which every function has.
+    pub components: usize,
+    /// Whether its element on the mesh is quadratic along each axis, or linear.
+    pub quadratic: bool,
+}
+
+/// The fields, and the positions of the kernels' degrees of freedom in a cell.
+///
+/// The coefficients of the fields follow one another, on the grid as on a cell: function by function, and
+/// component by component.
 #[derive(Debug, Clone)]
 pub struct Cells {
-    /// Basis of the displacement.
-    basis: Basis,
-    /// Position of each node of the displacement, 0 to 1 along each axis.
+    fields: Vec<Field>,
+    /// Position of each node of a quadratic element, 0 to 1 along each axis.
     nodes: [Point; NODES],
-    /// Position 0 or 1 along each axis of each vertex.
+    /// Position 0 or 1 along each axis of each vertex, which are the nodes of a linear element.
     vertices: [Index; VERTICES],
-    /// Whether there is a linear field besides the displacement.
-    linear: bool,
+    /// The bases of the fields, each once.
+    bases: Vec<Basis>,
+    components: Vec<Component>,
+}
+
+/// A component of a field, on one cell.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Component {
+    /// Position of its basis among those of [`Cells::bases`].
+    pub basis: usize,
+    /// Number of functions.
+    pub functions: usize,
+    /// Its first coefficient.
+    pub first: usize,
+    /// Distance to the next one.
+    pub step: usize,
 }
 
 /// Coefficients of the fields on one cell.
 pub(super) struct Local {
-    /// Number of each coefficient on the cell: function by function and component by component, then the
-    /// vertices.
-    numbers: [usize; MAX_DOFS],
+    /// Number of each coefficient on the grid.
+    numbers: [usize; MAX_COEFFICIENTS],
     len: usize,
 }
 
-/// The nodal values on one cell as combinations of its coefficients.
-pub(super) struct Nodal<'a> {
-    local: &'a Local,
-    extraction: Extraction<NODES>,
+/// The nodal values of the fields on one cell as combinations of its coefficients.
+#[derive(Default)]
+pub(super) struct Nodal {
+    fields: Vec<Extraction>,
+}
+
+/// The same for one field: `values[node][function]`.
+struct Extraction {
+    components: usize,
+    nodes: usize,
+    functions: usize,
+    values: [[f64; FUNCTIONS]; NODES],
+}
+
+impl Field {
+    /// Its functions on a grid.
+    #[must_use]
+    pub fn functions(&self, cells: Index) -> Functions {
+        Functions { basis: self.basis, cells }
+    }
+
+    /// Nodes of its element.
+    fn nodes(&self) -> usize {
+        if self.quadratic {
+            NODES
+        } else {
+            VERTICES
+        }
+    }
+
+    /// Functions on a cell.
+    fn per_cell(&self) -> usize {
+        self.basis.per_cell().pow(DIM as u32)
+    }
 }
 
 impl Cells {
-    /// From the positions of the kernels' nodes, counted from 0 along each axis of a cell.
+    /// From the fields and the positions of the nodes of both elements, counted from 0 along each axis of a
+    /// cell; `None` if there are more coefficients on a cell than [`MAX_COEFFICIENTS`].
     #[must_use]
     pub fn new(
-        basis: Basis,
+        fields: Vec<Field>,
         nodes: [Index; NODES],
         vertices: [Index; VERTICES],
-        linear: bool,
-    ) -> Self {
+    ) -> Option<Self> {
         let nodes = nodes.map(|node| node.map(|i| i as f64 / (NODES_1D - 1) as f64));
-        Self { basis, nodes, vertices, linear }
+        let (mut bases, mut components, mut first) = (Vec::new(), Vec::new(), 0);
+        for field in &fields {
+            let basis = bases.iter().position(|b| *b == field.basis).unwrap_or_else(|| {
+                bases.push(field.basis);
+                bases.len() - 1
+            });
+            let (functions, step) = (field.per_cell(), field.components);
+            components.extend((0..step).map(|k| Component {
+                basis,
+                functions,
+                first: first + k,
+                step,
+            }));
+            first += functions * step;
+        }
+        (first <= MAX_COEFFICIENTS).then_some(Self { fields, nodes, vertices, bases, components })
+    }
+
+    /// The fields.
+    #[must_use]
+    pub fn fields(&self) -> &[Field] {
+        &self.fields
     }
 
     /// Number of degrees of freedom of a kernel.
     #[must_use]
     pub fn dofs(&self) -> usize {
-        DISPLACEMENT_DOFS + if self.linear { VERTICES } else { 0 }
+        self.fields.iter().map(|field| field.components * field.nodes()).sum()
     }
 
-    /// Functions of the displacement on a grid.
-    #[must_use]
-    pub fn displacement(&self, cells: Index) -> Functions {
-        Functions { basis: self.basis, cells }
-    }
-
-    /// Functions of the linear field on a grid, if there is one.
-    #[must_use]
-    pub fn linear(&self, cells: Index) -> Option<Functions> {
-        self.linear.then_some(Functions { basis: Basis::Bilinear, cells })
-    }
-
-    /// Number of coefficients of all fields on a grid; those of the displacement come first.
+    /// Number of coefficients of all fields on a grid.
     #[must_use]
     pub fn coefficients(&self, cells: Index) -> usize {
-        let linear = self.linear(cells).map_or(0, |functions| functions.len());
-        DIM * self.displacement(cells).len() + linear
-    }
-
-    pub(super) fn local(&self, location: &Location, a: usize) -> Local {
-        let (cells, cell) = (location.grid.cells, location.active_index(a));
-        let displacement = self.displacement(cells);
-        let mut local = Local { numbers: [0; MAX_DOFS], len: 0 };
-        for &function in displacement.on_cell(cell).iter() {
-            (0..DIM).for_each(|k| local.push(DIM * function + k));
-        }
-        if let Some(linear) = self.linear(cells) {
-            let first = DIM * displacement.len();
-            for vertex in &self.vertices {
-                let index = std::array::from_fn(|axis| cell[axis] + vertex[axis]);
-                local.push(first + linear.number(index));
-            }
-        }
-        local
-    }
-
-    pub(super) fn nodal<'a>(&self, location: &Location, a: usize, local: &'a Local) -> Nodal<'a> {
-        let displacement = self.displacement(location.grid.cells);
-        Nodal {
-            local,
-            extraction: extraction(&displacement, location.active_index(a), &self.nodes),
-        }
+        self.fields.iter().map(|field| field.components * field.functions(cells).len()).sum()
     }
 
     /// Number of coefficients on a cell.
     #[must_use]
     pub fn local_len(&self) -> usize {
-        let displacement = DIM * self.basis.per_cell().pow(DIM as u32);
-        displacement + if self.linear { VERTICES } else { 0 }
+        self.fields.iter().map(|field| field.components * field.per_cell()).sum()
     }
 
-    /// Whether there is a linear field besides the displacement.
-    #[must_use]
-    pub fn has_linear(&self) -> bool {
-        self.linear
+    /// The bases of the fields, each once.
+    pub(super) fn bases(&self) -> &[Basis] {
+        &self.bases
     }
 
-    /// Position 0 or 1 along each axis of each vertex, in the order of the coefficients.
+    /// The components of all fields on a cell.
+    pub(super) fn components(&self) -> &[Component] {
+        &self.components
+    }
+
+    pub(super) fn local(&self, location: &Location, a: usize) -> Local {
+        let (cells, cell) = (location.grid.cells, location.active_index(a));
+        let (mut numbers, mut len, mut first) = ([0; MAX_COEFFICIENTS], 0, 0);
+        for field in &self.fields {
+            let functions = field.functions(cells);
+            for &function in functions.on_cell(cell).iter() {
+                for k in 0..field.components {
+                    numbers[len] = first + field.components * function + k;
+                    len += 1;
+                }
+            }
+            first += field.components * functions.len();
+        }
+        Local { numbers, len }
+    }
+
+    /// Position 0 or 1 along each axis of each vertex, in the order of the kernels.
     pub(super) fn vertices_of_cell(&self) -> &[Index; VERTICES] {
         &self.vertices
     }
@@ -129,68 +188,68 @@ impl Cells {
 }
 
 impl Local {
-    fn push(&mut self, number: usize) {
-        self.numbers[self.len] = number;
-        self.len += 1;
-    }
-
     /// Numbers of the coefficients.
     pub fn numbers(&self) -> &[usize] {
         &self.numbers[..self.len]
     }
 }
 
-impl Nodal<'_> {
-    fn functions(&self) -> usize {
-        self.extraction.functions.len()
+impl Nodal {
+    /// Compute those of the a-th active cell.
+    pub fn set(&mut self, cells: &Cells, location: &Location, a: usize) {
+        let cell = location.active_index(a);
+        self.fields.clear();
+        for field in &cells.fields {
+            let functions = field.functions(location.grid.cells);
+            let mut values = [[0.0; FUNCTIONS]; NODES];
+            if field.quadratic {
+                values = cells.nodes.map(|node| functions.values(cell, node));
+            } else {
+                for (values, vertex) in values.iter_mut().zip(&cells.vertices) {
+                    *values = functions.values(cell, vertex.map(|i| i as f64));
+                }
+            }
+            self.fields.push(Extraction {
+                components: field.components,
+                nodes: field.nodes(),
+                functions: field.per_cell(),
+                values,
+            });
+        }
     }
 
     /// Values at the degrees of freedom: `T c`.
-    pub fn values(&self, coefficients: &[f64], out: &mut [f64]) {
-        let (functions, numbers) = (self.functions(), self.local.numbers());
-        for (value, out) in self.extraction.values.iter().zip(out.chunks_exact_mut(DIM)) {
-            for (k, o) in out.iter_mut().enumerate() {
-                let term = |f: usize| value[f] * coefficients[numbers[DIM * f + k]];
-                *o = (0..functions).map(term).sum();
+    pub fn values(&self, numbers: &[usize], coefficients: &[f64], out: &mut [f64]) {
+        let (mut numbers, mut out) = (numbers, out.iter_mut());
+        for field in &self.fields {
+            let (mine, others) = numbers.split_at(field.components * field.functions);
+            for value in &field.values[..field.nodes] {
+                for (k, out) in (0..field.components).zip(&mut out) {
+                    let c = mine[k..].iter().step_by(field.components);
+                    *out = value.iter().zip(c).map(|(v, &c)| v * coefficients[c]).sum();
+                }
             }
-        }
-        for (o, &c) in out[DISPLACEMENT_DOFS..].iter_mut().zip(&numbers[DIM * functions..]) {
-            *o = coefficients[c];
+            numbers = others;
         }
     }
 
     /// `T^T a` for `columns` vectors at once: `a` is degrees of freedom x columns.
     pub fn transposed(&self, a: &[f64], columns: usize, out: &mut [f64]) {
-        // constant widths, which the compiler turns into vector instructions without loops
-        match columns {
-            1 => self.transposed_of(a, [0.0; 1], out),
-            DISPLACEMENT_DOFS => self.transposed_of(a, [0.0; DISPLACEMENT_DOFS], out),
-            MAX_DOFS => self.transposed_of(a, [0.0; MAX_DOFS], out),
-            _ => self.transposed_of(a, vec![0.0; columns], out),
-        }
-    }
-
-    fn transposed_of(&self, a: &[f64], mut sum: impl AsMut<[f64]>, out: &mut [f64]) {
-        let (functions, sum) = (self.functions(), sum.as_mut());
-        let columns = sum.len();
-        let (displacement, rest) = out.split_at_mut(DIM * functions * columns);
-        for (target, f) in displacement.chunks_exact_mut(DIM * columns).zip(0..) {
-            for (k, target) in target.chunks_exact_mut(columns).enumerate() {
-                sum.fill(0.0);
-                for (node, value) in self.extraction.values.iter().enumerate() {
-                    let v = value[f];
-                    if v == 0.0 {
-                        continue;
-                    }
-                    let row = &a[(DIM * node + k) * columns..][..columns];
-                    for (s, r) in sum.iter_mut().zip(row) {
-                        *s += v * r;
+        let (mut a, mut out) = (a, out.chunks_exact_mut(columns));
+        for field in &self.fields {
+            let (mine, others) = a.split_at(field.components * field.nodes * columns);
+            for f in 0..field.functions {
+                for (k, out) in (0..field.components).zip(&mut out) {
+                    out.fill(0.0);
+                    let rows = mine.chunks_exact(columns).skip(k).step_by(field.components);
+                    for (value, row) in field.values.iter().zip(rows) {
+                        if value[f] != 0.0 {
+                            out.iter_mut().zip(row).for_each(|(o, r)| *o += value[f] * r);
+                        }
                     }
                 }
-                target.copy_from_slice(sum);
             }
+            a = others;
         }
-        let vertices = &a[DISPLACEMENT_DOFS * columns..];
-        rest[..vertices.len()].copy_from_slice(vertices);
     }
 }

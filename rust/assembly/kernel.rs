@@ -7,7 +7,6 @@ use ndarray::ArrayView2;
 use super::cell::{Cells, Local, Nodal, Vertices};
 use super::point::{PointKernel, Points, Row};
 use crate::grid::Location;
-use crate::space::MAX_DOFS;
 use crate::transfer::cells::mean_of_cell;
 
 /// Signature of an FFCx kernel: element tensor, coefficients, constants, coordinates of the vertices
@@ -110,6 +109,7 @@ impl<'a> State<'a> {
         kernels: &[Kernel],
         a: usize,
         nodal: &Nodal,
+        numbers: &[usize],
         packed: &mut Vec<f64>,
         element: &mut [f64],
     ) {
@@ -121,7 +121,7 @@ impl<'a> State<'a> {
                 packed.resize(start + slot.len(self.cells), 0.0);
                 let out = &mut packed[start..];
                 match slot {
-                    Slot::Fields => nodal.values(self.coefficients, out),
+                    Slot::Fields => nodal.values(numbers, self.coefficients, out),
                     Slot::Means(columns, data) => {
                         mean_of_cell(self.location, a, self.volume, *data, columns, out);
                     }
@@ -144,23 +144,25 @@ impl<'a> State<'a> {
     }
 }
 
-/// Memory of one thread as [`Points`].
-pub(super) struct Work<const M: usize, const P: usize, const W: usize> {
+/// Memory of one thread, for cells whose coefficients fit into rows of `P` numbers.
+pub(super) struct Work<const P: usize> {
     packed: Vec<f64>,
-    points: Points<M, P, W>,
-    element: [f64; MAX_DOFS * MAX_DOFS],
-    half: [f64; MAX_DOFS * MAX_DOFS],
-    turned: [f64; MAX_DOFS * MAX_DOFS],
+    points: Points<P>,
+    nodal: Nodal,
+    element: Vec<f64>,
+    half: Vec<f64>,
+    turned: Vec<f64>,
 }
 
-impl<const M: usize, const P: usize, const W: usize> Work<M, P, W> {
-    pub(super) fn new() -> Self {
-        let zero = [0.0; MAX_DOFS * MAX_DOFS];
-        let (packed, points) = (Vec::new(), Points::new());
-        Self { packed, points, element: zero, half: zero, turned: zero }
+impl<const P: usize> Work<P> {
+    pub(super) fn new(cells: &Cells) -> Self {
+        let (packed, nodal, points) = (Vec::new(), Nodal::default(), Points::new(cells));
+        let [element, half, turned] = [(); 3].map(|()| vec![0.0; cells.dofs() * cells.dofs()]);
+        Self { packed, points, nodal, element, half, turned }
     }
 
-    /// Vector of the a-th active cell on its coefficients.
+    /// Vector of the a-th active cell on its coefficients; or, with `absolute`, the sums of the absolute
+    /// values of what each point and the kernels of the cell contribute to it.
     ///
     /// # Safety
     /// As [`vector`](super::vector).
@@ -170,17 +172,25 @@ impl<const M: usize, const P: usize, const W: usize> Work<M, P, W> {
         kernels: &Kernels,
         a: usize,
         local: &Local,
-    ) -> [f64; M] {
-        let mut out = [0.0; M];
+        absolute: bool,
+    ) -> Row<P> {
+        let mut out = Row::ZERO;
         if !kernels.cells.is_empty() {
-            let nodal = state.cells.nodal(state.location, a, local);
+            self.nodal.set(state.cells, state.location, a);
             let element = &mut self.element[..state.cells.dofs()];
+            let numbers = local.numbers();
             // SAFETY: the caller's; kernels of rank 1 write `dofs` numbers.
-            unsafe { state.tabulate(&kernels.cells, a, &nodal, &mut self.packed, element) };
-            nodal.transposed(element, 1, &mut out);
+            unsafe {
+                let (nodal, packed) = (&self.nodal, &mut self.packed);
+                state.tabulate(&kernels.cells, a, nodal, numbers, packed, element);
+            };
+            self.nodal.transposed(element, 1, &mut out.0);
+            if absolute {
+                out.0 = out.0.map(f64::abs);
+            }
         }
         // SAFETY: the caller's.
-        unsafe { self.points.add_vectors(&kernels.points, state, a, local, &mut out) };
+        unsafe { self.points.add_vectors(&kernels.points, state, a, local, absolute, &mut out) };
         out
     }
 
@@ -194,21 +204,25 @@ impl<const M: usize, const P: usize, const W: usize> Work<M, P, W> {
         form: &Bilinear,
         a: usize,
         local: &Local,
-        out: &mut [Row<P>; M],
+        out: &mut [Row<P>],
     ) {
         out.fill(Row::ZERO);
-        let n = state.cells.dofs();
+        let (n, m) = (state.cells.dofs(), out.len());
         if !form.kernels.cells.is_empty() {
-            let nodal = state.cells.nodal(state.location, a, local);
-            let element = &mut self.element[..n * n];
+            self.nodal.set(state.cells, state.location, a);
+            let (nodal, element) = (&self.nodal, &mut self.element[..n * n]);
+            let numbers = local.numbers();
             // SAFETY: the caller's; kernels of rank 2 write `dofs x dofs` numbers.
-            unsafe { state.tabulate(&form.kernels.cells, a, &nodal, &mut self.packed, element) };
+            unsafe {
+                let packed = &mut self.packed;
+                state.tabulate(&form.kernels.cells, a, nodal, numbers, packed, element);
+            };
             // T^T A, then (T^T (T^T A)^T)^T = T^T A T
             nodal.transposed(element, n, &mut self.half);
-            transpose(&self.half[..M * n], n, &mut self.turned);
-            nodal.transposed(&self.turned[..n * M], M, &mut self.half);
+            transpose(&self.half[..m * n], n, &mut self.turned);
+            nodal.transposed(&self.turned[..n * m], m, &mut self.half);
             for (i, row) in out.iter_mut().enumerate() {
-                (0..M).for_each(|j| row.0[j] = self.half[j * M + i]);
+                (0..m).for_each(|j| row.0[j] = self.half[j * m + i]);
             }
         }
         // SAFETY: the caller's.
@@ -216,10 +230,11 @@ impl<const M: usize, const P: usize, const W: usize> Work<M, P, W> {
         for [left, right] in &form.couplings {
             // SAFETY: the caller's.
             let (left, right) = unsafe {
-                (self.vector(state, left, a, local), self.vector(state, right, a, local))
+                let left = self.vector(state, left, a, local, false);
+                (left, self.vector(state, right, a, local, false))
             };
-            for (row, left) in out.iter_mut().zip(left) {
-                row.0.iter_mut().zip(right).for_each(|(e, right)| *e += left * right);
+            for (row, left) in out.iter_mut().zip(left.0) {
+                row.add(left, &right);
             }
         }
     }

@@ -4,12 +4,12 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use super::cell::Cells;
 use super::kernel::{Bilinear, State, Work};
 use super::pattern::Pattern;
 use super::point::Row;
 use super::selection::{self, Entry, Selection};
-use super::{colours, Shared};
-use crate::space::{DIM, DISPLACEMENT_DOFS, FUNCTIONS_1D, MAX_DOFS, VERTICES};
+use super::{colours, with_rows, Shared};
 
 /// The reduced matrix in its pattern: `P^T K P`. False if the pattern does not belong to these cells and this
 /// selection; `values` are then meaningless.
@@ -24,31 +24,13 @@ pub unsafe fn matrix(
     pattern: &Pattern,
     values: &mut [f64],
 ) -> bool {
-    // constant widths, which the compiler turns into vector instructions without loops
     // SAFETY: the caller's.
-    unsafe {
-        match state.cells.local_len() {
-            MAX_DOFS => {
-                matrix_of::<MAX_DOFS, 24, FUNCTIONS_1D>(state, form, selection, pattern, values)
-            }
-            DISPLACEMENT_DOFS => matrix_of::<DISPLACEMENT_DOFS, 24, FUNCTIONS_1D>(
-                state, form, selection, pattern, values,
-            ),
-            MIXED_LINEAR => {
-                matrix_of::<MIXED_LINEAR, 16, 2>(state, form, selection, pattern, values)
-            }
-            _ => matrix_of::<LINEAR, 8, 2>(state, form, selection, pattern, values),
-        }
-    }
+    unsafe { with_rows!(state.cells, matrix_of(state, form, selection, pattern, values)) }
 }
 
-/// Coefficients on a cell where the displacement is linear along each axis; with the linear field.
-pub(super) const LINEAR: usize = DIM * VERTICES;
-pub(super) const MIXED_LINEAR: usize = LINEAR + VERTICES;
-
 /// Memory of one thread: the matrix of the cell and its unknowns.
-struct Scatter<const M: usize, const P: usize, const W: usize> {
-    work: Work<M, P, W>,
+struct Scatter<const P: usize> {
+    work: Work<P>,
     entries: Vec<Entry>,
     /// Entries whose unknowns follow one another.
     runs: Vec<Range<usize>>,
@@ -56,21 +38,22 @@ struct Scatter<const M: usize, const P: usize, const W: usize> {
     /// cells they hardly change.
     places: Vec<usize>,
     /// The matrix of the cell.
-    of_cell: [Row<P>; M],
+    of_cell: Vec<Row<P>>,
 }
 
-impl<const M: usize, const P: usize, const W: usize> Scatter<M, P, W> {
-    fn new() -> Self {
-        let (entries, of_cell) = (Vec::with_capacity(M), [Row::ZERO; M]);
-        Self { work: Work::new(), entries, runs: Vec::new(), places: Vec::new(), of_cell }
+impl<const P: usize> Scatter<P> {
+    fn new(cells: &Cells) -> Self {
+        let (work, of_cell) = (Work::new(cells), vec![Row::ZERO; cells.local_len()]);
+        let entries = Vec::with_capacity(of_cell.len());
+        Self { work, entries, runs: Vec::new(), places: Vec::new(), of_cell }
     }
 }
 
-/// [`matrix`] for cells with `M` coefficients.
+/// [`matrix`] for cells whose coefficients fit into rows of `P` numbers.
 ///
 /// # Safety
 /// As [`matrix`].
-unsafe fn matrix_of<const M: usize, const P: usize, const W: usize>(
+unsafe fn matrix_of<const P: usize>(
     state: &State,
     form: &Bilinear,
     selection: &Selection,
@@ -83,7 +66,7 @@ unsafe fn matrix_of<const M: usize, const P: usize, const W: usize>(
         return false;
     };
     let shared = Shared::new(values);
-    let add = |a: usize, scatter: &mut Scatter<M, P, W>| {
+    let add = |a: usize, scatter: &mut Scatter<P>| {
         let Scatter { work, entries, runs, places, of_cell } = scatter;
         let local = state.cells.local(state.location, a);
         selection.of_cell(&local, entries);
@@ -119,13 +102,13 @@ unsafe fn matrix_of<const M: usize, const P: usize, const W: usize>(
     };
     for rows in colours(state.location) {
         let fits = rows.into_par_iter().all(|row| {
-            let mut scatter = Scatter::new();
+            let mut scatter = Scatter::new(state.cells);
             row.filter(|&a| !pattern.reaching[a]).all(|a| add(a, &mut scatter))
         });
         if !fits {
             return false;
         }
     }
-    let mut scatter = Scatter::new();
+    let mut scatter = Scatter::new(state.cells);
     (0..pattern.reaching.len()).filter(|&a| pattern.reaching[a]).all(|a| add(a, &mut scatter))
 }

@@ -1,8 +1,8 @@
 //! Element kernels over the active cells, straight into the reduced matrix.
 //!
 //! A kernel is the C function that FFCx made of a part of the form: of the integrand of sums over particles at
-//! one point (`point`), or of an integral over a cell with quadratic displacement and a linear field. For
-//! each cell this module gathers the coefficients of the kernels, calls them, brings their results to the
+//! one point (`point`), or of an integral over a cell with Lagrange elements for the fields. For each
+//! cell this module gathers the coefficients of the kernels, calls them, brings their results to the
 //! coefficients of the basis (with the functions at the point, or `T^T A T`, T the extraction of the
 //! cell) and adds that to known entries of a matrix in compressed rows. The result is `P^T K P` without P, K
 //! or their product.
@@ -22,16 +22,34 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::grid::Location;
-use crate::space::{number_of, DIM, DISPLACEMENT_DOFS, FUNCTIONS_1D, MAX_DOFS, ROWS};
+use crate::space::{number_of, DIM, FUNCTIONS_1D, ROWS};
 use kernel::Work;
-use matrix::{LINEAR, MIXED_LINEAR};
 
-pub use cell::Cells;
+pub use cell::{Cells, Field};
 pub use kernel::{Bilinear, Kernel, Kernels, Slot, State, TabulateTensor};
 pub use matrix::matrix;
 pub use pattern::{pattern, Pattern};
 pub use point::{Entries, Entry, Place, PointKernel, PointSlot};
 pub use selection::Selection;
+
+/// Most coefficients of all fields on a cell.
+pub const MAX_COEFFICIENTS: usize = 64;
+
+/// Call a function for rows long enough for the coefficients of a cell. The length is constant, which the
+/// compiler turns into vector instructions without loops.
+macro_rules! with_rows {
+    ($cells:expr, $function:ident($($argument:expr),*)) => {
+        match $cells.local_len().div_ceil(8) {
+            0 | 1 => $function::<8>($($argument),*),
+            2 => $function::<16>($($argument),*),
+            3 => $function::<24>($($argument),*),
+            4 => $function::<32>($($argument),*),
+            5 | 6 => $function::<48>($($argument),*),
+            _ => $function::<{ crate::assembly::MAX_COEFFICIENTS }>($($argument),*),
+        }
+    };
+}
+use with_rows;
 
 /// Active cells in rows along x, in colours: within a colour no two rows share a function, since a function
 /// reaches over as many rows as a cell has rows of functions.
@@ -80,41 +98,32 @@ impl Shared {
     }
 }
 
-/// The form's vector on all coefficients: `E^T r`.
+/// The form's vector on all coefficients: `E^T r`. With `absolute`, the sums of the absolute values of what
+/// each point, and each cell with integrals, contributes to it.
 ///
 /// # Safety
 /// Each kernel is a loaded FFCx kernel of rank 1 of these cells. It reads as many coefficients as its slots
 /// have and as many constants as it has. The coefficients are those of all fields.
-pub unsafe fn vector(state: &State, kernels: &Kernels) -> Vec<f64> {
+pub unsafe fn vector(state: &State, kernels: &Kernels, absolute: bool) -> Vec<f64> {
     // SAFETY: the caller's.
-    unsafe {
-        match state.cells.local_len() {
-            MAX_DOFS => vector_of::<MAX_DOFS, 24, FUNCTIONS_1D>(state, kernels),
-            DISPLACEMENT_DOFS => vector_of::<DISPLACEMENT_DOFS, 24, FUNCTIONS_1D>(state, kernels),
-            MIXED_LINEAR => vector_of::<MIXED_LINEAR, 16, 2>(state, kernels),
-            _ => vector_of::<LINEAR, 8, 2>(state, kernels),
-        }
-    }
+    unsafe { with_rows!(state.cells, vector_of(state, kernels, absolute)) }
 }
 
-/// [`vector`] for cells with `M` coefficients.
+/// [`vector`] for cells whose coefficients fit into rows of `P` numbers.
 ///
 /// # Safety
 /// As [`vector`].
-unsafe fn vector_of<const M: usize, const P: usize, const W: usize>(
-    state: &State,
-    kernels: &Kernels,
-) -> Vec<f64> {
+unsafe fn vector_of<const P: usize>(state: &State, kernels: &Kernels, absolute: bool) -> Vec<f64> {
     let mut sums = vec![0.0; state.coefficients.len()];
     let shared = Shared::new(&mut sums);
     for rows in colours(state.location) {
         rows.into_par_iter().for_each(|row| {
-            let mut work = Work::<M, P, W>::new();
+            let mut work = Work::<P>::new(state.cells);
             for a in row {
                 let local = state.cells.local(state.location, a);
                 // SAFETY: the caller's.
-                let of_cell = unsafe { work.vector(state, kernels, a, &local) };
-                for (&c, &value) in local.numbers().iter().zip(&of_cell) {
+                let of_cell = unsafe { work.vector(state, kernels, a, &local, absolute) };
+                for (&c, &value) in local.numbers().iter().zip(&of_cell.0) {
                     // SAFETY: the coefficient is one of all; rows of one colour share none.
                     unsafe { shared.add(c, value) };
                 }

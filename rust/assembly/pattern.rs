@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use ndarray::Array1;
 use rayon::prelude::*;
 
-use super::cell::Cells;
+use super::cell::{Cells, Field};
 use super::selection::Selection;
 use crate::grid::{Active, Functions, Location};
-use crate::space::{indices, number_of, Block, Index, DIM};
+use crate::space::{indices, number_of, Block, Index};
 
 /// Pattern of the reduced matrix in compressed rows.
 #[derive(Debug, Clone)]
@@ -21,8 +21,8 @@ pub struct Pattern {
     pub(super) reaching: Vec<bool>,
 }
 
-/// A field: its functions, and its place among the coefficients.
-struct Field {
+/// The functions of a field, and its place among the coefficients.
+struct Place {
     functions: Functions,
     /// First coefficient.
     first: usize,
@@ -34,14 +34,16 @@ fn intersection(a: Block, b: Block) -> Block {
     std::array::from_fn(|axis| [a[axis][0].max(b[axis][0]), a[axis][1].min(b[axis][1])])
 }
 
-impl Field {
-    /// The fields of the forms of these cells.
+impl Place {
+    /// The fields of these cells.
     fn of(cells: &Cells, grid: Index) -> Vec<Self> {
-        let functions = cells.displacement(grid);
-        let first = DIM * functions.len();
-        let displacement = Self { functions, first: 0, components: DIM };
-        let linear = cells.linear(grid).map(|functions| Self { functions, first, components: 1 });
-        std::iter::once(displacement).chain(linear).collect()
+        let mut next = 0;
+        let place = |field: &Field| {
+            let (functions, components, first) = (field.functions(grid), field.components, next);
+            next += components * functions.len();
+            Self { functions, first, components }
+        };
+        cells.fields().iter().map(place).collect()
     }
 
     /// Cells of the support of the function that a coefficient belongs to.
@@ -86,7 +88,7 @@ const ROWS: usize = 512;
 #[must_use]
 pub fn pattern(cells: &Cells, location: &Location, selection: &Selection) -> Option<Pattern> {
     let active = Active::new(location.grid, &location.active);
-    let fields = Field::of(cells, location.grid.cells);
+    let fields = Place::of(cells, location.grid.cells);
     let support = |c: usize| {
         let field = fields.iter().rev().find(|field| c >= field.first).unwrap_or(&fields[0]);
         field.support(c)

@@ -19,20 +19,14 @@ use std::ops::Range;
 
 use ndarray::ArrayView2;
 
-use super::cell::Local;
+use super::cell::{Cells, Local};
 use super::kernel::{State, TabulateTensor};
 use crate::grid::{products_of, Functions};
-use crate::space::{number_of, Index, Point, DIM, FUNCTIONS, SYMMETRIC, VERTICES};
+use crate::space::{Index, Point, DIM, FUNCTIONS, FUNCTIONS_1D, SYMMETRIC};
 use crate::transfer::cells::{mean_of_cell, sum_of_cell};
 
 /// A function, its first derivatives, and its second ones (xx, yy, xy).
 pub const DERIVATIVES: usize = 1 + DIM + SYMMETRIC;
-
-/// Components of all fields.
-const COMPONENTS: usize = DIM + 1;
-
-/// Most numbers that a kernel reads of the fields at a point.
-pub const MAX_ENTRIES: usize = COMPONENTS * DERIVATIVES;
 
 /// The interval on which kernels of points are compiled, whose length is 1.
 const INTERVAL: [f64; 6] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
@@ -40,7 +34,7 @@ const INTERVAL: [f64; 6] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
 /// A value or derivative of a component of the fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Entry {
-    /// Component: those of the displacement, then the linear field.
+    /// Number of the component among those of all fields.
     component: usize,
     /// 0 for the value; then the first and the second derivatives.
     derivative: usize,
@@ -59,7 +53,7 @@ impl Entry {
             }
             _ => return None,
         };
-        let inside = component < COMPONENTS && axes.iter().all(|&axis| axis < DIM);
+        let inside = axes.iter().all(|&axis| axis < DIM);
         inside.then_some(Self { component, derivative })
     }
 }
@@ -136,10 +130,11 @@ impl Entries {
         self.fields.len()
     }
 
-    /// Whether a field that the grid does not have is among them.
+    /// Whether they are entries of the fields of these cells.
     #[must_use]
-    pub fn fit(&self, linear: bool) -> bool {
-        linear || self.distinct.iter().all(|entry| entry.component < DIM)
+    pub fn fit(&self, cells: &Cells) -> bool {
+        let count = cells.components().len();
+        self.distinct.iter().all(|entry| entry.component < count)
     }
 }
 
@@ -190,45 +185,40 @@ impl<const P: usize> Row<P> {
     pub(super) const ZERO: Self = Self([0.0; P]);
 
     #[inline(always)]
-    fn add(&mut self, factor: f64, other: &Self) {
+    pub(super) fn add(&mut self, factor: f64, other: &Self) {
         self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a += factor * b);
     }
 }
 
-/// Memory of one thread for a cell with `M` coefficients in rows of `P` numbers, and with `W` functions of the
-/// displacement along each axis.
-pub(super) struct Points<const M: usize, const P: usize, const W: usize> {
+/// Memory of one thread for cells whose coefficients fit into rows of `P` numbers.
+pub(super) struct Points<const P: usize> {
     /// Coefficients of each component on the cell.
-    coefficients: [[f64; FUNCTIONS]; COMPONENTS],
-    displacement: Derivatives,
-    /// Those of the linear field, in the order of the vertices.
-    linear: Derivatives,
+    coefficients: Vec<[f64; FUNCTIONS]>,
+    /// The functions of each basis.
+    tables: Vec<Derivatives>,
     /// `rows[e]`: entry e of the functions behind each coefficient, zero for other components.
-    rows: [Row<P>; MAX_ENTRIES],
+    rows: Vec<Row<P>>,
     /// `D B`.
-    half: [Row<P>; MAX_ENTRIES],
+    half: Vec<Row<P>>,
     packed: Vec<f64>,
     /// r or D.
-    result: [f64; MAX_ENTRIES * MAX_ENTRIES],
+    result: Vec<f64>,
 }
 
-impl<const M: usize, const P: usize, const W: usize> Points<M, P, W> {
-    /// Functions of the displacement on a cell.
-    const FUNCTIONS: usize = W.pow(DIM as u32);
-
-    pub(super) fn new() -> Self {
+impl<const P: usize> Points<P> {
+    pub(super) fn new(cells: &Cells) -> Self {
         Self {
-            coefficients: [[0.0; FUNCTIONS]; COMPONENTS],
-            displacement: [[0.0; FUNCTIONS]; DERIVATIVES],
-            linear: [[0.0; FUNCTIONS]; DERIVATIVES],
-            rows: [Row::ZERO; MAX_ENTRIES],
-            half: [Row::ZERO; MAX_ENTRIES],
+            coefficients: vec![[0.0; FUNCTIONS]; cells.components().len()],
+            tables: vec![[[0.0; FUNCTIONS]; DERIVATIVES]; cells.bases().len()],
+            rows: Vec::new(),
+            half: Vec::new(),
             packed: Vec::new(),
-            result: [0.0; MAX_ENTRIES * MAX_ENTRIES],
+            result: Vec::new(),
         }
     }
 
-    /// Add kernels of rank 1 on the a-th active cell to a vector on its coefficients.
+    /// Add kernels of rank 1 on the a-th active cell to a vector on its coefficients, or the absolute value
+    /// of what each point contributes.
     ///
     /// # Safety
     /// As [`vector`](super::vector).
@@ -238,12 +228,13 @@ impl<const M: usize, const P: usize, const W: usize> Points<M, P, W> {
         state: &State,
         a: usize,
         local: &Local,
-        out: &mut [f64; M],
+        absolute: bool,
+        out: &mut Row<P>,
     ) {
         // SAFETY: the caller's.
         unsafe {
             self.evaluate(kernels, state, a, local, |points, entries, weight| {
-                points.add_vector(entries, weight, out);
+                points.add_vector(entries, state.cells, weight, absolute, out);
             });
         }
     }
@@ -258,15 +249,16 @@ impl<const M: usize, const P: usize, const W: usize> Points<M, P, W> {
         state: &State,
         a: usize,
         local: &Local,
-        out: &mut [Row<P>; M],
+        out: &mut [Row<P>],
     ) {
         for kernel in kernels {
-            self.rows[..kernel.entries.distinct.len()].fill(Row::ZERO);
+            self.rows.clear();
+            self.rows.resize(kernel.entries.distinct.len(), Row::ZERO);
             let kernel = std::slice::from_ref(kernel);
             // SAFETY: the caller's.
             unsafe {
                 self.evaluate(kernel, state, a, local, |points, entries, weight| {
-                    points.add_matrix(entries, weight, out);
+                    points.add_matrix(entries, state.cells, weight, out);
                 });
             }
         }
@@ -289,13 +281,11 @@ impl<const M: usize, const P: usize, const W: usize> Points<M, P, W> {
             return;
         }
         let numbers = local.numbers();
-        for (k, &c) in numbers.iter().enumerate() {
-            let (component, function) = if k < DIM * Self::FUNCTIONS {
-                (k % DIM, k / DIM)
-            } else {
-                (DIM, k - DIM * Self::FUNCTIONS)
-            };
-            self.coefficients[component][function] = state.coefficients[c];
+        for (c, component) in self.coefficients.iter_mut().zip(state.cells.components()) {
+            let mine = numbers[component.first..].iter().step_by(component.step);
+            c.iter_mut().zip(mine).take(component.functions).for_each(|(c, &n)| {
+                *c = state.coefficients[n];
+            });
         }
         let location = state.location;
         for kernel in kernels {
@@ -344,22 +334,8 @@ impl<const M: usize, const P: usize, const W: usize> Points<M, P, W> {
 
     /// The functions behind an entry.
     #[inline(always)]
-    fn functions(&self, entry: Entry) -> &[f64] {
-        if entry.component < DIM {
-            &self.displacement[entry.derivative][..Self::FUNCTIONS]
-        } else {
-            &self.linear[entry.derivative][..VERTICES]
-        }
-    }
-
-    /// Places of the coefficients of a component: first and step.
-    #[inline(always)]
-    fn places(component: usize) -> (usize, usize) {
-        if component < DIM {
-            (component, DIM)
-        } else {
-            (DIM * Self::FUNCTIONS, 1)
-        }
+    fn functions(&self, entry: Entry, cells: &Cells) -> &[f64; FUNCTIONS] {
+        &self.tables[cells.components()[entry.component].basis][entry.derivative]
     }
 
     /// Evaluate a kernel at a point: `result`, and the functions there.
@@ -377,14 +353,12 @@ impl<const M: usize, const P: usize, const W: usize> Points<M, P, W> {
     ) {
         let (entries, grid, cells) = (kernel.entries, &state.location.grid, state.cells);
         let cell = state.location.active_index(a);
-        self.displacement =
-            derivatives::<W>(&cells.displacement(grid.cells), cell, xi, grid.h, entries.second);
-        if let Some(linear) = cells.linear(grid.cells) {
-            let at = derivatives::<2>(&linear, cell, xi, grid.h, entries.second);
-            for (k, &vertex) in cells.vertices_of_cell().iter().enumerate() {
-                let from = number_of(vertex, [2; DIM]);
-                self.linear.iter_mut().zip(&at).for_each(|(to, at)| to[k] = at[from]);
-            }
+        for (table, &basis) in self.tables.iter_mut().zip(cells.bases()) {
+            let functions = Functions { basis, cells: grid.cells };
+            *table = match basis.per_cell() {
+                2 => derivatives::<2>(&functions, cell, xi, grid.h, entries.second),
+                _ => derivatives::<FUNCTIONS_1D>(&functions, cell, xi, grid.h, entries.second),
+            };
         }
         self.packed.clear();
         for slot in &kernel.slots {
@@ -394,7 +368,7 @@ impl<const M: usize, const P: usize, const W: usize> Points<M, P, W> {
                     for &e in &entries.fields {
                         let entry = entries.distinct[e];
                         let (functions, c) =
-                            (self.functions(entry), &self.coefficients[entry.component]);
+                            (self.functions(entry, cells), &self.coefficients[entry.component]);
                         let value = functions.iter().zip(c).map(|(b, c)| b * c).sum();
                         self.packed.push(value);
                     }
@@ -411,12 +385,12 @@ impl<const M: usize, const P: usize, const W: usize> Points<M, P, W> {
             }
         }
         let (rows, columns) = (entries.test.len(), entries.trial.len());
-        let result = &mut self.result[..rows * columns.max(1)];
-        result.fill(0.0);
+        self.result.clear();
+        self.result.resize(rows * columns.max(1), 0.0);
         // SAFETY: the caller guarantees the kernel, which writes rows x columns numbers.
         unsafe {
             (kernel.tabulate)(
-                result.as_mut_ptr(),
+                self.result.as_mut_ptr(),
                 self.packed.as_ptr(),
                 kernel.constants.as_ptr(),
                 INTERVAL.as_ptr(),
@@ -427,47 +401,56 @@ impl<const M: usize, const P: usize, const W: usize> Points<M, P, W> {
         }
     }
 
-    /// `out += weight B^T r`.
-    fn add_vector(&self, entries: &Entries, weight: f64, out: &mut [f64; M]) {
-        for (r, &e) in self.result.iter().zip(&entries.test) {
-            let entry = entries.distinct[e];
-            let (first, step) = Self::places(entry.component);
-            let r = weight * r;
-            let places = out[first..].iter_mut().step_by(step);
-            places.zip(self.functions(entry)).for_each(|(o, b)| *o += r * b);
+    /// `out += weight B^T r`, or its absolute value.
+    fn add_vector(
+        &self,
+        entries: &Entries,
+        cells: &Cells,
+        weight: f64,
+        absolute: bool,
+        out: &mut Row<P>,
+    ) {
+        for group in &entries.components {
+            let mut sum = [0.0; FUNCTIONS];
+            for (r, &e) in self.result[group.clone()].iter().zip(&entries.test[group.clone()]) {
+                let (r, functions) = (weight * r, self.functions(entries.distinct[e], cells));
+                sum.iter_mut().zip(functions).for_each(|(s, b)| *s += r * b);
+            }
+            let component =
+                cells.components()[entries.distinct[entries.test[group.start]].component];
+            let places = out.0[component.first..].iter_mut().step_by(component.step);
+            for (out, sum) in places.zip(&sum[..component.functions]) {
+                *out += if absolute { sum.abs() } else { *sum };
+            }
         }
     }
 
     /// `out += weight B^T D B`.
-    fn add_matrix(&mut self, entries: &Entries, weight: f64, out: &mut [Row<P>; M]) {
-        for (e, &entry) in entries.distinct.iter().enumerate() {
-            let (first, step) = Self::places(entry.component);
-            let places = self.rows[e].0[first..].iter_mut().step_by(step);
-            let functions = if entry.component < DIM {
-                &self.displacement[entry.derivative][..Self::FUNCTIONS]
-            } else {
-                &self.linear[entry.derivative][..VERTICES]
-            };
-            places.zip(functions).for_each(|(place, b)| *place = *b);
+    fn add_matrix(&mut self, entries: &Entries, cells: &Cells, weight: f64, out: &mut [Row<P>]) {
+        for (row, &entry) in self.rows.iter_mut().zip(&entries.distinct) {
+            let component = cells.components()[entry.component];
+            let functions = &self.tables[component.basis][entry.derivative];
+            let places = row.0[component.first..].iter_mut().step_by(component.step);
+            places.zip(&functions[..component.functions]).for_each(|(place, b)| *place = *b);
         }
-        let lines = self.result.chunks_exact(entries.trial.len()).take(entries.test.len());
-        for (half, d) in self.half.iter_mut().zip(lines) {
+        self.half.clear();
+        for d in self.result.chunks_exact(entries.trial.len()).take(entries.test.len()) {
             let mut sum = Row::ZERO;
             for (d, &column) in d.iter().zip(&entries.trial).filter(|(d, _)| **d != 0.0) {
                 sum.add(weight * d, &self.rows[column]);
             }
-            *half = sum;
+            self.half.push(sum);
         }
         for group in &entries.components {
             let half = &self.half[group.clone()];
             let mut functions: [&[f64]; DERIVATIVES] = [&[]; DERIVATIVES];
             for (functions, &e) in functions.iter_mut().zip(&entries.test[group.clone()]) {
-                *functions = self.functions(entries.distinct[e]);
+                *functions = self.functions(entries.distinct[e], cells);
             }
-            let component = entries.distinct[entries.test[group.start]].component;
-            let (first, step) = Self::places(component);
-            let lines = out[first..].iter_mut().step_by(step);
-            for (f, out) in (0..functions[0].len()).zip(lines) {
+            let component =
+                cells.components()[entries.distinct[entries.test[group.start]].component];
+            let lines = out[component.first..].iter_mut().step_by(component.step);
+            for (f, out) in (0..component.functions).zip(lines) {
                 let mut sum = *out;
                 for (functions, half) in functions.iter().zip(half) {
                     sum.add(functions[f], half);

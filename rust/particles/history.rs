@@ -73,6 +73,7 @@ impl Variable<'_> {
 impl Stage<'_> {
     /// A history variable of particle `p` at the end of the step, with the derivatives that `part` needs; 0
     /// where its law has no such variable.
+    #[cold]
     pub(super) fn variable(
         &self,
         name: &str,

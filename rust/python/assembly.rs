@@ -13,8 +13,8 @@ use super::threads::detached;
 use super::transfer::check_data;
 use super::{require, view, InputError};
 use crate::assembly::{
-    self, Bilinear, Cells, Entries, Entry, Kernel, Kernels, Pattern, Place, PointKernel, PointSlot,
-    Selection, Slot, State, TabulateTensor,
+    self, Bilinear, Cells, Entries, Entry, Field, Kernel, Kernels, Pattern, Place, PointKernel,
+    PointSlot, Selection, Slot, State, TabulateTensor,
 };
 use crate::grid::{Grid, Location};
 use crate::space::{Index, NODES, NODES_1D, VERTICES};
@@ -100,10 +100,10 @@ impl Source {
 impl PyKernels {
     #[new]
     fn new(assembler: &PyAssembler, rank: usize, kernels: Vec<KernelOf>) -> PyResult<Self> {
-        let (dofs, linear) = (assembler.cells.dofs(), assembler.cells.has_linear());
+        let (cells, dofs) = (&assembler.cells, assembler.cells.dofs());
         let plan = |(owner, address, its_rank, width, slots, constants, point): KernelOf| {
             require(address != 0 && its_rank == rank, "a kernel of another rank")?;
-            let point = point.map(|point| entries(point, rank, linear)).transpose()?;
+            let point = point.map(|point| entries(point, rank, cells)).transpose()?;
             let fields = point.as_ref().map_or(dofs, |(_, entries)| entries.num_fields());
             let source = |slot: Option<SlotOf>| slot.map(Source::new).transpose();
             let slots: Vec<_> = slots.into_iter().map(source).collect::<PyResult<_>>()?;
@@ -125,7 +125,7 @@ impl PyKernels {
 fn entries(
     (place, fields, test, trial): PointOf,
     rank: usize,
-    linear: bool,
+    cells: &Cells,
 ) -> PyResult<(Place, Entries)> {
     let place = match place.as_str() {
         "particle" => Place::Particles,
@@ -141,7 +141,7 @@ fn entries(
             .collect()
     };
     let entries = Entries::new(&read(fields)?, &read(test)?, &read(trial)?);
-    require(entries.rank() == rank && entries.fit(linear), "entries of other fields")?;
+    require(entries.rank() == rank && entries.fit(cells), "entries of other fields")?;
     Ok((place, entries))
 }
 
@@ -225,18 +225,26 @@ impl PyAssembler {
     #[new]
     fn new(
         location: &PyLocation,
-        basis: &str,
+        fields: Vec<(String, usize, usize)>,
         nodes: [Index; NODES],
         vertices: [Index; VERTICES],
-        linear: bool,
     ) -> PyResult<Self> {
         require(nodes.iter().flatten().all(|&p| p < NODES_1D), "nodes of a cell")?;
         require(vertices.iter().flatten().all(|&p| p < 2), "vertices of a cell")?;
-        let cells = Cells::new(basis.parse()?, nodes, vertices, linear);
+        let field = |(basis, components, degree): (String, usize, usize)| {
+            require(degree == 1 || degree == 2, "degree of an element")?;
+            Ok(Field { basis: basis.parse()?, components, quadratic: degree == 2 })
+        };
+        let fields = fields.into_iter().map(field).collect::<PyResult<_>>()?;
+        let Some(cells) = Cells::new(fields, nodes, vertices) else {
+            return Err(PyRuntimeError::new_err("internal: too many coefficients on a cell"));
+        };
         Ok(Self { location: Arc::clone(&location.0), cells })
     }
 
-    /// The form's vector on all coefficients; `data` are the arrays that the kernels count.
+    /// The form's vector on all coefficients, or the sum of the absolute values of what each particle
+    /// contributes; `data` are the arrays that the kernels count.
+    #[pyo3(signature = (kernels, data, volume, coefficients, absolute = false))]
     fn vector<'py>(
         &self,
         py: Python<'py>,
@@ -244,11 +252,12 @@ impl PyAssembler {
         data: Vec<Read2<f64>>,
         volume: Read1<f64>,
         coefficients: Read1<f64>,
+        absolute: bool,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let kernels = kernels.with(self, 1, &data)?;
         let state = self.state(&volume, &coefficients)?;
         // SAFETY: kernels as in `PyKernels::new`, of rank 1; the number of coefficients was checked.
-        let sums = detached(py, || unsafe { assembly::vector(&state, &kernels) });
+        let sums = detached(py, || unsafe { assembly::vector(&state, &kernels, absolute) });
         Ok(sums.to_pyarray(py))
     }
 

@@ -59,6 +59,7 @@ fn view<'py, T: Element, D: Dimension, O: PyClass>(
 #[pymodule]
 fn _rust(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    m.add("MAX_COEFFICIENTS", crate::assembly::MAX_COEFFICIENTS)?;
     m.add("TawamiError", m.py().get_type::<TawamiError>())?;
     m.add("InputError", m.py().get_type::<InputError>())?;
     m.add("InvertedError", m.py().get_type::<InvertedError>())?;

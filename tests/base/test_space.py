@@ -7,7 +7,7 @@ import pytest
 from scenes import grid_of
 
 import tawami
-from tawami.base.space import PLANE, Space, lattice, tensor_product
+from tawami.base.space import AXISYMMETRIC, PLANE, Space, lattice, tensor_product
 
 #: No grid is three-dimensional yet; the names of its space are known already.
 SOLID = Space(axes=("x", "y", "z"), volume="m3", depth="")
@@ -16,6 +16,8 @@ SOLID = Space(axes=("x", "y", "z"), volume="m3", depth="")
 def test_names_of_components():
     assert PLANE.tensor == ("xx", "yy", "zz", "xy")
     assert PLANE.gradient == ("xx", "xy", "yx", "yy")
+    assert AXISYMMETRIC.gradient == ("xx", "xy", "yx", "yy", "zz")
+    assert (PLANE.num_strains, AXISYMMETRIC.num_strains, SOLID.num_strains) == (3, 4, 6)
     assert SOLID.tensor == ("xx", "yy", "zz", "xy", "xz", "yz")
     assert len(SOLID.gradient) == 9
 

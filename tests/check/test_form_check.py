@@ -9,11 +9,11 @@ from ufl import div, dot, grad, inner
 
 import tawami
 from tawami.check import scenes
-from tawami.form import tangent
+from tawami.form import scalar, tangent, vector
 
 ALL = {**FORMS, **FINITE}
-MIXED = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
-ALONE = {"u": ("displacement", "w")}
+MIXED = {"u": vector("w"), "eps_v": scalar("q", role="volumetric_strain")}
+ALONE = {"u": vector("w")}
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -55,7 +55,7 @@ def test_the_inf_sup_constant_of_taylor_hood():
 
 
 def mixed(residual, **more):
-    return tawami.Form(MIXED, "mixed", residual, **more)
+    return tawami.Form(MIXED, residual, **more)
 
 
 def paper(u, eps_v, w, q, sigma, K, mu, h, sum_p, *, alpha=0.01):
@@ -127,7 +127,7 @@ def test_a_wrong_tangent_fails(monkeypatch):
     monkeypatch.setattr(
         tangent.Linearisation, "_direction", lambda self, density: 0.9 * right(self, density)
     )
-    form = tawami.Form(ALONE, "displacement", lambda w, sigma, sum_p: sum_p(sigma, grad(w)))
+    form = tawami.Form(ALONE, lambda w, sigma, sum_p: sum_p(sigma, grad(w)))
     report = tawami.check_form(form)
     assert report.line("tangent").verdict == "FAILED"
     assert report.line("rigid motions").verdict == "ok"
@@ -142,20 +142,18 @@ right = tangent.Linearisation._direction
     [
         ("nowhere.py", "declaration", "cannot be read"),
         (
-            tawami.Form(ALONE, "displacement", lambda w, porosity: 0),
+            tawami.Form(ALONE, lambda w, porosity: 0),
             "arguments",
             "asks for 'porosity'",
         ),
-        (tawami.Form(ALONE, "displacement", lambda u: 3.0), "arguments", "expected a UFL form"),
+        (tawami.Form(ALONE, lambda u: 3.0), "arguments", "expected a UFL form"),
         (
-            tawami.Form(
-                ALONE, "displacement", lambda w: 0, parameters={"a": {"default": -1, "minimum": 0}}
-            ),
+            tawami.Form(ALONE, lambda w: 0, parameters={"a": {"default": -1, "minimum": 0}}),
             "parameters",
             "a = -1.0: expected",
         ),
         (
-            tawami.Form(ALONE, "displacement", lambda w, t, ds, dx: dot(t, w) * ds),
+            tawami.Form(ALONE, lambda w, t, ds, dx: dot(t, w) * ds),
             "kernels",
             "expected integrals",
         ),
@@ -176,7 +174,6 @@ def test_parameters_and_inexact_sums_are_reported():
     assert "alpha = 2: expected at most 1" in str(tawami.check_form("u_epsv", alpha=2.0))
     form = tawami.Form(
         ALONE,
-        "displacement",
         lambda u, w, sigma, mu, sum_p: sum_p(sigma, grad(w)) + sum_p(mu, div(u) ** 3 * div(w)),
     )
     line = tawami.check_form(form).line("dolfinx")

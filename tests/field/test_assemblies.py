@@ -16,6 +16,7 @@ from scipy.sparse import csr_matrix, identity
 import tawami
 from tawami import _rust
 from tawami.field.matrix import as_arrays
+from tawami.form import vector
 from tawami.form.form import Form
 
 SUPPORTS = {
@@ -67,7 +68,7 @@ def test_a_form_nonlinear_in_the_fields_agrees(random_scene):
         return sum_p(s, grad(w)) + sum_c(sigma_m, div(w)) + extra * dx + 2 * extra * dx_c
 
     form = Form(
-        {"u": ("displacement", "w")}, "cell", residual, parameters={"beta": {"default": 0.7}}
+        {"u": vector("w")}, residual, kinematics="cell", parameters={"beta": {"default": 0.7}}
     )
     scenes = both(lambda **path: random_scene(form=form, **path))
     for scene in scenes:
@@ -108,7 +109,7 @@ def test_newton_reuses_the_pattern(random_scene):
         stiffer = 3e3 * cell_mean(mu) * div(u) ** 3 * div(w) * dx
         return sum_p(sigma, grad(w)) + stiffer - dot(t, w) * ds
 
-    form = Form({"u": ("displacement", "w")}, "displacement", stiff)
+    form = Form({"u": vector("w")}, stiff)
     solutions = []
     for path in ("points", "dolfinx"):
         grid = grid_of()

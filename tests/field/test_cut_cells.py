@@ -11,6 +11,7 @@ from scipy.interpolate import BSpline
 import tawami
 from cases.showcase import cut_cells
 from tawami.field import ghost
+from tawami.form import vector
 from tawami.form.form import Form
 
 GHOST = {"form": "u_epsv", "ghost_penalty": "on", "k": 0.5}
@@ -116,7 +117,7 @@ def test_terms_on_sides_that_are_not_linear_are_rejected(random_scene, term, wor
     def residual(u, w, sigma, mu, sum_p, dG, jump_nn):
         return sum_p(sigma, grad(w)) + term(u, w, dG, jump_nn, mu)
 
-    form = Form({"u": ("displacement", "w")}, "displacement", residual)
+    form = Form({"u": vector("w")}, residual)
     with pytest.raises(tawami.FormError, match=words):
         random_scene(form=form)
 

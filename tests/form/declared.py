@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from tawami.form import scalar, vector
 from tawami.form.form import Form
 
 
-def form_of(function, fields=None, kinematics="displacement", **more):
-    return Form(fields or {"u": ("displacement", "w")}, kinematics, function, **more)
+def form_of(function, fields=None, **more):
+    return Form(fields or {"u": vector("w")}, function, **more)
 
 
-BOTH = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
+BOTH = {"u": vector("w"), "eps_v": scalar("q", role="volumetric_strain")}

@@ -12,17 +12,17 @@ import numpy as np
 import pytest
 from declared import BOTH, form_of
 from scenes import FINITE, FORMS, grid_of
-from ufl import div, dot, grad, inner, sym
+from ufl import div, dot, grad, inner, sqrt, sym
 
 import tawami
 from tawami.base.errors import InexactSumWarning
+from tawami.form import scalar, vector
 from tawami.form.files import shipped
 from tawami.form.form import Form
-from tawami.form.quantities import ParticleScalar
+from tawami.form.symbols import Symbols
 
 # A form in a driver script: this module is one. It is the shipped u_epsv, written differently.
-fields = {"v": ("displacement", "w"), "theta": ("volumetric_strain", "r")}
-kinematics = "mixed"
+fields = {"v": vector("w"), "theta": scalar("r", role="volumetric_strain")}
 parameters = {"beta": {"default": 0.2, "minimum": 0.0}}
 
 
@@ -48,8 +48,8 @@ def test_a_form_in_a_file_works_like_a_shipped_one(random_scene, tmp_path):
         textwrap.dedent(
             """
             from ufl import dot, grad
-            fields = {"u": ("displacement", "w")}
-            kinematics = "displacement"
+            from tawami.form import vector
+            fields = {"u": vector("w")}
             def residual(w, sigma, t, sum_p, ds):
                 return sum_p(sigma, grad(w)) - dot(t, w) * ds
             """
@@ -94,7 +94,7 @@ def test_a_form_nonlinear_in_the_fields_has_the_right_tangent(random_scene):
             + extra * dx_c
         )
 
-    form = Form({"u": ("displacement", "w")}, "displacement", cubic)
+    form = Form({"u": vector("w")}, cubic)
     with pytest.warns(InexactSumWarning, match=r"degree \d .* at most degree 4"):
         random_scene(form=form, assembly="dolfinx")
     scene = random_scene(form=form)
@@ -137,7 +137,7 @@ def test_newton_converges_quadratically_on_a_nonlinear_form():
     def stiff(u, w, sigma, mu, sum_p, t, ds):
         return sum_p(sigma, grad(w)) + sum_p(3e3 * mu, div(u) ** 3 * div(w)) - dot(t, w) * ds
 
-    form = Form({"u": ("displacement", "w")}, "displacement", stiff)
+    form = Form({"u": vector("w")}, stiff)
     grid = grid_of()
     body = tawami.box(grid, grid.origin, grid.upper, per_axis=3)
     material = tawami.linear_elastic(E=1e3, nu=0.2)
@@ -161,7 +161,7 @@ def test_sums_at_vertices_are_row_sum_lumped(random_scene, assembly):
     def lumped(w, q, eps_v, sigma, K, sum_p, sum_v):
         return sum_p(sigma, grad(w)) + sum_v(K, q * eps_v)
 
-    form = form_of(lumped, BOTH, "mixed")
+    form = form_of(lumped, BOTH)
     scene = random_scene(form=form, assembly=assembly)
     c = np.zeros(scene.num_coefficients)
     n = scene.configuration.domain.layout.num_displacement
@@ -178,8 +178,8 @@ def test_an_edited_and_reloaded_module_is_another_form(random_scene, tmp_path, m
     path = tmp_path / "edited_form.py"
     text = """
 from ufl import grad
-fields = {"u": ("displacement", "w")}
-kinematics = "displacement"
+from tawami.form import vector
+fields = {"u": vector("w")}
 def residual(w, sigma, sum_p):
     return FACTOR * sum_p(sigma, grad(w))
 """
@@ -222,14 +222,16 @@ def test_parameters_change_without_compiling_again(random_scene):
 
 
 def test_constants_of_particles_have_arithmetic():
-    values = {"a": np.array([1.0, 2.0]), "b": np.array([4.0, 0.5])}
-    a, b = (ParticleScalar(n, lambda v, n=n: v[n]) for n in "ab")
-    expression = (2 * a + b**2 / a - 1) / (3 - b) + 1 / a
-    x, y = values["a"], values["b"]
-    expected = (2 * x + y**2 / x - 1) / (3 - y) + 1 / x
-    np.testing.assert_allclose(expression.evaluate(values), expected)
-    assert a * b == a * b
-    assert a * b != a / b
+    def residual(w, K, mu, sum_v):
+        return sum_v((2 * K + sqrt(mu) ** 2 / K - 1) / (3 - mu) + 1 / K, w[0])
+
+    symbols = Symbols(Form({"u": vector("w")}, residual), {})
+    symbols.residual()
+    (quantity,) = (d.quantity for d in symbols.data.placeholders if d.rule == "vertex")
+    K, mu = np.array([1.0, 2.0, 1.0]), np.array([4.0, 0.5, 4.0])
+    expected = (2 * K + mu / K - 1) / (3 - mu) + 1 / K
+    np.testing.assert_allclose(quantity.evaluate({"K": K, "mu": mu}), expected)
+    assert "sqrt(mu)" in quantity.text
 
 
 def test_alpha_of_the_residual_based_stabilisation_is_limited():

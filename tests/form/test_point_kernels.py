@@ -27,6 +27,7 @@ from ufl import (
 )  # fmt: skip
 
 import tawami
+from tawami.form import vector
 from tawami.form.form import Form
 
 CELLS, H = (5, 4), 0.3
@@ -57,7 +58,7 @@ def cloud():
 
 def scene_of(cloud, residual, **options):
     grid, x, volume, _ = cloud
-    form = Form({"u": ("displacement", "w")}, "displacement", residual)
+    form = Form({"u": vector("w")}, residual)
     material = tawami.linear_elastic(K=2.0, mu=1.0)
     return tawami.Scene(grid, tawami.Body(x, volume), material, form=form, **options)
 

@@ -18,6 +18,7 @@ BASIS = "quadratic_spline"
 TERMS = [(i, j) for j in range(2) for i in range(2)]
 
 
+FIELDS = [(BASIS, 2, 2), ("bilinear", 1, 1)]
 NODES = [(i, j) for i in range(3) for j in range(3)]
 
 
@@ -38,7 +39,7 @@ class Sample:
         self.active = _rust.Active(self.grid, self.location.active)
         self.stage = _rust.Stage(self.particles, self.location, [self.law], "mixed", False, BASIS)
         self.assembler = _rust.Assembler(
-            self.location, BASIS, NODES, [(0, 0), (0, 1), (1, 0), (1, 1)], True
+            self.location, FIELDS, NODES, [(0, 0), (0, 1), (1, 0), (1, 1)]
         )
         self.u, self.v, self.all = np.zeros(60), np.zeros(20), np.zeros(80)
         self.selection = (
@@ -51,7 +52,7 @@ class Sample:
         self.rows = np.arange(len(self.location.active), dtype=np.uint32)
         self.packed = np.zeros((len(self.rows), 12))
         self.few = np.array([0, 2], dtype=np.uint32)
-        self.given = (np.zeros(4 * N), np.zeros(16 * N), np.zeros(N))
+        self.given = (np.zeros(4 * N), np.zeros(16 * N), np.zeros(N), np.zeros(N), np.zeros(0))
         self.wanted = [[("sigma", "value", 0, None), ("sigma_m", "value", 3, np.ones(N))]]
         self.requests = _rust.Requests(self.wanted)
         self.none = [_rust.Kernels(self.assembler, rank, []) for rank in (1, 2)]
@@ -83,8 +84,9 @@ CALLS: dict[str, Callable[[Sample], tuple[Any, ...]]] = {
     "Material.linear_elastic_e_one_minus_2nu": lambda s: (
         _rust.Material.linear_elastic_e_one_minus_2nu, 1.0, 0.3,
     ),
+    "Material.external": lambda s: (_rust.Material.external, "law", (2.0, 1.0), ["a"]),
     "Material.of": lambda s: (_rust.Material.of, "von_mises", (1.0, 0.3), [1.0, 0.0]),
-    "Assembler": lambda s: (_rust.Assembler, s.location, BASIS, NODES, TERMS, True),
+    "Assembler": lambda s: (_rust.Assembler, s.location, FIELDS, NODES, TERMS),
     "Assembler.vector": lambda s: (s.assembler.vector, s.none[0], [s.data], s.volume, s.all),
     "Assembler.pattern": lambda s: (s.assembler.pattern, s.selection),
     "Assembler.matrix": lambda s: (

@@ -30,6 +30,7 @@ from scenes import grid_of
 
 import tawami
 from tawami.base.files import atomic_file, result_folder
+from tawami.form import vector
 from tawami.results.plot import plot
 from tawami.results.single import write_grid, write_particles
 
@@ -266,7 +267,7 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         "preconsolidation": 0.1, "tension": 1e-3}),
     "NumpyLaw": (tawami.NumpyLaw, {"respond": law, "K": 1.0, "mu": 1.0}),
     "Form": (lambda **a: scene_of(form=tawami.Form(**a)), {
-        "fields": {"u": ("displacement", "w")}, "kinematics": "displacement", "residual": residual,
+        "fields": {"u": vector("w")}, "residual": residual,
         "parameters": {}, "options": {}, "strain": "small", "whole_cells": (), "name": "own"}),
     "Scene": (lambda **a: tawami.Scene(**a), {
         "grid": grid_of(), "body": tawami.Body(np.array([[0.0, 1.0]]), np.array([0.1])),

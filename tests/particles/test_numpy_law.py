@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
-from numpy_laws import hooke, stiffening, von_mises
+from numpy_laws import drucker_prager, hooke, stiffening, von_mises
 from scenes import grid_of, linear_field
 
 import tawami
@@ -183,6 +183,22 @@ def test_von_mises_in_numpy_is_that_in_rust(form, law):
     assert plastic.max() > 0.01
     assert plastic.min() == 0
     assert_same(mine, other, 1e-9)
+
+
+@pytest.mark.parametrize("form", ["u", "u_epsv", "u_p", "u_epsv_finite"])
+@pytest.mark.filterwarnings("ignore::tawami.TangentWarning")
+def test_flow_that_changes_the_volume_is_that_in_rust(form):
+    """A form with a field for the volume finds the volume at which the law has the mean stress."""
+    elastic = tawami.linear_elastic(K=K, mu=MU)
+    rust = tawami.drucker_prager(elastic, phi=20.0, psi=10.0, c=20.0)
+    laws = drucker_prager(K, MU, phi=20.0, psi=10.0, c=20.0), rust
+    mine, other = (pressed(block(law, form), force=50.0)[-1] for law in laws)
+    names = ("stress", "displacement")
+    pairs = [[getattr(s.scene.particles, name) for s in (mine, other)] for name in names]
+    pairs.append([s.scene.particles.history("dilatancy") for s in (mine, other)])
+    assert pairs[-1][1].max() > 1e-3
+    for one, two in pairs:
+        np.testing.assert_allclose(one, two, rtol=0, atol=1e-7 * np.abs(two).max())
 
 
 @pytest.mark.parametrize("form", ["u_epsv", "u_epsv_finite"])

@@ -8,6 +8,7 @@ from scenes import FINITE, FORMS, grid_of
 from ufl import div, grad
 
 import tawami
+from tawami.form import scalar, vector
 
 ELASTIC = tawami.linear_elastic(E=100.0, nu=0.3)
 
@@ -98,12 +99,12 @@ def test_a_block_in_plane_compression_yields_at_its_limit(form):
 def test_flow_that_changes_the_volume_needs_a_term_in_the_form(law):
     grid = grid_of()
     body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
-    fields = {"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")}
+    fields = {"u": vector("w"), "eps_v": scalar("q", role="volumetric_strain")}
 
     def paper(u, eps_v, w, q, sigma, K, sum_p):
         return sum_p(sigma, grad(w)) + sum_p(K, q * (div(u) - eps_v))
 
-    form = tawami.Form(fields, "mixed", paper)
+    form = tawami.Form(fields, paper)
     with pytest.raises(tawami.InputError, match="expected eps_p in its volume equation"):
         tawami.Scene(grid, body, law(ELASTIC, phi=30.0), form=form)
     tawami.Scene(grid, body, tawami.von_mises(ELASTIC, yield_stress=1.0), form=form)

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import heated
 import numpy as np
 from mpi4py import MPI
 from numpy_laws import von_mises
@@ -19,6 +20,7 @@ from cases.showcase.collapse.pile import build as pile_of_rods
 from cases.verification.cantilever import fem, mpm
 from tawami import _rust
 from tawami.base.ranks import allgathered
+from tawami.form import vector
 from tawami.form.form import Form
 from tawami.results import write_grid, write_particles
 from tawami.solve.newton import Newton
@@ -69,6 +71,31 @@ def random_clouds() -> dict[str, np.ndarray]:
     return found
 
 
+def fields() -> dict[str, np.ndarray]:
+    """A form of three fields: residual, tangent, and a solution; some ranks have no particle."""
+    found = {}
+    for path, theta in (
+        ("points", "quadratic_spline"),
+        ("points", "bilinear"),
+        ("dolfinx", "bilinear"),
+    ):
+        grid, random = grid_of((6, 5)), np.random.default_rng(0)
+        body = tawami.box(grid, grid.origin, (0.5, 2.0))
+        law = tawami.linear_elastic(E=2.0, nu=0.3)
+        form = heated.form_of(basis=theta)
+        scene = tawami.Scene(grid, body, law, form=form, assembly=path, tolerance=1e-11)
+        c = random.standard_normal(scene.num_coefficients)
+        found[f"fields {theta} {path} residual"] = scene.residual(c)
+        found[f"fields {theta} {path} tangent"] = scene.tangent(c).toarray()
+        scene.fix("bottom", "x")
+        scene.fix("bottom", "y")
+        solution = scene.solve()
+        found[f"fields {theta} {path} u"] = solution.u
+        found[f"fields {theta} {path} all"] = scene.configuration.total
+        found[f"fields {theta} {path} measure"] = np.array(solution.history[0][2])
+    return found
+
+
 def nonlinear() -> dict[str, np.ndarray]:
     """Several iterations with one factorisation, points held in cells of other ranks, a second step."""
     from ufl import div, dot, grad
@@ -76,7 +103,7 @@ def nonlinear() -> dict[str, np.ndarray]:
     def stiff(u, w, sigma, mu, sum_p, t, ds):
         return sum_p(sigma, grad(w)) + sum_p(3e3 * mu, div(u) ** 3 * div(w)) - dot(t, w) * ds
 
-    form = Form({"u": ("displacement", "w")}, "displacement", stiff)
+    form = Form({"u": vector("w")}, stiff)
     found = {}
     for path in ("points", "dolfinx"):
         grid = grid_of()
@@ -312,7 +339,7 @@ def output(folder: Path) -> dict[str, np.ndarray]:
 
 def results(folder: Path) -> dict[str, Any]:
     """Results of all scenes; files are written to the folder."""
-    found = beams() | random_clouds() | nonlinear() | singular() | motion() | initial()
+    found = beams() | random_clouds() | fields() | nonlinear() | singular() | motion() | initial()
     found |= construction()
     return found | errors() | inverted() | few_cells() | output(folder)
 

@@ -182,7 +182,10 @@ def test_messages_are_collected():
     found = {(message.kind, message.says) for message in messages.collected()}
     for kind, says in (
         ("InputError", "edge <shown(name)>: expected 'left', 'right', 'bottom' or 'top'<hint>"),
-        ("FormError", "field '<name>' is of kind '<kind>': expected one of <quoted(FIELD_UNITS)>"),
+        (
+            "FormError",
+            "test function <shown(test)>: expected a name, as vector('w') or scalar('q')",
+        ),
         ("InputError", "volume of particle <index> is <value> m2: expected a positive number"),
         ("InputError", "phi = <value>: expected a friction angle in degrees, 0 <= phi < 90"),
     ):

@@ -14,6 +14,7 @@ from mpi4py import MPI
 
 import tawami
 from tawami.base.files import result_folder
+from tawami.form import vector
 from tawami.results.single import write_grid, write_particles
 
 Array = npt.NDArray[np.float64]
@@ -118,7 +119,7 @@ def weak_form() -> bool:
     def residual(w: Any, sigma: Any, sum_p: Any) -> Any:
         return sum_p(sigma, w.grad)
 
-    form = tawami.Form({"u": ("displacement", "w")}, kinematics="displacement", residual=residual)
+    form = tawami.Form({"u": vector("w")}, residual=residual)
     report: tawami.FormReport = tawami.check_form(form)
     return report.usable and tawami.check_form("u_epsv", alpha=0.1).usable
 
@@ -154,7 +155,7 @@ def wrong(comm: MPI.Comm) -> None:
     tawami.Scene(grid, body, law, form=3)  # wrong: arg-type
     scene = tawami.Scene(grid, body, law)
     scene.fix("west", "x")  # wrong: arg-type
-    scene.fix("left", "z")  # wrong: arg-type
+    scene.fix("left", 1)  # wrong: arg-type
     scene.fix("left", "x", "held")  # wrong: arg-type
     scene.fix("left", "x", lambda y: y)  # wrong: arg-type misc
     scene.hold("left", "x")  # wrong: arg-type

@@ -16,6 +16,7 @@ from mpi4py import MPI
 from ufl import grad
 
 import tawami
+from tawami.form import vector
 from tawami.form.form import Form
 from tawami.results import provenance
 
@@ -118,7 +119,7 @@ def test_a_form_of_a_script_can_be_loaded_again(tmp_path):
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.5, cells=(4, 2))
     body = tawami.box(grid, (0, 0), (2, 1), per_axis=2)
     law = tawami.linear_elastic(E=1e3, nu=0.3)
-    form = Form({"u": ("displacement", "w")}, "displacement", plain)
+    form = Form({"u": vector("w")}, plain)
     scene = tawami.Scene(grid, body, law, form=form)
     provenance.write(tmp_path, scene)
     known = json.loads((tmp_path / "run.json").read_text())["form"]
@@ -131,7 +132,7 @@ def test_a_form_of_a_script_can_be_loaded_again(tmp_path):
 def test_a_form_without_source_is_recorded_as_such(tmp_path):
     names: dict = {"grad": grad}
     exec("def residual(w, sigma, sum_p):\n    return sum_p(sigma, grad(w))", names)
-    form = Form({"u": ("displacement", "w")}, "displacement", names["residual"])
+    form = Form({"u": vector("w")}, names["residual"])
     assert provenance.source_of(form) is None
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.5, cells=(4, 2))
     body = tawami.box(grid, (0, 0), (2, 1), per_axis=2)

@@ -14,7 +14,7 @@ from standing_block import STATIC, moving, plastic, scene_of
 
 import tawami
 from tawami.fem import kernels
-from tawami.form import compilation
+from tawami.form import compilation, vector
 from tawami.scene.domain import Domain
 from tawami.scene.model import KEYWORDS
 from tawami.solve.inertia import Inertia
@@ -237,7 +237,7 @@ def test_a_parameter_without_effect_is_rejected():
         scene_of(form="u_epsv", k=0.1)
     scene = scene_of(form="u_epsv", alpha=0.2, k=0.1, ghost_penalty="on")
     assert scene.parameters == {"alpha": 0.2, "k": 0.1}
-    idle = tawami.Form({"u": ("displacement", "w")}, "displacement", _residual,
+    idle = tawami.Form({"u": vector("w")}, _residual,
                        parameters={"beta": {"default": 1.0}})  # fmt: skip
     assert scene_of(form=idle).parameters == {}
     with pytest.raises(tawami.InputError, match=r"beta = 2.0: .* expected no beta"):

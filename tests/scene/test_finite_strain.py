@@ -10,6 +10,7 @@ from scipy.optimize import root
 
 import tawami
 from cases.verification import self_weight
+from tawami.form import scalar, vector
 from tawami.form.form import Form
 
 
@@ -240,11 +241,12 @@ def test_unsupported_combinations_are_rejected(random_scene):
     with pytest.raises(
         tawami.FormError, match="strain = 'huge': expected one of 'small', 'finite'"
     ):
-        Form({"u": ("displacement", "w")}, "displacement", lambda w: w, strain="huge")
+        Form({"u": vector("w")}, lambda w: w, strain="huge")
+    fields = {"u": vector("w"), "p": scalar("q", role="pressure")}
     with pytest.raises(
-        tawami.FormError, match="strain = 'finite' with the kinematics 'deviatoric'"
+        tawami.FormError, match="strain = 'finite' with a field of the role 'pressure'"
     ):
-        Form({"u": ("displacement", "w")}, "deviatoric", lambda w: w, strain="finite")
+        Form(fields, lambda w: w, strain="finite")
     with pytest.raises(tawami.InputError, match=r"gravity\(...\) needs Scene\(..., density=...\)"):
         random_scene().gravity((0, -10))
     with pytest.raises(tawami.InputError, match="density = -1.0: expected a finite number"):

@@ -13,6 +13,7 @@ from scenes import grid_of
 
 import tawami
 from tawami import _rust
+from tawami.form import scalar, vector
 
 ELASTIC = {"E": 1e6, "nu": 0.3}
 
@@ -69,8 +70,7 @@ def test_a_form_that_names_k_rejects_an_incompressible_material():
         return sum_p(sigma, grad(w)) + sum_p(p * div(w)) + sum_p(K, q * div(u)) - sum_p(q * p)
 
     form = tawami.Form(
-        fields={"u": ("displacement", "w"), "p": ("pressure", "q")},
-        kinematics="deviatoric",
+        fields={"u": vector("w"), "p": scalar("q", role="pressure")},
         residual=residual,
     )
     grid = grid_of()
@@ -238,8 +238,7 @@ def test_a_traction_on_a_form_without_an_edge_term_is_rejected():
     from ufl import grad
 
     form = tawami.Form(
-        fields={"u": ("displacement", "w")},
-        kinematics="displacement",
+        fields={"u": vector("w")},
         residual=lambda w, sigma, sum_p: sum_p(sigma, grad(w)),
     )
     grid = grid_of()
@@ -254,9 +253,7 @@ def test_an_error_of_newton_holds_its_history_and_changes_nothing():
     def residual(u, w, sigma, mu, t, sum_p, ds):
         return sum_p(sigma, grad(w)) + sum_p(3e5 * mu, div(u) ** 3 * div(w)) - dot(t, w) * ds
 
-    form = tawami.Form(
-        fields={"u": ("displacement", "w")}, kinematics="displacement", residual=residual
-    )
+    form = tawami.Form(fields={"u": vector("w")}, residual=residual)
     grid = grid_of()
     body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
     material = tawami.linear_elastic(**ELASTIC)

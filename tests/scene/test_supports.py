@@ -17,9 +17,15 @@ import tawami
 from tawami import _rust
 from tawami.base.errors import SupportError
 from tawami.field import constraints
+from tawami.field.layout import Place
 from tawami.field.reduction import Reduction
 from tawami.grid import edges
 from tawami.grid.basis import values_1d
+
+
+def _place(basis):
+    """A displacement in a basis; the number of its functions is not used."""
+    return Place(basis, 2, 2, 0, 0)
 
 
 @pytest.mark.parametrize("point", [(-1.0, 1.25), (-1.0, 1.0), (-0.63, 1.87), (1.0, 2.0)])
@@ -36,7 +42,7 @@ def test_a_held_point_equals_a_lagrange_multiplier(basis, point, value):
     n = scene.num_coefficients
     matrix = scene.tangent(np.zeros(n))
     cells, layout = scene.configuration.domain.active, scene.configuration.domain.layout
-    held = constraints.held_edge(scene.grid, basis, cells, "left", 0, 1e-3)
+    held = constraints.held_edge(scene.grid, _place(basis), cells, "left", 0, 1e-3)
     rows = [sp.csr_matrix(([1.0], ([0], [k])), shape=(1, n)) for k in held.indices]
     values = list(held.values)
     for place, v in ((point, value), ((0.3, 0.9), -value)):
@@ -58,7 +64,7 @@ def test_a_number_is_its_own_projection(basis):
     active[:, 3] = False  # no particles there
     for between in (None, (-0.5, 1.5)):
         number, function = (
-            constraints.held_edge(grid, basis, active, "top", 1, value, between)
+            constraints.held_edge(grid, _place(basis), active, "top", 1, value, between)
             for value in (-0.7, lambda x, y: -0.7 + 0 * x)
         )
         np.testing.assert_array_equal(number.indices, function.indices)
@@ -68,7 +74,12 @@ def test_a_number_is_its_own_projection(basis):
 def test_profiles_are_projected_in_l2_and_reproduced_where_the_basis_can(basis):
     scene = beam(basis=basis)
     linear = constraints.held_edge(
-        scene.grid, basis, scene.configuration.domain.active, "top", 0, lambda x, y: 2 + 3 * x
+        scene.grid,
+        _place(basis),
+        scene.configuration.domain.active,
+        "top",
+        0,
+        lambda x, y: 2 + 3 * x,
     )
     width = len(linear.indices)
     u = np.zeros(scene.configuration.domain.layout.num_displacement)
@@ -78,7 +89,7 @@ def test_profiles_are_projected_in_l2_and_reproduced_where_the_basis_can(basis):
         assert _rust.interpolate(location, basis, 2, u)[0, 0] == pytest.approx(2 + 3 * x, abs=1e-13)
     # a cubic is not in the space: the error of the projection is orthogonal to it
     active = scene.configuration.domain.active
-    cubic = constraints.held_edge(scene.grid, basis, active, "top", 0, lambda x, y: x**3)
+    cubic = constraints.held_edge(scene.grid, _place(basis), active, "top", 0, lambda x, y: x**3)
     t, w = np.polynomial.legendre.leggauss(6)
     total = np.zeros(width)
     for cell in range(4):
@@ -323,7 +334,8 @@ def test_the_reduction_selects_each_free_coefficient_once():
     layout = scene.configuration.domain.layout
     active = scene.configuration.domain.active
     held = [
-        constraints.held_edge(scene.grid, scene.basis, active, "left", k, 0.0) for k in range(2)
+        constraints.held_edge(scene.grid, _place(scene.basis), active, "left", k, 0.0)
+        for k in range(2)
     ]
     reduction = Reduction(layout, held, [], np.zeros(layout.size))
     assert reduction.size == layout.size - 2 * (3 + 2)

@@ -90,7 +90,7 @@ def test_the_secant_method_ends_where_the_work_is_half_as_large():
         tried.append(t)
         return np.array([-1 + 3 * t**3])
 
-    search = LineSearch(MPI.COMM_WORLD, np.array([1.0]), np.array([-1.0]), 1)
+    search = LineSearch(MPI.COMM_WORLD, np.array([1.0]), np.array([-1.0]), np.array([1.0]))
     assert search.overshoots(np.array([2.0]))
     assert not search.overshoots(np.array([0.7]))
     assert not search.overshoots(np.array([-2.0]))
@@ -108,12 +108,13 @@ def test_the_search_ends_after_eight_evaluations_and_takes_no_tiny_step():
         tried.append(t)
         return np.array([2.0])
 
-    search = LineSearch(MPI.COMM_WORLD, np.array([1.0]), np.array([-1.0]), 1)
+    search = LineSearch(MPI.COMM_WORLD, np.array([1.0]), np.array([-1.0]), np.array([1.0]))
     assert search.length(residual_at, np.array([2.0])) >= 0.05
     assert len(tried) <= 8
 
 
 def test_the_volume_counts_with_the_other_sign():
     """At a saddle point, a change of eps_v that lowers the energy is one in the wrong direction."""
-    search = LineSearch(MPI.COMM_WORLD, np.array([1.0, 1.0]), np.array([-2.0, 1.0]), 1)
+    change, residual, signs = np.array([[1.0, 1.0], [-2.0, 1.0], [1.0, -1.0]])
+    search = LineSearch(MPI.COMM_WORLD, change, residual, signs)
     assert search.overshoots(np.array([0.0, -3.0]))  # g(0) = -3, g(1) = 3

@@ -15,6 +15,7 @@ import tawami
 from cases.verification.cantilever import mpm
 from tawami.base.errors import InexactSumWarning
 from tawami.field import PointAssembly
+from tawami.form import vector
 from tawami.form.form import Form
 from tawami.solve import direct
 from tawami.solve.scaling import Scaling
@@ -27,7 +28,7 @@ def hardening(strength):
         harder = sum_p(strength * mu, inner(div(u) ** 3, div(w)))
         return sum_p(sigma, grad(w)) + harder - dot(t, w) * ds
 
-    return Form({"u": ("displacement", "w")}, "displacement", residual)
+    return Form({"u": vector("w")}, residual)
 
 
 def beam(form, **options):
@@ -203,7 +204,7 @@ def test_a_tangent_with_nan_is_named():
         root = sum_p(mu, inner((div(u) ** 2) ** 0.5, div(w)))
         return sum_p(sigma, grad(w)) + root - dot(t, w) * ds
 
-    form = Form({"u": ("displacement", "w")}, "displacement", residual)
+    form = Form({"u": vector("w")}, residual)
     with pytest.raises(tawami.SingularError, match="the tangent holds NaN or infinity"):
         beam(form).solve()
 

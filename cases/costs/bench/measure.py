@@ -20,6 +20,7 @@ from cases.costs.bench.setting import SOLVER, STAGES, Setting
 from cases.verification.cantilever import mpm
 from cases.verification.cantilever.beam import NU, D, E, L, P
 from tawami.fem.environment import peak_memory
+from tawami.form import scalar, vector
 
 
 def stiffening(u, eps_v, w, q, sigma, K, mu, t, h, sum_p, ds, alpha):  # type: ignore[no-untyped-def]
@@ -31,8 +32,7 @@ def stiffening(u, eps_v, w, q, sigma, K, mu, t, h, sum_p, ds, alpha):  # type: i
 
 
 STIFFENING = tawami.Form(
-    fields={"u": ("displacement", "w"), "eps_v": ("volumetric_strain", "q")},
-    kinematics="mixed",
+    fields={"u": vector("w"), "eps_v": scalar("q", role="volumetric_strain")},
     residual=stiffening,
     parameters={"alpha": {"default": 0.1}},
 )

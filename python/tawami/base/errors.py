@@ -37,6 +37,8 @@ When a step fails, the particles are unchanged.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from tawami._rust import InputError, TawamiError
 
 
@@ -116,14 +118,15 @@ class ConvergenceError(TawamiError):
     """A Newton iteration that did not converge.
 
     Attributes:
-        history: (measure of momentum, measure of volume or None) of every residual.
+        history: (measure of momentum, of volume or None) of every residual; with fields without a role,
+            the largest of theirs as well.
     """
 
-    def __init__(self, message: str, history: list[tuple[float, float | None]]) -> None:
+    def __init__(self, message: str, history: Sequence[tuple[float | None, ...]]) -> None:
         super().__init__(message)
         self.history = history
 
-    def __reduce__(self) -> tuple[type, tuple[str, list[tuple[float, float | None]]]]:
+    def __reduce__(self) -> tuple[type, tuple[str, Sequence[tuple[float | None, ...]]]]:
         """Keep the history when the error is sent between ranks."""
         return type(self), (str(self), self.history)
 

@@ -8,7 +8,7 @@ dimensions needs a second `Space`, a second form of `Position` and `Counts`, and
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from itertools import combinations, product
@@ -36,12 +36,16 @@ class Space:
     Attributes:
         axes: Names of the axes.
         volume: Unit of the volume of a particle or a cell, in text.
-        depth: Text after the units of extensive quantities, which refer to a metre of depth.
+        depth: Text after the units of extensive quantities: they refer to a metre of depth, or, where it
+            is empty, to the whole body.
+        hoop: Whether the first axis is the radius from the last: then zz is the hoop direction, whose
+            strain follows from the displacement.
     """
 
     axes: tuple[str, ...]
     volume: str
     depth: str
+    hoop: bool = False
 
     @property
     def dim(self) -> int:
@@ -55,13 +59,16 @@ class Space:
 
     @property
     def gradient(self) -> tuple[str, ...]:
-        """Names of the components of the gradient of a vector: component, then derivative."""
-        return tuple("".join(pair) for pair in product(self.axes, repeat=2))
+        """Names of the components of the gradient of a vector: component, then derivative; the hoop
+        strain last.
+        """
+        hoop = ("zz",) if self.hoop else ()
+        return (*("".join(pair) for pair in product(self.axes, repeat=2)), *hoop)
 
     @property
     def num_strains(self) -> int:
-        """Strain components that a displacement gradient has: xx, yy, gamma_xy in the plane."""
-        return self.dim * (self.dim + 1) // 2
+        """Components of a strain: xx, yy, gamma_xy in the plane; the hoop strain last."""
+        return self.dim * (self.dim + 1) // 2 + self.hoop
 
     @property
     def num_vertices(self) -> int:
@@ -101,11 +108,11 @@ class Space:
 
 
 #: Plane strain.
-PLANE = Space(
-    axes=("x", "y"),
-    volume="m2",
-    depth=" per m",
-)
+PLANE = Space(axes=("x", "y"), volume="m2", depth=" per m")
+#: Axisymmetry: x is the radius, y the axis, and zz the hoop direction.
+AXISYMMETRIC = Space(axes=("x", "y"), volume="m3", depth="", hoop=True)
+#: The spaces of a grid by the name of its geometry.
+SPACES: Mapping[str, Space] = {"plane_strain": PLANE, "axisymmetric": AXISYMMETRIC}
 
 
 def lattice(along: Sequence[npt.NDArray[Scalar]]) -> npt.NDArray[Scalar]:

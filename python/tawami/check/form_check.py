@@ -144,7 +144,8 @@ def _judged(error: float, bound: float, what: str) -> tuple[Verdict, str]:
 
 def _declaration(form: Form, _: Settings) -> Found:
     fields = ", ".join(
-        f"{name} ({kind}, test {test})" for name, (kind, test) in form.fields.items()
+        f"{name} ({field.role or field.unit}, test {field.test})"
+        for name, field in form.fields.items()
     )
     yield "ok", f"{fields}; kinematics {form.kinematics}, {form.strain} strain"
 
@@ -164,7 +165,7 @@ def _arguments(form: Form, given: Settings) -> Found:
     Symbols(form, options).residual()
     yield (
         "ok",
-        f"all known; each of {quoted(test for _, test in form.fields.values())} has its term",
+        f"all known; each of {quoted(field.test for field in form.fields.values())} has its term",
     )
 
 

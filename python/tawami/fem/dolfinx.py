@@ -19,8 +19,8 @@ from tawami.base.dependencies import report_missing
 from tawami.base.space import PLANE
 
 __all__ = [
-    "BILINEAR_DOFS", "DISPLACEMENT_DOFS", "OLD", "IntegralType", "at_points", "at_vertices",
-    "basix", "cpp", "dolfinx", "domain", "ffcx", "function_space", "interval", "jit", "lagrange",
+    "OLD", "IntegralType", "at_points", "at_vertices", "basix", "cpp", "dolfinx", "domain",
+    "element_of", "ffcx", "function_space", "interval", "jit", "lagrange",
     "mixed", "on_interval", "per_cell", "reference_nodes", "version",
 ]  # fmt: skip
 
@@ -40,8 +40,6 @@ if warnings.showwarning is not _showwarning:
     logging.captureWarnings(False)
 
 version: str = dolfinx.__version__
-#: Degrees of freedom of a cell: displacement, quadratic along each axis, and a field linear along each.
-DISPLACEMENT_DOFS, BILINEAR_DOFS = PLANE.dim * 3**PLANE.dim, PLANE.num_vertices
 #: Whether this is dolfinx 0.5, whose elements are those of UFL.
 OLD = not hasattr(dolfinx.fem, "functionspace")
 CELL = "quadrilateral"
@@ -124,6 +122,12 @@ else:
     def function_space(mesh: Any, element: Any, compiled: Any) -> Any:
         """Function space on a dolfinx mesh."""
         return dolfinx.fem.functionspace(mesh, element)
+
+
+def element_of(fields: Sequence[tuple[int, int]]) -> Any:
+    """Element of one or several fields, each with its degree and its number of components."""
+    elements = [lagrange(degree, components) for degree, components in fields]
+    return elements[0] if len(elements) == 1 else mixed(elements)
 
 
 def domain() -> Any:

@@ -47,7 +47,19 @@ class Assembly(ABC):
 
     @abstractmethod
     def residual(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
-        """Internal forces and volume residual on all coefficients, before supports, on every rank.
+        """Residual of every field on all coefficients, before supports, on every rank.
+
+        Args:
+            coefficients: Increments of all fields.
+            data: Particle data of each rule, particles x columns.
+        """
+
+    @abstractmethod
+    def magnitude(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
+        """Sums of the absolute values of the contributions to the residual, on every rank.
+
+        A contribution is that of a particle, and of a cell for integrals over cells. The ghost penalty
+        is left out.
 
         Args:
             coefficients: Increments of all fields.

@@ -21,8 +21,8 @@ from tawami.grid.grid import Grid
 
 #: Sum over the particles of a spline below which round-off of the assembly hides its stiffness: that of
 #: a particle 4e-7 of a cell inside the support. Such a spline follows its neighbour, as if the particle
-#: had not arrived. A ghost penalty gives it a stiffness instead. Lagrange functions need no tie: their
-#: gradients do not vanish with them, and biquadratic ones have negative sums as well.
+#: had not arrived. A ghost penalty gives the displacement a stiffness instead. Lagrange functions need
+#: no tie: their gradients do not vanish with them, and biquadratic ones have negative sums as well.
 UNRESOLVED = 1e-13
 
 
@@ -45,7 +45,8 @@ class Attachment:
         rows: Position of each of them in `location.active`.
         layout: Places of the coefficients.
         points: Indices along the axes of the points of each rule; none for means over cells.
-        values: Values of h and of the parameters of the form.
+        values: Values of h, time, dt, b and the parameters of the form; :meth:`change` replaces them.
+        version: A number that changes with them.
     """
 
     def __init__(
@@ -60,27 +61,42 @@ class Attachment:
     ) -> None:
         self.grid, self.compiled, self.stopwatch = grid, compiled, stopwatch
         self.location, self.volume = location, volume
-        self.values = {"h": grid.h, **parameters}
-        self.space = grid.function_space(len(compiled.form.fields), compiled.element)
+        dim = grid.space.dim
+        self.values: dict[str, Any] = {"h": grid.h, "time": 0.0, "dt": 0.0, "b": np.zeros(dim)}
+        self.values |= parameters
+        self.version = 0
+        self.space = grid.function_space(compiled.element)
         number = grid.cell_numbers(grid.rectangle.ij)
         active: Mask = np.zeros(grid.cells[::-1], dtype=bool)
         active.ravel()[location.active] = True
         self.cells = np.flatnonzero(active.ravel()[number]).astype(np.int32)
         self.rows = np.searchsorted(location.active, number[self.cells]).astype(np.uint32)
         self.active = ranks.any_of(grid.comm, active)
-        self.layout = Layout(grid, basis, self.space, self.active)
-        if compiled.ghost is None and basis == "quadratic_spline":
+        self.layout = Layout(grid, basis, compiled.form.fields, self.space, self.active)
+        weak = [
+            name
+            for name, place in self.layout.fields.items()
+            if place.basis == "quadratic_spline" and (place.start > 0 or compiled.ghost is None)
+        ]
+        if weak:
             once = np.ones(len(volume))
-            sums = _rust.nodal_sums(location, once, once[:, None], basis)
-            self.layout.tie(self.summed(sums)[:, 0], UNRESOLVED)
+            sums = _rust.nodal_sums(location, once, once[:, None], "quadratic_spline")
+            self.layout.tie(weak, self.summed(sums)[:, 0], UNRESOLVED)
         self.points: dict[Rule, list[tuple[int, ...]]] = {
             rule: _point_indices(rule, swapped=grid.rectangle.swapped)
             for rule in compiled.densities
         }
 
     def constants(self, integral: Integral) -> Array:
-        """Values of the constants that an integral names."""
-        return np.array([self.values[name] for name in integral.constants], dtype=float)
+        """Values of the constants that an integral names, one after the other."""
+        values = [np.ravel(self.values[name]) for name in integral.constants]
+        return np.asarray(np.concatenate([np.zeros(0), *values]), dtype=float)
+
+    def change(self, values: Mapping[str, Any]) -> None:
+        """Replace values of constants."""
+        if any(np.any(self.values[name] != value) for name, value in values.items()):
+            self.values |= values
+            self.version += 1
 
     def summed(self, of_cells: Any) -> Array:
         """The sum over all ranks of arrays from their cells."""

@@ -58,6 +58,8 @@ class GhostPenalty:
     def __init__(self, attachment: Attachment) -> None:
         self._attachment = attachment
         self._matrix: sp.csr_matrix | None = None
+        #: Values of the constants in it.
+        self._constants = np.zeros(0)
         #: The tangent whose sum with the penalty is in `_petsc`.
         self._tangent: Any = None
         self._petsc = Handles(self, attachment.grid.comm)
@@ -98,9 +100,13 @@ class GhostPenalty:
     def _on_all(self, data: Mapping[Rule, Array]) -> sp.csr_matrix | None:
         """G on all coefficients, the same on every rank; None without a penalty."""
         integral = self._attachment.compiled.ghost
-        if integral is not None and self._matrix is None:
+        if integral is None:
+            return None
+        constants = self._attachment.constants(integral)
+        if self._matrix is None or not np.array_equal(constants, self._constants):
             with self._attachment.stopwatch("set-up"):
                 self._matrix = self._assembled(integral, data["mean"])
+            self._constants, self._tangent = constants, None
         return self._matrix
 
     def _assembled(self, integral: Integral, data: Array) -> sp.csr_matrix:

@@ -1,14 +1,16 @@
 """Places of the coefficients of all fields, and the extraction matrix E.
 
-The coefficients of all fields form one vector: the displacement (function, then component), followed by
-the bilinear field. E gives the degrees of freedom of the mesh: nodal = E coefficients.
+The coefficients of all fields form one vector, in the order of the form: the displacement first. Those
+of a field go function by function and component by component. E gives the degrees of freedom of the
+mesh: nodal = E coefficients.
 """
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,8 +20,42 @@ from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.space import lattice
 from tawami.fem import dolfinx
 from tawami.fem.mesh import FunctionSpace
+from tawami.form.fields import Field
 from tawami.grid.basis import Basis, greville
 from tawami.grid.grid import Grid
+
+
+@dataclass(frozen=True)
+class Place:
+    """Place of a field among the coefficients.
+
+    Attributes:
+        basis: Its functions.
+        components: Number of components of each function.
+        degree: Degree along each axis of its element on the mesh.
+        start: Its first coefficient.
+        num_functions: Number of its functions.
+    """
+
+    basis: Basis
+    components: int
+    degree: int
+    start: int
+    num_functions: int
+
+    @property
+    def stop(self) -> int:
+        """The coefficient after its last one."""
+        return self.start + self.components * self.num_functions
+
+    @property
+    def slice(self) -> slice:
+        """All of its coefficients."""
+        return slice(self.start, self.stop)
+
+    def holds(self, coefficients: Any) -> Any:
+        """Whether numbers of coefficients are those of this field."""
+        return (coefficients >= self.start) & (coefficients < self.stop)
 
 
 class Layout:
@@ -28,22 +64,40 @@ class Layout:
     Args:
         grid: The grid.
         basis: Basis of the displacement.
-        space: Function space on the mesh: biquadratic displacement, then a bilinear field or none.
+        fields: The fields of the form; the displacement comes first.
+        space: Their function space on the mesh.
         active: Whether each cell holds particles, on any rank, ny x nx.
 
     Attributes:
-        num_displacement: Number of displacement coefficients; the bilinear field follows.
+        fields: Place of each field by name.
+        volumetric: Place of the volumetric strain or pressure; None without such a field.
+        num_displacement: Number of displacement coefficients; the other fields follow.
         size: Number of coefficients.
         active: Whether each coefficient belongs to a function with a particle in its support.
         owner: Rank of each coefficient: one with a cell in the support of the function.
         num_parts: Number of parts of the body that share no displacement function.
         part: Part of each displacement coefficient, -1 for inactive ones.
-        tied: Pairs of displacement coefficients, the first of which follows the second.
+        tied: Pairs of coefficients, the first of which follows the second.
     """
 
-    def __init__(self, grid: Grid, basis: Basis, space: FunctionSpace, active: Mask) -> None:
+    def __init__(
+        self,
+        grid: Grid,
+        basis: Basis,
+        fields: Mapping[str, Field],
+        space: FunctionSpace,
+        active: Mask,
+    ) -> None:
         self.grid, self.basis, self._space = grid, basis, space
-        self._bilinear = space.dofs.shape[1] > dolfinx.DISPLACEMENT_DOFS
+        self.fields: dict[str, Place] = {}
+        self.size = 0
+        for name, field in fields.items():
+            its_basis = cast(Basis, field.basis or basis)
+            count = int(np.prod(self._shape(its_basis)))
+            place = Place(its_basis, field.components, field.degree, self.size, count)
+            self.fields[name], self.size = place, place.stop
+        roles = {field.role: self.fields[name] for name, field in fields.items()}
+        self.volumetric = roles.get("volumetric_strain", roles.get("pressure"))
         self._cells = np.flatnonzero(active).astype(np.uint32)
         self._of_cells = _rust.Active(grid.rust, self._cells)
         self.num_parts, part = self._of_cells.parts(basis)
@@ -51,27 +105,30 @@ class Layout:
         self.num_displacement = len(self.part)
         self.active = self._of_all(self._of_cells.functions)
         self.owner = self._of_all(lambda b: self._of_cells.spread(b, grid.rank_of_cell))
-        self.size = len(self.active)
         self.tied: Indices = np.empty((0, 2), dtype=np.int64)
 
     def same_cells(self, other: Layout) -> bool:
         """Whether another layout has the same functions and active cells."""
         if self is other:
             return True
-        same = self.grid is other.grid and self.basis == other.basis and self.size == other.size
+        same = self.grid is other.grid and self.fields == other.fields
         return same and np.array_equal(self._cells, other._cells)
 
-    def tie(self, sums: Array, least: float) -> None:
-        """Tie weak displacement functions to their strongest neighbours.
+    def tie(self, names: Sequence[str], sums: Array, least: float) -> None:
+        """Tie weak functions of some fields of the same basis to their strongest neighbours.
 
         A weak function has particles in its support, but its sum over them is below `least`.
 
         Args:
+            names: The fields.
             sums: Sum of each function over the particles.
             least: Bound of the sums [-].
         """
-        dim, shape = self.grid.space.dim, self._shape(self.basis)
-        weak = np.flatnonzero(self.active[: self.num_displacement : dim] & (sums < least))
+        places = [self.fields[name] for name in names]
+        shape = self._shape(places[0].basis)
+        weak = np.flatnonzero(
+            self.active[places[0].slice][:: places[0].components] & (sums < least)
+        )
         tied: list[tuple[int, int]] = []
         for function in weak:
             at = np.unravel_index(function, shape, order="F")
@@ -81,7 +138,14 @@ class Layout:
             if sums[strongest] >= least:
                 tied.append((int(function), int(strongest)))
         pairs = np.array(tied, dtype=np.int64).reshape(-1, 1, 2)
-        self.tied = (dim * pairs + np.arange(dim)[:, None]).reshape(-1, 2)
+        self.tied = np.concatenate(
+            [
+                (
+                    place.start + place.components * pairs + np.arange(place.components)[:, None]
+                ).reshape(-1, 2)
+                for place in places
+            ]
+        )
         self.active[self.tied[:, 0]] = False
 
     def _shape(self, basis: Basis) -> tuple[int, ...]:
@@ -89,9 +153,12 @@ class Layout:
         return tuple(_rust.basis_len(basis, n) for n in self.grid.cells)
 
     def _of_all(self, of_functions: Callable[[Basis], Any]) -> Any:
-        """Values for all coefficients, from those for the functions of each field."""
-        fields = [np.repeat(of_functions(self.basis), self.grid.space.dim)]
-        return np.concatenate(fields + [of_functions("bilinear")] * self._bilinear)
+        """Values for all coefficients, from those for the functions of each basis."""
+        bases = dict.fromkeys(field.basis for field in self.fields.values())
+        of_basis = {basis: of_functions(basis) for basis in bases}
+        return np.concatenate(
+            [np.repeat(of_basis[f.basis], f.components) for f in self.fields.values()]
+        )
 
     def reached_by(self, cells: Any) -> Mask:
         """Whether each coefficient belongs to a function with one of these cells in its support."""
@@ -105,24 +172,22 @@ class Layout:
 
     def extraction_on(self, cells: Any) -> sp.csr_matrix:
         """The rows of E of the degrees of freedom of some dolfinx cells; the others are empty."""
-        grid, of_u, of_bilinear = self.grid, dolfinx.DISPLACEMENT_DOFS, dolfinx.BILINEAR_DOFS
-        dofs, dim = self._space.dofs[cells], grid.space.dim
-        number = grid.cell_numbers(grid.rectangle.ij[cells])
-        fields: list[tuple[Basis, int, Any]] = [(self.basis, 2, dofs[:, :of_u].reshape(-1, dim))]
-        if self._bilinear:
-            fields.append(("bilinear", 1, dofs[:, of_u : of_u + of_bilinear].reshape(-1, 1)))
-        rows, columns, values, first = [], [], [], 0
-        for basis, degree, of_nodes in fields:
-            functions, at_nodes = self._at_nodes(basis, degree, number)
+        number = self.grid.cell_numbers(self.grid.rectangle.ij[cells])
+        dofs = self._space.dofs[cells]
+        rows, columns, values, done = [], [], [], 0
+        for field in self.fields.values():
+            functions, at_nodes = self._at_nodes(field.basis, field.degree, number)
+            width = at_nodes.shape[1] * field.components
+            of_nodes = dofs[:, done : done + width].reshape(-1, field.components)
+            done += width
             once = np.unique(of_nodes[:, 0], return_index=True)[1]  # (cell, node) of each row
             functions = functions[once // at_nodes.shape[1]]
             at_nodes = at_nodes.reshape(-1, at_nodes.shape[2])[once]
-            components = np.arange(of_nodes.shape[1])
+            components = np.arange(field.components)
             shape = (*functions.shape, len(components))
-            columns.append(first + len(components) * functions[..., None] + components)
+            columns.append(field.start + len(components) * functions[..., None] + components)
             rows.append(np.broadcast_to(of_nodes[once][:, None], shape))
             values.append(np.broadcast_to(at_nodes[..., None], shape))
-            first += len(components) * int(np.prod(self._shape(basis)))
         flat = [
             np.concatenate([part.ravel() for part in parts]) for parts in (values, rows, columns)
         ]
@@ -132,16 +197,15 @@ class Layout:
 
     def on_cell(self, cell: Indices) -> tuple[Indices, Array]:
         """Coefficients on a cell (i, j), and T: degrees of freedom of a kernel = T coefficients."""
-        number, dim = np.array([self.grid.cell_numbers(cell)]), self.grid.space.dim
-        functions, at_nodes = self._at_nodes(self.basis, 2, number)
-        coefficients = (dim * functions[0][:, None] + np.arange(dim)).ravel()
-        blocks = [np.kron(at_nodes[0], np.eye(dim))]
-        if self._bilinear:  # each function is 1 at one vertex
-            functions, at_nodes = self._at_nodes("bilinear", 1, number)
-            of_vertices = self.num_displacement + functions[0][at_nodes[0].argmax(axis=1)]
-            coefficients = np.concatenate([coefficients, of_vertices])
-            blocks.append(np.eye(len(of_vertices)))
-        return coefficients, sp.block_diag(blocks).toarray()
+        number = np.array([self.grid.cell_numbers(cell)])
+        coefficients, blocks = [], []
+        for field in self.fields.values():
+            functions, at_nodes = self._at_nodes(field.basis, field.degree, number)
+            components = np.arange(field.components)
+            first = field.start + field.components * functions[0]
+            coefficients.append((first[:, None] + components).ravel())
+            blocks.append(np.kron(at_nodes[0], np.eye(field.components)))
+        return np.concatenate(coefficients), sp.block_diag(blocks).toarray()
 
     def _at_nodes(self, basis: Basis, degree: int, cells: Indices) -> tuple[Indices, Array]:
         """Functions on cells (cells x functions), and their values at Lagrange nodes of a degree
@@ -156,12 +220,15 @@ class Layout:
         return greville(self.basis, self.grid.origin, self.grid.h, self.grid.cells)
 
     def split(self, coefficients: Array) -> tuple[Array, Array | None]:
-        """Coefficients of the displacement and of the bilinear field (None if there is none)."""
-        n = self.num_displacement
-        return coefficients[:n], coefficients[n:] if n < self.size else None
+        """Coefficients of the displacement, and of the volumetric strain or pressure (None without)."""
+        volumetric = None if self.volumetric is None else coefficients[self.volumetric.slice]
+        return coefficients[: self.num_displacement], volumetric
+
+    def name_of(self, coefficient: int) -> str:
+        """Name of the field of a coefficient."""
+        return next(name for name, field in self.fields.items() if coefficient < field.stop)
 
     def cells_of(self, coefficient: int) -> Indices:
         """Cells (i, j) with particles in the support of a coefficient's function, cells x axes."""
-        if coefficient < self.num_displacement:
-            return self._of_cells.support(self.basis, coefficient // self.grid.space.dim)
-        return self._of_cells.support("bilinear", coefficient - self.num_displacement)
+        field = self.fields[self.name_of(coefficient)]
+        return self._of_cells.support(field.basis, (coefficient - field.start) // field.components)

@@ -16,6 +16,7 @@ import numpy as np
 
 from tawami import _rust
 from tawami.base.arrays import Array
+from tawami.base.errors import FormError
 from tawami.fem import dolfinx
 from tawami.fem.rules import Rule
 from tawami.field.assembly import Assembly
@@ -30,11 +31,25 @@ class PointAssembly(Assembly):
 
     Args:
         attachment: The form and the active cells.
+
+    Raises:
+        FormError: The fields have too many functions on a cell.
     """
 
     def __init__(self, attachment: Attachment) -> None:
         super().__init__(attachment)
+        on_cell, _ = self.layout.on_cell(np.zeros(self.layout.grid.space.dim, dtype=np.int64))
+        count = len(on_cell)
+        if count > _rust.MAX_COEFFICIENTS:
+            raise FormError(
+                f"form {attachment.compiled.form.name}: too many fields: they have {count} coefficients "
+                f"on a cell: expected at most {_rust.MAX_COEFFICIENTS}. Use fewer fields, or "
+                "basis='bilinear' for some of them"
+            )
         self._matrix = ReducedMatrix(attachment.grid.comm)
+        #: Kernels, which hold the values of the constants, with the version of these.
+        self._residual: tuple[int, _rust.Kernels] | None = None
+        self._tangent: tuple[int, _rust.Kernels, _rust.Kernels] | None = None
 
     def follow(self, earlier: Assembly) -> None:
         """See `Assembly.follow`."""
@@ -48,10 +63,8 @@ class PointAssembly(Assembly):
             np.rint(degree * to_grid(dolfinx.reference_nodes(degree))).astype(int).tolist()
             for degree in (2, 1)
         )
-        bilinear = len(self._compiled.form.fields) > 1
-        return _rust.Assembler(
-            self.attachment.location, self.layout.basis, nodes, vertices, bilinear
-        )
+        fields = [(f.basis, f.components, f.degree) for f in self.layout.fields.values()]
+        return _rust.Assembler(self.attachment.location, fields, nodes, vertices)
 
     def _kernel(self, integral: Integral) -> tuple[Any, ...]:
         """An integral as `_rust.Kernels` reads it."""
@@ -74,23 +87,38 @@ class PointAssembly(Assembly):
     def _kernels(self, rank: int, integrals: Sequence[Integral]) -> _rust.Kernels:
         return _rust.Kernels(self._assembler, rank, list(map(self._kernel, integrals)))
 
-    @functools.cached_property
+    @property
     def _of_residual(self) -> _rust.Kernels:
-        return self._kernels(1, self._compiled.residual)
+        if self._residual is None or self._residual[0] != self.attachment.version:
+            kernels = self._kernels(1, self._compiled.residual)
+            self._residual = self.attachment.version, kernels
+        return self._residual[1]
 
-    @functools.cached_property
+    @property
     def _of_tangent(self) -> tuple[_rust.Kernels, _rust.Kernels]:
         """Kernels of rank 2, and the pairs of kernels of rank 1 whose products are added."""
-        pairs = [integral for pair in self._compiled.couplings for integral in pair]
-        return self._kernels(2, self._compiled.tangent), self._kernels(1, pairs)
+        if self._tangent is None or self._tangent[0] != self.attachment.version:
+            pairs = [integral for pair in self._compiled.couplings for integral in pair]
+            kernels = self._kernels(2, self._compiled.tangent), self._kernels(1, pairs)
+            self._tangent = self.attachment.version, *kernels
+        return self._tangent[1:]
 
     def residual(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
         """See `Assembly.residual`."""
+        forces = self._vector(coefficients, data, absolute=False)
+        return self._ghost.add_forces(forces, coefficients, data)
+
+    def magnitude(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
+        """See `Assembly.magnitude`."""
+        return self._vector(coefficients, data, absolute=True)
+
+    def _vector(self, coefficients: Array, data: Mapping[Rule, Array], *, absolute: bool) -> Array:
         with self._stopwatch("residual"):
             arrays, volume = list(data.values()), self.attachment.volume
-            of_cells = self._assembler.vector(self._of_residual, arrays, volume, coefficients)
-            forces = self.attachment.summed(of_cells)
-        return self._ghost.add_forces(forces, coefficients, data)
+            of_cells = self._assembler.vector(
+                self._of_residual, arrays, volume, coefficients, absolute
+            )
+            return self.attachment.summed(of_cells)
 
     def tangent(self, coefficients: Array, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
         """See `Assembly.tangent`."""

@@ -93,6 +93,10 @@ class Reduction:
         """Whether each unknown belongs to the displacement."""
         return np.asarray(self.unknowns < self.layout.num_displacement)
 
+    def of_field(self, name: str) -> Mask:
+        """Whether each unknown belongs to a field."""
+        return np.asarray(self.layout.fields[name].holds(self.unknowns))
+
     @functools.cached_property
     def _number_of(self) -> Indices:
         """Unknown that gives the value of each coefficient; -1 for those that none gives by itself."""

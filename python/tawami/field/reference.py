@@ -44,6 +44,16 @@ class ReferenceAssembly(Assembly):
         forces = self.attachment.summed(extraction.T @ vector)
         return self._ghost.add_forces(forces, coefficients, data)
 
+    def magnitude(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
+        """See `Assembly.magnitude`; all contributions are those of cells."""
+        extraction, dofs = self.layout.extraction, self._space.dofs[self._cells]
+        nodal, sums = extraction @ coefficients, np.zeros(self.layout.size)
+        for integral in self._compiled.residual:
+            of_cells = self._of_each_cell(integral, nodal, data)
+            for of_nodes, vector in zip(dofs, of_cells, strict=True):
+                sums += np.abs(extraction[of_nodes].T @ vector)
+        return self.attachment.summed(sums)
+
     def tangent(self, coefficients: Array, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
         """See `Assembly.tangent`."""
         matrix = self._assemble_tangent(coefficients, data)

@@ -53,9 +53,9 @@ class Tractions:
         cells = attached.cells[on_edge]
         cells = cells[rectangle.facet_order(cells, local)]
         dim = self._grid.space.dim
-        packed = np.zeros((len(cells), dolfinx.DISPLACEMENT_DOFS // dim, dim))
+        packed = np.zeros((len(cells), len(dolfinx.reference_nodes(2)), dim))
         packed[:, self._on(edge)] = values[np.searchsorted(self.cells(edge), ij[cells, 1 - axis])]
-        packed = packed.reshape(len(cells), dolfinx.DISPLACEMENT_DOFS)
+        packed = packed.reshape(len(cells), integral.width)
         form = attached.space.form(integral.kernel, 1, rectangle.entities(cells, local))
         vector = np.zeros(attached.space.size)
         mesh.add_vector(vector, form, integral.kernel, attached.constants(integral), packed)

@@ -6,16 +6,17 @@ Forms are written and compiled without a mesh, once per process and on disk.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tawami.base.errors import InputError
+from tawami.base.errors import FormError, InputError
+from tawami.base.space import PLANE, Space
 from tawami.base.timing import tally
 from tawami.fem.rules import Rule
 from tawami.form.form import Form
-from tawami.form.integral import Integral, KernelBuilder, ufl_errors
-from tawami.form.quantities import Density, LawQuantity
+from tawami.form.integral import Integral, KernelBuilder
+from tawami.form.quantities import Density, LawQuantity, ParticleScalar
 from tawami.form.symbols import Assembly, Symbols
 from tawami.form.tangent import Linearisation
 from tawami.form.terms import at_points, by_rule, terms_of
@@ -34,7 +35,8 @@ class CompiledForm:
         couplings: The other part of the tangent: products of two integrals of rank 1, cell by cell.
         ghost: Integral of rank 2 over sides of partially filled cells, if there is one.
         densities: Particle data of each rule: each density with its first column.
-        used: Parameters that the residual names with these options.
+        used: Parameters, data and constants (time, dt, b) that the residual reads with these options.
+        fields_of_particles: Parameters whose value is one number for each particle.
     """
 
     form: Form
@@ -46,6 +48,7 @@ class CompiledForm:
     ghost: Integral | None
     densities: Mapping[Rule, Mapping[Density, int]]
     used: frozenset[str]
+    fields_of_particles: tuple[str, ...]
 
     @functools.cached_property
     def traction(self) -> Integral | None:
@@ -66,7 +69,7 @@ class CompiledForm:
         )
 
 
-_compiled: dict[tuple[Form, Assembly, bool, tuple[tuple[str, str], ...]], CompiledForm] = {}
+_compiled: dict[tuple[Any, ...], CompiledForm] = {}
 
 
 def compile_form(
@@ -76,6 +79,9 @@ def compile_form(
     assembly: Assembly = "points",
     *,
     plastic_volume: bool = True,
+    space: Space = PLANE,
+    histories: Iterable[str] = (),
+    fields_of_particles: Iterable[str] = (),
 ) -> CompiledForm:
     """Compile a form with its options; a collective call.
 
@@ -86,32 +92,44 @@ def compile_form(
         assembly: 'points' for kernels at the particles, 'dolfinx' for integrals over cells only.
         plastic_volume: Whether plastic flow may change the volume. Otherwise eps_p is zero, and its
             terms are left out.
+        space: Dimension and geometry.
+        histories: Names of the history variables of the laws.
+        fields_of_particles: Parameters whose value is one number for each particle.
 
     Raises:
         FormError: A name is unknown, a test function is missing, or UFL or FFCx rejects the form.
     """
-    key = (form, assembly, plastic_volume, tuple(sorted(options.items())))
+    histories, fields = tuple(sorted({*histories})), tuple(sorted({*fields_of_particles}))
+    chosen = tuple(sorted(options.items()))
+    key = (form, assembly, plastic_volume, space, histories, fields, chosen)
     if key not in _compiled:
-        symbols = Symbols(form, options, plastic_volume=plastic_volume, assembly=assembly)
+        if space.hoop and assembly == "dolfinx":
+            raise FormError(
+                "assembly='dolfinx' in axisymmetry: the hoop strain u_r / r is no polynomial, so that "
+                "densities on a fixed rule are not exact: expected assembly='points'"
+            )
+        symbols = Symbols(
+            form, options, plastic_volume=plastic_volume, assembly=assembly, space=space,
+            histories=histories, fields_of_particles=fields,
+        )  # fmt: skip
         with tally.compiling():
-            _compiled[key] = _compile(comm, symbols)
+            _compiled[key] = _compile(comm, symbols, fields)
     return _compiled[key]
 
 
-def _compile(comm: Any, symbols: Symbols) -> CompiledForm:
+def _compile(comm: Any, symbols: Symbols, fields: tuple[str, ...]) -> CompiledForm:
     form, residual = symbols.form, symbols.residual()
     terms = terms_of(symbols, residual)
-    with ufl_errors(form):
+    with symbols.lines.errors(terms.cells):
         linearisation = Linearisation(symbols, terms.cells)
         tangent, couplings = linearisation.tangent(), linearisation.couplings()
     builder = KernelBuilder(comm, symbols)
     integral, edges, ghost = builder.integral, terms.edges, terms.ghost
-    rule_of = {symbol: density.rule for density, symbol in symbols.placeholders.items()}
 
     def integrals(form: Any) -> tuple[Integral, ...]:
         if symbols.assembly == "dolfinx":
             return tuple(map(integral, by_rule(form)))
-        sums, rest = at_points(form, rule_of)
+        sums, rest = at_points(form)
         kernels = [builder.at_points(part, rule) for rule, part in sums]
         return (*kernels, *map(integral, by_rule(rest)))
 
@@ -128,14 +146,18 @@ def _compile(comm: Any, symbols: Symbols) -> CompiledForm:
         ghost=None if ghost is None else integral(ghost, "interior_facet"),
         couplings=tuple(map(of_pair, couplings)),
         densities=builder.densities,
-        used=_named(symbols, residual),
+        used=_used(symbols, residual),
+        fields_of_particles=fields,
     )
 
 
-def _named(symbols: Symbols, residual: Any) -> frozenset[str]:
-    """Parameters that a residual names."""
-    used = set(residual.constants())
-    return frozenset(name for name in symbols.form.parameters if symbols.constants[name] in used)
+def _used(symbols: Symbols, residual: Any) -> frozenset[str]:
+    """Constants and numbers of the particles that a residual reads."""
+    constants, coefficients = set(residual.constants()), residual.coefficients()
+    read = {name for name, constant in symbols.constants.items() if constant in constants}
+    data = [data for c in coefficients if (data := symbols.data.of(c)) is not None]
+    read |= {d.quantity.text for d in data if isinstance(d.quantity, ParticleScalar)}
+    return frozenset(read)
 
 
 def check_used(
@@ -167,4 +189,4 @@ def check_used(
 
 def _uses(form: Form, options: Mapping[str, str], name: str) -> bool:
     symbols = Symbols(form, options)
-    return name in _named(symbols, symbols.residual())
+    return name in _used(symbols, symbols.residual())

@@ -1,41 +1,15 @@
 """The contract of a weak form: the declarations of a file in `forms/`.
 
-A form declares `fields` and `kinematics`, optionally `parameters`, `options`, `strain` and
-`whole_cells`, and a function `residual`. The names of its arguments select from the following:
-
-========================= ========================================================================
-fields, test functions    u, w, eps_v, q, ... as declared in `fields`; fields are increments of the step
-sigma, s, sigma_m         stress of the law in the plane at the end of the step, its
-                          three-dimensional deviator, mean stress
-P, P_s, tau_m, ln_J       with `strain = "finite"`, instead of these: tau f^-T, s f^-T, mean Kirchhoff
-                          stress and ln det f of the step, where f = I + grad u and
-                          tau = s + tau_m I is the Kirchhoff stress of the law
-eps_p                     plastic volumetric strain of the step, with the kinematics 'mixed' and
-                          'deviatoric': the field is elastic, div u (ln_J) = eps_v + eps_p
-K, mu                     bulk and shear modulus of the particle, also in K**2 / mu, 1 / K, K * ln_J
-sum_p(D, f), sum_p(f)     sum over particles of V_p D_p : f(x_p), and of V_p f(x_p), for any f of the
-                          fields, their first and their second derivatives
-sum_c(D, f), sum_c(f)     the same, with f at the centre of the particle's cell
-sum_v(D, f), sum_v(f)     the same, with f at the vertices of the particle's cell, interpolated by the
-                          bilinear functions: q eps_v is row-sum lumped
-cell_mean(D)              volume-weighted mean over the particles of each cell
-dx, dx_c, ds              area of the cells with particles (full rule, one point); loaded edges
-dG, facet_mean(D)         sides of partially filled cells, and cell_mean(D) there
-jump_n(f), jump_nn(f)     jump across these sides of the first and second normal derivative of a field
-                          or test function, for ghost penalties that are linear in the fields
-t, h                      traction [Pa], cell size [m]
-parameters, options       alpha, ... as declared
-========================= ========================================================================
-
-The integrand of `sum_p` is evaluated at the particles (`tawami.form.points`). With assembly='dolfinx'
-particle data enter as densities at the points of a fixed rule, which is exact for f up to degree 4 along
-x and along y (docs: theory). The tangent is derived (`tawami.form.tangent`).
+A form declares `fields`, optionally `kinematics`, `data`, `parameters`, `options`, `strain` and
+`whole_cells`, and a function `residual`. The names of its arguments select from those of
+`tawami.form.symbols` (docs: forms).
 """
 
 from __future__ import annotations
 
 import functools
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
@@ -47,30 +21,39 @@ from tawami.base.checks import TEXT, number, one_of, real, shown
 from tawami.base.errors import FormError, InputError
 from tawami.base.meaning import meaning
 from tawami.base.text import meant, quoted
+from tawami.form.fields import Field
 from tawami.form.files import module_of
 from tawami.form.kinematics import (
-    FIELD_UNITS,
     KINEMATICS,
     STRAIN_MEASURES,
     Kinematics,
     StrainMeasure,
+    kinematics_of,
 )
-from tawami.form.quantities import COMPONENTS
 
 #: Default of declarations that are optional.
 NOTHING: Mapping[str, Any] = {}
-#: Declarations of a form besides its residual; the first two are required.
+#: Declarations of a form besides its residual; the first is required.
 DECLARATIONS = (
-    "fields", "kinematics", "parameters", "options", "static_options", "strain", "whole_cells"
+    "fields", "kinematics", "data", "parameters", "options", "static_options", "strain", "whole_cells"
 )  # fmt: skip
+#: The unit at the end of the meaning of data.
+UNIT = re.compile(r"\[([^\[\]]+)\]$")
 #: Keys that a parameter may declare.
 LIMITS = ("default", "minimum", "maximum", "usual")
 #: Names that every form has.
 RESERVED = frozenset(
     (
-        *COMPONENTS, "K", "mu", "t", "h", "dx", "dx_c", "ds", "dG", "sum_p", "sum_c", "sum_v",
-        "cell_mean", "facet_mean", "jump_n", "jump_nn",
+        *STRAIN_MEASURES["small"].quantities, *STRAIN_MEASURES["finite"].quantities,
+        "K", "mu", "rho", "x", "time", "dt", "b", "t", "h", "old", "dx", "dx_c", "ds", "dG",
+        "grad", "div", "eps", "I", "dim", "sum_p", "sum_c", "sum_v", "cell_mean", "facet_mean",
+        "jump_n", "jump_nn",
     )
+)  # fmt: skip
+#: Arrays of the particles that no field and no data may be called after.
+ARRAYS = frozenset(
+    ("volume", "material", "number", "stress", "displacement", "strain", "velocity", "acceleration",
+     "velocity_gradient", "acceleration_gradient", "displacement_gradient")
 )  # fmt: skip
 
 
@@ -79,11 +62,14 @@ class Form:
     """A weak form. Forms are compared by identity.
 
     Args:
-        fields: Unknowns: name -> (kind, name of the test function). Kinds are 'displacement' (in the
-            basis of the scene), 'volumetric_strain' and 'pressure' [Pa] (both bilinear).
-        kinematics: Strain that the material law receives: 'displacement', 'mixed', 'cell' or
-            'deviatoric'. The attribute is a `Kinematics`.
+        fields: Unknowns by name, as {"u": vector("w"), "eps_v": scalar("q", role="volumetric_strain")}:
+            the displacement first.
         residual: Function that returns the residual as a UFL form.
+        kinematics: Strain that the material law receives. It follows from the roles of the fields:
+            'displacement' without a role, 'mixed' with 'volumetric_strain', 'deviatoric' with
+            'pressure'. Only 'cell' (B-bar) must be given. The attribute is a `Kinematics`.
+        data: Numbers of each particle that a scene gives with `scene.data(name, ...)`: name -> what they
+            are with their unit, as {"kappa": "permeability [m2]"}.
         parameters: Numbers that may change without another compilation: name -> {"default": ...,
             "minimum": ..., "maximum": ..., "usual": ...}. Only the default is required. A maximum may
             depend on an option: {option: maximum}. A scene warns of a value above the usual one.
@@ -98,9 +84,10 @@ class Form:
         FormError: The declarations are wrong or do not fit together.
     """
 
-    fields: Mapping[str, tuple[str, str]]
-    kinematics: Kinematics
+    fields: Mapping[str, Field]
     residual: Callable[..., Any]
+    kinematics: Kinematics
+    data: Mapping[str, str]
     parameters: Mapping[str, Mapping[str, Any]]
     options: Mapping[str, tuple[str, ...]]
     strain: StrainMeasure
@@ -110,9 +97,10 @@ class Form:
 
     def __init__(
         self,
-        fields: Mapping[str, tuple[str, str]],
-        kinematics: str | Kinematics,
+        fields: Mapping[str, Field],
         residual: Callable[..., Any],
+        kinematics: str | Kinematics | None = None,
+        data: Mapping[str, str] = NOTHING,
         parameters: Mapping[str, Mapping[str, Any]] = NOTHING,
         options: Mapping[str, tuple[str, ...]] = NOTHING,
         strain: str | StrainMeasure = "small",
@@ -121,57 +109,99 @@ class Form:
         name: str = "of the driver script",
     ) -> None:
         declared = {
-            "fields": fields, "residual": residual, "parameters": parameters, "options": options,
-            "whole_cells": whole_cells, "static_options": static_options, "name": name,
+            "fields": fields, "residual": residual, "data": data, "parameters": parameters,
+            "options": options, "whole_cells": whole_cells, "static_options": static_options,
+            "name": name,
         }  # fmt: skip
         for attribute, value in declared.items():
             object.__setattr__(self, attribute, value)
         self._check_declarations()
-        object.__setattr__(self, "kinematics", self._named("kinematics", kinematics, KINEMATICS))
+        self._check_fields()
+        given = kinematics_of(self.fields) if kinematics is None else kinematics
+        object.__setattr__(self, "kinematics", self._named("kinematics", given, KINEMATICS))
         object.__setattr__(self, "strain", self._named("strain", strain, STRAIN_MEASURES))
         self._check_limits()
         self._check_names()
-        self._check_fields()
+        self._check_kinematics()
 
     def _check_names(self) -> None:
         """Check that no name is declared twice."""
-        names = [*self.fields, *(test for _, test in self.fields.values())]
-        names += [*self.parameters, *self.options, *RESERVED]
+        names = [*self.fields, *(field.test for field in self.fields.values())]
+        names += [*self.data, *self.parameters, *self.options, *RESERVED]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             self._fail(f"{quoted(twice)} has two meanings: expected another name for one of them")
+        taken = sorted(ARRAYS.intersection((*self.own_fields, *self.data)))
+        if taken:
+            self._fail(f"{quoted(taken)} is an array that particles have: expected another name")
 
     def _check_fields(self) -> None:
-        """Check that the fields are those of the kinematics."""
-        kinds = [kind for kind, _ in self.fields.values()]
-        for name, (kind, _) in self.fields.items():
-            if kind not in FIELD_UNITS:
+        """Check the fields: the displacement first, and no role twice."""
+        for name, field in self.fields.items():
+            if not isinstance(field, Field):
                 self._fail(
-                    f"field '{name}' is of kind '{kind}': expected one of {quoted(FIELD_UNITS)}"
+                    f"field '{name}' is {shown(field)}: expected vector('w') for the displacement, or "
+                    "scalar('q', role='volumetric_strain'), scalar('r', unit='Pa'), ... (from "
+                    "tawami.form import scalar, vector)"
                 )
-        if self.strain.finite and self.kinematics.deviatoric:
+        roles = [field.role for field in self.fields.values()]
+        if roles[:1] != ["displacement"]:
             self._fail(
-                "strain = 'finite' with the kinematics 'deviatoric': expected 'displacement', 'mixed' "
-                "or 'cell'"
+                "the first of its fields is not the displacement: expected \"u\": vector('w') first"
             )
-        wanted = ("displacement", *self.kinematics.volume_fields)
-        if tuple(kinds) != wanted:
+        twice = {role for role in roles if role is not None and roles.count(role) > 1}
+        if len({*roles} & {"volumetric_strain", "pressure"}) > 1:
+            twice |= {"volumetric_strain", "pressure"}
+        if twice:
+            names = [name for name, field in self.fields.items() if field.role in twice]
             self._fail(
-                f"kinematics '{self.kinematics}' needs fields of the kinds {quoted(wanted)}, in this "
-                f"order; it declares {quoted(kinds)}"
+                f"fields {quoted(names)} have the roles {quoted(sorted(twice))}: expected one "
+                "displacement, and at most one other field that the law receives"
+            )
+
+    def _check_kinematics(self) -> None:
+        """Check that the kinematics take the roles of the fields."""
+        if self.strain.finite and self.kinematics.deviatoric:
+            self._fail("strain = 'finite' with a field of the role 'pressure': expected 'small'")
+        fits = kinematics_of(self.fields)
+        if fits != str(self.kinematics) and not (
+            self.kinematics.volume_at_centre and not self.volume_field
+        ):
+            self._fail(
+                f"kinematics '{self.kinematics}' does not take the roles of its fields, which make it "
+                f"'{fits}': expected no kinematics, or other roles"
             )
         if not callable(self.residual):
             self._fail(f"residual = {shown(self.residual)}: expected a function")
 
+    @property
+    def volume_field(self) -> str | None:
+        """Name of the field with the role of the volumetric strain or of a pressure."""
+        roles = ("volumetric_strain", "pressure")
+        return next((name for name, field in self.fields.items() if field.role in roles), None)
+
+    def data_unit(self, name: str) -> str:
+        """Unit of data."""
+        match = UNIT.search(self.data[name])
+        return match.group(1) if match else "-"
+
+    @property
+    def own_fields(self) -> dict[str, Field]:
+        """The fields without a role."""
+        return {name: field for name, field in self.fields.items() if field.own}
+
     def _check_declarations(self) -> None:
         """Check the types of all declarations."""
-        for what in ("fields", "parameters", "options", "static_options"):
+        for what in ("fields", "data", "parameters", "options", "static_options"):
             declared = getattr(self, what)
             if not isinstance(declared, Mapping) or not all(isinstance(n, str) for n in declared):
                 self._fail(f"{what} = {shown(declared)}: expected a mapping from names")
-        for name, declared in self.fields.items():
-            if not _are_names(declared) or len(declared) != 2:
-                self._fail(f"field '{name}' is {shown(declared)}: expected (kind, test function)")
+        for name, what in self.data.items():
+            if not isinstance(what, str) or not UNIT.search(what):
+                self._fail(
+                    f"data '{name}' is {shown(what)}: expected its meaning with a unit in brackets, as "
+                    "'permeability [m2]'"
+                )
         for name, limits in self.parameters.items():
             if not isinstance(limits, Mapping) or "default" not in limits:
                 self._fail(f"parameter '{name}' has no \"default\"")
@@ -309,7 +339,7 @@ def _are_names(value: Any) -> bool:
 @functools.cache
 def _from_module(module: ModuleType, _residual: Any, name: str | None = None) -> Form:
     """The form of a module; a module that is reloaded with another residual gives another form."""
-    missing = [n for n in ("fields", "kinematics", "residual") if not hasattr(module, n)]
+    missing = [n for n in ("fields", "residual") if not hasattr(module, n)]
     name = name or f"'{module.__name__}'"
     if missing:
         raise FormError(f"form {name} declares no {quoted(missing)}: see tawami.form.form")

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import ufl
-from ufl.algorithms.check_arities import ArityMismatch, check_form_arity
 
-from tawami.base.errors import FormError, TawamiError
-from tawami.fem import dolfinx, kernels
+from tawami.fem import kernels
 from tawami.fem.kernels import Kernel, Kind
 from tawami.fem.rules import DEGREE, Rule, rule_points
 from tawami.form import points
-from tawami.form.form import Form
-from tawami.form.points import PointForm
+from tawami.form.arity import check_arity
+from tawami.form.lines import without_line
+from tawami.form.points import Integrand, PointForm
 from tawami.form.quantities import Density
 from tawami.form.symbols import Symbols
 
@@ -72,19 +70,15 @@ class KernelBuilder:
 
     Args:
         comm: Communicator.
-        symbols: Symbols of the form, with the densities of all its integrals.
+        symbols: Symbols of the form.
 
     Attributes:
-        densities: Particle data of each rule: each density with its first column.
+        densities: Particle data of each rule that its integrals read: each with its first column.
     """
 
     def __init__(self, comm: Any, symbols: Symbols) -> None:
         self._comm, self._symbols = comm, symbols
         self.densities: dict[Rule, dict[Density, int]] = {rule: {} for rule in (*DEGREE, "mean")}
-        width = dict.fromkeys(self.densities, 0)
-        for density in symbols.placeholders:
-            self.densities[density.rule][density] = width[density.rule]
-            width[density.rule] += density.size
 
     def integral(self, form: Any, kind: Kind = "cell") -> Integral:
         """Compile a UFL form with integrals of one kind and rule.
@@ -94,14 +88,18 @@ class KernelBuilder:
             kind: Domain of the integrals.
         """
         symbols, slots, packed = self._symbols, self._field_slots(), {}
-        for rule, densities, columns in self._used(form):
-            vector = ufl.Coefficient(symbols.space(rule, len(columns)), count=2 + len(slots))
-            for symbol, first in densities.items():
-                size = symbol.ufl_shape[0]
-                packed[symbol] = ufl.as_vector([vector[first + k] for k in range(size)])
+        found = {symbol: symbols.data.of(symbol) for symbol in form.coefficients()}
+        symbol_of = {data: symbol for symbol, data in found.items() if data is not None}
+        for rule, first, columns in self._columns(symbol_of):
+            space = symbols.data.function_space(rule, len(columns))
+            vector = ufl.Coefficient(space, count=2 + len(slots))
+            for data, start in first.items():
+                components = [vector[start + k] for k in range(data.size)]
+                packed[symbol_of[data]] = ufl.as_vector(components)
             num_points = max(len(rule_points(rule)), 1)
             slots[vector] = Slot(rule, num_points * len(columns), columns)
-        return self._compiled(ufl.replace(form, packed), slots, kind)
+        form = ufl.Form([without_line(part) for part in ufl.replace(form, packed).integrals()])
+        return self._compiled(form, slots, kind)
 
     def at_points(self, form: Any, place: Rule) -> Integral:
         """Compile sums over particles with the fields at points of one kind.
@@ -111,37 +109,40 @@ class KernelBuilder:
             place: 'particle', or 'centre' or 'vertex' of the cell of each particle.
         """
         slots: dict[Any, Slot] = {}
-        data: dict[Any, tuple[Any, int]] = {}
-        for rule, densities, columns in self._used(form):
-            vector = points.vector(len(columns), 1 + len(slots))
-            slots[vector] = Slot(rule, len(columns), columns)
-            data |= {symbol: (vector, first) for symbol, first in densities.items()}
-        with ufl_errors(self._symbols.form):
-            found = points.at_point(form, self._symbols.increments, data)
+        where: dict[Density, tuple[Any, int]] = {}
+        with self._symbols.lines.errors(form):
+            integrand = Integrand(form, self._symbols)
+            for rule, first, columns in self._columns(integrand.data):
+                vector = points.vector(len(columns), 1 + len(slots))
+                slots[vector] = Slot(rule, len(columns), columns)
+                where |= {data: (vector, start) for data, start in first.items()}
+            found = integrand.form(where)
         size = len(found.fields)
         slots |= {points.vector(size, 0): Slot("fields", size)}
         return replace(self._compiled(found.form, slots), points=(place, found))
 
-    def _used(self, form: Any) -> Iterator[tuple[Rule, dict[Any, int], tuple[int, ...]]]:
-        """Of each rule of a form: its placeholders, each with its first place among the columns, and the
-        columns of the particle data.
+    def _columns(
+        self, read: Iterable[Density]
+    ) -> Iterator[tuple[Rule, dict[Density, int], tuple[int, ...]]]:
+        """Of each rule of some data: each of them with its first place among the columns that are read,
+        and these columns of the particle data.
         """
-        used = set(form.coefficients())
         for rule, columns in self.densities.items():
             first, numbers = {}, list[int]()
-            for density, symbol in self._symbols.placeholders.items():
-                if density.rule == rule and symbol in used:
-                    first[symbol], start = len(numbers), columns[density]
-                    numbers += range(start, start + density.size)
+            for data in (data for data in read if data.rule == rule):
+                if data not in columns:
+                    columns[data] = sum(other.size for other in columns)
+                first[data] = len(numbers)
+                numbers += range(columns[data], columns[data] + data.size)
             if first:
                 yield rule, first, tuple(numbers)
 
     def _compiled(self, form: Any, slots: Mapping[Any, Slot], kind: Kind = "cell") -> Integral:
         """Compile a form whose coefficients are those of the slots."""
         symbols = self._symbols
-        with ufl_errors(symbols.form):
+        with symbols.lines.errors(form):
             # newer versions of FFCx leave their cache locked if they find the error themselves
-            check_form_arity(ufl.algorithms.expand_derivatives(form), form.arguments())
+            check_arity(form, symbols.lines.text(None))
             kernel = kernels.compile_kernel(self._comm, form, kind)
         order = form.coefficients()
         names = {constant.count(): name for name, constant in symbols.constants.items()}
@@ -154,23 +155,8 @@ class KernelBuilder:
 
     def _field_slots(self) -> dict[Any, Slot]:
         """Slots of the increments and of the traction."""
-        displacement, bilinear = dolfinx.DISPLACEMENT_DOFS, dolfinx.BILINEAR_DOFS
-        num_bilinear = len(self._symbols.form.fields) - 1
+        displacement, *others = (f.num_dofs for f in self._symbols.form.fields.values())
         return {
-            self._symbols.increments: Slot("fields", displacement + bilinear * num_bilinear),
+            self._symbols.increments: Slot("fields", displacement + sum(others)),
             self._symbols.traction: Slot("traction", displacement),
         }
-
-
-@contextmanager
-def ufl_errors(form: Form) -> Iterator[None]:
-    """Raise the errors of UFL and FFCx as errors of tawami; each names the form."""
-    try:
-        yield
-    except TawamiError as error:  # of the cache of compiled forms
-        raise type(error)(f"form {form.name}: {error}") from error
-    except (Exception, ArityMismatch) as error:  # the second is no Exception in newer UFL
-        advice = ""
-        if isinstance(error, ArityMismatch):
-            advice = ". Each term must be linear in one test function"
-        raise FormError(f"form {form.name}: UFL or FFCx rejected it: {error}{advice}") from error

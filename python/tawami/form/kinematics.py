@@ -1,26 +1,19 @@
 """The kinematics and the strain measure of a form, and everything that differs between them.
 
-A form file names them: `kinematics = "mixed"`, `strain = "finite"`.
+The kinematics follow from the roles of the fields; a form file declares `strain = "finite"`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import combinations, product
-from typing import Any
 
 import numpy as np
 import scipy.linalg as la
-import ufl
 
 from tawami.base.arrays import Array
-from tawami.base.space import PLANE
+from tawami.form.fields import Field
 from tawami.form.quantities import Part
-
-AXES = range(PLANE.dim)
-#: Kinds of the fields of a form, with their units.
-FIELD_UNITS: Mapping[str, str] = {"displacement": "m", "volumetric_strain": "-", "pressure": "Pa"}
 
 
 @dataclass(frozen=True)
@@ -29,7 +22,7 @@ class Kinematics:
 
     Attributes:
         name: As a form file declares it.
-        volume_fields: Kinds of the fields that the form needs after the displacement.
+        role: Role of the field that determines the mean stress, if there is one.
         has_eps_v: Whether the elastic volumetric strain is a field. Particles store the total.
         volume_at_centre: Whether it is that of the displacement at the centre of the cell.
         deviatoric: Whether the law receives the deviator alone: the pressure is a field.
@@ -37,7 +30,7 @@ class Kinematics:
     """
 
     name: str
-    volume_fields: tuple[str, ...] = ()
+    role: str | None = None
     has_eps_v: bool = False
     volume_at_centre: bool = False
     deviatoric: bool = False
@@ -46,7 +39,7 @@ class Kinematics:
     @property
     def has_mean_stress(self) -> bool:
         """Whether the volumetric field determines the mean stress that the law receives."""
-        return bool(self.volume_fields)
+        return self.role is not None
 
     def __str__(self) -> str:
         return self.name
@@ -83,21 +76,6 @@ class StrainMeasure:
     def __str__(self) -> str:
         return self.name
 
-    def direction(self, du: Any) -> tuple[Any, ...]:
-        """Components of a change of displacement (UFL) that :attr:`gradient_part` multiplies."""
-        if self.finite:
-            g = ufl.grad(du)
-            return tuple(g[i, j] for i, j in product(AXES, repeat=2))
-        e = ufl.sym(ufl.grad(du))
-        shear = (2 * e[i, j] for i, j in combinations(AXES, 2))
-        return (*(e[i, i] for i in AXES), *shear)
-
-    def volume_change(self, u: Any, du: Any) -> Any:
-        """Change of div u (small strain) or ln det f (finite strain) with du, in UFL."""
-        if self.finite:
-            return ufl.inner(ufl.inv(ufl.Identity(PLANE.dim) + ufl.grad(u)).T, ufl.grad(du))
-        return ufl.div(du)
-
     def metric_change(self, gradient: Array) -> Array:
         """Twice the strain that vanishes for rigid motions; `gradient` is (n x dim x dim)."""
         transposed = gradient.transpose(0, 2, 1)
@@ -124,10 +102,18 @@ KINEMATICS: Mapping[str, Kinematics] = {
     for kinematics in (
         Kinematics("displacement", locks=True),
         Kinematics("cell", volume_at_centre=True),
-        Kinematics("mixed", ("volumetric_strain",), has_eps_v=True),
-        Kinematics("deviatoric", ("pressure",), deviatoric=True),
+        Kinematics("mixed", "volumetric_strain", has_eps_v=True),
+        Kinematics("deviatoric", "pressure", deviatoric=True),
     )
 }
+
+
+def kinematics_of(fields: Mapping[str, Field]) -> str:
+    """Name of the kinematics that follow from the roles of the fields."""
+    roles = {field.role for field in fields.values()} - {None}
+    return next((k.name for k in KINEMATICS.values() if k.role in roles), "displacement")
+
+
 STRAIN_MEASURES: Mapping[str, StrainMeasure] = {
     "small": StrainMeasure(
         name="small",

@@ -20,6 +20,8 @@ from ufl.corealg.traversal import unique_pre_traversal
 
 from tawami.base.errors import FormError
 from tawami.fem import dolfinx
+from tawami.form.quantities import Density, ParticleScalar
+from tawami.form.symbols import Symbols
 
 #: Component of the fields and axes of its derivatives: (0, ()) is u_x, (1, (0,)) is du_y/dx.
 Entry = tuple[int, tuple[int, ...]]
@@ -41,40 +43,91 @@ class PointForm:
     trial: tuple[Entry, ...]
 
 
-def at_point(form: Any, increments: Any, data: Mapping[Any, tuple[Any, int]]) -> PointForm:
-    """The integrand of a form as a function of the fields at a point.
+class Integrand:
+    """The integrand of a form as a function of numbers at a point.
 
     Args:
         form: Integrals over cells with one quadrature rule and with expanded derivatives.
-        increments: Coefficient of the fields.
-        data: Of each other coefficient, the vector coefficient on the interval that replaces it (see
-            :func:`vector`), and its first component there.
+        symbols: Symbols of the form.
+
+    Attributes:
+        data: Particle data that it reads.
+
+    Raises:
+        FormError: It contains derivatives that the functions or the particles do not have.
     """
-    integrand, *more = (part.integrand() for part in form.integrals())
-    integrand = expand_indices(_without_variables(remove_complex_nodes(sum(more, integrand))))
-    domain, kinds = dolfinx.interval(), ("fields", 0, 1)
-    replaced: dict[Any, Any] = {}
-    of_fields: dict[Any, tuple[Any, Entry]] = {}
-    for node in unique_pre_traversal(integrand):
-        if isinstance(node, Constant):
-            replaced[node] = ufl.Constant(domain, count=node.count())
-        elif isinstance(node, Indexed):
-            symbol, index = node.ufl_operands
-            if symbol in data:
-                to, first = data[symbol]
-                replaced[node] = to[first + int(index[0])]
-            elif (found := _entry(node, increments)) is not None:
-                of_fields[node] = found
-    used = set(of_fields.values())
-    entries = {kind: tuple(sorted(e for k, e in used if k == kind)) for kind in kinds}
-    vectors: dict[Any, Any] = {
-        n: ufl.Argument(_space(len(entries[n]), domain), n) for n in (0, 1) if entries[n]
-    }
-    vectors["fields"] = vector(len(entries["fields"]), 0, domain)
-    for node, (kind, entry) in of_fields.items():
-        replaced[node] = vectors[kind][entries[kind].index(entry)]
-    measure = ufl.dx(domain=domain, metadata={"quadrature_degree": 0})
-    return PointForm(ufl.replace(integrand, replaced) * measure, *(entries[k] for k in kinds))
+
+    def __init__(self, form: Any, symbols: Symbols) -> None:
+        first, *more = (part.integrand() for part in form.integrals())
+        lowered = _without_variables(remove_complex_nodes(sum(more, first)))
+        self._integrand = expand_indices(lowered)
+        self._of_fields: dict[Any, tuple[Any, Entry]] = {}
+        self._of_data: dict[Any, tuple[Density, int]] = {}
+        self._constants: list[Any] = []
+        for node in unique_pre_traversal(self._integrand):
+            if isinstance(node, Constant):
+                self._constants.append(node)
+            elif isinstance(node, Indexed):
+                self._read(node, symbols)
+        self.data = list(dict.fromkeys(density for density, _ in self._of_data.values()))
+
+    def _read(self, node: Any, symbols: Symbols) -> None:
+        """Find what a component of a symbol or of its derivatives stands for."""
+        symbol, index = node.ufl_operands
+        while isinstance(symbol, Grad):
+            (symbol,) = symbol.ufl_operands
+        if isinstance(symbol, Constant):
+            return
+        component, *derivatives = map(int, index)
+        axes = tuple(sorted(derivatives))
+        if symbol == symbols.increments or isinstance(symbol, Argument):
+            if len(axes) > 2:
+                raise FormError(
+                    "a third derivative in a sum: expected at most second derivatives of fields"
+                )
+            kind = symbol.number() if isinstance(symbol, Argument) else "fields"
+            self._of_fields[node] = kind, (component, axes)
+        elif (density := symbols.data.of(symbol)) is not None:
+            if axes:
+                raise FormError(
+                    f"a derivative of particle data ({_text(density)}): expected derivatives of fields "
+                    "and of old fields"
+                )
+            self._of_data[node] = density, component
+        elif (density := symbols.data_of(symbol, component, axes)) is not None:
+            self._of_data[node] = density, 0
+
+    def form(self, columns: Mapping[Density, tuple[Any, int]]) -> PointForm:
+        """The form on a unit interval.
+
+        Args:
+            columns: Of the data, the vector coefficient on the interval (see :func:`vector`) and its
+                first component there.
+        """
+        domain, kinds = dolfinx.interval(), ("fields", 0, 1)
+        used = set(self._of_fields.values())
+        entries = {kind: tuple(sorted(e for k, e in used if k == kind)) for kind in kinds}
+        vectors: dict[Any, Any] = {
+            n: ufl.Argument(_space(len(entries[n]), domain), n) for n in (0, 1) if entries[n]
+        }
+        vectors["fields"] = vector(len(entries["fields"]), 0, domain)
+        replaced: dict[Any, Any] = {
+            node: ufl.Constant(domain, node.ufl_shape, count=node.count())
+            for node in self._constants
+        }
+        for node, (density, component) in self._of_data.items():
+            to, first = columns[density]
+            replaced[node] = to[first + component]
+        for node, (kind, entry) in self._of_fields.items():
+            replaced[node] = vectors[kind][entries[kind].index(entry)]
+        measure = ufl.dx(domain=domain, metadata={"quadrature_degree": 0})
+        integrand = ufl.replace(self._integrand, replaced)
+        return PointForm(integrand * measure, *(entries[k] for k in kinds))
+
+
+def _text(density: Density) -> str:
+    quantity = density.quantity
+    return quantity.text if isinstance(quantity, ParticleScalar) else quantity.name
 
 
 def _without_variables(expression: Any) -> Any:
@@ -94,19 +147,3 @@ def vector(size: int, count: int, domain: Any = None) -> Any:
 
 def _space(size: int, domain: Any) -> Any:
     return ufl.FunctionSpace(domain, dolfinx.on_interval(max(size, 1)))
-
-
-def _entry(node: Any, increments: Any) -> tuple[Any, Entry] | None:
-    """Kind ('fields', or the number of an argument) and entry of a component; None for anything else."""
-    symbol, index = node.ufl_operands
-    while isinstance(symbol, Grad):
-        (symbol,) = symbol.ufl_operands
-    if symbol != increments and not isinstance(symbol, Argument):
-        return None
-    component, *axes = map(int, index)
-    if len(axes) > 2:
-        raise FormError(
-            "a third derivative in a sum: expected at most second derivatives of fields"
-        )
-    kind = symbol.number() if isinstance(symbol, Argument) else "fields"
-    return kind, (component, tuple(sorted(axes)))

@@ -1,7 +1,8 @@
-"""Particle data that a form may name, and the densities through which they enter the field problem.
+"""Particle data that a form reads, and the columns through which they enter the field problem.
 
-At the points q of a fixed rule, particle data D become volume-weighted densities (docs: theory):
-D_q = (sum_p V_p D_p l_q(x_p)) / (w_q |J|).
+At the particles they are columns of the kernels. With assembly='dolfinx', and at the centre and the
+vertices of a cell, particle data D become volume-weighted densities at the points q of a fixed rule
+(docs: theory): D_q = (sum_p V_p D_p l_q(x_p)) / (w_q |J|).
 """
 
 from __future__ import annotations
@@ -12,84 +13,35 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tawami.base.errors import FormError
-from tawami.base.space import PLANE
+from tawami.base.space import Space
 from tawami.fem.rules import Rule
 
 Part = Literal["value", "strain", "gradient", "volume"]
 
-#: Components of a strain or a stress, (xx, yy, xy), and of a gradient, (xx, xy, yx, yy).
-STRAIN, GRADIENT = PLANE.num_strains, len(PLANE.gradient)
-#: Components of the quantities that the material law gives.
-COMPONENTS: Mapping[str, int] = {
-    "sigma": STRAIN, "s": STRAIN, "sigma_m": 1, "P": GRADIENT, "P_s": GRADIENT, "tau_m": 1, "ln_J": 1,
-    "eps_p": 1,
-}  # fmt: skip
-#: Numbers per component of the parts of a law quantity: its value, and its derivatives with respect to
-#: the strain (xx, yy, gamma_xy), grad u (xx, xy, yx, yy) and the volumetric field, eps_v or p.
-WIDTH: Mapping[Part, int] = {"value": 1, "strain": STRAIN, "gradient": GRADIENT, "volume": 1}
-
-OPERATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
-    "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power
-}  # fmt: skip
+#: Quantities of the law that are stresses, and those that are stresses times a gradient.
+STRESSES, NOMINAL = ("sigma", "s"), ("P", "P_s")
+#: Name of a history variable of the law, as the particle stage knows it.
+HISTORY = "history:"
 
 
 @dataclass(frozen=True)
 class ParticleScalar:
-    """An expression of constants of the particle, as K or K**2/mu.
+    """A number of each particle: K, rho, x[0], or an expression of such numbers.
 
     Attributes:
-        text: The expression; two with the same text are the same density.
+        text: Its name or the expression; two with the same text are the same.
         evaluate: Gives its values from arrays by name, with one entry per particle.
+        varies: Whether it may change between the steps of particles that do not move.
     """
 
     text: str
     evaluate: Callable[[Mapping[str, Any]], Any] = field(compare=False)
+    varies: bool = field(default=False, compare=False)
 
-    def _binary(self, other: Any, symbol: str, *, swap: bool = False) -> Any:
-        if isinstance(other, LawQuantity) and symbol == "*":
-            return other * self
-        if not isinstance(other, ParticleScalar):
-            if not isinstance(other, (int, float)):
-                raise FormError(
-                    f"'{self.text} {symbol} ...': a particle constant combines with numbers and other "
-                    f"particle constants only, not with {type(other).__name__}: expected "
-                    "sum_p(constant, expression)"
-                )
-            number = float(other)
-            other = ParticleScalar(repr(other), lambda _: number)
-        a, b = (other, self) if swap else (self, other)
-        operation = OPERATIONS[symbol]
-        return ParticleScalar(
-            f"({a.text} {symbol} {b.text})", lambda v: operation(a.evaluate(v), b.evaluate(v))
-        )
 
-    def __add__(self, other: Any) -> Any:
-        return self._binary(other, "+")
-
-    def __radd__(self, other: Any) -> Any:
-        return self._binary(other, "+", swap=True)
-
-    def __sub__(self, other: Any) -> Any:
-        return self._binary(other, "-")
-
-    def __rsub__(self, other: Any) -> Any:
-        return self._binary(other, "-", swap=True)
-
-    def __mul__(self, other: Any) -> Any:
-        return self._binary(other, "*")
-
-    def __rmul__(self, other: Any) -> Any:
-        return self._binary(other, "*", swap=True)
-
-    def __truediv__(self, other: Any) -> Any:
-        return self._binary(other, "/")
-
-    def __rtruediv__(self, other: Any) -> Any:
-        return self._binary(other, "/", swap=True)
-
-    def __pow__(self, other: Any) -> Any:
-        return self._binary(other, "**")
+def named(name: str, *, varies: bool = False) -> ParticleScalar:
+    """The number of each particle with this name."""
+    return ParticleScalar(name, lambda values: values[name], varies)
 
 
 @dataclass(frozen=True)
@@ -98,40 +50,45 @@ class LawQuantity:
 
     Attributes:
         name: Name of the quantity.
-        factor: Constant of the particle that multiplies it.
+        factor: Number of the particle that multiplies it.
     """
 
     name: str
     factor: ParticleScalar | None = None
 
-    def __mul__(self, other: Any) -> LawQuantity:
-        if not isinstance(other, (int, float, ParticleScalar)):
-            raise FormError(
-                f"'{self.name} * ...': a quantity of the law combines with particle constants only, not "
-                f"with {type(other).__name__}: expected sum_p({self.name}, expression)"
-            )
-        return LawQuantity(self.name, (self.factor or ONE) * other)
-
-    __rmul__ = __mul__
-
 
 Quantity = ParticleScalar | LawQuantity
-K = ParticleScalar("K", lambda values: values["K"])
-MU = ParticleScalar("mu", lambda values: values["mu"])
 ONE = ParticleScalar("1", lambda values: np.ones_like(values["mu"]))
 
 
 @dataclass(frozen=True)
 class Density:
-    """Particle data at the points of a rule: `part` of `quantity`, with `size` components."""
+    """Particle data at the points of a rule: `part` of `quantity`.
+
+    Attributes:
+        rule: The points; for 'particle' the particles themselves, where kernels are evaluated there.
+        quantity: The quantity.
+        part: Its value, or its derivative with respect to the strain (xx, yy, gamma_xy), grad u (xx, xy,
+            yx, yy) or the volumetric field, eps_v or p.
+        size: Number of components.
+    """
 
     rule: Rule
     quantity: Quantity
     part: Part = "value"
+    size: int = 1
 
-    @property
-    def size(self) -> int:
-        """Number of components."""
-        if isinstance(self.quantity, ParticleScalar):
-            return 1
-        return COMPONENTS[self.quantity.name] * WIDTH[self.part]
+
+def components(quantity: Quantity, space: Space) -> int:
+    """Number of components of a quantity."""
+    if isinstance(quantity, ParticleScalar):
+        return 1
+    if quantity.name in STRESSES:
+        return space.num_strains
+    return len(space.gradient) if quantity.name in NOMINAL else 1
+
+
+def density(rule: Rule, quantity: Quantity, space: Space, part: Part = "value") -> Density:
+    """Data of a quantity or one of its derivatives in a space."""
+    width = {"strain": space.num_strains, "gradient": len(space.gradient)}.get(part, 1)
+    return Density(rule, quantity, part, components(quantity, space) * width)

@@ -10,7 +10,7 @@ from typing import Any
 
 import ufl
 
-from tawami.form.quantities import COMPONENTS, Density, LawQuantity
+from tawami.form.quantities import Density, LawQuantity
 from tawami.form.symbols import Symbols
 
 
@@ -31,8 +31,7 @@ class Linearisation:
             ufl.derivative(self._residual, self._symbols.increments, self._symbols.trial)
         )
         for density, symbol in self._law_densities():
-            # linear in each density: the bilinear terms after the exchange are its contribution
-            tangent += ufl.lhs(ufl.replace(self._residual, {symbol: self._direction(density)}))
+            tangent += _with(self._residual, symbol, self._direction(density))
         return tangent
 
     def couplings(self) -> list[tuple[Any, Any]]:
@@ -46,12 +45,16 @@ class Linearisation:
             return []
         symbols = self._symbols
         du = next(iter(symbols.tests.values()))
-        at_centre, at_particles = symbols.measures["centre"], symbols.measures["particle"]
-        area = symbols.constants["h"] ** 2
+        place = symbols.assembly == "points"
+        at_centre, at_particles = (
+            symbols.measure(rule, place=place) for rule in ("centre", "particle")
+        )
+        # a cell has one centre: points have weight 1 there, integrals over the cell its area
+        area = 1.0 if place else symbols.constants["h"] ** 2
         products = []
         for density, symbol in self._law_densities():
             if density.rule == "particle":
-                change = symbols.density(Density("particle", density.quantity, "volume"))
+                change = symbols.data.part("particle", density.quantity, "volume")
                 of_volume = self._volume_change(du) / area * at_centre
                 products.append((_with(self._residual, symbol, change), of_volume))
             else:
@@ -62,50 +65,47 @@ class Linearisation:
 
     def _law_densities(self) -> list[tuple[Density, Any]]:
         """The law quantities of the residual with their placeholders."""
-        used = set(self._residual.coefficients())
+        used = {s: self._symbols.data.of(s) for s in self._residual.coefficients()}
         return [
-            (density, symbol)
-            for density, symbol in self._symbols.placeholders.items()
-            if isinstance(density.quantity, LawQuantity)
-            and density.part == "value"
-            and symbol in used
+            (data, symbol)
+            for symbol, data in used.items()
+            if data is not None and isinstance(data.quantity, LawQuantity)
         ]
 
     def _direction(self, density: Density) -> Any:
         """Change of a law quantity with the fields: C : strain(du) (or grad(du)) + c d_eps_v (d_p)."""
         kinematics, quantity = self._form.kinematics, density.quantity
         assert isinstance(quantity, LawQuantity)
-        n = COMPONENTS[quantity.name]
-        du, *volumetric = self._symbols.trials.values()
-        change = [ufl.as_ufl(0.0)] * n
+        du = next(iter(self._symbols.trials.values()))
+        change = [ufl.as_ufl(0.0)] * density.size
         if density.rule == "particle":
             change = self._strain_change(quantity, du)
         volume = None
         if kinematics.has_mean_stress and quantity.name != "ln_J":
-            volume = volumetric[0]
+            volume = self._symbols.trials[str(self._form.volume_field)]
         elif kinematics.volume_at_centre and density.rule == "centre":
             volume = self._volume_change(du)
         if volume is not None:
-            c = self._symbols.density(Density(density.rule, quantity, "volume"))
-            change = [change[i] + c[i] * volume for i in range(n)]
+            c = self._symbols.data.part(density.rule, quantity, "volume")
+            change = [change[i] + c[i] * volume for i in range(density.size)]
         return ufl.as_vector(change)
 
     def _strain_change(self, quantity: Any, du: Any) -> list[Any]:
         """Change of a law quantity with the strain (or grad u) at the particle."""
-        direction, part = self._form.strain.direction(du), self._form.strain.gradient_part
-        c = self._symbols.density(Density("particle", quantity, part))
-        m, n = len(direction), COMPONENTS[quantity.name]
-        return [sum(c[m * i + j] * direction[j] for j in range(m)) for i in range(n)]
+        operators, part = self._symbols.operators, self._form.strain.gradient_part
+        direction = operators.strain(du) if part == "strain" else operators.gradient(du)
+        c = self._symbols.data.part("particle", quantity, part)
+        m = len(direction)
+        return [sum(c[m * i + j] * direction[j] for j in range(m)) for i in range(len(c) // m)]
 
     def _volume_change(self, du: Any) -> Any:
         """Change of div u (ln det f) with du."""
         u = next(iter(self._symbols.fields.values()))
-        return self._form.strain.volume_change(u, du)
+        return self._symbols.operators.volume_change(u, du, finite=self._form.strain.finite)
 
 
 def _with(form: Any, symbol: Any, value: Any) -> Any:
-    """The terms of a form that contain a symbol linearly, with a value in its place."""
-    slope = ufl.derivative(form, symbol, ufl.Argument(symbol.ufl_function_space(), 2))
-    slope = ufl.algorithms.expand_derivatives(slope)
-    (argument,) = (a for a in slope.arguments() if a.number() == 2)
+    """Derivative of a form with respect to a placeholder, times a value."""
+    argument = ufl.Argument(symbol.ufl_function_space(), 2)
+    slope = ufl.algorithms.expand_derivatives(ufl.derivative(form, symbol, argument))
     return ufl.replace(slope, {argument: value})

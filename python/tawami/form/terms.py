@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import ufl
 from ufl import SpatialCoordinate
 from ufl.algorithms import expand_derivatives
-from ufl.algorithms.analysis import extract_arguments, extract_coefficients, has_type
+from ufl.algorithms.analysis import (
+    extract_arguments,
+    extract_coefficients,
+    extract_constants,
+    has_type,
+)
 from ufl.algorithms.check_arities import ArityMismatch, check_form_arity
 from ufl.classes import Zero
 
 from tawami.base.errors import FormError
 from tawami.fem.rules import Rule
-from tawami.form.symbols import PLACEHOLDERS, Symbols
+from tawami.form.arity import check_arity
+from tawami.form.lines import line_of
+from tawami.form.particle_data import PLACEHOLDERS
+from tawami.form.symbols import Symbols
 
 
 @dataclass(frozen=True)
@@ -41,26 +48,7 @@ def terms_of(symbols: Symbols, residual: Any) -> Terms:
     """
     name = symbols.form.name
     for part in residual.integrals():
-        if part.ufl_domain() != symbols.domain or "quadrature_degree" not in part.metadata():
-            raise FormError(
-                f"form {name}: a measure of UFL: expected dx, dx_c or ds as arguments, residual(..., dx)"
-            )
-        if not extract_arguments(part) and not isinstance(part.integrand(), Zero):
-            raise FormError(f"form {name}: a term has no test function: expected one in each term")
-        if part.subdomain_id() != "everywhere":
-            raise FormError(
-                f"form {name}: a measure with a number, as dx({part.subdomain_id()}): expected dx, dx_c "
-                "and ds without a number; the particles determine the domain"
-            )
-    if any(has_type(part.integrand(), SpatialCoordinate) for part in residual.integrals()):
-        raise FormError(
-            f"form {name}: the position x in a term: expected position-dependent data at the particles "
-            "(material, volume) or in scene.traction(...)"
-        )
-    if not {*residual.constants()} <= {*symbols.constants.values()}:
-        raise FormError(
-            f"form {name}: a Constant of UFL: expected a number, or one of 'parameters'"
-        )
+        _check(symbols, part)
     kinds = ("cell", "exterior_facet", "interior_facet")
     cells, edges, sides = (_of_type(residual, kind) for kind in kinds)
     if edges is not None and not _is_linear_in(edges, symbols.traction):
@@ -81,6 +69,39 @@ def terms_of(symbols: Symbols, residual: Any) -> Terms:
     return Terms(cells, edges, None if sides is None else _matrix(symbols, sides))
 
 
+def _check(symbols: Symbols, part: Any) -> None:
+    """Check one integral of a residual."""
+    where = symbols.lines.text(line_of(part))
+    if part.ufl_domain() != symbols.domain or "quadrature_degree" not in part.metadata():
+        raise FormError(
+            f"{where}: a measure of UFL: expected dx, dx_c or ds as arguments, residual(..., dx)"
+        )
+    if not extract_arguments(part) and not isinstance(part.integrand(), Zero):
+        raise FormError(f"{where}: a term has no test function: expected one in each term")
+    with symbols.lines.errors(ufl.Form([part])):
+        check_arity(ufl.Form([part]), where)
+    if part.subdomain_id() != "everywhere":
+        raise FormError(
+            f"{where}: a measure with a number, as dx({part.subdomain_id()}): expected dx, dx_c and ds "
+            "without a number; the particles determine the domain"
+        )
+    if not {*extract_constants(part.integrand())} <= {*symbols.constants.values()}:
+        raise FormError(f"{where}: a Constant of UFL: expected a number, or one of 'parameters'")
+    if "place" in part.metadata():
+        return
+    read = [symbols.data.of(symbol) for symbol in extract_coefficients(part.integrand())]
+    if symbols.assembly == "points" and any(data and data.rule != "mean" for data in read):
+        raise FormError(
+            f"{where}: particle data outside a sum over particles: expected sum_p(...), or cell_mean(K) "
+            "and the like in terms with dx"
+        )
+    of_space = symbols.space.hoop  # the factor 2 pi r
+    if has_type(part.integrand(), SpatialCoordinate) and not of_space:
+        raise FormError(
+            f"{where}: the position x outside a sum over particles: expected x in sum_p(...) only"
+        )
+
+
 def by_rule(form: Any) -> list[Any]:
     """One form for each quadrature rule.
 
@@ -95,25 +116,19 @@ def by_rule(form: Any) -> list[Any]:
     return [ufl.Form(rules[rule]) for rule in sorted(rules, reverse=True)]
 
 
-def at_points(form: Any, rule_of: Mapping[Any, Rule]) -> tuple[list[tuple[Rule, Any]], Any]:
-    """Sums over particles of a form by place, with expanded derivatives, and integrals over cells.
-
-    Args:
-        form: Integrals over cells.
-        rule_of: The rule of each placeholder of particle data.
-    """
+def at_points(form: Any) -> tuple[list[tuple[Rule, Any]], Any]:
+    """Sums over particles of a form by place, with expanded derivatives, and integrals over cells."""
     sums: dict[Rule, list[Any]] = {}
     rest = []
     for integral in form.integrals():
         expanded = expand_derivatives(ufl.Form([integral]))
         if expanded.empty():
             continue
-        rules = {rule_of[c] for c in extract_coefficients(integral) if c in rule_of} - {"mean"}
-        if rules:
-            (rule,) = rules
-            sums.setdefault(rule, []).extend(expanded.integrals())
-        else:
+        place = integral.metadata().get("place")
+        if place is None:
             rest.append(integral)
+        else:
+            sums.setdefault(place, []).extend(expanded.integrals())
     return [(rule, ufl.Form(parts)) for rule, parts in sums.items()], ufl.Form(rest)
 
 
@@ -137,7 +152,7 @@ def _is_linear_in(form: Any, coefficient: Any) -> bool:
 def _matrix(symbols: Symbols, sides: Any) -> Any:
     """The matrix of the terms on sides of cells."""
     used = set(sides.coefficients())
-    others = {density for density, symbol in symbols.placeholders.items() if symbol in used}
+    others = {data for symbol in used if (data := symbols.data.of(symbol)) is not None}
     matrix = ufl.replace(sides, {symbols.increments: symbols.trial})
     try:
         expanded = ufl.algorithms.expand_derivatives(matrix)

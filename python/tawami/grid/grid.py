@@ -72,7 +72,7 @@ class Grid(Unique):
                 "(0, 0): farther away, positions have too few digits; move body and grid nearer"
             )
         self._rectangle: mesh.Rectangle | None = None
-        self._function_spaces: dict[int, mesh.FunctionSpace] = {}
+        self._function_spaces: dict[str, mesh.FunctionSpace] = {}
 
     @property
     def num_cells(self) -> int:
@@ -125,11 +125,12 @@ class Grid(Unique):
         rank[self.cell_numbers(self.rectangle.ij)] = self.comm.rank
         return ranks.sum_of(self.comm, rank)
 
-    def function_space(self, num_fields: int, element: Any) -> mesh.FunctionSpace:
-        """The function space of displacement and `num_fields - 1` bilinear fields."""
-        if num_fields not in self._function_spaces:
-            self._function_spaces[num_fields] = mesh.FunctionSpace(self.rectangle, element)
-        return self._function_spaces[num_fields]
+    def function_space(self, element: Any) -> mesh.FunctionSpace:
+        """The function space of an element."""
+        key = repr(element)
+        if key not in self._function_spaces:
+            self._function_spaces[key] = mesh.FunctionSpace(self.rectangle, element)
+        return self._function_spaces[key]
 
     def edge(self, name: Edge) -> tuple[int, int]:
         """Axis normal to an edge of the grid, and 0 for its lower or -1 for its upper end.

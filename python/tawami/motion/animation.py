@@ -13,7 +13,7 @@ from tawami.motion.observer import Motion
 from tawami.picture import film
 from tawami.picture.particles import scale_of
 from tawami.scene.presentation import checked_limits, corners_of, positions, shapes
-from tawami.scene.quantities import Given, body_arrays
+from tawami.scene.quantities import Given, body_arrays, of_scene
 from tawami.scene.scalars import pick
 
 if TYPE_CHECKING:
@@ -45,8 +45,7 @@ class Camera:
         if multiple > self._last or (last and time > self._taken):
             self._last, self._taken = max(multiple, self._last), time
             scene, arrays = self._motion.scene, body_arrays(self._motion)
-            histories = scene.particles.history_names
-            self.name, self.unit, values = pick(self._quantity, arrays, histories)
+            self.name, self.unit, values = pick(self._quantity, arrays, of_scene(scene))
             moved, deformed = scene.form.strain.finite, self._deformed
             x = positions(arrays, moved=moved, deformed=deformed)
             shape = shapes(arrays, moved=moved, deformed=deformed)

@@ -25,6 +25,7 @@ from tawami.scene.configuration import Configuration
 from tawami.scene.contact import ActiveSet
 from tawami.scene.share import Moment
 from tawami.scene.step import Accepted, Problem
+from tawami.scene.step_values import Fields
 from tawami.solve.inertia import Inertia
 
 Array = npt.NDArray[np.float64]
@@ -102,9 +103,18 @@ class NewmarkStep:
         self._speed1 = self._prescribed(lambda term: term.rates(self._finish)[1])
         self._speed_rate = (self._speed1 - self._speed) / dt
 
-    def _constraints(self, amount: Callable[[Term], float]) -> tuple[Reduction, ActiveSet]:
+    @property
+    def moment(self) -> Moment:
+        """See `StepKind`."""
+        return self._finish
+
+    def _constraints(
+        self, amount: Callable[[Term], float], fields: Fields | None = None
+    ) -> tuple[Reduction, ActiveSet]:
         now, zero = self._now, np.zeros(self._now.domain.layout.size)
-        return now.supports.constraints(now.domain, amount, zero, now.before, moving=True)
+        return now.supports.constraints(
+            now.domain, amount, zero, now.before, moving=True, fields=fields
+        )
 
     def _prescribed(self, rate: Callable[[Term], float]) -> Array:
         """Prescribed velocities on all coefficients [m/s]."""
@@ -120,7 +130,8 @@ class NewmarkStep:
         """The problem in the present states of the walls."""
         now, dt = self._now, self._dt
         crossings = now.supports.crossings(self._displacement) if now.model.moves else {}
-        reduction, contact = self._constraints(self._displacement)
+        at_end: Fields = (now.old, lambda term: term.at(self._finish))
+        reduction, contact = self._constraints(self._displacement, at_end)
         v, a = self._mapped
         if self._loads != self._clock.loads:  # a belongs to other loads
             a = self._first_acceleration(a)
@@ -150,15 +161,15 @@ class NewmarkStep:
         """First iterate: u = dt v, eps_v the lumped projection of its div u (ln det f)."""
         domain = self._now.domain
         guess = np.zeros(domain.layout.size)
-        n = u.size
-        guess[:n] = u
+        guess[: u.size] = u
         if domain.model.form.kinematics.has_eps_v:
-            ln_j = domain.stage.volume_strains(guess[:n], None)[:, 0]
+            ln_j = domain.stage.volume_strains(guess[: u.size], None)[:, 0]
             weight = domain.constants["K"] * domain.particles.volume
             # a guess that halves a particle or inverts it is limited
             data = np.column_stack([np.fmax(ln_j, np.log(0.5)), np.ones(len(weight))])
             sums = domain.sums(weight, data, "bilinear")
-            guess[n:] = divided(sums[:, 0], sums[:, 1])
+            assert domain.layout.volumetric is not None
+            guess[domain.layout.volumetric.slice] = divided(sums[:, 0], sums[:, 1])
         return guess
 
     def accept(self, accepted: Accepted) -> NewmarkUpdate:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tawami.base.errors import ConvergenceError
-from tawami.solve.measures import History
+from tawami.solve.measures import History, measured
 
 
 @dataclass
@@ -35,7 +35,8 @@ class Step:
     Attributes:
         end: Time [s], or share of the load, at its end.
         size: Its size [s], or share of the load.
-        history: (momentum, volume) measures of every residual.
+        history: (momentum, volume) measures of every residual; with fields without a role, the largest
+            of theirs as well.
         krylov: FGMRES iterations of every linear solve; 0 if the tangent was factorised.
     """
 
@@ -76,12 +77,12 @@ class Steps(list[Step]):
 
 def pack(steps: Sequence[Step]) -> dict[str, Any]:
     """Steps as a few arrays for a checkpoint; NaN for a volume that is not measured."""
-    history = [(u, np.nan if q is None else q) for step in steps for u, q in step.history]
+    history = [[np.nan if m is None else m for m in of] for step in steps for of in step.history]
     return {
         "end": np.array([step.end for step in steps]),
         "size": np.array([step.size for step in steps]),
         "residuals": np.array([len(step.history) for step in steps], dtype=np.int64),
-        "history": np.array(history).reshape(-1, 2),
+        "history": np.array(history or np.empty((0, 2))),
         "solves": np.array([len(step.krylov) for step in steps], dtype=np.int64),
         "krylov": np.array([k for step in steps for k in step.krylov], dtype=np.int64),
     }
@@ -95,7 +96,7 @@ def unpack(arrays: Mapping[str, Any]) -> list[Step]:
         Step(
             float(end),
             float(size),
-            [(float(u), None if np.isnan(q) else float(q)) for u, q in history],
+            [measured(*of_residual) for of_residual in history],
             tuple(map(int, solves)),
         )
         for end, size, history, solves in zip(

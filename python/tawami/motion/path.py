@@ -19,6 +19,7 @@ from tawami.motion.stepping import Stop, end_early, march
 from tawami.scene.configuration import Configuration
 from tawami.scene.points import check_in_body
 from tawami.scene.scene import Scene
+from tawami.scene.share import Moment
 from tawami.scene.solution import Solution
 from tawami.scene.statics import StaticStep
 from tawami.scene.step import Accepted, Problem
@@ -101,6 +102,11 @@ class PathStep:
     following: Following
     configuration: Configuration
     size: float
+
+    @property
+    def moment(self) -> Moment:
+        """See `StepKind`."""
+        return self.configuration.moment(self.following.factor)
 
     @property
     def end(self) -> float:

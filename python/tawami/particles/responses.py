@@ -33,12 +33,13 @@ class Responses:
         particles: The particles, with volumes and stresses.
         location: Their cells and positions in them.
         stage: Their material laws.
-        constants: K and mu of each particle [Pa].
+        values: Numbers of the particles by name, K and mu [Pa] among them.
         comm: Communicator.
         stopwatch: Measures the time of the laws.
 
     Attributes:
         form: The form.
+        constants: K and mu of each particle [Pa].
         data: Particle data of each rule, particles x columns; :meth:`evaluate` writes them.
         stiffest: Largest modulus of the body [Pa]; a bulk modulus counts up to `LOCKED` mu.
         largest_mu: Largest shear modulus of the body [Pa].
@@ -53,32 +54,37 @@ class Responses:
         particles: _rust.Particles,
         location: _rust.Location,
         stage: _rust.Stage | NumpyStage,
-        constants: Mapping[str, Array],
+        values: Mapping[str, Array],
         comm: Any,
         stopwatch: Stopwatch,
     ) -> None:
-        self.form, self.stage, self.constants = compiled.form, stage, constants
+        self.form, self.stage, self._values = compiled.form, stage, values
+        self.constants = {name: values[name] for name in ("K", "mu")}
         self.particles, self.location = particles, location
         self._comm, self._stopwatch = comm, stopwatch
         self.data: dict[Rule, Array] = {
             rule: np.zeros((len(particles), compiled.columns(rule))) for rule in compiled.densities
         }
         requests: dict[Rule, list[Request]] = {rule: [] for rule in self.data}
+        #: Numbers that may change between steps, with their arrays and columns.
+        self._varying = list[tuple[ParticleScalar, Array, int]]()
         with ranks.raise_together(comm):
             for rule, densities in compiled.densities.items():
                 for density, column in densities.items():
                     quantity = density.quantity
-                    if isinstance(quantity, ParticleScalar):
+                    if isinstance(quantity, ParticleScalar) and quantity.varies:
+                        self._varying.append((quantity, self.data[rule], column))
+                    elif isinstance(quantity, ParticleScalar):
                         self.data[rule][:, column] = self._constant(quantity)
                     else:
                         requests[rule].append(self._request(density, column))
         #: Particle data with law quantities, and these quantities.
         self._written = [self.data[rule] for rule, of_rule in requests.items() if of_rule]
         self._requests = _rust.Requests([of_rule for of_rule in requests.values() if of_rule])
-        softer = np.minimum(constants["K"], LOCKED * constants["mu"])
+        mu = self.constants["mu"]
+        softer = np.minimum(self.constants["K"], LOCKED * mu)
         self.stiffest, self.largest_mu = (
-            ranks.largest(comm, float(modulus.max(initial=0.0)))
-            for modulus in (softer, constants["mu"])
+            ranks.largest(comm, float(modulus.max(initial=0.0))) for modulus in (softer, mu)
         )
 
     def _request(self, density: Density, column: int) -> Request:
@@ -86,13 +92,27 @@ class Responses:
         assert isinstance(quantity, LawQuantity)
         factor = None
         if quantity.factor is not None:
-            factor = np.asarray(quantity.factor.evaluate(self.constants), dtype=float)
+            factor = np.asarray(quantity.factor.evaluate(self._values), dtype=float)
         return quantity.name, density.part, column, factor
+
+    def refresh(self) -> None:
+        """Read again what may have changed since the last step: old fields, data, parameters.
+
+        A collective call.
+
+        Raises:
+            InputError: Data that the scene does not have, or an expression that is not finite.
+        """
+        if self._varying:
+            with ranks.raise_together(self._comm):
+                for scalar, data, column in self._varying:
+                    data[:, column] = self._constant(scalar)
 
     def _constant(self, scalar: ParticleScalar) -> Array:
         with np.errstate(all="ignore"):
-            values = np.asarray(scalar.evaluate(self.constants), dtype=float)
-        bad = np.flatnonzero(~np.isfinite(values))
+            values = np.asarray(scalar.evaluate(self._values), dtype=float)
+        incompressible = scalar.text == "K" and self.form.kinematics.deviatoric
+        bad = np.flatnonzero(~np.isfinite(values) & (not incompressible))
         if len(bad):
             p = bad[0]
             K, mu = (self.constants[name][p] for name in ("K", "mu"))

@@ -11,7 +11,6 @@ import scipy.sparse as sp
 from tawami import _rust
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError, NotModelledError
-from tawami.form.kinematics import FIELD_UNITS
 from tawami.grid import edges
 from tawami.grid.basis import extraction, greville_1d, values_1d
 from tawami.motion.observer import Snapshot, Subject
@@ -23,9 +22,9 @@ from tawami.scene.quantities import (
     Given,
     Quantity,
     body_arrays,
-    history,
     local_arrays,
     of_particles,
+    of_scene,
     unknown,
 )
 from tawami.scene.scene import Scene
@@ -56,8 +55,8 @@ def on_grid(
     """
     scene = subject.scene
     own = _of_grid(scene)
-    histories = {name: history(name) for name in scene.particles.history_names}
-    projected = [name for name, quantity in (PARTICLES | histories).items() if quantity.nodal]
+    of_particle = PARTICLES | of_scene(scene)
+    projected = [name for name, quantity in of_particle.items() if quantity.nodal]
     found = []
     for name in names:
         if isinstance(name, Quantity):
@@ -92,8 +91,9 @@ def _of_grid(scene: Scene) -> dict[str, GridQuantity]:
         ),
     }
     if not scene.form.strain.finite:  # else the grid has only that of the last step
-        for name, (kind, _) in list(scene.form.fields.items())[1:]:
-            found[name] = GridQuantity(f"{name} [{FIELD_UNITS[kind]}]", _bilinear)
+        for name, field in list(scene.form.fields.items())[1:]:
+            if field.basis == "bilinear":
+                found[name] = GridQuantity(f"{name} [{field.unit}]", _bilinear(name))
     return found
 
 
@@ -133,10 +133,17 @@ def _displacement(now: Snapshot) -> Array:
     return _at_vertices(scene, u)
 
 
-def _bilinear(now: Snapshot) -> Array:
-    scene, solution = now.scene, now.solution
-    values = scene.split(scene.configuration.before)[1] if solution is None else solution.volumetric
-    return np.asarray(values)
+def _bilinear(name: str) -> Callable[[Snapshot], Array]:
+    """The coefficients of a field, which are its values at the vertices."""
+
+    def of(now: Snapshot) -> Array:
+        configuration = now.scene.configuration
+        part = configuration.domain.layout.fields[name].slice
+        solution = now.solution
+        of_all = configuration.before if solution is None else solution.coefficients
+        return np.asarray(of_all[part])
+
+    return of
 
 
 def _velocity(now: Snapshot) -> Array:

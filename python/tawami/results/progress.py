@@ -15,6 +15,7 @@ from tawami.base.errors import InputError
 from tawami.base.files import check_regular, writing
 from tawami.base.line import Line
 from tawami.motion.pace import Step
+from tawami.solve.measures import text
 
 log = logging.getLogger("tawami")
 #: The log file in the folder of a run.
@@ -50,8 +51,7 @@ class Progress:
 
     def step(self, number: int, at: float, step: Step, particles: int, *, last: bool) -> None:
         """Report an accepted step that ends at a time or share `at`."""
-        momentum, volume = step.history[-1]
-        measures = f"{momentum:.1e}" if volume is None else f"{momentum:.1e}, {volume:.1e}"
+        measures = text(step.history[-1])
         log.info(
             "%s: step %d to %g %s, size %g, %d Newton iterations to %s, %d particles",
             self.phase, number, at, self.unit, step.size, step.iterations, measures, particles,

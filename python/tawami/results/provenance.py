@@ -133,7 +133,7 @@ def source_of(form: Form) -> bytes | None:
     code = getattr(form.residual, "__code__", None)
     names = sorted(name for name in getattr(code, "co_names", ()) if hasattr(ufl, name))
     name = getattr(form.residual, "__name__", "residual")
-    lines = [f"# Form {form.name}: defined in {file}"]
+    lines = [f"# Form {form.name}: defined in {file}", "from tawami.form import scalar, vector"]
     lines += [f"from ufl import {', '.join(names)}"] if names else []
     for key in DECLARATIONS:
         value = getattr(form, key)

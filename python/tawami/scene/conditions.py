@@ -8,12 +8,13 @@ import numpy.typing as npt
 
 from tawami.base import checks
 from tawami.base.errors import InputError
-from tawami.grid.edges import Component, Interval, Profile
+from tawami.base.text import quoted
+from tawami.grid.edges import Interval, Profile
 from tawami.grid.grid import Edge
 from tawami.scene import selection
 from tawami.scene.configuration import Configuration
 from tawami.scene.factor import InTime
-from tawami.scene.loads import Load
+from tawami.scene.load import Load
 from tawami.scene.points import check_in_body
 from tawami.scene.selection import Where
 from tawami.scene.support import Support
@@ -37,18 +38,19 @@ class Conditions:
     def fix(
         self,
         edge: Edge,
-        component: Component,
+        component: str,
         value: Profile = 0.0,
         *,
         amplitude: InTime | None = None,
         velocity: InTime | None = None,
         between: Interval | None = None,
     ) -> Support:
-        """Prescribe a displacement component along an edge of the grid.
+        """Prescribe a displacement component, or another field of the form, along an edge of the grid.
 
         Args:
             edge: 'left', 'right', 'bottom' or 'top'.
-            component: 'x' or 'y'.
+            component: 'x' or 'y', or the name of a field without a role, as 'p_w'. The value is then
+                that of the field, in its unit.
             value: Displacement [m] from now on (at small strain from the start of the scene): a
                 number, or a function f(x, y) on arrays, which is projected in L2 on the functions of
                 the edge.
@@ -65,7 +67,7 @@ class Conditions:
     def hold(
         self,
         point: Sequence[float],
-        component: Component,
+        component: str,
         value: float = 0.0,
         *,
         amplitude: InTime | None = None,
@@ -99,7 +101,39 @@ class Conditions:
         """
         return self.configuration.supports.wall(edge, friction, separates)
 
-    def release(self, place: Edge | Sequence[float], component: Component | None = None) -> None:
+    def flux(
+        self,
+        edge: Edge,
+        field: str,
+        value: Profile,
+        *,
+        amplitude: InTime | None = None,
+        between: Interval | None = None,
+    ) -> Load:
+        """Let a field flow into the body through an edge of the grid.
+
+        The residual of the field's equation gets - int value r ds, r its test function.
+
+        Args:
+            edge: 'left', 'right', 'bottom' or 'top'.
+            field: Name of a field of the form without a role, as 'p_w'.
+            value: Flux in the unit in which the form writes the equation of the field (with a source s
+                in it as - s r, the unit of s times m): a number, or a function f(x, y) on arrays.
+            amplitude: Factor of the value, a number or a function of time [s].
+            between: Part of the edge, from one line of the grid to another [m].
+
+        Raises:
+            InputError: An unknown edge or field, or a part that is not one of whole cells.
+        """
+        known = self.configuration.model.form.own_fields
+        if not checks.one_of(field, known):
+            raise InputError(
+                f"flux(edge='{edge}', {checks.shown(field)}, ...): expected a field of the form without "
+                f"a role: {quoted(known) or 'it has none'}"
+            )
+        return self.configuration.loads.add_flux(edge, field, value, between, amplitude)
+
+    def release(self, place: Edge | Sequence[float], component: str | None = None) -> None:
         """Remove supports that `fix`, `hold` or `wall` made, as their `release()` does.
 
         Args:

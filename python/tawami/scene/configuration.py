@@ -22,16 +22,17 @@ from tawami.base.process import check_process
 from tawami.base.program import leave_together
 from tawami.base.timing import Stopwatch
 from tawami.particles import placement
-from tawami.scene import coverage, mean_stress, quantities, softening, strain_limit
+from tawami.scene import coverage, mean_stress, own_fields, quantities, strain_limit
 from tawami.scene.activity import Activity
 from tawami.scene.domain import Domain
+from tawami.scene.form_inputs import FormInputs
 from tawami.scene.loads import Loads
 from tawami.scene.model import Model
 from tawami.scene.reactions import Reactions
 from tawami.scene.share import Moment
 from tawami.scene.step import Accepted, Problem, StepKind
+from tawami.scene.strain_limits import StrainLimits
 from tawami.scene.supports import Supports
-from tawami.scene.tangents import warn_of_differences
 from tawami.solve.newton import Converged
 from tawami.solve.numerics import Numerics
 
@@ -71,6 +72,7 @@ class Configuration:
     Attributes:
         domain: The particles where they are; another object after a step that moves them.
         supports, loads: As the driver script made them.
+        inputs: Parameters and data of the form.
         activity: Time and activity of the scene.
         total: Coefficients of all fields since the start, where particles do not move.
         left: Number, position [m] and time [s] of the particles that left the grid or were removed.
@@ -86,17 +88,19 @@ class Configuration:
         if model.form.kinematics.has_eps_v:
             mine.add_eps_v()
         mine.add_strain(finite=model.moves)
+        own_fields.carry(model.form, mine, model.space.dim)
         self._attach(mine, location)
         self.activity = Activity()
-        self.supports = Supports(model.grid, model.basis, self.activity)
+        self.supports = Supports(model.grid, model.basis, model.form.own_fields, self.activity)
         self.loads = Loads(model.grid, np.array(particles.volume), self.activity)
         self.total = np.zeros(self.domain.layout.size)
-        self.left = list[tuple[int, tuple[float, float], float]]()
-        self.removed = np.zeros(2)
+        self.inputs = FormInputs(model, self.activity.time)
+        self.inputs.begin(model, self.domain)
+        self._latest = self.activity.time
+        self.left, self.removed = list[tuple[int, tuple[float, float], float]](), np.zeros(2)
         self.begun = self._coverage_checked = False
-        self.projected = self._travel = 0.0
-        self._small_strain, self._softens = not model.moves, False
-        self._without_tangent = set[str]()
+        self.projected = 0.0
+        self._travel, self._limits = mean_stress.Travel(), StrainLimits(small=not model.moves)
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
         earlier: Domain | None = getattr(self, "domain", None)
@@ -107,6 +111,24 @@ class Configuration:
     def before(self) -> Array:
         """Coefficients since the start where particles do not move, 0 where they do."""
         return np.zeros_like(self.total) if self.model.moves else self.total
+
+    @property
+    def old(self) -> Array:
+        """Fields without a role as coefficients, 0 for the others; a call for all ranks."""
+        return own_fields.on_grid(self.domain) if self.model.moves else self.total
+
+    def prepare(self, now: Moment, dt: float | None = None) -> None:
+        """Hand the form what it reads in a step that ends at a moment; a call for all ranks.
+
+        Args:
+            now: The end of the step.
+            dt: Length of the step [s]; by default since the last one.
+
+        Raises:
+            InputError: Data that are missing, or a form that reads dt where no time passes.
+        """
+        passed = now.time - self._latest if dt is None else dt
+        self.inputs.prepare(self.domain, now.time, passed, self.loads.acceleration(now))
 
     def moment(self, part: float = 1.0, until: float | None = None) -> Moment:
         """A part of a static phase that ends at a time [s], that of the scene by default.
@@ -164,18 +186,21 @@ class Configuration:
         committed = False
         try:
             with leave_together():  # laws and other functions of the driver script are called here
+                self.prepare(kind.moment)
                 accepted = self._solve(kind)
             if not self.model.moves:
                 strain_limit.check_digits(self.domain, accepted.step, self.numerics.tolerance)
             moved = self._moved(accepted, kind.end)
-            self._warn_of_strain(accepted)
+            self._limits.warn(self.domain, self.total, accepted.step.coefficients)
             update = kind.accept(accepted)
             with signals.deferred():
                 with self.stopwatch("commit"), ranks.raise_together(self.model.grid.comm):
                     fields = self.domain.layout.split(accepted.step.coefficients)
                     dissipated = self.domain.stage.commit(*fields)
+                    own_fields.accept(self.domain, accepted.step.coefficients)
                 committed = True
                 update.store(dissipated)
+                self._latest = kind.moment.time
                 outcome = self._store(accepted, moved, kind.end)
                 update.finish()
                 return outcome
@@ -214,8 +239,9 @@ class Configuration:
             path = None if path is None else replace(path, guess=last.factor)
         friction = problem.contact.friction if problem.contact.walls else None
         found = self.domain.newton.solve(
-            problem.reduction, problem.external, problem.inertia, guess, friction, path
-        )
+            problem.reduction, problem.external, problem.inertia, guess, friction, path,
+            self.old if self.model.form.own_fields else None,
+        )  # fmt: skip
         if last is None:
             return found
         history, krylov = last.history + found.history[1:], last.krylov + found.krylov
@@ -235,18 +261,6 @@ class Configuration:
         placement.check_staying(self.model.grid, particles, moved, time, stop=stop)
         return moved
 
-    def _warn_of_strain(self, accepted: Accepted) -> None:
-        """Warn, once each, of large displacement gradients, of softening, of laws without a tangent."""
-        coefficients, n = accepted.step.coefficients, self.domain.layout.num_displacement
-        if self._small_strain:
-            large = strain_limit.exceeded(self.domain, self.total[:n] + coefficients[:n])
-            if large is not None:
-                self._small_strain = False
-                strain_limit.warn_of(self.domain, *large)
-        if not self._softens:
-            self._softens = softening.warned(self.domain, coefficients)
-        warn_of_differences(self.domain, self._without_tangent)
-
     def _store(self, accepted: Accepted, moved: Array | None, time: float) -> Outcome:
         """Store a step that the laws have committed, and move the particles."""
         self.begun = True
@@ -256,7 +270,7 @@ class Configuration:
             return self._outcome(accepted, coefficients)
         problem, grid = accepted.problem, self.model.grid
         self.supports.follow(accepted.u, problem.reduction.points, problem.crossings)
-        projects = self._must_project(moved)
+        projects = self._travel.must_project(self.domain, moved)
         self.domain.particles.move_to(moved)
         outcome = self._outcome(accepted, coefficients)
         outside = placement.outside(grid, self.domain.particles.x)
@@ -269,25 +283,9 @@ class Configuration:
                 self.projected = mean_stress.project(self.domain)
         return outcome
 
-    def _must_project(self, moved: Array) -> bool:
-        """Count the way to new positions, and whether the mean stress must be projected there."""
-        if not self.model.form.kinematics.has_eps_v:
-            return False
-        self._travel += mean_stress.travel(self.domain, moved)
-        if self._travel <= mean_stress.TRAVEL:
-            return False
-        self._travel = 0.0
-        return True
-
     def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:
-        particles, comm = self.domain.particles, self.model.grid.comm
-        in_order = placement.in_order(comm, particles.number)
-        arrays = {
-            name: in_order(quantities.array_of(particles, name))
-            for name in quantities.arrays_of(particles)
-        }
-        reactions = Reactions.of(accepted, self.supports)
-        return Outcome(accepted, coefficients, reactions, arrays)
+        arrays = quantities.of_body(self.model.grid.comm, self.domain.particles)
+        return Outcome(accepted, coefficients, Reactions.of(accepted, self.supports), arrays)
 
     # -- checkpoints ---------------------------------------------------------
 
@@ -312,11 +310,13 @@ class Configuration:
         return {
             "particles": placement.gathered(self.model.grid, self.domain.particles),
             "time": self.activity.time,
+            "latest": self._latest,
+            "inputs": self.inputs.state(),
             "total": self.total,
             "left": self.left,
             "removed": [*self.removed],
             "laws": self.model.texts,
-            "travel": self._travel,
+            "travel": self._travel.cells,
             "coverage_checked": self._coverage_checked,
             "supports": self.supports.state(),
             "loads": self.loads.state(),
@@ -341,7 +341,8 @@ class Configuration:
         self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
         self.removed = np.reshape(state["removed"], 2)
         self._coverage_checked, self.begun = state["coverage_checked"], True
-        self._travel = state["travel"]
+        self._travel.cells, self._latest = state["travel"], state["latest"]
+        self.inputs.restore(state["inputs"])
         self.supports.restore(state["supports"])
         self.loads.restore(state["loads"])
         self._attach(particles, location)

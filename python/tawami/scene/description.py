@@ -58,12 +58,10 @@ def _particles(now: Configuration) -> str:
 
 def _unknowns(now: Configuration) -> str:
     layout = now.domain.layout
-    parts = np.split(layout.active, [layout.num_displacement])
-    numbers = [int(part.sum()) for part in parts]
-    names = now.model.form.fields
-    fields = ", ".join(f"{n} of {name}" for name, n in zip(names, numbers, strict=False))
+    numbers = {name: int(layout.active[place.slice].sum()) for name, place in layout.fields.items()}
+    fields = ", ".join(f"{n} of {name}" for name, n in numbers.items())
     free = now.supports.num_free(now.domain)
-    return f"{free}: {fields}, minus {sum(numbers) - free} prescribed by supports"
+    return f"{free}: {fields}, minus {sum(numbers.values()) - free} prescribed by supports"
 
 
 def _models(now: Configuration, motion: str) -> Iterator[str]:
@@ -84,7 +82,7 @@ def _not_modelled(now: Configuration, motion: str) -> Iterator[str]:
         yield f"finite strain (form='{STRAIN_MEASURES['finite'].mixed_form}')"
     if model.without_history.all():
         yield "plasticity (von_mises(...), drucker_prager(...), mohr_coulomb(...), cam_clay(...))"
-    if len(form.fields) == 1:
+    if form.volume_field is None:
         yield f"a field for the volume (form='{form.strain.mixed_form}')"
     if model.options.get("ghost_penalty") == "off":
         yield "ghost penalty (ghost_penalty='on')"

@@ -24,6 +24,7 @@ from tawami.grid.basis import Basis
 from tawami.particles import assignment
 from tawami.particles.numpy_stage import NumpyStage
 from tawami.particles.responses import Responses
+from tawami.particles.values import ParticleValues
 from tawami.scene.model import Model
 from tawami.solve.newton import Newton
 from tawami.solve.numerics import Numerics
@@ -85,7 +86,8 @@ class Domain:
 
         def responses_of(stage: _rust.Stage | NumpyStage) -> Responses:
             return Responses(
-                model.compiled, particles, location, stage, _constants(model, particles),
+                model.compiled, particles, location, stage,
+                ParticleValues(model.form, particles, model.moduli, model.density),
                 model.grid.comm, stopwatch,
             )  # fmt: skip
 
@@ -127,7 +129,7 @@ class Domain:
     @property
     def constants(self) -> dict[str, Array]:
         """K and mu [Pa] of each particle."""
-        return _constants(self.model, self.particles)
+        return self.responses.constants
 
     @property
     def is_elastic(self) -> npt.NDArray[np.bool_]:
@@ -227,8 +229,3 @@ def _stage(
     if not laws:
         return rust
     return NumpyStage(rust, particles, laws, kinematics, finite=model.form.strain.finite)
-
-
-def _constants(model: Model, particles: _rust.Particles) -> dict[str, Array]:
-    of_particle = model.moduli[particles.material]
-    return {"K": of_particle[:, 0].copy(), "mu": of_particle[:, 1].copy()}

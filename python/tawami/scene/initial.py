@@ -17,7 +17,7 @@ from tawami.base import checks, ranks
 from tawami.base.errors import InputError
 from tawami.base.space import PLANE
 from tawami.form import quantities
-from tawami.scene import sources
+from tawami.scene import own_fields, sources
 from tawami.scene.configuration import Configuration
 from tawami.scene.domain import Domain
 from tawami.scene.earlier import Earlier
@@ -40,6 +40,14 @@ def set_field(now: Configuration, name: str, given: Source, beyond: Beyond) -> N
     """Set a field of the particles; see `Scene.initial`."""
     _check(now, name, beyond)
     domain = now.domain
+    if name in now.model.form.own_fields:
+        unit = now.model.form.own_fields[name].unit
+        with ranks.raise_together(domain.model.grid.comm):
+            found = sources.values(domain, name, given, "value", unit)[:, 0]
+        coefficients = own_fields.start(domain, name, found)
+        if not now.model.moves:
+            now.total[domain.layout.fields[name].slice] = coefficients
+        return
     with ranks.raise_together(domain.model.grid.comm):
         found = sources.values(domain, name, given, *COMPONENTS.get(name, ("value", "")))
         if name == "eps_v" and not isinstance(given, Earlier):
@@ -66,7 +74,7 @@ def set_field(now: Configuration, name: str, given: Source, beyond: Beyond) -> N
 
 def _check(now: Configuration, name: str, beyond: Beyond) -> None:
     checks.choice("beyond", beyond, ("stop", "return"))
-    known = [*COMPONENTS, *now.domain.particles.history_names]
+    known = [*COMPONENTS, *now.model.form.own_fields, *now.domain.particles.history_names]
     if now.model.form.kinematics.has_eps_v:
         known.append("eps_v")
     if not checks.one_of(name, known):
@@ -137,7 +145,8 @@ def _returned(domain: Domain) -> Array:
     fields = layout.split(np.zeros(layout.size))
     strain = domain.model.form.strain
     wanted = [(strain.mean, "value", 0, None), (strain.stress, "value", 1, None)]
-    data = np.zeros((len(domain.particles), 1 + quantities.COMPONENTS[strain.stress]))
+    size = quantities.components(quantities.LawQuantity(strain.stress), domain.model.space)
+    data = np.zeros((len(domain.particles), 1 + size))
     domain.total_strain_stage.evaluate(*fields, _rust.Requests([wanted]), [data])
     mean, components = data[:, 0], data[:, 1:]
     xx, yy, xy = components[:, strain.stress_xx_yy_xy].T

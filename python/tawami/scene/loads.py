@@ -5,142 +5,23 @@ Loads that are new since the last full solve grow with a part from 0 to 1; the o
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from tawami.base import checks
 from tawami.base.arrays import Array, Indices, Mask
-from tawami.base.errors import InputError, SupportError
-from tawami.base.identity import text
+from tawami.base.errors import SupportError
 from tawami.base.text import listed
 from tawami.grid import edges
 from tawami.grid.edges import Interval
 from tawami.grid.grid import Edge, Grid
-from tawami.scene.action import Action, Owner, Term, Value, restored
+from tawami.scene.action import Owner, Term, restored
 from tawami.scene.activity import Activity
 from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor
+from tawami.scene.load import Flux, Forces, Load, Traction, Weight
 from tawami.scene.share import Moment
-
-Numbers = npt.NDArray[np.integer[Any]]
-
-
-class Load(Action):
-    """A load of a scene: :meth:`change` replaces its value, :meth:`release` takes it away."""
-
-    __slots__ = ()
-
-    @property
-    def line(self) -> str:
-        """The load in words, for the header of a run."""
-        return f"{self}{self.terms[-1].factor}{' until it fades' if self.released else ''}"
-
-    def place(self) -> list[Any]:
-        """Place where it acts, in the types of JSON."""
-        return []
-
-
-class Weight(Load):
-    """The weight of the body; its values are the components of an acceleration [m/s2]."""
-
-    __slots__ = ()
-
-    def _checked(self, value: Any) -> tuple[Value, ...]:
-        return checks.point("gravity", value)
-
-    @property
-    def acceleration(self) -> Array:
-        """The acceleration in the driver script [m/s2]."""
-        return np.array(self.terms[-1].values if not self.released else np.zeros(2), dtype=float)
-
-    def __str__(self) -> str:
-        b = ", ".join(f"{component:g}" for component in self.terms[-1].values)
-        return f"gravity ({b}) m/s2"
-
-
-class Traction(Load):
-    """A traction on an edge of the grid; its values are components [Pa]."""
-
-    __slots__ = ("between", "edge")
-
-    def __init__(
-        self, owner: Owner[Any], edge: Edge, value: Any, between: Interval | None, factor: Factor
-    ) -> None:
-        self.edge, self.between = edge, between
-        super().__init__(owner, value, factor)
-
-    def _checked(self, value: Any) -> tuple[Value, ...]:
-        t_x, t_y = checks.pair(f"{self}", value, "components (t_x, t_y)")
-        return checks.profile(f"{self}: t_x", t_x), checks.profile(f"{self}: t_y", t_y)
-
-    def place(self) -> list[Any]:
-        """Edge, and part of it."""
-        return [self.edge, text(self.between)]
-
-    def __str__(self) -> str:
-        return f"traction(edge='{self.edge}')"
-
-
-class Forces(Load):
-    """Forces on particles of the body [N per metre depth]; its values are the components of one force
-    that they share by volume, or arrays of the components on each particle of the body.
-
-    Attributes:
-        chosen: Numbers of the particles.
-        shares: Share of each particle of the body in one force.
-    """
-
-    __slots__ = ("_dim", "chosen", "shares")
-
-    def __init__(
-        self, owner: Loads, chosen: Indices, volume: Array, value: Any, factor: Factor
-    ) -> None:
-        self._dim = owner.grid.space.dim
-        self.chosen, self.shares = chosen, np.zeros(len(volume))
-        self.shares[chosen] = volume[chosen] / volume[np.unique(chosen)].sum()
-        super().__init__(owner, value, factor)
-
-    def _checked(self, value: Any) -> tuple[Value, ...]:
-        given = checks.any_array("load(...): force", value)
-        if given.ndim != 2:
-            return checks.point("load(...): force", value)
-        forces = checks.array("load(...): force", given, 2)
-        n, dim = len(self.chosen), self._dim
-        if forces.shape != (n, dim):
-            raise InputError(
-                f"load(...): force has shape {forces.shape}: expected ({n}, {dim}), one row for each of "
-                f"the {n} particles in their order, or {dim} components of a force that they share"
-            )
-        if not np.isfinite(forces).all():
-            k = int(np.flatnonzero(~np.isfinite(forces).all(axis=1))[0])
-            raise InputError(f"load(...): force[{k}] = {forces[k]}: expected finite numbers")
-        if len(np.unique(self.chosen)) < n:
-            raise InputError(
-                "load(...): a particle is given twice, with a force for each: expected each once"
-            )
-        on_body = np.zeros((dim, len(self.shares)))
-        on_body[:, self.chosen] = forces.T
-        return tuple(on_body)
-
-    def on(self, term: Term, number: Numbers) -> Array:
-        """Forces of a term on the particles of these numbers, particles x dim."""
-        return np.column_stack(
-            [
-                v[number] if isinstance(v, np.ndarray) else v * self.shares[number]
-                for v in term.values
-            ]
-        )
-
-    def place(self) -> list[Any]:
-        """A hash of the shares."""
-        return [hashlib.sha256(self.shares.tobytes()).hexdigest()]
-
-    def __str__(self) -> str:
-        return f"force on {np.count_nonzero(self.shares)} particles"
 
 
 class Loads(Owner[Load]):
@@ -195,10 +76,20 @@ class Loads(Owner[Load]):
         self.all.append(traction)
         return traction
 
+    def add_flux(
+        self, edge: Edge, field: str, value: Any, between: Interval | None, amplitude: Any
+    ) -> Load:
+        """Load an edge of the grid with a flux of a field."""
+        factor = self._factor(f"flux(edge='{edge}')", amplitude)
+        edges.cells_between(self.grid, edge, between)
+        flux = Flux(self, edge, field, value, between, factor)
+        self.all.append(flux)
+        return flux
+
     def add_forces(self, particles: Indices, force: Any, amplitude: Any) -> Load:
         """Load particles of the body, given by their numbers."""
         factor = self._factor("load(...)", amplitude)
-        forces = Forces(self, particles, self._volume, force, factor)
+        forces = Forces(self, self.grid.space.dim, particles, self._volume, force, factor)
         self.all.append(forces)
         return forces
 
@@ -207,6 +98,14 @@ class Loads(Owner[Load]):
         """The acceleration in the driver script, without amplitudes [m/s2]."""
         weights = [load.acceleration for load in self.all if isinstance(load, Weight)]
         return sum(weights, np.zeros(self.grid.space.dim))
+
+    def acceleration(self, now: Moment) -> Array:
+        """Acceleration of all weights at a moment [m/s2]."""
+        total = np.zeros(self.grid.space.dim)
+        for load, term, factor in self._acting(now):
+            if isinstance(load, Weight):
+                total += factor * np.array(term.values, dtype=float)
+        return total
 
     @property
     def vary(self) -> bool:
@@ -225,6 +124,10 @@ class Loads(Owner[Load]):
         particles, external = domain.particles, np.zeros(domain.layout.size)
         on_particles, any_on_particles = np.zeros((len(particles), self.grid.space.dim)), False
         for load, term, factor in self._acting(now):
+            if isinstance(load, Flux):
+                indices, integrals = load.on(domain, term)
+                external[indices] += factor * integrals
+                continue
             if isinstance(load, Traction):
                 external += factor * self._on_edge(domain, load, term)
                 continue
@@ -250,7 +153,7 @@ class Loads(Owner[Load]):
         for load in self.all:
             for term in load.terms:
                 factor = term.at(now)
-                if not term.is_zero and (factor or isinstance(load, Traction)):
+                if not term.is_zero and (factor or isinstance(load, Traction | Flux)):
                     yield load, term, factor
 
     def _on_edge(self, domain: Domain, traction: Traction, term: Term) -> Array:

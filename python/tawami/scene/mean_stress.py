@@ -16,23 +16,39 @@ from __future__ import annotations
 
 import numpy as np
 
-from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.scene.domain import Domain
+from tawami.scene.least_squares import least_squares
 
-#: Size of the residual of the projection over that of its right-hand side, and most iterations. The part
-#: that iterations do not find is lost, and rounding would make it depend on the number of ranks.
-TOLERANCE, MOST_ITERATIONS = 1e-11, 200
 #: Cells that the particles travel between two projections. A body at rest is never projected.
 TRAVEL = 0.1
 
 
-def travel(domain: Domain, moved: Array) -> float:
-    """Root mean square of the distances to new positions, in cells; a call for all ranks."""
-    squares = ((moved - domain.particles.x) ** 2).sum(axis=1) / domain.model.grid.h**2
-    sums = ranks.sum_of(domain.model.grid.comm, np.array([squares.sum(), len(squares)]))
-    return float(np.sqrt(sums[0] / max(sums[1], 1.0)))
+class Travel:
+    """Distance of the particles since the last projection.
+
+    Attributes:
+        cells: Sum over the steps of the root mean square of the distances [cells].
+    """
+
+    def __init__(self) -> None:
+        self.cells = 0.0
+
+    def must_project(self, domain: Domain, moved: Array) -> bool:
+        """Add the way to new positions, and whether the mean stress must be projected there.
+
+        A call for all ranks.
+        """
+        if not domain.model.form.kinematics.has_eps_v:
+            return False
+        squares = ((moved - domain.particles.x) ** 2).sum(axis=1) / domain.model.grid.h**2
+        sums = ranks.sum_of(domain.model.grid.comm, np.array([squares.sum(), len(squares)]))
+        self.cells += float(np.sqrt(sums[0] / max(sums[1], 1.0)))
+        if self.cells <= TRAVEL:
+            return False
+        self.cells = 0.0
+        return True
 
 
 def project(domain: Domain) -> float:
@@ -49,41 +65,7 @@ def project(domain: Domain) -> float:
     projected = np.zeros_like(strain)
     for number in range(len(domain.model.materials)):
         own = material == number
-        projected[own] = _projection(domain, np.where(own, weight, 0.0), strain)[own]
+        own_weight = np.where(own, weight, 0.0)
+        projected[own] = least_squares(domain, "bilinear", own_weight, strain)[1][own]
     stress[:, :3] += (moduli * (projected - strain))[:, None]
     return float(0.5 * weight @ (strain**2 - projected**2))
-
-
-def _projection(domain: Domain, weight: Array, values: Array) -> Array:
-    """Weighted projection of values at particles on the bilinear functions, at the particles.
-
-    Conjugate gradients, preconditioned by the lumped mass. Few particles in a cell make the mass
-    singular; the right-hand side is in its range, so that they converge nevertheless. A regularised mass
-    would dissipate a little energy in every step, and a body would never come to rest. All ranks
-    have the same coefficients.
-    """
-
-    def at_particles(coefficients: Array) -> Array:
-        return np.asarray(_rust.interpolate(domain.location, "bilinear", 1, coefficients)).ravel()
-
-    def sums(of_particles: Array) -> Array:
-        return domain.sums(weight, of_particles.reshape(-1, 1), "bilinear")[:, 0]
-
-    lumped = sums(np.ones_like(values))
-    inverse = np.divide(1.0, lumped, out=np.zeros_like(lumped), where=lumped > 0.0)
-    residual = sums(values)
-    at_found = np.zeros_like(values)
-    direction = preconditioned = inverse * residual
-    size = start = residual @ preconditioned
-    for _ in range(MOST_ITERATIONS):
-        if not size > TOLERANCE**2 * start:
-            break
-        at_direction = at_particles(direction)
-        image = sums(at_direction)
-        step = size / (direction @ image)
-        at_found = at_found + step * at_direction
-        residual = residual - step * image
-        preconditioned = inverse * residual
-        before, size = size, residual @ preconditioned
-        direction = preconditioned + size / before * direction
-    return at_found

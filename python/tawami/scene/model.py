@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -15,6 +15,8 @@ import numpy.typing as npt
 from tawami import _rust
 from tawami.base import checks, ranks
 from tawami.base.errors import CheckpointError, InputError, LockingWarning, ParameterWarning
+from tawami.base.identity import text
+from tawami.base.meaning import meaning
 from tawami.base.sealed import Settings
 from tawami.base.space import Space
 from tawami.base.warn import warn
@@ -26,6 +28,7 @@ from tawami.grid.basis import BASES, Basis
 from tawami.grid.grid import Grid
 from tawami.particles import assignment
 from tawami.particles.assignment import Law
+from tawami.scene.parameters import by_kind
 
 Array = npt.NDArray[np.float64]
 Leaving = Literal["stop", "remove"]
@@ -50,7 +53,9 @@ class Model:
         compiled: The same, compiled.
         basis: Basis of the displacement.
         values: Every number that the form declares (alpha, ...).
-        parameters: Those that this choice of options uses.
+        parameters: Those that this choice of options uses, as the scene was made.
+        in_time: Parameters that are functions of time [s].
+        in_space: Sources of the parameters that are numbers of each particle.
         options: Choices that the form offers.
         given: The material laws, in Rust or in NumPy.
         density: Of each material [kg/m3]; None if the scene has no mass.
@@ -64,7 +69,9 @@ class Model:
     compiled: CompiledForm
     basis: Basis
     values: Mapping[str, float]
-    parameters: Settings[float]
+    parameters: Mapping[str, float]
+    in_time: Mapping[str, Callable[[float], float]]
+    in_space: Mapping[str, Any]
     options: Settings[str]
     given: Sequence[Law]
     density: Array | None
@@ -130,6 +137,8 @@ class Model:
     def form_line(self) -> str:
         """The form with its parameters, for the header of a run."""
         used = [f"{name} = {value:g}" for name, value in self.parameters.items()]
+        used += [f"{name} in time" for name in self.in_time]
+        used += [f"{name} of each particle" for name in self.in_space]
         used += [f"{name} '{choice}'" for name, choice in self.options.items()]
         return ", ".join([f"{self.form.name} in {' and '.join(self.form.fields)}", *used])
 
@@ -142,6 +151,8 @@ class Model:
             | {
                 "basis": self.basis,
                 "parameters": {**self.parameters, **self.options},
+                "changing parameters": {n: text(f) for n, f in self.in_time.items()}
+                | {n: meaning(source) for n, source in self.in_space.items()},
                 "laws": [*self.texts, *laws],
                 "density": None if self.density is None else self.density.tolist(),
                 "leaving": self.leaving,
@@ -177,7 +188,8 @@ def build(
             "a tawami.Body"
         )
     loaded = Form.load(form)
-    values, options = loaded.settings(parameters, static=density is None, others=KEYWORDS)
+    numbers, in_time, in_space = by_kind(loaded, parameters)
+    values, options = loaded.settings(numbers, static=density is None, others=KEYWORDS)
     for message in [] if grid.comm.rank else loaded.unusual(values):
         warn(message, ParameterWarning)
     particles, laws = _particles(body, material, material_of, loaded)
@@ -185,14 +197,19 @@ def build(
     densities = assignment.densities(density, len(materials), body.names)
     ratios = np.array([m.bulk_modulus / m.shear_modulus for m in materials])[particles.material]
     warn_of_locking(grid, loaded, float(ratios.max()), int(ratios.argmax()))
-    compiled = _compiled(grid, loaded, options, assembly, materials)
+    compiled = _compiled(grid, loaded, options, assembly, laws, in_space)
+    if "rho" in compiled.used and densities is None:
+        raise InputError(
+            f"form {loaded.name} reads the density rho: expected Scene(..., density=...) [kg/m3]"
+        )
     check_used(compiled, options, parameters)
     _check_plastic_volume(compiled, laws, particles)
-    instead = "the form's parameters are fixed when a scene is made: Scene(..., {}=...)"
-    used = {name: value for name, value in values.items() if name in compiled.used}
+    fixed = "options of the form are fixed when a scene is made: Scene(..., stabilisation=...)"
+    changing = {*in_time, *in_space}
+    used = {n: value for n, value in values.items() if n in compiled.used and n not in changing}
     model = Model(
         grid, loaded, compiled, basis, values,
-        Settings(used, instead.format("alpha")), Settings(options, instead.format("stabilisation")),
+        used, in_time, in_space, Settings(options, fixed),
         laws, densities, _names(body, len(materials)), leaving, len(particles),
     )  # fmt: skip
     return model, particles
@@ -203,11 +220,17 @@ def _compiled(
     form: Form,
     options: Mapping[str, str],
     assembly: Assembly,
-    materials: Sequence[_rust.Material],
+    laws: Sequence[Law],
+    in_space: Iterable[str],
 ) -> CompiledForm:
     """The form, with the plastic volume of the laws if any of them may have one."""
+    materials = assignment.materials_of(laws)
     plastic_volume = any(one.pressure_dependent for one in materials)
-    return compile_form(grid.comm, form, options, assembly, plastic_volume=plastic_volume)
+    histories = [name for one in materials for name in one.history_names]
+    return compile_form(
+        grid.comm, form, options, assembly, plastic_volume=plastic_volume, space=grid.space,
+        histories=histories, fields_of_particles=in_space,
+    )  # fmt: skip
 
 
 def with_laws(
@@ -232,7 +255,7 @@ def with_laws(
     form, materials = model.form, assignment.materials_of(laws)
     with ranks.raise_together(model.grid.comm):
         particles.check_materials(materials, form.kinematics.name, form.strain.finite)
-    compiled = _compiled(model.grid, form, model.options, assembly, materials)
+    compiled = _compiled(model.grid, form, model.options, assembly, laws, model.in_space)
     with ranks.raise_together(model.grid.comm):
         _check_plastic_volume(compiled, laws, particles)
     return replace(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from tawami.grid.grid import Grid
 from tawami.picture import style
 from tawami.picture.figure import lay_out, shown_axes
 from tawami.picture.particles import Corners, Squares, draw_frame, scale_of, size_of, view
-from tawami.scene.quantities import GRADIENT, Arrays, Given, Quantity, named
+from tawami.scene.quantities import GRADIENT, PARTICLES, Arrays, Given, Quantity
 from tawami.scene.scalars import pick, scalars
 
 if TYPE_CHECKING:
@@ -81,11 +81,11 @@ def plot(
     moved: bool,
     deformed: float,
     limits: tuple[float, float] | None,
-    histories: Iterable[str],
+    more: Mapping[str, Quantity],
 ) -> Axes:
     """Draw particles; see `Solution.plot`."""
     deformed, limits = checks.number("deformed", deformed), checked_limits(limits)
-    name, unit, values = pick(given, arrays, histories)
+    name, unit, values = pick(given, arrays, more)
     x, corners = positions(arrays, moved=moved, deformed=deformed), corners_of(grid)
     lower, upper = view(x, corners)
     new = axes is None
@@ -107,11 +107,11 @@ def plot(
 
 
 def columns(
-    arrays: Arrays, given: Iterable[Given], usual: Iterable[str], histories: Iterable[str]
+    arrays: Arrays, given: Iterable[Given], usual: Iterable[str], more: Mapping[str, Quantity]
 ) -> dict[str, Array]:
     """Columns "x [m]", "y [m]", "stress xx [Pa]", ...: one number for each particle."""
     found = {"x [m]": arrays["x"]}
-    for quantity in _chosen(given, usual, histories):
+    for quantity in _chosen(given, usual, more):
         found[quantity.label] = quantity.values(arrays)
     table = scalars(found, sizes=False)
     return {
@@ -121,9 +121,9 @@ def columns(
 
 
 def _chosen(
-    given: Iterable[Given], usual: Iterable[str], histories: Iterable[str]
+    given: Iterable[Given], usual: Iterable[str], more: Mapping[str, Quantity]
 ) -> list[Quantity]:
-    known = named(histories)
+    known = {**PARTICLES, **more}
     chosen = list(given) or list(usual)
     for one in chosen:
         if not isinstance(one, Quantity) and not checks.one_of(one, known):
@@ -140,10 +140,10 @@ def to_pandas(table: dict[str, Array], number: Array) -> Any:
 
 
 def fields(
-    arrays: Arrays, given: Iterable[Given], usual: Iterable[str], histories: Iterable[str]
+    arrays: Arrays, given: Iterable[Given], usual: Iterable[str], more: Mapping[str, Quantity]
 ) -> dict[str, Array]:
     """Fields by label, vectors with a third component 0, as VTK expects them."""
-    found = {q.label: q.values(arrays) for q in _chosen(given, usual, histories)}
+    found = {q.label: q.values(arrays) for q in _chosen(given, usual, more)}
     return {label: in_space(values) for label, values in found.items()}
 
 

@@ -172,6 +172,18 @@ class Subject(Protocol):
         """The scene."""
 
 
+def of_scene(scene: Any) -> dict[str, Quantity]:
+    """The quantities that the laws and the form of a scene add: history variables, fields and data."""
+    form, particles = scene.form, scene.particles
+    found = {name: history(name) for name in particles.history_names}
+    found |= {
+        name: Quantity(f"{name} [{field.unit}]", _stored(name))
+        for name, field in form.own_fields.items()
+    }
+    given = {name: form.data_unit(name) for name in form.data if name in dict(particles.arrays)}
+    return found | {n: Quantity(f"{n} [{unit}]", _stored(n)) for n, unit in given.items()}
+
+
 def history(name: str) -> Quantity:
     """The quantity of a history variable."""
     return Quantity(f"{name} [{HISTORY.get(name, '-')}]", _stored(name))
@@ -182,9 +194,16 @@ def history(name: str) -> Quantity:
 
 def arrays_of(particles: _rust.Particles) -> list[str]:
     """Names of the arrays that particles store, without those of a motion that are gradients."""
-    stored = dict(particles.arrays)
+    stored = [name for name, _ in particles.arrays]
     names = [name for name in ("x", *PARTICLES, GRADIENT) if name in stored]
-    return [*names, *particles.history_names]
+    return [*names, *particles.history_names, *_of_form(particles)]
+
+
+def _of_form(particles: _rust.Particles) -> list[str]:
+    """Names of the fields and data of a form that particles store."""
+    others = {"x", *PARTICLES, GRADIENT, *particles.history_names}
+    others |= {"velocity_gradient", "acceleration_gradient"}
+    return [name for name, _ in particles.arrays if name not in others]
 
 
 def array_of(particles: _rust.Particles, name: str) -> npt.NDArray[Any]:
@@ -193,14 +212,23 @@ def array_of(particles: _rust.Particles, name: str) -> npt.NDArray[Any]:
     Raises:
         InputError: The particles do not have it; the message names what models it.
     """
-    known = dict.fromkeys(["x", *PARTICLES, GRADIENT, *HISTORY, *particles.history_names])
+    of_form = _of_form(particles)
+    known = ["x", *PARTICLES, GRADIENT, *HISTORY, *particles.history_names, *of_form]
+    if name in of_form:  # of a field, the gradient is behind the value
+        return particles.carried(name)[:, 0]
     if name not in known:
-        raise unknown("arrays of the particles", name, known)
+        raise unknown("arrays of the particles", name, dict.fromkeys(known))
     if name in CARRIED:
         return particles.carried(name)
     if name not in (*PARTICLES, GRADIENT, "x"):
         return particles.history(name)
     return np.asarray(getattr(particles, name))
+
+
+def of_body(comm: Any, particles: _rust.Particles) -> dict[str, npt.NDArray[Any]]:
+    """All arrays of the particles of the body, in the order of the numbers; a call for all ranks."""
+    in_order = placement.in_order(comm, particles.number)
+    return {name: in_order(array_of(particles, name)) for name in arrays_of(particles)}
 
 
 def local_arrays(subject: Subject) -> Arrays:
@@ -221,11 +249,6 @@ def body_arrays(subject: Subject) -> Arrays:
     return Arrays(lambda name: gather(_present(subject, name)))
 
 
-def named(histories: Iterable[str]) -> dict[str, Quantity]:
-    """Quantities by name, with those of history variables."""
-    return PARTICLES | {name: history(name) for name in histories}
-
-
 # -- by name -----------------------------------------------------------------
 
 
@@ -236,7 +259,7 @@ def of_particles(given: Iterable[Given], subject: Subject) -> list[Quantity]:
         NotModelledError: The scene does not have one; the message names the switch that adds it.
         InputError: An unknown name, or a function of the driver script that fails.
     """
-    known = named(subject.scene.particles.history_names)
+    known = PARTICLES | of_scene(subject.scene)
     found = []
     for one in given:
         if isinstance(one, Quantity):
@@ -260,7 +283,7 @@ def usual_of_particles(subject: Any) -> tuple[str, ...]:
     scene, names = subject.scene, ["displacement", "stress", "mean stress"]
     names += ["eps_v"] if scene.form.kinematics.has_eps_v else []
     names += ["velocity"] if subject.motion is not None else []
-    return (*names, *scene.particles.history_names)
+    return (*names, *of_scene(scene))
 
 
 def unknown(place: str, name: str, known: Iterable[str]) -> InputError:

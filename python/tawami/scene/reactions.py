@@ -113,6 +113,7 @@ class Reactions:
         for point, support, force in points:
             assert not isinstance(support.given, str)
             assert not isinstance(support.place, str)
+            assert not isinstance(support.component, str)
             places = (support.given, support.place, point.place)
             at_points.append(AtPoint(places, support.component, float(force)))
         on_edges = held.reshape(accepted.u.shape) + accepted.friction

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from tawami.scene.quantities import (
     Given,
     Quantity,
     history,
-    named,
     split,
     unknown,
 )
@@ -46,20 +45,20 @@ def scalars(fields: Mapping[str, Array], *, sizes: bool = True) -> dict[str, tup
     return found
 
 
-def pick(given: Given, arrays: Arrays, histories: Iterable[str]) -> tuple[str, str, Array]:
+def pick(given: Given, arrays: Arrays, more: Mapping[str, Quantity]) -> tuple[str, str, Array]:
     """Name, unit and values of a quantity with one number for each particle.
 
     Args:
         given: A quantity, or a name as 'mean stress', 'stress xx', 'displacement' (its size) or
             'displacement y'.
         arrays: Of the particles.
-        histories: Names of the history variables of the laws.
+        more: Quantities that the laws and the form add.
 
     Raises:
         NotModelledError: The scene does not have it.
         InputError: An unknown name, or a tensor without a component.
     """
-    known = named(histories)
+    known = {**PARTICLES, **more}
     if isinstance(given, Quantity):
         quantity, name = given, given.name
     else:

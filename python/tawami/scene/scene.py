@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
@@ -15,7 +15,7 @@ from tawami import _rust
 from tawami.base import checks, html
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
-from tawami.base.sealed import Sealed
+from tawami.base.sealed import Sealed, Settings
 from tawami.base.timing import Stopwatch
 from tawami.body.body import Body
 from tawami.field.reduction import Reduction
@@ -62,12 +62,14 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
             dictionary as for the materials); gravity needs it.
         leaving: Treatment of particles that leave the grid: 'stop' with an error before they do, or
             'remove' them; `left` lists them.
-        parameters: Parameters and options of the form: alpha, stabilisation, ...
+        parameters: Parameters and options of the form: alpha, stabilisation, ... A parameter is a
+            number, a function of time [s], or one number for each particle: a function f(x, y), an
+            array, `tawami.table(...)` or `tawami.earlier(...)`.
 
     Attributes:
         grid, form, basis: As given.
         numerics: Numerical settings of a step.
-        parameters, options: Of the form, as they are used. They cannot be changed.
+        options: Of the form. They cannot be changed.
         num_particles: Number of particles of the body, on all ranks.
         stopwatch: Time of each stage of a step.
         configuration: Particles, supports and loads as the solver sees them. Its attributes may change
@@ -119,14 +121,16 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         )
         self.configuration = Configuration(model, particles, numerics)
         self.grid, self.form, self.basis = model.grid, model.form, model.basis
-        self.parameters, self.options = model.parameters, model.options
+        self.options = model.options
         self.num_particles = model.num_particles
         self.stopwatch: Stopwatch = self.configuration.stopwatch
         self._seal()
 
     def _how_to_set(self, name: str) -> str:
         """Advice for an attribute that cannot be set."""
-        if name in self.form.parameters or name in self.form.options:
+        if name in self.form.parameters:
+            return f"expected scene.parameter('{name}', ...), between two steps"
+        if name in self.form.options:
             return f"the form's parameters are fixed when a scene is made: Scene(..., {name}=...)"
         if name == "particles":
             return "write into its arrays, as scene.particles.stress[:] = ..., or use scene.initial(...)"
@@ -199,7 +203,8 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         names.
 
         Args:
-            name: 'stress', 'displacement', 'eps_v', or a history variable.
+            name: 'stress', 'displacement', 'eps_v', a history variable, or a field of
+                the form without a role, as 'p_w'.
             source: Numbers, the same for all or one row a particle of the body; a function f(x, y) on
                 arrays that returns the components; `tawami.table(...)` or `tawami.earlier(...)`.
             beyond: Treatment of stress beyond the yield surface: 'stop' with an error, or 'return'
@@ -211,6 +216,42 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         """
         with self.configuration.activity.step("initial(...)"):
             initial.set_field(self.configuration, name, source, beyond)
+
+    def data(self, name: str, source: Source) -> None:
+        """Give the particles data that the form declares; a call for all ranks, also between steps.
+
+        Args:
+            name: As in `data` of the form.
+            source: Numbers, in the unit that the form declares: one for all or one for each particle of
+                the body; a function f(x, y) on arrays of present positions; `tawami.table(...)` or
+                `tawami.earlier(...)`. Particles that move keep their number.
+
+        Raises:
+            InputError: An unknown name, another shape, or a number that is not finite.
+        """
+        self.configuration.activity.check_between_steps("data(...)")
+        self.configuration.inputs.set_data(self.configuration.domain, name, source)
+
+    def parameter(self, name: str, value: float | Callable[[float], float] | Source) -> None:
+        """Change a parameter of the form from the next step on, without compiling again.
+
+        A call for all ranks.
+
+        Args:
+            name: Of the parameter.
+            value: A number or a function of time [s]. For a scene that was made with one number for each
+                particle, a source as in :meth:`data`.
+
+        Raises:
+            InputError: An unknown or unused parameter, or a value beyond its limits.
+        """
+        self.configuration.activity.check_between_steps("parameter(...)")
+        self.configuration.inputs.set_parameter(self.configuration.domain, name, value)
+
+    @property
+    def parameters(self) -> Settings[float]:
+        """Parameters of the form that are numbers, as they are used; :meth:`parameter` changes them."""
+        return self.configuration.inputs.parameters
 
     # -- solving -------------------------------------------------------------
 
@@ -302,7 +343,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         return self.configuration.domain.layout.size
 
     def split(self, coefficients: Array) -> tuple[Array, Array | None]:
-        """Coefficients of the displacement and of the bilinear field (None if there is none).
+        """Coefficients of the displacement, and of eps_v or p (None if the form has neither).
 
         Raises:
             InputError: Not the coefficients of all fields.
@@ -313,19 +354,25 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         """Unknowns that the supports leave free: coefficients = selection @ unknowns + offset."""
         return StaticStep(self.configuration, self.configuration.moment()).problem().reduction
 
-    def residual(self, coefficients: Array) -> Array:
+    def residual(self, coefficients: Array, *, dt: float | None = None) -> Array:
         """The form's integrals over particles and cells, for every test function, before supports.
 
         Args:
-            coefficients: Increments of all fields: displacement (two per function, x fastest),
-                then the bilinear field, as `split` separates them.
+            coefficients: Increments of all fields one after the other, in the order of the form; each
+                with its components for every function, x fastest.
+            dt: Length of the step [s], for a form that reads it.
+
+        Raises:
+            InputError: The form reads data that the scene does not have, or dt, and it is not given.
         """
         self.configuration.activity.check_between_steps("residual(...)")
+        self.configuration.prepare(self.configuration.moment(), dt)
         return self.configuration.domain.newton.internal(self._coefficients(coefficients))
 
-    def tangent(self, coefficients: Array) -> sp.csr_matrix:
+    def tangent(self, coefficients: Array, *, dt: float | None = None) -> sp.csr_matrix:
         """Derivative of :meth:`residual` as the form's tangent gives it, before supports."""
         self.configuration.activity.check_between_steps("tangent(...)")
+        self.configuration.prepare(self.configuration.moment(), dt)
         coefficients, domain = self._coefficients(coefficients), self.configuration.domain
         domain.newton.internal(coefficients)
         return domain.assembly.unreduced_tangent(coefficients, domain.responses.data)

@@ -13,6 +13,7 @@ from tawami.base import checks, html
 from tawami.base.errors import InputError, NotModelledError
 from tawami.base.process import Unique
 from tawami.base.sealed import Sealed
+from tawami.base.text import quoted
 from tawami.field.constraints import LEAST_SHARE
 from tawami.form.kinematics import KINEMATICS
 from tawami.grid import edges
@@ -20,7 +21,7 @@ from tawami.scene import presentation, quantities
 from tawami.scene.absent import Elsewhere
 from tawami.scene.configuration import Configuration, Outcome
 from tawami.scene.points import ROUND_OFF, outside
-from tawami.scene.quantities import Arrays, Given
+from tawami.scene.quantities import Arrays, Given, Quantity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,12 +45,14 @@ class Solution(Elsewhere, Sealed, Unique):
 
     Attributes:
         scene: The scene.
+        coefficients: Of all fields, one after the other, as `u`.
         u: Coefficients of the displacement [m], two per function, x fastest: since the start, and of
             the last step where strains are finite.
         unknowns: Number of reduced unknowns.
         load: Share of the new loads and displacements that it is in equilibrium with; NaN in dynamics.
         iterations: Newton iterations of the last step.
-        history: (momentum, volume) measures of every residual of the last step.
+        history: (momentum, volume) measures of every residual of the last step; with fields without a
+            role, the largest of theirs as well.
         krylov: FGMRES iterations of every linear solve of the last step; 0 where the tangent was
             factorised.
         number: Numbers of the particles in the body, ascending: all, unless some have left.
@@ -69,6 +72,7 @@ class Solution(Elsewhere, Sealed, Unique):
         self.scene: Any = scene
         self._model = scene.configuration.model
         layout, step = outcome.accepted.problem.reduction.layout, outcome.accepted.step
+        self.coefficients = outcome.coefficients
         self.u, self._volumetric = layout.split(outcome.coefficients)
         self._active = layout.active[: layout.num_displacement].astype(float)
         self.unknowns, self.iterations = outcome.accepted.problem.reduction.size, step.iterations
@@ -102,7 +106,7 @@ class Solution(Elsewhere, Sealed, Unique):
         Raises:
             InputError: The form has neither.
         """
-        return self._of_form("volumetric", self._volumetric, "volume_fields")
+        return self._of_form("volumetric", self._volumetric, "has_mean_stress")
 
     @property
     def eps_v(self) -> Array:
@@ -112,6 +116,24 @@ class Solution(Elsewhere, Sealed, Unique):
             InputError: The form does not have that field.
         """
         return self._of_form("eps_v", self._eps_v, "has_eps_v")
+
+    def field(self, name: str) -> Array:
+        """A field of the form at the particles, in its unit: the value, not the increment of the step.
+
+        Args:
+            name: As in `fields` of the form: a field without a role, or eps_v.
+
+        Raises:
+            InputError: The form has no such field.
+        """
+        form = self._model.form
+        known = [*form.own_fields, *(["eps_v"] if form.kinematics.has_eps_v else [])]
+        if not checks.one_of(name, known):
+            raise InputError(
+                f"field({checks.shown(name)}): form {form.name} has {quoted(known) or 'no such field'}: "
+                "displacement_of_particles and stress have the rest"
+            )
+        return np.asarray(self._array(name))
 
     def _array(self, name: str) -> npt.NDArray[Any]:
         """An array of the particles by its name."""
@@ -201,7 +223,7 @@ class Solution(Elsewhere, Sealed, Unique):
         """
         return presentation.plot(
             self.arrays, self._model.grid, quantity, axes, moved=self._model.moves, deformed=deformed,
-            limits=limits, histories=self.scene.particles.history_names,
+            limits=limits, more=quantities.of_scene(self.scene),
         )  # fmt: skip
 
     def to_pandas(self, *names: Given) -> Any:
@@ -231,15 +253,15 @@ class Solution(Elsewhere, Sealed, Unique):
         data = presentation.fields(self.arrays, names, *self._usual())
         return presentation.to_pyvista(presentation.in_space(self.x), data)
 
-    def _usual(self) -> tuple[list[str], list[str]]:
-        """Quantities of a table without names, and the history variables among them."""
-        histories = self.scene.particles.history_names
+    def _usual(self) -> tuple[list[str], dict[str, Quantity]]:
+        """Quantities of a table without names, and those of the laws and the form among them."""
+        more = quantities.of_scene(self.scene)
         known = {*self._arrays, "strain"} - {"number"}
         stored = [name for name in quantities.PARTICLES if name in known]
-        return [*stored, *quantities.DERIVED, *histories], histories
+        return [*stored, *quantities.DERIVED, *more], more
 
     def _repr_html_(self) -> str:
-        momentum, volume = zip(*self.history, strict=True)
+        momentum, volume, *others = zip(*self.history, strict=True)
         rows = {
             "form": self._model.form_line,
             "particles": str(len(self.number)),
@@ -249,6 +271,8 @@ class Solution(Elsewhere, Sealed, Unique):
             "momentum": ", ".join(f"{measure:.1e}" for measure in momentum),
             "volume": ", ".join(f"{measure:.1e}" for measure in volume if measure is not None),
         }
+        if others:
+            rows["other fields"] = ", ".join(f"{measure:.1e}" for measure in others[0])
         return html.table("Solution", rows)
 
     # -- forces --------------------------------------------------------------

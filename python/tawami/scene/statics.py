@@ -27,6 +27,11 @@ class StaticStep:
     stressed: bool = False
 
     @property
+    def moment(self) -> Moment:
+        """See `StepKind`."""
+        return self.now
+
+    @property
     def end(self) -> float:
         """Statics has no time."""
         return np.nan
@@ -42,8 +47,9 @@ class StaticStep:
         with now.stopwatch("set-up"):
             crossings = now.supports.crossings(amount) if moves else {}
             reduction, contact = now.supports.constraints(
-                now.domain, amount, now.before, now.before, moving=self.stressed
-            )
+                now.domain, amount, now.before, now.before, moving=self.stressed,
+                fields=(now.old, lambda term: term.at(self.now)),
+            )  # fmt: skip
             external = now.external(self.now)
         return Problem(reduction, contact, external, crossings=crossings, load=self.now.part)
 

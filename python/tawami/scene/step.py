@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from tawami.field.reduction import Reduction
 from tawami.scene.contact import ActiveSet
+from tawami.scene.share import Moment
 from tawami.solve.inertia import Inertia
 from tawami.solve.newton import Converged
 from tawami.solve.path import Path
@@ -100,6 +101,10 @@ class Update(Protocol):
 
 class StepKind(Protocol):
     """A static or a dynamic step."""
+
+    @property
+    def moment(self) -> Moment:
+        """Its position in a phase."""
 
     @property
     def end(self) -> float:

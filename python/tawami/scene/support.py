@@ -6,7 +6,7 @@ from typing import Any
 
 from tawami.base import checks
 from tawami.base.errors import InputError
-from tawami.grid.edges import Component, Interval, Profile
+from tawami.grid.edges import Interval, Profile
 from tawami.grid.grid import Edge
 from tawami.scene.action import Action, Owner
 from tawami.scene.factor import Factor, InTime
@@ -25,27 +25,33 @@ class Support(Action):
     Attributes:
         place: Name of the edge, or the point (x, y) [m], which moves with the body.
         given: The same as the driver script gave it.
-        component, axis: Number and name of the component.
+        component: Number of the component of the displacement, or name of another field.
+        unit: Unit of its values.
         between: Part of the edge [m]; None for all of it.
         crossing: Distance by which it has moved the body across its edge [m], where particles move.
     """
 
-    __slots__ = ("axis", "between", "component", "crossing", "given", "place")
+    __slots__ = ("between", "component", "crossing", "given", "place", "unit")
 
     def __init__(
         self,
         owner: Owner[Any],
         place: Place,
-        component: int,
-        axis: Component,
+        component: int | str,
+        unit: str,
         value: Profile,
         factor: Factor,
         between: Interval | None = None,
     ) -> None:
         self.place = self.given = place
-        self.component, self.axis = component, axis
+        self.component, self.unit = component, unit
         self.between, self.crossing = between, 0.0
         super().__init__(owner, value, factor)
+
+    @property
+    def axis(self) -> str:
+        """Name of the component."""
+        return self.component if isinstance(self.component, str) else "xyz"[self.component]
 
     def _checked(self, value: Any) -> tuple[Profile, ...]:
         check = checks.profile if isinstance(self.place, str) else checks.number
@@ -118,5 +124,7 @@ class Support(Action):
     def line(self) -> str:
         """The support in words: place, component, and what it prescribes if that is not zero."""
         (value,), factor = self.terms[-1].values, self.terms[-1].factor
-        amount = " by a function" if callable(value) else f" = {value:g} m" if value else ""
+        amount = (
+            " by a function" if callable(value) else f" = {value:g} {self.unit}" if value else ""
+        )
         return f"{self} {self.axis}{'' if factor.has_velocity else amount}{factor}"

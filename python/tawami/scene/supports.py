@@ -11,13 +11,15 @@ import numpy.typing as npt
 from tawami.base import checks
 from tawami.base.errors import CheckpointError, InputError, SupportError
 from tawami.base.identity import text
-from tawami.base.text import listed
-from tawami.field.constraints import Held, PointHeld, held_edge, held_point
+from tawami.base.text import listed, quoted
+from tawami.field.constraints import Held, PointHeld
 from tawami.field.reduction import Reduction
+from tawami.form.fields import Field
 from tawami.grid import edges
 from tawami.grid.basis import Basis
-from tawami.grid.edges import Component, Interval, Profile
+from tawami.grid.edges import Interval, Profile
 from tawami.grid.grid import Edge, Grid
+from tawami.scene import step_values
 from tawami.scene.action import Owner, Term, restored
 from tawami.scene.activity import Activity
 from tawami.scene.contact import ActiveSet
@@ -37,6 +39,7 @@ class Supports(Owner[Support]):
     Args:
         grid: The grid.
         basis: Basis of the displacement.
+        fields: The fields without a role.
         activity: Time and activity of the scene.
 
     Attributes:
@@ -45,9 +48,11 @@ class Supports(Owner[Support]):
         version: A number that changes with every change of a support or wall by the driver script.
     """
 
-    def __init__(self, grid: Grid, basis: Basis, activity: Activity) -> None:
+    def __init__(
+        self, grid: Grid, basis: Basis, fields: Mapping[str, Field], activity: Activity
+    ) -> None:
         super().__init__(activity)
-        self.grid, self.basis = grid, basis
+        self.grid, self.basis, self._fields = grid, basis, fields
         self.walls: list[Wall] = []
 
     def remove(self, action: Support | Wall) -> None:
@@ -58,7 +63,7 @@ class Supports(Owner[Support]):
     def fix(
         self,
         edge: Edge,
-        component: Component,
+        component: str,
         value: Profile,
         amplitude: InTime | None,
         velocity: InTime | None,
@@ -73,7 +78,7 @@ class Supports(Owner[Support]):
     def hold(
         self,
         point: Sequence[float],
-        component: Component,
+        component: str,
         value: float,
         amplitude: InTime | None,
         velocity: InTime | None,
@@ -88,22 +93,38 @@ class Supports(Owner[Support]):
         self,
         place: Place,
         where: str,
-        component: Component,
+        component: str,
         value: Profile,
         amplitude: InTime | None,
         velocity: InTime | None,
         between: Interval | None,
     ) -> Support:
         self.activity.check_between_steps(where)
-        axis = self.grid.space.axis(component)
+        axis = self._component(component)
+        if isinstance(axis, str) and (velocity is not None or not isinstance(place, str)):
+            what = "a velocity" if velocity is not None else "a point"
+            raise InputError(
+                f"{where}: the field '{axis}' with {what}: expected fix(edge, '{axis}', value), where "
+                "amplitude=... changes the value in time"
+            )
         if velocity is not None:
             if callable(value) or value != 0:
                 raise InputError(f"{where}: expected a value or a velocity, not both")
             value = 1.0
         factor = Factor(where, amplitude, velocity, time=self.activity.time)
-        support = Support(self, place, axis, component, value, factor, between)
+        unit = self._fields[axis].unit if isinstance(axis, str) else "m"
+        support = Support(self, place, axis, unit, value, factor, between)
         self.all.append(support)
         return support
+
+    def _component(self, component: str) -> int | str:
+        """Number of a component of the displacement, or name of a field."""
+        if self._fields and checks.one_of(component, self._fields):
+            return component
+        if self._fields and not checks.one_of(component, self.grid.space.axes):
+            known = quoted([*self.grid.space.axes, *self._fields])
+            raise InputError(f"component {checks.shown(component)}: expected one of {known}")
+        return self.grid.space.axis(component)
 
     def wall(self, edge: Edge, friction: float, separates: bool) -> Wall:
         """A wall along an edge."""
@@ -122,10 +143,10 @@ class Supports(Owner[Support]):
         self.changed()
         return wall
 
-    def release(self, place: Edge | Sequence[float], component: Component | None) -> None:
+    def release(self, place: Edge | Sequence[float], component: str | None) -> None:
         """Take supports away."""
         at = place if isinstance(place, str) else checks.point("release(...)", place)
-        axis = None if component is None else self.grid.space.axis(component)
+        axis = None if component is None else self._component(component)
         gone = [s for s in self.all if at in (s.place, s.given) and axis in (None, s.component)]
         walls = [w for w in self.walls if w.edge == at and axis is None]
         if not gone and not walls:
@@ -156,6 +177,7 @@ class Supports(Owner[Support]):
         before: Array,
         *,
         moving: bool,
+        fields: step_values.Fields | None = None,
     ) -> tuple[Reduction, ActiveSet]:
         """Unknowns that the supports leave free, and the walls in their present states.
 
@@ -168,6 +190,8 @@ class Supports(Owner[Support]):
             moving: Inertia or stress holds the body: rigid motions may be free, and edges that are
                 held at rest and that the body has left are skipped.
 
+            fields: Fields without a role and what is prescribed for them; they stay by default.
+
         Raises:
             SupportError: The body has left an edge with a prescribed motion, or a point.
         """
@@ -177,11 +201,13 @@ class Supports(Owner[Support]):
             list[PointHeld](),
         )
         for support in self.all:
-            if isinstance(support.place, str):
-                if not (moving and not support.moves and self._is_left(domain, support)):
-                    held.append(self._on_edge(domain, support, amount))
+            if isinstance(support.component, str):
+                held.append(step_values.of_field(domain, support, start, fields))
+            elif isinstance(support.place, str):
+                if not (moving and not support.moves and step_values.is_left(domain, support)):
+                    held.append(step_values.on_edge(domain, support, amount))
             else:
-                points.append(self._at_point(domain, support, amount))
+                points.append(step_values.at_point(domain, support, amount))
         fixed = np.zeros(layout.size, dtype=bool)
         for edge in held:
             fixed[edge.indices] = True
@@ -195,32 +221,6 @@ class Supports(Owner[Support]):
         contact = ActiveSet(self.walls, prescribed)
         return Reduction(layout, held, points, start, moving=moving), contact
 
-    def _is_left(self, domain: Domain, support: Support) -> bool:
-        """Whether no cell along the support's edge holds particles."""
-        assert isinstance(support.place, str)
-        part = edges.cells_between(self.grid, support.place, support.between)
-        return not part[domain.tractions.cells(support.place)].any()
-
-    def _on_edge(self, domain: Domain, support: Support, amount: Callable[[Term], float]) -> Held:
-        assert isinstance(support.place, str)
-        indices, values = np.empty(0, dtype=np.int64), np.zeros(1)
-        for term in support.terms:
-            edge = held_edge(
-                self.grid, self.basis, domain.active, support.place, support.component,
-                term.values[0], support.between,
-            )  # fmt: skip
-            indices, values = edge.indices, values + amount(term) * edge.values
-        return Held(indices, values, support.line)
-
-    def _at_point(
-        self, domain: Domain, support: Support, amount: Callable[[Term], float]
-    ) -> PointHeld:
-        assert not isinstance(support.place, str)
-        return held_point(
-            self.grid, self.basis, domain.active, support.place, support.component,
-            _total(support, amount), domain.layout.active,
-        )  # fmt: skip
-
     def check_reach(self, before: Domain, after: Domain) -> None:
         """Check that supports still hold something once particles were removed; a call for all ranks.
 
@@ -232,7 +232,9 @@ class Supports(Owner[Support]):
         """
         for support in self.all:
             if isinstance(support.place, str):
-                lost = self._is_left(after, support) and not self._is_left(before, support)
+                lost = step_values.is_left(after, support) and not step_values.is_left(
+                    before, support
+                )
             else:
                 lost = not is_in_body(after, support.place)
             if lost:
@@ -262,7 +264,7 @@ class Supports(Owner[Support]):
                 isinstance(support.place, str)
                 and self.grid.edge(support.place)[0] == support.component
             ):
-                crossings[number] = support.crossing + _total(support, amount)
+                crossings[number] = support.crossing + step_values.total(support, amount)
                 profiled = any(callable(term.values[0]) for term in support.terms)
                 if abs(crossings[number]) > 0.25 * self.grid.h and not profiled:
                     raise InputError(
@@ -339,9 +341,3 @@ class Supports(Owner[Support]):
         for wall, values in zip(self.walls, state["walls"], strict=True):
             wall.restore(values)
         self.changed()
-
-
-def _total(support: Support, amount: Callable[[Term], float]) -> float:
-    """A prescribed displacement [m], with 1 for each function of position."""
-    values = ((1.0 if callable(v) else v, amount(t)) for t in support.terms for v in t.values)
-    return sum(value * factor for value, factor in values)

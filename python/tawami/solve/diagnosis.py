@@ -18,7 +18,7 @@ from tawami.particles.responses import Responses
 from tawami.solve.direct import DirectSolver
 from tawami.solve.equations import Equations
 from tawami.solve.linear_solver import LinearSolver
-from tawami.solve.measures import History
+from tawami.solve.measures import History, text
 from tawami.solve.scaling import Scaling
 
 #: K/mu from which forms without a field for the volume lose all digits.
@@ -51,19 +51,20 @@ class Diagnosis:
         self._layout = assembly.layout
         self._comm = self._layout.grid.comm
 
-    def report_divergence(self, history: History, tolerance: float, advice: str) -> NoReturn:
+    def report_divergence(
+        self, history: History, tolerance: float, advice: str, field: str | None
+    ) -> NoReturn:
         """Raise the error of an iteration that did not converge.
 
         Args:
             history: Measures of all residuals.
             tolerance: Bound of the measures.
             advice: The likely cause, and what to do.
+            field: The field without a role whose measure is the largest; None without such fields.
         """
-        rows = "; ".join(
-            f"{k}: {u:.2e}" + ("" if q is None else f", {q:.2e}")
-            for k, (u, q) in enumerate(history)
-        )
-        so_far = f"measures of momentum and volume by iteration: {rows}. " if history else ""
+        rows = "; ".join(f"{k}: {text(measures, 2)}" for k, measures in enumerate(history))
+        names = "momentum and volume" if field is None else f"momentum, volume and '{field}'"
+        so_far = f"measures of {names} by iteration: {rows}. " if history else ""
         raise ConvergenceError(
             f"Newton did not converge in {max(len(history) - 1, 0)} iterations to {tolerance:g}; "
             f"{so_far}Nothing was changed in the particles. {advice}",
@@ -157,7 +158,7 @@ class Diagnosis:
     def _incompressible(self) -> str:
         K, mu = (self._responses.constants[name] for name in ("K", "mu"))
         ratio = self._comm.allreduce(float((K / mu).max(initial=0.0)), op=MPI.MAX)
-        if ratio < NO_DIGITS or self._responses.form.kinematics.volume_fields:
+        if ratio < NO_DIGITS or self._responses.form.kinematics.has_mean_stress:
             return ""
         return (
             f"K/mu is {ratio:.1e}: a form without a field for the volume has no digits left; use form "

@@ -3,7 +3,7 @@
 Smoothed-aggregation multigrid with the rigid modes preconditions the displacement. eps_v or p, scaled
 as p/mu (docs: theory), need no preconditioner: their Schur complement is near the identity. It is
 farther from the identity for small alpha: 20 to 50 iterations with alpha = 0.1, up to 130 with 0.01, for
-any Poisson's ratio.
+any Poisson's ratio. Multigrid preconditions each field without a role.
 
 FGMRES also solves a singular system whose right-hand side is in its range. So the first system is also
 solved, to a low tolerance, for a random vector, which is in the range of no singular matrix. That
@@ -105,17 +105,23 @@ class IterativeSolver(LinearSolver):
             pc.setType("gamg")
             return
         start = matrix.getOwnershipRange()[0]
-        fields = []
-        for name, where in (("u", blocks.displacement), ("p", ~blocks.displacement)):
+        volume = ~np.logical_or.reduce([blocks.displacement, *blocks.own])
+        splits = [("u", blocks.displacement, "gamg"), ("p", volume, "none")]
+        splits += [(f"field {k}", mine, "gamg") for k, mine in enumerate(blocks.own)]
+        fields, kinds = [], []
+        for name, where, kind in splits:
+            if not matrix.comm.tompi4py().allreduce(bool(where.any()), op=MPI.LOR):
+                continue
             numbers = (start + np.flatnonzero(where)).astype(PETSc.IntType)
             rows = self._handles[name] = PETSc.IS().createGeneral(numbers, comm=matrix.comm)
             fields.append((name, rows))
+            kinds.append(kind)
         self._handles["u"].compose("nearnullspace", self._near_null_space(rigid, matrix.comm))
         pc.setType("fieldsplit")
         pc.setFieldSplitIS(*fields)
         pc.setFieldSplitType(PETSc.PC.CompositeType.MULTIPLICATIVE)
         pc.setUp()
-        for solver, kind in zip(pc.getFieldSplitSubKSP(), ("gamg", "none"), strict=True):
+        for solver, kind in zip(pc.getFieldSplitSubKSP(), kinds, strict=True):
             solver.setType("preonly")
             inner = solver.getPC()
             inner.setType(kind)

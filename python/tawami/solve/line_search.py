@@ -2,6 +2,8 @@
 
     g(t) = du . R_u - deps . R_q        at the increments + t (du, deps)
 
+Fields without a role do not count: in general their equations have no energy.
+
 A full Newton step has g(0) < 0 and g(1) near 0. The sign of R_q makes g the slope of the energy in an
 elastic body, whose energy is least in u and largest in eps_v. Near a limit load a search that asks for a
 smaller residual costs many iterations, so this one acts only where a step overshoots: g(1) has the
@@ -32,18 +34,16 @@ class LineSearch:
         comm: Communicator; all ranks get the same bits.
         change: Change of all increments by a full step.
         residual: Forces out of balance at its beginning.
-        num_displacement: Number of displacement coefficients, which come first.
+        signs: Sign of each coefficient in g: 1, -1 or 0.
     """
 
-    def __init__(self, comm: Any, change: Array, residual: Array, num_displacement: int) -> None:
+    def __init__(self, comm: Any, change: Array, residual: Array, signs: Array) -> None:
         self._comm, self._change, self._residual = comm, change, residual
-        self._num_displacement = num_displacement
+        self._signs = signs
 
     @functools.cached_property
     def _weights(self) -> Array:
-        weights = self._change.copy()
-        weights[self._num_displacement :] *= -1
-        return weights
+        return self._signs * self._change
 
     @functools.cached_property
     def _start(self) -> float:

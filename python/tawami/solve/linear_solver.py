@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,10 +26,12 @@ class Blocks:
     Attributes:
         displacement: Whether each unknown belongs to the displacement.
         rigid: Values of the rigid motions at those that do, n x motions.
+        own: Whether each unknown belongs to each field without a role.
     """
 
     displacement: Mask
     rigid: Array
+    own: Sequence[Mask] = ()
 
 
 class LinearSolver:

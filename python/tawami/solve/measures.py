@@ -1,15 +1,20 @@
-"""The two measures that stop Newton's method (docs: theory).
+"""The measures that stop Newton's method (docs: theory).
 
 momentum   |R_u| / max(|f_int|, |f_ext|, |f_inertia|), norms over all displacement coefficients; a static
            step also takes |f_int| at its beginning, which a body that is unloaded does not end with
 volume     |R_q| / |sum_p V_p W_p q (max(|div u|, |eps_v|) + p_ref/K_p + floor)|, W = K for a field
            eps_v, and 1 for a field p (then eps_v is p/K)
+field      |R_f| / max(|sum_p |R_f,p| + |f_ext||, 1e-7 |diag(K_ff) (|f| + |df|)|) of each field f without
+           a role, of which the largest counts; R_f,p is the contribution of a particle, K the last
+           tangent, and the first norm the largest of the iterates. The second is the size of round-off
+           where the terms of the equation cancel at each particle, as in a hydrostatic equilibrium
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -17,14 +22,15 @@ from mpi4py import MPI
 from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array
-from tawami.field.layout import Layout
+from tawami.field.assembly import Assembly
 from tawami.field.reduction import Reduction
 from tawami.particles.responses import Responses
 from tawami.solve.inertia import Inertia
 from tawami.solve.iterate import Forces
 
-#: Measures of momentum and volume; the second is None without a field for the volume.
-Measured = tuple[float, float | None]
+#: Measures of momentum and volume, and with fields without a role the largest of theirs; the second is
+#: None without a field for the volume.
+Measured = tuple[float, float | None] | tuple[float, float | None, float]
 #: The measures of every residual of a step, the first before any solve.
 History = list[Measured]
 
@@ -32,6 +38,8 @@ History = list[Measured]
 STRAIN_FLOOR = 1e-7
 #: Forces and strains below these, relative to those of the motion of the body, are round-off.
 NO_FORCE, NO_STRAIN = 1e-14, 1e-10
+#: Share of the diagonal times a field below which a residual of its equation is round-off.
+NO_RESIDUAL = 1e-7
 
 
 def norm(values: Array) -> float:
@@ -40,11 +48,22 @@ def norm(values: Array) -> float:
 
 
 def worst(measures: Measured) -> float:
-    """The larger of the two measures; NaN if one of them is."""
-    momentum, volume = measures
-    if volume is None or np.isnan(momentum):
-        return momentum
-    return volume if np.isnan(volume) else max(momentum, volume)
+    """The largest of the measures; NaN if one of them is."""
+    known = [measure for measure in measures if measure is not None]
+    return math.nan if any(map(math.isnan, known)) else max(known)
+
+
+def text(measures: Measured, digits: int = 1) -> str:
+    """Measures as text, as "1.0e-03, 2.0e-05"."""
+    return ", ".join(f"{measure:.{digits}e}" for measure in measures if measure is not None)
+
+
+def measured(momentum: float, volume: float, *others: float) -> Measured:
+    """The measures that a checkpoint stores as numbers, with NaN for a volume that is not measured."""
+    of_volume = None if math.isnan(volume) else float(volume)
+    if others:
+        return float(momentum), of_volume, float(others[0])
+    return float(momentum), of_volume
 
 
 def forcing(history: History, tolerance: float) -> float:
@@ -62,21 +81,32 @@ class Measures:
     """Measures of the residuals of one step after another.
 
     Args:
-        layout: Places of the coefficients.
+        assembly: Residual and tangent of the form.
         responses: The particles.
+
+    Attributes:
+        worst_field: The field without a role whose last measure is the largest; None if there is none.
     """
 
-    def __init__(self, layout: Layout, responses: Responses) -> None:
-        self._layout, self._responses = layout, responses
-        self._comm = layout.grid.comm
+    def __init__(self, assembly: Assembly, responses: Responses) -> None:
+        self._assembly, self._responses = assembly, responses
+        self._layout = assembly.layout
+        self._comm = self._layout.grid.comm
         self._p_ref = self._at_start = 0.0
+        self.worst_field: str | None = None
+        self._own = list(responses.form.own_fields)
+        self._values = self._diagonal = np.zeros(self._layout.size)
+        self._largest: dict[str, float] = {}
 
-    def begin(self, internal: Callable[[Array], Array] | None) -> None:
+    def begin(self, internal: Callable[[Array], Array] | None, values: Array | None = None) -> None:
         """Begin a step; a collective call.
 
         Args:
             internal: Internal forces at given increments, in a static step.
+            values: Values of the fields at the beginning, on all coefficients; zero by default.
         """
+        self._values = np.zeros(self._layout.size) if values is None else values
+        self._largest = dict.fromkeys(self._own, 0.0)
         mean_stress = self._responses.particles.stress[:, :3].mean(axis=1)
         sums = np.array([np.sum(mean_stress**2), len(mean_stress)])
         squares, count = ranks.sum_of(self._comm, sums)
@@ -89,7 +119,7 @@ class Measures:
     def of(
         self, forces: Forces, coefficients: Array, reduction: Reduction, inertia: Inertia | None
     ) -> Measured:
-        """Measures of momentum and volume, the same on all ranks; a collective call.
+        """Measures of the residuals, the same on all ranks; a collective call.
 
         Args:
             forces: Forces at the increments.
@@ -108,12 +138,45 @@ class Measures:
         )
         momentum = 0.0 if at_rest or scale == 0 else norm(free[of_u]) / scale
         volume = None
-        if self._responses.form.kinematics.volume_fields:
+        if self._responses.form.kinematics.has_mean_stress:
             sums = self._responses.sums(self._volume_scale(coefficients)[:, None])
+            assert self._layout.volumetric is not None
+            of_volume = self._layout.volumetric.holds(reduction.unknowns)
             volume = float(
-                np.divide(norm(free[~of_u]), norm(sums.ravel()))
+                np.divide(norm(free[of_volume]), norm(sums.ravel()))
             )  # NaN without any scale
-        return ranks.same(self._comm, (momentum, volume))  # the same bits on all ranks
+        measured: Measured = (momentum, volume)
+        if self._own:
+            fields = self._of_fields(free, forces, coefficients, reduction)
+            # NaN counts as the largest
+            self.worst_field = max(fields, key=lambda name: np.nan_to_num(fields[name], nan=np.inf))
+            measured = (momentum, volume, fields[self.worst_field])
+        return ranks.same(self._comm, measured)  # the same bits on all ranks
+
+    def observe(self, tangent: Any, reduction: Reduction) -> None:
+        """Keep what the measures need of a tangent that is not scaled yet; a collective call."""
+        if self._own:
+            vector = tangent.getDiagonal()
+            diagonal = ranks.allgathered(self._comm, vector.array)
+            vector.destroy()
+            self._diagonal = np.zeros(self._layout.size)
+            self._diagonal[reduction.unknowns] = np.abs(diagonal)
+
+    def _of_fields(
+        self, free: Array, forces: Forces, coefficients: Array, reduction: Reduction
+    ) -> dict[str, float]:
+        """Measure of each field without a role."""
+        magnitude = self._assembly.magnitude(coefficients, self._responses.data)
+        magnitude += np.abs(forces.external)
+        round_off = NO_RESIDUAL * self._diagonal * (np.abs(self._values) + np.abs(coefficients))
+        measures = {}
+        for name in self._own:
+            mine = reduction.of_field(name)
+            unknowns = reduction.unknowns[mine]
+            self._largest[name] = max(self._largest[name], norm(magnitude[unknowns]))
+            scale, residual = max(self._largest[name], norm(round_off[unknowns])), norm(free[mine])
+            measures[name] = residual / scale if scale > 0 else residual
+        return measures
 
     def _is_at_rest(self, scale: float, u: Array, offset: Array, inertia: Inertia | None) -> bool:
         """Whether forces without a load are round-off.

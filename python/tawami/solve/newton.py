@@ -45,7 +45,7 @@ class Converged:
         coefficients: Increments of all fields.
         acceleration: Acceleration of each displacement coefficient at the end of a dynamic step [m/s2].
         forces: Forces of supports and walls on all coefficients [N per metre depth].
-        history: Measures of momentum and volume of every residual, the first before any solve.
+        history: Measures of every residual, the first before any solve.
         krylov: FGMRES iterations of every solve; 0 if the tangent was factorised.
         condition: Estimated condition number of the last factorised tangent, scaled; 1 if none was.
         symmetric: Whether that tangent was symmetric, and LDL^T was used.
@@ -92,7 +92,7 @@ class Newton:
         self._assembly, self._responses = assembly, responses
         self.numerics, self._stopwatch = numerics, stopwatch
         self._comm = assembly.layout.grid.comm
-        self._measures = Measures(assembly.layout, responses)
+        self._measures = Measures(assembly, responses)
         self._scaling = Scaling(assembly.layout, responses)
         self._diagnosis = Diagnosis(assembly, responses, self._scaling, elastic)
         self._solver: LinearSolver
@@ -154,6 +154,7 @@ class Newton:
         guess: Array | None = None,
         friction: Friction | None = None,
         path: Path | None = None,
+        values: Array | None = None,
     ) -> Converged:
         """Solve for the increments that balance the external forces.
 
@@ -164,6 +165,8 @@ class Newton:
             guess: Increments of all fields to start from; zero by default.
             friction: Friction of the walls; the tangent neglects its change.
             path: Path on which the load factor is an unknown.
+            values: Values of the fields at the beginning, on all coefficients; zero by default. Those
+                of fields without a role tell how large round-off is.
 
         Raises:
             ConvergenceError: Newton did not reach the tolerance within `max_iterations`, or the
@@ -173,7 +176,7 @@ class Newton:
         """
         clean_up(self._comm)
         self._stopwatch.start()
-        self._measures.begin(self.internal if inertia is None else None)
+        self._measures.begin(self.internal if inertia is None else None, values)
         equations = Equations(reduction, external, inertia, friction, path)
         iterate, history, krylov = equations.first(guess), History(), list[int]()
         add_mass = None if inertia is None else inertia.adder(reduction)
@@ -205,8 +208,7 @@ class Newton:
             with reported():
                 change, of_factor = self._change(iterate, forces, equations, add_mass, history)
             if equations.at_rest and not self._responses.form.strain.finite:
-                n = reduction.layout.num_displacement
-                search = LineSearch(self._comm, change, forces.residual, n)
+                search = LineSearch(self._comm, change, forces.residual, self._signs)
             iterate.add(change, of_factor)
             krylov.append(self._solver.iterations)
             self._stopwatch.lap()
@@ -258,6 +260,7 @@ class Newton:
             add_mass(tangent)
         if self._stored is not None:
             self._restore(tangent, reduction)
+        self._measures.observe(tangent, reduction)
         tolerance = ON_PATH
         if equations.path is None:
             tolerance = forcing(history, self.numerics.tolerance)
@@ -290,9 +293,20 @@ class Newton:
             self._fail(history, "The loads do not move the control: choose another control")
         return change + of_factor * rate, of_factor
 
+    @functools.cached_property
+    def _signs(self) -> Array:
+        """Signs of the coefficients in a line search."""
+        layout = self._assembly.layout
+        signs = np.zeros(layout.size)
+        signs[: layout.num_displacement] = 1.0
+        if layout.volumetric is not None:
+            signs[layout.volumetric.slice] = -1.0
+        return signs
+
     def _on_all(self, reduction: Reduction, unknowns: Array) -> Array:
         """All coefficients from this rank's unknowns."""
         return reduction.expanded(ranks.allgathered(self._comm, unknowns))
 
     def _fail(self, history: History, advice: str) -> NoReturn:
-        self._diagnosis.report_divergence(history, self.numerics.tolerance, advice)
+        field = self._measures.worst_field
+        self._diagnosis.report_divergence(history, self.numerics.tolerance, advice, field)

@@ -1,4 +1,6 @@
-"""Scaling of the unknowns: displacement by its stiffness, eps_v and p as p/mu (docs: theory)."""
+"""Scaling of the unknowns: displacement by its stiffness, eps_v and p as p/mu (docs: theory), any other
+field by its own stiffness and its coupling with the displacement.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from tawami.base import ranks
 from tawami.base.arrays import Array, Indices
+from tawami.base.petsc import rows_of
 from tawami.field.layout import Layout
 from tawami.field.reduction import Reduction
 from tawami.field.rigid import rigid_motions
@@ -34,7 +38,8 @@ class Scaling:
 
         Displacement is divided by the square root of the diagonal. eps_v and p are solved for as p/mu,
         divided by the square root of mu sum_p V_p M^2, the size of their coupling with the scaled
-        displacement, or of their diagonal if that is larger.
+        displacement, or of their diagonal if that is larger. Other fields are multiplied by the scale
+        that they declare, or divided by the square root of their diagonal, or of that coupling.
         """
         own = reduction.unknowns[reduction.own]
         of_u = own < self._layout.num_displacement
@@ -45,10 +50,37 @@ class Scaling:
         # stiffness), in a scale that does not depend on units.
         size = np.abs(np.where(of_u, diagonal, 0.0))
         scale: Array = 1 / np.sqrt(np.where(size > 0, size, self._responses.largest_mu))
-        if self._responses.form.kinematics.volume_fields:
-            functions = own[~of_u] - self._layout.num_displacement
-            scale[~of_u] = self._of_volume(functions, diagonal[~of_u])
+        volumetric = self._layout.volumetric
+        if volumetric is not None:
+            mine = volumetric.holds(own)
+            scale[mine] = self._of_volume(own[mine] - volumetric.start, diagonal[mine])
+        others = self._responses.form.own_fields
+        coupling = None
+        for name, field in others.items():
+            mine = self._layout.fields[name].holds(own)
+            if field.scale is not None:
+                scale[mine] = field.scale
+                continue
+            if coupling is None:
+                coupling = self._coupling(matrix, reduction, np.where(of_u, scale, 0.0))
+            size = np.maximum(np.abs(diagonal[mine]), coupling[mine])
+            largest = ranks.largest(self._layout.grid.comm, float(size.max(initial=0.0)))
+            scale[mine] = 1 / np.sqrt(np.where(size > 0, size, largest or 1.0))
         return scale
+
+    def _coupling(self, matrix: Any, reduction: Reduction, of_u: Array) -> Array:
+        """Size of the entries that couple each of this rank's unknowns with the scaled displacement.
+
+        It is the product of the norms of row and column, which depends on units as the diagonal does.
+
+        Args:
+            of_u: Factors of this rank's unknowns that belong to the displacement; zero for others.
+        """
+        comm, rows = self._layout.grid.comm, rows_of(matrix)
+        squares = rows.multiply(rows).tocsr()
+        columns = ranks.sum_of(comm, np.asarray(squares.T @ of_u**2))
+        along = squares @ ranks.allgathered(comm, of_u) ** 2
+        return np.asarray(np.sqrt(along * columns[reduction.own]))
 
     def _of_volume(self, functions: Indices, diagonal: Array) -> Array:
         """Factors of eps_v or p of some bilinear functions."""
@@ -72,4 +104,5 @@ class Scaling:
         own = reduction.unknowns[reduction.own]
         of_u = own < self._layout.num_displacement
         points = self._layout.greville - self._layout.grid.origin
-        return Blocks(of_u, rigid_motions(points)[own[of_u]])
+        fields = [self._layout.fields[name].holds(own) for name in self._responses.form.own_fields]
+        return Blocks(of_u, rigid_motions(points)[own[of_u]], fields)

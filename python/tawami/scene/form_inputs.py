@@ -1,0 +1,135 @@
+"""Inputs of a form besides the state of the particles: data, parameters, time, dt and gravity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from tawami.base import checks, ranks
+from tawami.base.errors import InputError
+from tawami.base.sealed import Settings
+from tawami.base.text import meant, quoted
+from tawami.scene import sources
+from tawami.scene.domain import Domain
+from tawami.scene.factor import Factor
+from tawami.scene.model import Model
+from tawami.scene.parameters import by_kind
+
+
+class FormInputs:
+    """Inputs of the form of a scene, which may change between its steps.
+
+    Args:
+        model: Grid, form and laws.
+        time: Time of the scene [s].
+    """
+
+    def __init__(self, model: Model, time: float) -> None:
+        self._form = model.form
+        self._values: dict[str, Any] = dict(model.values)
+        self._numbers = frozenset(model.parameters)
+        self._in_time = {
+            name: Factor(name, given, time=time) for name, given in model.in_time.items()
+        }
+
+    @property
+    def parameters(self) -> Settings[float]:
+        """Present values of the parameters that are numbers."""
+        known = {n: v for n, v in self._values.items() if n in self._numbers}
+        return Settings(known, "expected scene.parameter(name, value), between two steps")
+
+    def begin(self, model: Model, domain: Domain) -> None:
+        """Give the particles of a new scene the parameters with one number each."""
+        for name, source in model.in_space.items():
+            domain.particles.carry(name, 1)
+            self._to_particles(domain, name, source, "")
+
+    def set_data(self, domain: Domain, name: str, source: Any) -> None:
+        """Give the particles the data of the form with this name; see `Scene.data`."""
+        declared = self._form.data
+        if not checks.one_of(name, declared):
+            known = quoted(declared) or "none"
+            raise InputError(
+                f"data({checks.shown(name)}, ...): form {self._form.name} declares no such data: "
+                f"expected one of {known}{meant(str(name), declared)}"
+            )
+        unit = self._form.data_unit(name)
+        with ranks.raise_together(domain.model.grid.comm):
+            found = sources.values(domain, name, source, "value", unit)
+        domain.particles.carry(name, 1)
+        domain.particles.carried(name)[:, 0] = found[:, 0]
+
+    def set_parameter(self, domain: Domain, name: str, given: Any) -> None:
+        """Change a parameter; see `Scene.parameter`."""
+        model, form = domain.model, self._form
+        if not checks.one_of(name, form.parameters):
+            raise InputError(
+                f"parameter({checks.shown(name)}, ...): form {form.name} has {quoted(form.parameters)}"
+                f"{meant(str(name), form.parameters)}"
+            )
+        if name not in model.compiled.used:
+            raise InputError(
+                f"parameter('{name}', ...): form {form.name} does not use it with its present options"
+            )
+        numbers, in_time, in_space = by_kind(form, {name: given})
+        if name in model.in_space:
+            self._to_particles(domain, name, given, "")
+            return
+        if in_space:
+            raise InputError(
+                f"parameter('{name}', ...): the scene was made with one number for all particles: "
+                f"expected a number or a function of time, or Scene(..., {name}=...) with a field"
+            )
+        if in_time:
+            factor = Factor(name, in_time[name], time=0.0)
+            self._checked(name, factor.at(0.0), model)
+            self._in_time[name] = factor
+            return
+        self._values[name] = self._checked(name, numbers[name], model)
+        self._in_time.pop(name, None)
+
+    def _to_particles(self, domain: Domain, name: str, source: Any, unit: str) -> None:
+        with ranks.raise_together(domain.model.grid.comm):
+            found = sources.values(domain, name, source, "value", unit)[:, 0]
+            for value in (found.min(), found.max()) if len(found) else ():
+                self._checked(name, float(value), domain.model)
+        domain.particles.carried(name)[:, 0] = found
+
+    def _checked(self, name: str, value: Any, model: Model) -> float:
+        """A value within the limits of the parameter."""
+        return self._form.settings({**model.options, name: value})[0][name]
+
+    def prepare(self, domain: Domain, time: float, dt: float, gravity: Any) -> None:
+        """Hand the form its inputs before a step; a call for all ranks.
+
+        Args:
+            domain: The particles.
+            time: At the end of the step [s].
+            dt: Length of the step [s].
+            gravity: Acceleration at the end of the step [m/s2].
+
+        Raises:
+            InputError: The form reads dt and no time passes, or data that the scene does not have.
+        """
+        model = domain.model
+        if "dt" in model.compiled.used and not dt > 0:
+            raise InputError(
+                f"form {self._form.name} reads dt, and no time passes in this step (dt = {dt:g} s): "
+                "expected solve(until=...) or ramp(..., until=...) with a later time, or Dynamics(scene)"
+            )
+        values: dict[str, Any] = {"time": time, "dt": dt, "b": np.asarray(gravity, dtype=float)}
+        values |= self._values
+        for name, factor in self._in_time.items():
+            values[name] = self._checked(name, factor.at(time), model)
+        domain.assembly.attachment.change(values)
+        domain.responses.refresh()
+
+    def state(self) -> dict[str, Any]:
+        """Values of the parameters, for a checkpoint."""
+        return {"values": dict(self._values)}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """The reverse of :meth:`state`."""
+        self._values |= state["values"]

@@ -1,0 +1,189 @@
+"""One load: the weight, a traction or a flux on an edge of the grid, forces on particles."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami.base import checks
+from tawami.base.arrays import Array, Indices
+from tawami.base.errors import InputError
+from tawami.base.identity import text
+from tawami.field.constraints import edge_load
+from tawami.grid.edges import Interval
+from tawami.grid.grid import Edge
+from tawami.scene.action import Action, Owner, Term, Value
+from tawami.scene.domain import Domain
+from tawami.scene.factor import Factor
+
+Numbers = npt.NDArray[np.integer[Any]]
+
+
+class Load(Action):
+    """A load of a scene: :meth:`change` replaces its value, :meth:`release` takes it away."""
+
+    __slots__ = ()
+
+    @property
+    def line(self) -> str:
+        """The load in words, for the header of a run."""
+        return f"{self}{self.terms[-1].factor}{' until it fades' if self.released else ''}"
+
+    def place(self) -> list[Any]:
+        """Place where it acts, in the types of JSON."""
+        return []
+
+
+class Weight(Load):
+    """The weight of the body; its values are the components of an acceleration [m/s2]."""
+
+    __slots__ = ()
+
+    def _checked(self, value: Any) -> tuple[Value, ...]:
+        return checks.point("gravity", value)
+
+    @property
+    def acceleration(self) -> Array:
+        """The acceleration in the driver script [m/s2]."""
+        return np.array(self.terms[-1].values if not self.released else np.zeros(2), dtype=float)
+
+    def __str__(self) -> str:
+        b = ", ".join(f"{component:g}" for component in self.terms[-1].values)
+        return f"gravity ({b}) m/s2"
+
+
+class Traction(Load):
+    """A traction on an edge of the grid; its values are components [Pa]."""
+
+    __slots__ = ("between", "edge")
+
+    def __init__(
+        self, owner: Owner[Any], edge: Edge, value: Any, between: Interval | None, factor: Factor
+    ) -> None:
+        self.edge, self.between = edge, between
+        super().__init__(owner, value, factor)
+
+    def _checked(self, value: Any) -> tuple[Value, ...]:
+        t_x, t_y = checks.pair(f"{self}", value, "components (t_x, t_y)")
+        return checks.profile(f"{self}: t_x", t_x), checks.profile(f"{self}: t_y", t_y)
+
+    def place(self) -> list[Any]:
+        """Edge, and part of it."""
+        return [self.edge, text(self.between)]
+
+    def __str__(self) -> str:
+        return f"traction(edge='{self.edge}')"
+
+
+class Flux(Load):
+    """A flux of a field into the body through an edge of the grid.
+
+    Attributes:
+        field: Name of the field.
+        edge: Name of the edge.
+        between: Part of the edge [m]; None for all of it.
+    """
+
+    __slots__ = ("between", "edge", "field")
+
+    def __init__(
+        self,
+        owner: Owner[Any],
+        edge: Edge,
+        field: str,
+        value: Any,
+        between: Interval | None,
+        factor: Factor,
+    ) -> None:
+        self.edge, self.field, self.between = edge, field, between
+        super().__init__(owner, value, factor)
+
+    def _checked(self, value: Any) -> tuple[Value, ...]:
+        return (checks.profile(f"{self}", value),)
+
+    def place(self) -> list[Any]:
+        """Field, edge, and part of it."""
+        return [self.field, self.edge, text(self.between)]
+
+    def on(self, domain: Domain, term: Term) -> tuple[Indices, Array]:
+        """Coefficients, and the integrals of the whole flux times their functions."""
+        place = domain.layout.fields[self.field]
+        return edge_load(
+            domain.model.grid,
+            place,
+            domain.active,
+            self.edge,
+            term.values[0],
+            self.between,
+            f"{self}",
+        )
+
+    def __str__(self) -> str:
+        return f"flux(edge='{self.edge}') of {self.field}"
+
+
+class Forces(Load):
+    """Forces on particles of the body [N per metre depth]; its values are the components of one force
+    that they share by volume, or arrays of the components on each particle of the body.
+
+    Attributes:
+        chosen: Numbers of the particles.
+        shares: Share of each particle of the body in one force.
+    """
+
+    __slots__ = ("_dim", "chosen", "shares")
+
+    def __init__(
+        self,
+        owner: Owner[Any],
+        dim: int,
+        chosen: Indices,
+        volume: Array,
+        value: Any,
+        factor: Factor,
+    ) -> None:
+        self._dim = dim
+        self.chosen, self.shares = chosen, np.zeros(len(volume))
+        self.shares[chosen] = volume[chosen] / volume[np.unique(chosen)].sum()
+        super().__init__(owner, value, factor)
+
+    def _checked(self, value: Any) -> tuple[Value, ...]:
+        given = checks.any_array("load(...): force", value)
+        if given.ndim != 2:
+            return checks.point("load(...): force", value)
+        forces = checks.array("load(...): force", given, 2)
+        n, dim = len(self.chosen), self._dim
+        if forces.shape != (n, dim):
+            raise InputError(
+                f"load(...): force has shape {forces.shape}: expected ({n}, {dim}), one row for each of "
+                f"the {n} particles in their order, or {dim} components of a force that they share"
+            )
+        if not np.isfinite(forces).all():
+            k = int(np.flatnonzero(~np.isfinite(forces).all(axis=1))[0])
+            raise InputError(f"load(...): force[{k}] = {forces[k]}: expected finite numbers")
+        if len(np.unique(self.chosen)) < n:
+            raise InputError(
+                "load(...): a particle is given twice, with a force for each: expected each once"
+            )
+        on_body = np.zeros((dim, len(self.shares)))
+        on_body[:, self.chosen] = forces.T
+        return tuple(on_body)
+
+    def on(self, term: Term, number: Numbers) -> Array:
+        """Forces of a term on the particles of these numbers, particles x dim."""
+        return np.column_stack(
+            [
+                v[number] if isinstance(v, np.ndarray) else v * self.shares[number]
+                for v in term.values
+            ]
+        )
+
+    def place(self) -> list[Any]:
+        """A hash of the shares."""
+        return [hashlib.sha256(self.shares.tobytes()).hexdigest()]
+
+    def __str__(self) -> str:
+        return f"force on {np.count_nonzero(self.shares)} particles"

@@ -1,0 +1,38 @@
+"""Warnings of a step about strains and laws, each given once."""
+
+from __future__ import annotations
+
+from tawami.base.arrays import Array
+from tawami.scene import softening, strain_limit
+from tawami.scene.domain import Domain
+from tawami.scene.tangents import warn_of_differences
+
+
+class StrainLimits:
+    """Displacement gradients beyond small strain, softening, and laws without a tangent.
+
+    Args:
+        small: Whether the strains of the scene are small.
+    """
+
+    def __init__(self, *, small: bool) -> None:
+        self._small, self._softens = small, False
+        self._without_tangent = set[str]()
+
+    def warn(self, domain: Domain, total: Array, coefficients: Array) -> None:
+        """Warn of a step; a call for all ranks.
+
+        Args:
+            domain: The particles.
+            total: Coefficients of all fields since the start.
+            coefficients: Their increments at the end of the step.
+        """
+        n = domain.layout.num_displacement
+        if self._small:
+            large = strain_limit.exceeded(domain, total[:n] + coefficients[:n])
+            if large is not None:
+                self._small = False
+                strain_limit.warn_of(domain, *large)
+        if not self._softens:
+            self._softens = softening.warned(domain, coefficients)
+        warn_of_differences(domain, self._without_tangent)
