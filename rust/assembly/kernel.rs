@@ -4,9 +4,10 @@ use std::ffi::c_void;
 
 use ndarray::ArrayView2;
 
-use super::cell::{Cells, Local, Nodal, Vertices};
+use super::cell::{Cells, Local, Nodal, Vertices, COORDINATES};
 use super::point::{PointKernel, Points, Row};
 use crate::grid::Location;
+use crate::space::DIM;
 use crate::transfer::cells::mean_of_cell;
 
 /// Signature of an FFCx kernel: element tensor, coefficients, constants, coordinates of the vertices
@@ -41,6 +42,8 @@ pub struct Kernel<'a> {
     pub slots: Vec<Slot<'a>>,
     /// Its constants.
     pub constants: &'a [f64],
+    /// Whether it reads the position; otherwise it gets positions relative to the corner of the cell.
+    pub reads_position: bool,
 }
 
 /// Kernels whose results are added.
@@ -127,6 +130,13 @@ impl<'a> State<'a> {
                     }
                 }
             }
+            let mut vertices = self.vertices;
+            if kernel.reads_position {
+                let corner = self.location.grid.position(self.location.active_index(a), [0.0; DIM]);
+                for x in vertices.chunks_exact_mut(COORDINATES) {
+                    x.iter_mut().zip(corner).for_each(|(x, corner)| *x += corner);
+                }
+            }
             // SAFETY: the caller guarantees the kernel and the length of `element`. Integrals over cells
             // do not read facet, permutations and user data.
             unsafe {
@@ -134,7 +144,7 @@ impl<'a> State<'a> {
                     element.as_mut_ptr(),
                     packed.as_ptr(),
                     kernel.constants.as_ptr(),
-                    self.vertices.as_ptr(),
+                    vertices.as_ptr(),
                     std::ptr::null(),
                     std::ptr::null(),
                     std::ptr::null_mut(),
@@ -177,14 +187,15 @@ impl<const P: usize> Work<P> {
         let mut out = Row::ZERO;
         if !kernels.cells.is_empty() {
             self.nodal.set(state.cells, state.location, a);
-            let element = &mut self.element[..state.cells.dofs()];
+            let dofs = state.cells.dofs();
             let numbers = local.numbers();
             // SAFETY: the caller's; kernels of rank 1 write `dofs` numbers.
             unsafe {
                 let (nodal, packed) = (&self.nodal, &mut self.packed);
+                let element = &mut self.element[..dofs];
                 state.tabulate(&kernels.cells, a, nodal, numbers, packed, element);
             };
-            self.nodal.transposed(element, 1, &mut out.0);
+            self.nodal.transposed(&self.element[..dofs], 1, &mut out.0);
             if absolute {
                 out.0 = out.0.map(f64::abs);
             }
@@ -210,15 +221,15 @@ impl<const P: usize> Work<P> {
         let (n, m) = (state.cells.dofs(), out.len());
         if !form.kernels.cells.is_empty() {
             self.nodal.set(state.cells, state.location, a);
-            let (nodal, element) = (&self.nodal, &mut self.element[..n * n]);
+            let nodal = &self.nodal;
             let numbers = local.numbers();
             // SAFETY: the caller's; kernels of rank 2 write `dofs x dofs` numbers.
             unsafe {
-                let packed = &mut self.packed;
+                let (packed, element) = (&mut self.packed, &mut self.element[..n * n]);
                 state.tabulate(&form.kernels.cells, a, nodal, numbers, packed, element);
             };
             // T^T A, then (T^T (T^T A)^T)^T = T^T A T
-            nodal.transposed(element, n, &mut self.half);
+            nodal.transposed(&self.element[..n * n], n, &mut self.half);
             transpose(&self.half[..m * n], n, &mut self.turned);
             nodal.transposed(&self.turned[..n * m], m, &mut self.half);
             for (i, row) in out.iter_mut().enumerate() {
