@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -162,6 +164,25 @@ def test_finite_compression_satisfies_the_implicit_equations_in_logarithmic_stra
 
     v, multiplier = fsolve(equations, [0.05, 1.0], xtol=1e-13) * [1.0, 1e-7]
     assert state(scene) == pytest.approx(after(v, multiplier), rel=1e-7)
+
+
+@pytest.mark.parametrize("form", ["u", "u_epsv"])
+def test_softening_dry_of_critical_is_a_warning(form):
+    """A clay of overconsolidation ratio 6 is sheared with its volume free."""
+    scene = block(form, P_C / 6)
+    scene.initial("preconsolidation", P_C)
+    scene.traction("right", (-P_C / 6, 0.0))
+    top = scene.fix("top", "y", 0.0)
+    for strain in (0.005, 0.01, 0.015):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            top.change(-strain)
+            scene.solve()
+        if caught:
+            break
+    assert [w.category for w in caught] == [tawami.SofteningWarning]
+    assert "the preconsolidation pressure of particle" in str(caught[0].message)
+    assert scene.particles.history("preconsolidation").min() < P_C
 
 
 def test_initial_preconsolidation():

@@ -155,6 +155,15 @@ def test_wrong_moduli_are_rejected(bulk, mu):
         tawami.NumpyLaw(elastic, bulk, mu)
 
 
+def test_a_function_of_other_arguments_is_rejected():
+    with pytest.raises(
+        tawami.InputError, match=r"takes \(strain, stress\): expected .*stress, history"
+    ):
+        tawami.NumpyLaw(elastic, K, MU, history=("kappa",))
+    with pytest.raises(tawami.InputError, match="stress; with history variables NumpyLaw"):
+        tawami.NumpyLaw(NUMPY.respond, K, MU)
+
+
 @pytest.mark.parametrize(
     ("history", "message"),
     [
@@ -164,12 +173,13 @@ def test_wrong_moduli_are_rejected(bulk, mu):
         (("plastic strain",), "history variable 'plastic strain': expected a name of letters"),
         ((3,), "history variable 3: expected a name of letters"),
         (("stress",), "that particles do not have already"),
+        ({"p_c": 3}, "unit of p_c = 3: expected text, as 'Pa'"),
     ],
 )
 def test_wrong_names_of_history_variables_are_rejected(history, message):
     with pytest.raises(tawami.InputError, match=message):
-        tawami.NumpyLaw(elastic, K, MU, history)
-    tawami.NumpyLaw(elastic, K, MU, history=("plastic_strain",))  # the advice
+        tawami.NumpyLaw(NUMPY.respond, K, MU, history)
+    tawami.NumpyLaw(NUMPY.respond, K, MU, history=("plastic_strain",))  # the advice
 
 
 @pytest.mark.parametrize(
@@ -306,3 +316,14 @@ def test_initial_history_moves_the_yield_surface():
     scene.initial("plastic_strain", 0.1)
     scene.initial("stress", beyond * (1 - 1e-12))
     assert scene.particles.history("plastic_strain") == pytest.approx(0.1)
+
+
+@pytest.mark.filterwarnings("ignore::tawami.TangentWarning")
+def test_the_units_of_history_variables_are_in_the_labels():
+    def respond(strain, stress, history):
+        return stress + strain @ ELASTIC, {"p_c": history["p_c"] + 2.0, "alpha": history["alpha"]}
+
+    law = tawami.NumpyLaw(respond, K, MU, history={"p_c": "Pa", "alpha": "-"})
+    table = scene_with(law, "u").solve().to_pandas("p_c", "alpha")
+    assert list(table.columns[2:]) == ["p_c [Pa]", "alpha [-]"]
+    assert (table["p_c [Pa]"] == 2.0).all()
