@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from scenes import FINITE, FORMS
+from ufl import dot, inner
 
 import tawami
+from tawami.form import scalar, vector
 from tawami.results import write_particles
 
 E, NU = 1e4, 0.3
@@ -308,3 +310,26 @@ def test_a_body_of_an_earlier_run_has_its_areas(tmp_path):
     np.testing.assert_allclose(again.particles.volume, solution.volume, rtol=1e-12)
     again.initial("stress", earlier)
     np.testing.assert_array_equal(again.particles.stress, solution.stress)
+
+
+def test_conduction_through_a_pipe_has_the_logarithmic_profile():
+    """lap c = 0, c = 0 at r = 2, a flux of 3 into the wall at r = 1: c = 3 ln(2 / r)."""
+
+    def residual(w, r, c, sigma, old, grad, sum_p):
+        return sum_p(inner(sigma, grad(w))) + sum_p(dot(grad(r), grad(old.c + c)))
+
+    fields = {"u": vector("w"), "c": scalar("r", unit="K")}
+    scene = ring(1.0, cells=(8, 2), h=0.125, form=tawami.Form(fields, residual))
+    for edge in ("left", "right", "bottom", "top"):
+        scene.fix(edge, "y")
+        scene.fix(edge, "x")
+    scene.fix("right", "c", 0.0)
+    scene.flux("left", "c", 3.0)
+    solution = scene.solve()
+    exact = 3 * np.log(2 / solution.x[:, 0])
+    assert np.abs(solution.field("c") - exact).max() < 0.01 * exact.max()
+    forces = scene.configuration.external()
+    assert forces.sum() == pytest.approx(3 * 2 * np.pi * 1.0 * 0.25)
+    scene.flux("top", "c", 1.0)
+    forces = scene.configuration.external() - forces
+    assert forces.sum() == pytest.approx(np.pi * (2**2 - 1**2))
