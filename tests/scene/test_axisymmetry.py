@@ -312,6 +312,22 @@ def test_a_body_of_an_earlier_run_has_its_areas(tmp_path):
     np.testing.assert_array_equal(again.particles.stress, solution.stress)
 
 
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("form", ["u_epsv", "u_epsv_finite"])
+def test_results_do_not_depend_on_the_unit_of_length(form, size):
+    scene = ring(size, h=0.25 * size, form=form)
+    scene.fix("bottom", "y", 0.02 * size)
+    solution = scene.solve()  # a translation along the axis
+    assert np.abs(solution.stress).max() < 1e-8 * E
+    scene.traction("right", (-10.0, 0.0))
+    inner = scene.solve().stress[0]
+    reference = ring(1.0, form=form)
+    reference.fix("bottom", "y", 0.02)
+    reference.solve()
+    reference.traction("right", (-10.0, 0.0))
+    np.testing.assert_allclose(inner, reference.solve().stress[0], rtol=1e-6, atol=1e-6)
+
+
 def test_conduction_through_a_pipe_has_the_logarithmic_profile():
     """lap c = 0, c = 0 at r = 2, a flux of 3 into the wall at r = 1: c = 3 ln(2 / r)."""
 
