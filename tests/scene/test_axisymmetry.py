@@ -204,6 +204,11 @@ TRIAXIAL = {
     "numpy": (_numpy_law(), -20 - 0.04 * E),
     "von_mises": (tawami.von_mises(ELASTIC, yield_stress=30.0), -50.0),
     "tresca": (tawami.mohr_coulomb(ELASTIC, phi=0.0, c=15.0), -50.0),
+    # sqrt(J2) + A p = c B with A = 3 t / sqrt(9 + 12 t^2), B = A / t, t = tan(phi), for psi = phi
+    "drucker_prager": (
+        tawami.drucker_prager(ELASTIC, phi=30.0, c=5.0, psi=30.0),
+        -20 - (15 / 13**0.5 + 20 * (3 / 13) ** 0.5) / (1 / 3**0.5 - (1 / 39) ** 0.5),
+    ),
     "mohr_coulomb": (  # s1 = N s3 + 2 c sqrt(N), N = tan^2(45 deg + phi/2) = 3
         tawami.mohr_coulomb(ELASTIC, phi=30.0, c=5.0, psi=10.0), -60 - 10 * np.sqrt(3.0)
     ),
