@@ -91,7 +91,12 @@ def _check(symbols: Symbols, part: Any) -> None:
         raise FormError(f"{where}: a Constant of UFL: expected a number, or one of 'parameters'")
     if "place" in part.metadata():
         return
-    read = [symbols.data.of(symbol) for symbol in extract_coefficients(part.integrand())]
+    coefficients = extract_coefficients(part.integrand())
+    if symbols.old in coefficients:
+        raise FormError(
+            f"{where}: an old field outside a sum over particles: expected old fields in sum_p(...) only"
+        )
+    read = [symbols.data.of(symbol) for symbol in coefficients]
     if symbols.assembly == "points" and any(data and data.rule != "mean" for data in read):
         raise FormError(
             f"{where}: particle data outside a sum over particles: expected sum_p(...), or cell_mean(K) "
