@@ -62,8 +62,8 @@ class FormInputs:
             mine = domain.particles.number[np.isinf(bulk)]
             which = f"particle {mine[0]}" if len(mine) else "a particle of another rank"
             raise InputError(
-                f"form {self._form.name}: 'K' is not finite at {which}, where nu = 0.5: expected 1 / K in "
-                "its terms, as in form 'u_p', or nu < 0.5"
+                f"form {self._form.name}: 'K' is not finite at {which}, where nu = 0.5: expected 1 / K "
+                "in its terms, as in form 'u_p', or nu < 0.5"
             )
 
     def set_data(self, domain: Domain, name: str, source: Any) -> None:
