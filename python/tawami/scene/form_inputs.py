@@ -45,6 +45,26 @@ class FormInputs:
         for name, source in model.in_space.items():
             domain.particles.carry(name, 1)
             self._to_particles(domain, name, source, "")
+        self._check_incompressible(model, domain)
+
+    def _check_incompressible(self, model: Model, domain: Domain) -> None:
+        """Check that a form of an incompressible material contains its K in no other way than 1 / K.
+
+        Raises:
+            InputError: It has a term that is infinite.
+        """
+        bulk = domain.responses.constants["K"]
+        infinite = ranks.any_of(domain.model.grid.comm, np.array([np.isinf(bulk).any()]))[0]
+        if not infinite or "dt" in model.compiled.used or self._form.data:
+            return
+        self.prepare(domain, 0.0, 0.0, np.zeros(model.space.dim))
+        if not np.isfinite(domain.newton.internal(np.zeros(domain.layout.size))).all():
+            mine = domain.particles.number[np.isinf(bulk)]
+            which = f"particle {mine[0]}" if len(mine) else "a particle of another rank"
+            raise InputError(
+                f"form {self._form.name}: 'K' is not finite at {which}, where nu = 0.5: expected 1 / K "
+                "in its terms, as in form 'u_p', or nu < 0.5"
+            )
 
     def set_data(self, domain: Domain, name: str, source: Any) -> None:
         """Give the particles the data of the form with this name; see `Scene.data`."""
