@@ -48,6 +48,7 @@ class Symbols:
         fields, tests, trials: The parts of these for each field; test functions by their own name.
         operators: Differential operators of the geometry.
         lines: Source of the residual.
+        names: Function that makes the symbol of each name that the residual may ask for.
     """
 
     def __init__(
@@ -81,7 +82,7 @@ class Symbols:
             name: Known(domain, shape, count=k) for k, (name, shape) in enumerate(shapes.items())
         }
         self.data = ParticleData(self.operators, plastic_volume=plastic_volume)
-        self._names = self._all_names(options, histories, fields_of_particles)
+        self.names = self._all_names(options, histories, fields_of_particles)
 
     def _all_names(
         self,
@@ -177,15 +178,15 @@ class Symbols:
                 f"form {form.name}: the arguments of its residual cannot be read ({error}): expected a "
                 "function written in Python"
             ) from None
-        unknown = [name for name in wanted if name not in self._names]
+        unknown = [name for name in wanted if name not in self.names]
         if unknown:
-            hint = meant(unknown[0], self._names)
+            hint = meant(unknown[0], self.names)
             raise FormError(
                 f"{self.lines.text(self.lines.first)}: residual asks for {quoted(unknown)}, which is "
-                f"not defined: expected names among {quoted(sorted(self._names))}{hint}"
+                f"not defined: expected names among {quoted(sorted(self.names))}{hint}"
             )
         try:
-            made = {name: self._names[name]() for name in wanted}
+            made = {name: self.names[name]() for name in wanted}
             return form.residual(**(made | {n: s for n, s in other.items() if n in made}))
         except FormError as error:
             raise self._located(error) from None
