@@ -52,33 +52,31 @@ def check_symbols(symbols: Any, residual: Any) -> None:
                 f"{where}: a measure of UFL: expected dx, dx_c or ds as arguments, residual(..., dx), "
                 "or sum_p(...) without a measure"
             )
-        found = _foreign(symbols, part.integrand())
-        if found is not None:
-            raise FormError(f"{where}: {found}")
+        _check_integrand(symbols, part.integrand(), where)
 
 
-def _foreign(symbols: Any, integrand: Any) -> str | None:
-    """Symbols of an integrand that are not its own, with the remedy; None if there are none."""
+def _check_integrand(symbols: Any, integrand: Any, where: str) -> None:
+    """Check the symbols and numbers of one integrand."""
     if not {*extract_constants(integrand)} <= {*symbols.constants.values()}:
-        return (
-            "a Constant of UFL: expected a number, or one of 'parameters', as parameters = "
+        raise FormError(
+            f"{where}: a Constant of UFL: expected a number, or one of 'parameters', as parameters = "
             '{"k": {"default": 1.0}}'
         )
     own = {symbols.increments, symbols.old, symbols.traction}
     for coefficient in extract_coefficients(integrand):
         if coefficient not in own and symbols.data.of(coefficient) is None:
-            return (
-                "a Coefficient of UFL, or a Function of dolfinx: expected a field, or numbers of the "
-                'particles, as data = {"kappa": "permeability [m2]"} with scene.data("kappa", ...)'
+            raise FormError(
+                f"{where}: a Coefficient of UFL, or a Function of dolfinx: expected a field, or numbers "
+                'of the particles, as data = {"kappa": "permeability [m2]"} with '
+                'scene.data("kappa", ...)'
             )
     tests = symbols.test_function
     if any(argument != tests for argument in extract_arguments(integrand)):
-        return (
-            "a test or trial function of UFL: expected those of 'fields', as residual(u, w, ...); the "
-            "tangent is derived"
+        raise FormError(
+            f"{where}: a test or trial function of UFL: expected those of 'fields', as "
+            "residual(u, w, ...); the tangent is derived"
         )
     if extract_type(integrand, ComplexValue) or extract_type(integrand, Imag):
-        return "a complex number: expected real ones"
+        raise FormError(f"{where}: a complex number: expected real ones")
     if any(not math.isfinite(float(value)) for value in extract_type(integrand, FloatValue)):
-        return "NaN or infinity: expected finite numbers"
-    return None
+        raise FormError(f"{where}: NaN or infinity: expected finite numbers")
