@@ -296,8 +296,8 @@ impl Law for CamClay {
         (Stress { deviator, mean: -flow.p }, moduli)
     }
 
-    /// Beyond half the tensile strength, p + p_t = p_t/2, the deviator is the one there, and the clay opens as
-    /// in [`SOFT`]. To this the slope of the plastic volume is added, which is near 1 / sqrt(p + p_t).
+    /// Beyond half the tensile strength the deviator is the one there, and the clay opens by [`SOFT`] and by
+    /// the slope theta / (p + p_t) of an open clay: with a smaller one Newton's method would go in cycles.
     fn respond_at_mean(
         &self,
         increment: &Sym,
@@ -332,10 +332,9 @@ impl Law for CamClay {
         }
         if mean > limit {
             let x = mean - limit;
-            let soft = 1.0 / (SOFT * mu) + answer.plastic_volume / self.tension;
+            let soft = 1.0 / (SOFT * mu) + self.theta / (self.tension - limit);
             new[0] = (new[0] * (-soft * x / self.theta).exp()).max(LEAST * self.preconsolidation);
             answer.plastic_volume += soft * x;
-            answer.volume_dev = answer.volume_dev.map(|v| v * (1.0 + x / self.tension));
             answer.dev_mean = [0.0; COMPONENTS];
             answer.volume_mean = soft;
         }

@@ -45,6 +45,17 @@ def test_b_bar_fails_the_loaded_patch_test_as_known():
     assert "quadratic splines: 2.0e-01" in miss.words
 
 
+def test_a_form_with_the_gradient_of_ufl_is_for_plane_strain_only():
+    def residual(w, sigma, sum_p):
+        return sum_p(sigma, grad(w))
+
+    report = tawami.check_form(tawami.Form(ALONE, residual))
+    line = report.line("axisymmetry")
+    assert line.verdict == "cost"
+    assert "for plane strain only: form of the driver script, line" in line.words
+    assert r"shape (3, 3) and an expression of shape (2, 2)" in line.words
+
+
 def test_the_inf_sup_constant_of_taylor_hood():
     """0.43 is the code's own number, which `python -m cases.extremes` prints."""
     form = tawami.Form.load("u_epsv")

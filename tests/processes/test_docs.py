@@ -231,7 +231,14 @@ def test_tutorials_can_be_downloaded_as_notebooks(name):
     assert len(code) >= 3
     assert not re.search(r"\{\w+\}`|eval-rst", text)
     imported = set(re.findall(r"^(?:import|from) (\w+)", "\n".join(code), flags=re.MULTILINE))
-    assert imported <= sys.stdlib_module_names | {"tawami", "numpy", "matplotlib", "mpi4py", "ufl"}
+    assert imported <= sys.stdlib_module_names | {
+        "tawami",
+        "numpy",
+        "matplotlib",
+        "mpi4py",
+        "scipy",
+        "ufl",
+    }
     assert any("plot" in source for source in code)
     assert any("print(" in source for source in code)
     assert notebooks.download(PAGES[name]) == notebooks.download(PAGES[name])

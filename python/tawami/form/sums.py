@@ -24,6 +24,7 @@ from tawami.fem import dolfinx
 from tawami.fem.rules import Rule
 from tawami.form.form import Form
 from tawami.form.lines import Lines
+from tawami.form.operators import ADVICE
 from tawami.form.particle_data import PLACEHOLDERS, ParticleData
 from tawami.form.quantities import ONE, LawQuantity, ParticleScalar, Quantity
 
@@ -254,6 +255,6 @@ def _product(caller: str, D: Any, f: Any) -> Any:
     if D.ufl_shape != f.ufl_shape:
         raise FormError(
             f"{caller} got a quantity of shape {D.ufl_shape} and an expression of shape {f.ufl_shape}: "
-            "expected the same shape"
+            f"expected the same shape{'; ' + ADVICE if 3 in D.ufl_shape else ''}"
         )
     return ufl.inner(D, f)

@@ -19,7 +19,7 @@ from tawami.form.fields import element_of
 from tawami.form.foreign import Known, check_symbols
 from tawami.form.form import Form
 from tawami.form.lines import Lines, Measure
-from tawami.form.operators import Operators
+from tawami.form.operators import ADVICE, Operators
 from tawami.form.particle_data import PLACEHOLDERS, ParticleData
 from tawami.form.quantities import HISTORY, Density, density, named
 from tawami.form.sums import Sums
@@ -194,7 +194,8 @@ class Symbols:
             raise
         except Exception as error:
             where = self.lines.text(self.lines.of(error))
-            raise FormError(f"{where}: its residual raised {error!r}") from error
+            advice = f". If shapes differ: {ADVICE}" if self.space.hoop else ""
+            raise FormError(f"{where}: its residual raised {error!r}{advice}") from error
 
     def _located(self, error: FormError) -> FormError:
         """An error of a name of the residual, with form and line."""

@@ -75,6 +75,8 @@ def _check(symbols: Symbols, part: Any) -> None:
     if not extract_arguments(part) and not isinstance(part.integrand(), Zero):
         raise FormError(f"{where}: a term has no test function: expected one in each term")
     with symbols.lines.errors(ufl.Form([part])):
+        if part.integral_type() != "interior_facet":  # jumps are of derivatives across a side
+            symbols.operators.check(part.integrand())
         check_arity(ufl.Form([part]), where)
     if "place" in part.metadata():
         return

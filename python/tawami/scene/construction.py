@@ -78,10 +78,10 @@ class Construction:
     def change_material(self, where: Where, material: Law) -> None:
         """Replace the material law of particles.
 
-        Stress and density stay. A law of the same name keeps its history variables; those of another
-        law begin at 0. If the stress is beyond the yield surface of the new law, it returns to it with
-        the next step; forces out of balance then fade like a released load. `scene.particles`
-        is another object afterwards. A call for all ranks.
+        Stress and density stay. A law of the same name keeps its history variables, and a `NumpyLaw` has
+        the name of its function; those of another law begin at 0. If the stress is beyond the yield
+        surface of the new law, it returns to it with the next step; forces out of balance then fade like
+        a released load. `scene.particles` is another object afterwards. A call for all ranks.
 
         Args:
             where: The particles, as in `load`.
