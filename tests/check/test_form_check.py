@@ -10,7 +10,7 @@ from ufl import div, dot, grad, inner
 
 import tawami
 from tawami.base import dimensions
-from tawami.check import assembled, declared, scenes
+from tawami.check import assembled, declared, motions, scenes
 from tawami.form import scalar, tangent, vector
 
 ALL = {**FORMS, **FINITE}
@@ -197,6 +197,17 @@ def test_a_reaction_is_no_fault():
     )
     assert damage.usable
     assert "a uniform d [-] changes by itself" in damage.line("field d").words
+
+
+def test_a_small_part_of_the_stress_may_be_carried_by_a_term():
+    """1e-6 of the stress, as the residual stiffness of a damaged material."""
+
+    def residual(w, sigma, t, grad, sum_p, ds):
+        return (1 + 1e-6) * sum_p(sigma, grad(w)) - dot(t, w) * ds
+
+    [(verdict, words)] = motions.compressed(edited.form(residual), {})
+    assert verdict == "cost"
+    assert "1.0e-06" in words
 
 
 def test_a_flux_of_the_wrong_sign_is_broken():

@@ -67,12 +67,10 @@ def check_units(form: Form, given: Settings) -> Found:
         )
         return
     found = list(units.contradictions(form, options, trial.histories(form)))
-    silent = [
-        name
-        for name, limits in form.parameters.items()
-        if "unit" not in limits and trial.reads(form, given, name)
-    ]
-    for sentence in found:
+    for sentence, read in found:
+        silent = [
+            name for name in form.parameters if name in read and "unit" not in form.parameters[name]
+        ]
         cause = f"; give {quoted(silent)} a \"unit\", as 'Pa s'" if silent else ""
         yield "cost", f"{sentence}: results depend on the choice of units{cause}"
     if not found:

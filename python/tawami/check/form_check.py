@@ -41,7 +41,7 @@ def check_form(form: str | Path | ModuleType | Form, **parameters: Any) -> FormR
         return FormReport(shown(form), (Line("declaration", "broken", str(error)),))
     if parameters:
         loaded.settings(parameters)
-    lines, part = list[Line](), mechanical(loaded)
+    lines, part, roots = list[Line](), mechanical(loaded), dict[str, str]()
     with warnings.catch_warnings():
         # random particles and the K/mu of the beam cause warnings on purpose
         warnings.simplefilter("ignore")
@@ -49,7 +49,8 @@ def check_form(form: str | Path | ModuleType | Form, **parameters: Any) -> FormR
             wrong = {line.subject for line in lines if line.verdict in ("broken", "not tried")}
             missing = next((need for need in needs if need in wrong), None)
             if missing is not None:
-                lines.append(Line(subject, "not tried", f"it needs '{missing}' to pass"))
+                roots[subject] = roots.get(missing, missing)
+                lines.append(Line(subject, "not tried", f"it needs '{roots[subject]}' to pass"))
             else:
                 lines += _tried(subject, check, loaded if whole else part, parameters)
     return FormReport(loaded.name, tuple(lines))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-from types import SimpleNamespace
 from typing import Any
 
 from tawami.form.form import Form
@@ -21,7 +20,7 @@ def mechanical(form: Form) -> Form:
     own = form.own_fields
     if not own:
         return form
-    left_out = {*own, *(field.test for field in own.values()), "old"}
+    left_out = {*own, *(field.test for field in own.values())}
     wanted = list(inspect.signature(form.residual).parameters)
     test = next(iter(form.fields.values())).test
     asked = dict.fromkeys([*(n for n in wanted if n not in left_out), test, REST])
@@ -30,7 +29,7 @@ def mechanical(form: Form) -> Form:
         zero, w = names.pop(REST), names[test]
         names |= dict.fromkeys(own, zero)
         names |= {field.test: zero * w[0] for field in own.values()}
-        names["old"] = SimpleNamespace(**dict.fromkeys(own, zero))
+        names["old"] = _Old(names["old"], dict.fromkeys(own, zero)) if "old" in wanted else None
         return form.residual(**{name: names[name] for name in wanted})
 
     keyword = inspect.Parameter.KEYWORD_ONLY
@@ -49,3 +48,13 @@ def mechanical(form: Form) -> Form:
         static_options=form.static_options,
         name=form.name,
     )
+
+
+class _Old:
+    """Old values, with those of some fields at rest."""
+
+    def __init__(self, old: Any, at_rest: dict[str, Any]) -> None:
+        self._old, self._at_rest = old, at_rest
+
+    def __getattr__(self, name: str) -> Any:
+        return self._at_rest[name] if name in self._at_rest else getattr(self._old, name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any, Literal
 
 from tawami.base.checks import shown
@@ -67,7 +68,20 @@ class FormReport:
         costs = sum(line.verdict == "cost" for line in self.lines)
         end = "it can be used" if self.usable else f"it cannot be used: {len(self.broken)} broken"
         end += f", {costs} cost{'s' if costs > 1 else ''}" if costs else ""
-        return "\n".join([f"form {self.name}", *map(str, self.lines), end])
+        return "\n".join([f"form {self.name}", *map(str, _joined(self.lines)), end])
+
+
+def _joined(lines: tuple[Line, ...]) -> Iterator[Line]:
+    """Lines with consecutive ones that were not tried for the same reason in one."""
+    for (verdict, words), group in groupby(
+        lines, lambda line: (line.verdict, line.words if line.verdict == "not tried" else line)
+    ):
+        same = list(group)
+        if verdict != "not tried" or len(same) == 1:
+            yield from same
+            continue
+        subjects = dict.fromkeys(line.subject for line in same)
+        yield Line(f"{len(subjects)} checks", "not tried", f"{words}: {', '.join(subjects)}")
 
 
 def judged(error: float, bound: float, what: str, otherwise: str = "") -> tuple[Verdict, str]:

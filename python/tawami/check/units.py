@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import ufl
 from ufl.algorithms import expand_derivatives
-from ufl.algorithms.analysis import extract_type
+from ufl.algorithms.analysis import extract_constants, extract_type
 from ufl.classes import FacetNormal, Terminal
 
 from tawami.base.dimensions import Dimension, dimension, size, text_of
@@ -55,8 +55,9 @@ def unreadable(form: Form) -> list[str]:
 
 def contradictions(
     form: Form, options: Mapping[str, str], histories: Collection[str] = ()
-) -> Iterator[str]:
-    """A sentence for each line of a residual whose terms have other units than its equation.
+) -> Iterator[tuple[str, frozenset[str]]]:
+    """A sentence for each line of a residual whose terms have other units than its equation, and the
+    names of the constants in it.
 
     Args:
         form: The form; its units can be read.
@@ -78,8 +79,10 @@ def contradictions(
             if found is None:
                 continue
             where = symbols.lines.text(line)
+            constants = {*extract_constants(integrand)}
+            read = frozenset(n for n, c in symbols.constants.items() if c in constants)
             if isinstance(found, str):
-                yield f"{where}, equation of '{name}': {found}"
+                yield f"{where}, equation of '{name}': {found}", read
                 continue
             unit = _times(found, dimension(MEASURES[kind]))
             if expected is None:
@@ -90,7 +93,8 @@ def contradictions(
                 )  # fmt: skip
                 yield (
                     f"{where}, equation of '{name}': a term has the unit {text_of(unit)} (times that of "
-                    f"{field.test}), but {text_of(expected[0])} {other}"
+                    f"{field.test}), but {text_of(expected[0])} {other}",
+                    read,
                 )
 
 
@@ -190,6 +194,8 @@ class _Terms:
         """Unit of an expression of numbers of the particles."""
         if scalar.text in self._units:
             return self._units[scalar.text]
+        if scalar.text.startswith("x["):
+            return {"m": 1.0}
         exponents = {}
         for base in self._bases:
             values = []
@@ -197,6 +203,11 @@ class _Terms:
                 known = {
                     n: np.array([1.5 * size(u, {base: scale})]) for n, u in self._units.items()
                 }
-                values.append(float(np.asarray(scalar.evaluate(known))[0]))
+                try:
+                    values.append(float(np.asarray(scalar.evaluate(known))[0]))
+                except (
+                    KeyError
+                ):  # another quantity of the step, as the old ratio of volumes: a number
+                    return {}
             exponents[base] = float(np.log2(values[1] / values[0]))
         return exponents

@@ -207,12 +207,12 @@ class Form:
             if not isinstance(limits, Mapping) or "default" not in limits:
                 self._fail(f"parameter '{name}' has no \"default\"")
             for limit, value in limits.items():
-                if limit == "unit" and isinstance(value, str):
-                    continue
-                numbers = list(value.values()) if isinstance(value, Mapping) else [value]
-                if not all(isinstance(number, Real) for number in numbers):
+                numbers = value.values() if isinstance(value, Mapping) else (value,)
+                kind: Any = str if limit == "unit" else Real
+                if not all(isinstance(number, kind) for number in numbers):
+                    expected = "text" if limit == "unit" else "a number"
                     self._fail(
-                        f"parameter '{name}': {shown(limit)}: {shown(value)}: expected a number"
+                        f"parameter '{name}': {shown(limit)}: {shown(value)}: expected {expected}"
                     )
         for name, choices in self.options.items():
             if not _are_names(choices) or not choices:
