@@ -1,4 +1,4 @@
-"""Parameters of a form by kind (numbers, functions of time, numbers of the particles), and their names."""
+"""Parameters of a form: numbers, functions of time or numbers of the particles, and their names."""
 
 from __future__ import annotations
 
