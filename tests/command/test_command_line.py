@@ -231,9 +231,9 @@ def test_form_check_prints_its_report(capsys, rejected, tmp_path):
     assert "stabilisation = 'projection'" in said
     assert said.splitlines()[-1].startswith("it can be used")
     path = tmp_path / "my_form.py"
-    path.write_text("fields = {'u': ('displacement', 'w')}\nkinematics = 'displacement'\n"
+    path.write_text("from tawami.form import vector\nfields = {'u': vector('w')}\n"
                     "def residual(w, stiffness): pass\n")  # fmt: skip
     assert main.main(["form", "check", str(path)]) == 1
-    assert "FAILED    arguments" in capsys.readouterr().out
+    assert "broken    arguments" in capsys.readouterr().out
     assert "expected NAME=VALUE" in rejected("form", "check", "u", "--set", "alpha")
     assert "has no parameter 'k'" in rejected("form", "check", "u", "--set", "k=1")

@@ -6,6 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from numpy_laws import drucker_prager, hooke, stiffening, von_mises
 from scenes import grid_of, linear_field
 
@@ -193,6 +194,26 @@ def test_von_mises_in_numpy_is_that_in_rust(form, law):
     assert plastic.max() > 0.01
     assert plastic.min() == 0
     assert_same(mine, other, 1e-9)
+
+
+@pytest.mark.parametrize("form", ["u_epsv", "u_epsv_finite"])
+def test_laws_in_numpy_and_in_rust_agree_in_axisymmetry(form):
+    """A cylinder that is pressed around its axis: the hoop is the component zz of the law."""
+    solutions = []
+    for law in (NUMPY, RUST):
+        grid = tawami.Grid(
+            MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(6, 6), geometry="axisymmetric"
+        )
+        body = tawami.box(grid, (0.0, 0.0), (1.0, 1.0), per_axis=2)
+        scene = tawami.Scene(grid, body, law, form=form, tolerance=1e-10)
+        for edge, component in (("left", "x"), ("bottom", "x"), ("bottom", "y")):
+            scene.fix(edge, component)
+        scene.load(lambda x, y: (y > 0.75) & (x < 0.5), (0.0, -60.0))
+        solutions.append(scene.solve())
+    plastic, stress = (solutions[1].scene.particles.history("plastic_strain"), solutions[1].stress)
+    assert plastic.max() > 0.01
+    assert np.abs(stress[:, 2]).max() > 1.0
+    assert_same(*solutions, 1e-9)
 
 
 @pytest.mark.parametrize("form", ["u", "u_epsv", "u_p", "u_epsv_finite"])
