@@ -51,7 +51,7 @@ def test_a_form_with_the_gradient_of_ufl_is_for_plane_strain_only():
 
     report = tawami.check_form(tawami.Form(ALONE, residual))
     line = report.line("axisymmetry")
-    assert line.verdict == "note"
+    assert line.verdict == "cost"
     assert "for plane strain only: form of the driver script, line" in line.words
     assert r"shape (3, 3) and an expression of shape (2, 2)" in line.words
 
