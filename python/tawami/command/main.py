@@ -211,8 +211,8 @@ def _add_form(commands: Any) -> None:
     actions = form.add_subparsers(title="commands", metavar="COMMAND", required=True)
     check = _add(actions, "check", _form_check, "test a weak form", (
         "Loads a form and tests it: names, operators, units, symmetry, the tangent against differences\n"
-        "at several dt, each field, rigid motions, patch tests, axisymmetry, both assemblies, stability\n"
-        "and locking. Prints a table with the number and what to do in each line:\n"
+        "at several dt, each field, rigid motions, patch tests, axisymmetry, both assemblies,\n"
+        "stability and locking. Prints a table with the number and what to do in each line:\n"
         "pass; cost (exit code 0): a price or a limit; broken (exit code 1): it cannot be used."
     ), under="tawami form", epilog=(
         "examples:\n"
