@@ -124,3 +124,20 @@ def test_walls_are_rejected():
     scene.wall("right")
     with pytest.raises(tawami.InputError, match="^modes: the scene has walls"):
         tawami.modes(scene)
+
+
+def test_a_sphere_breathes_with_lambs_frequency():
+    """tan x = x / (1 - (x c_l / 2 c_t)^2), f = x c_l / (2 pi R) (Lamb 1882), nu = 0.25: x = 2.5634."""
+    grid = tawami.Grid(
+        MPI.COMM_WORLD, origin=(0, -1.125), h=0.125, cells=(9, 18), geometry="axisymmetric"
+    )
+    law = tawami.linear_elastic(E=1.0, nu=0.25)
+    scene = tawami.Scene(
+        grid, tawami.disc(grid, (0, 0), 1.0, gauss=True), law, form="u_finite", density=1.0,
+        ghost_penalty="on",
+    )  # fmt: skip
+    found = tawami.modes(scene, 5).frequencies
+    speed = np.sqrt(law.bulk_modulus + 4 / 3 * law.shear_modulus)
+    assert found[0] == pytest.approx(0.0, abs=1e-6)  # the translation along the axis, no other
+    assert found[1] > 0.2
+    assert found[4] == pytest.approx(2.5634 * speed / (2 * np.pi), rel=0.01)

@@ -7,10 +7,12 @@ use proptest::prelude::*;
 use tawami::error::Error;
 use tawami::grid::{Basis, Grid};
 use tawami::law::{Law, LinearElastic, NeoHookean};
-use tawami::particles::kinematics::{Increments, Kinematics};
+use tawami::particles::kinematics::{gradient, Increments, Kinematics};
 use tawami::particles::request::{Operator, Part, Request};
 use tawami::particles::stage::{check_materials, Output, Stage};
 use tawami::particles::{Particles, Role};
+use tawami::space::Geometry;
+use tawami::tensor::Gradient;
 use tawami::transfer::to_particles::Field;
 
 const CELLS: [usize; 2] = [4, 3];
@@ -158,4 +160,27 @@ fn materials_are_checked_before_anything_runs() {
     assert_eq!(check_materials(&n(2), &laws, Kinematics::Mixed, true), Ok(()));
     let unknown = Error::UnknownMaterial { index: 1, material: 3, count: 3 };
     assert_eq!(check(3, Kinematics::Mixed), Err(unknown));
+}
+
+#[test]
+fn the_hoop_strain_is_the_radial_displacement_over_the_radius() {
+    let geometry = Geometry::Axisymmetric;
+    let grid = Grid::new([1.0, 0.5], 0.5, CELLS).unwrap().with(geometry).unwrap();
+    let g = [[0.2, 0.1], [-0.3, 0.4]];
+    for basis in [Basis::QuadraticSpline, Basis::Bilinear, Basis::Biquadratic] {
+        let coefficients = linear(&grid, basis, [0.25, -0.5], g);
+        let u: Field<2> = Field { grid, basis, coefficients: &coefficients };
+        let (cell, xi) = ([2, 1], [0.3, 0.8]);
+        let [x, y] = grid.position(cell, xi);
+        assert!((x - 2.15).abs() < 1e-15 && (y - 1.4).abs() < 1e-15);
+        let found = gradient(&u, cell, xi);
+        let radial = 0.25 + 0.2 * (x - 1.0) + 0.1 * (y - 0.5);
+        assert!((found.hoop - radial / x).abs() < 1e-14);
+        assert!((found.trace() - 0.6 - radial / x).abs() < 1e-14);
+        let mut rows = [0.0; 9];
+        found.write(geometry, &mut rows);
+        assert_eq!(Gradient::of_rows(&rows), found);
+    }
+    let left = Grid::new([-1.0, 0.5], 0.5, CELLS).unwrap().with(geometry);
+    assert!(matches!(left, Err(Error::Parameter { name: "origin[0]", .. })));
 }

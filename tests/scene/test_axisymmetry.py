@@ -188,6 +188,25 @@ def test_an_incompressible_billet_does_not_lock():
     assert locked > 1.1 * mixed
 
 
+def test_a_billet_keeps_its_volume_when_it_is_upset_by_30_percent():
+    """Between smooth plates, nu = 0.4999, Hencky's law: axial stress E ln(0.7), 0.5 % off here."""
+    n = 6
+    grid = grid_at(0.0, (9, n + 1), 1 / n)
+    body = tawami.box(grid, (0, 0), (1, 1), gauss=True)
+    law = tawami.linear_elastic(E=3.0, nu=0.4999)
+    scene = tawami.Scene(grid, body, law, form="u_epsv_finite")
+    scene.fix("bottom", "y")
+    for r in (0.0, *(np.arange(n) + 0.5) / n, 1.0):
+        scene.hold((r, 1.0), "y", -0.3)
+    tawami.ramp(scene, 0.1, stop="raise")
+    p = scene.particles
+    stretched = np.linalg.det(np.eye(3) + p.displacement_gradient) @ p.volume
+    assert stretched == pytest.approx(p.volume.sum(), rel=2e-4)
+    axial = p.stress[:, 1] @ p.volume / p.volume.sum()
+    assert axial == pytest.approx(3 * np.log(0.7), rel=0.01)
+    assert p.x[:, 0].max() < 1 / np.sqrt(0.7)
+
+
 ELASTIC = tawami.linear_elastic(E=E, nu=NU)
 
 

@@ -29,7 +29,7 @@ from tawami.base.space import Space
 
 #: What a form must do to work in axisymmetry.
 ADVICE = (
-    "expected grad, div, eps and I as arguments of the residual, not from UFL: in axisymmetry tensors "
+    "take grad, div, eps and I as arguments of the residual, not from UFL: in axisymmetry tensors "
     "have a third row, for the hoop direction"
 )
 

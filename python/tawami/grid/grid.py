@@ -118,7 +118,8 @@ class Grid(Unique):
 
     def __repr__(self) -> str:
         cells = " x ".join(map(str, self.cells))
-        return f"Grid({cells} cells of {self.h:g} m, {self.extent} m)"
+        about = ", axisymmetric" if self.space.hoop else ""
+        return f"Grid({cells} cells of {self.h:g} m, {self.extent} m{about})"
 
     @property
     def lattice(self) -> tuple[Position, float, Counts]:
