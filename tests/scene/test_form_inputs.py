@@ -278,7 +278,7 @@ def test_fields_data_and_parameters_are_in_checkpoints(tmp_path):
         ),
     ],
 )
-def test_what_a_form_cannot_read_is_said_with_its_line(residual, words):
+def test_what_a_form_cannot_read_is_reported_with_its_line(residual, words):
     with pytest.raises(tawami.FormError, match=rf"line \d+ .*{words}"):
         scene_of(residual, more={"data": {"kappa": "conductivity [m2/s]"}})
 
