@@ -32,8 +32,8 @@ whole_cells = ("residual_based",)
 
 
 def residual(
-    u, eps_v, w, q, sigma, eps_p, K, mu, t, h, grad, div, eps, I, sum_p, cell_mean, dx, dx_c, ds,
-    dG, facet_mean, jump_n, jump_nn, alpha, k, stabilisation, ghost_penalty,
+    u, eps_v, w, q, sigma, eps_p, K, mu, t, h, grad, div, eps, I, sum_p, cell_mean, dx_c, ds, dG,
+    facet_mean, jump_n, jump_nn, alpha, k, stabilisation, ghost_penalty,
 ):  # fmt: skip
     """R_u = sum_p V_p sigma_p : grad w - int t . w ds
     R_q = sum_p V_p K_p q (div u - eps_v - eps_p) - S.
@@ -44,8 +44,12 @@ def residual(
         R_u += k * facet_mean(mu) * h**3 * inner(jump_nn(u), jump_nn(w)) * dG
         R_q -= k * facet_mean(K**2 / mu) * h**3 * jump_n(eps_v) * jump_n(q) * dG
     if stabilisation == "projection":
-        c = alpha * cell_mean(K**2 / mu)
-        return R_u + R_q - c * q * eps_v * dx + c * q * eps_v * dx_c
+        c = alpha * cell_mean(
+            K**2 / mu
+        )  # int (q - q_c) (eps_v - eps_v,c), _c at the centre of the cell
+        twist = grad(grad(q))[0, 1] * grad(grad(eps_v))[0, 1]
+        S = c * (h**2 / 12 * dot(grad(q), grad(eps_v)) + h**4 / 144 * twist) * dx_c
+        return R_u + R_q - S
     S = sum_p(K**2 / mu, alpha * h**2 * dot(grad(q), grad(eps_v)))
     if stabilisation == "residual_based":
         s_over_mu = 2 * (eps(u) - div(u) / 3 * I)

@@ -1,4 +1,4 @@
-//! The space of the computation: the plane, with plane strain.
+//! The space of the computation: the plane, with plane strain or axisymmetry.
 //!
 //! This module owns every number that follows from the dimension. Other modules use its names and loop over
 //! axes; they contain no literal 2, 4, 9 or 18 of the plane. Two things are particular to the plane beyond
@@ -10,6 +10,9 @@
 //! compute the length of an array from a parameter (`3^DIM`); one build computes in one space.
 
 use std::fmt::{self, Display, Formatter};
+use std::str::FromStr;
+
+use crate::error::Error;
 
 /// Number of axes, of coordinates and of displacement components.
 pub const DIM: usize = 2;
@@ -25,6 +28,59 @@ pub const SYMMETRIC: usize = DIM + SHEARS;
 
 /// Components of a gradient of a vector in space (xx, xy, yx, yy).
 pub const GRADIENT: usize = DIM * DIM;
+
+/// Meaning of the axes of the grid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Geometry {
+    /// Cartesian axes; the strain zz is zero.
+    PlaneStrain,
+    /// The first axis is the radius, the last one the axis of rotation, and zz the hoop direction.
+    Axisymmetric,
+}
+
+impl Geometry {
+    /// Components that belong to the hoop direction: 1 or 0.
+    const fn hoop(self) -> usize {
+        match self {
+            Self::PlaneStrain => 0,
+            Self::Axisymmetric => 1,
+        }
+    }
+
+    /// Components of the strain of a displacement (xx, yy, gamma_xy, and the hoop strain zz).
+    #[must_use]
+    pub const fn strains(self) -> usize {
+        SYMMETRIC + self.hoop()
+    }
+
+    /// Components of the gradient of a displacement (xx, xy, yx, yy, and the hoop strain zz).
+    #[must_use]
+    pub const fn gradients(self) -> usize {
+        GRADIENT + self.hoop()
+    }
+
+    /// Numbers in the rows of the gradient of a displacement as a tensor: 2 x 2, or 3 x 3.
+    #[must_use]
+    pub const fn tensor(self) -> usize {
+        (DIM + self.hoop()) * (DIM + self.hoop())
+    }
+}
+
+impl FromStr for Geometry {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self, Error> {
+        match name {
+            "plane_strain" => Ok(Self::PlaneStrain),
+            "axisymmetric" => Ok(Self::Axisymmetric),
+            _ => Err(Error::UnknownName {
+                what: "geometry",
+                name: name.to_owned(),
+                expected: "'plane_strain', 'axisymmetric'",
+            }),
+        }
+    }
+}
 
 /// Most functions of a basis that do not vanish on a cell, along one axis.
 pub const FUNCTIONS_1D: usize = 3;

@@ -34,6 +34,7 @@ SHORTER = {
     "elastica": ("--steps", "20", "--cells", "4"),
     "footing": ("--cells", "8"),
     "bearing_capacity": ("--cells", "2"),
+    "circular_footing": ("--cells", "8"),
     "ordering": ("--cells", "4,8,16,32,64"),
 }
 

@@ -38,6 +38,7 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "elastica": ("Elastica", "verification", ("strip",)),
     "footing": ("Footing", "verification", ()),
     "bearing_capacity": ("Bearing capacity", "verification", ()),
+    "circular_footing": ("Circular footing", "verification", ()),
     "dilatancy": ("Dilatancy", "verification", ("block", "enumeration")),
     "vibrating_beam": ("Vibrating beam", "verification", ("beam",)),
     "spinning_disc": ("Spinning disc", "verification", ("disc",)),

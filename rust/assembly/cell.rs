@@ -5,7 +5,7 @@ use crate::grid::{Basis, Functions, Location};
 use crate::space::{Index, Point, DIM, FUNCTIONS, NODES, NODES_1D, VERTICES};
 
 /// Coordinates of a vertex that a kernel reads, also in the plane.
-const COORDINATES: usize = 3;
+pub(super) const COORDINATES: usize = 3;
 
 /// Coordinates of all vertices of a cell, in the order of the kernels.
 pub(super) type Vertices = [f64; COORDINATES * VERTICES];
@@ -176,8 +176,7 @@ impl Cells {
         &self.vertices
     }
 
-    /// Vertices of a cell relative to its corner. No form names the position, and far from the origin the
-    /// size of the cell would be rounded.
+    /// Vertices of a cell relative to its corner. Far from the origin the size of the cell would be rounded.
     pub(super) fn vertices(&self, h: f64) -> Vertices {
         let mut x = [0.0; COORDINATES * VERTICES];
         for (vertex, x) in self.vertices.iter().zip(x.chunks_exact_mut(COORDINATES)) {

@@ -4,9 +4,10 @@ use std::ffi::c_void;
 
 use ndarray::ArrayView2;
 
-use super::cell::{Cells, Local, Nodal, Vertices};
+use super::cell::{Cells, Local, Nodal, Vertices, COORDINATES};
 use super::point::{PointKernel, Points, Row};
 use crate::grid::Location;
+use crate::space::DIM;
 use crate::transfer::cells::mean_of_cell;
 
 /// Signature of an FFCx kernel: element tensor, coefficients, constants, coordinates of the vertices
@@ -41,6 +42,8 @@ pub struct Kernel<'a> {
     pub slots: Vec<Slot<'a>>,
     /// Its constants.
     pub constants: &'a [f64],
+    /// Whether it reads the position; otherwise it gets positions relative to the corner of the cell.
+    pub reads_position: bool,
 }
 
 /// Kernels whose results are added.
@@ -127,6 +130,13 @@ impl<'a> State<'a> {
                     }
                 }
             }
+            let mut vertices = self.vertices;
+            if kernel.reads_position {
+                let corner = self.location.grid.position(self.location.active_index(a), [0.0; DIM]);
+                for x in vertices.chunks_exact_mut(COORDINATES) {
+                    x.iter_mut().zip(corner).for_each(|(x, corner)| *x += corner);
+                }
+            }
             // SAFETY: the caller guarantees the kernel and the length of `element`. Integrals over cells
             // do not read facet, permutations and user data.
             unsafe {
@@ -134,7 +144,7 @@ impl<'a> State<'a> {
                     element.as_mut_ptr(),
                     packed.as_ptr(),
                     kernel.constants.as_ptr(),
-                    self.vertices.as_ptr(),
+                    vertices.as_ptr(),
                     std::ptr::null(),
                     std::ptr::null(),
                     std::ptr::null_mut(),

@@ -153,6 +153,8 @@ pub enum Place {
 pub enum PointSlot<'a> {
     /// Values of the fields.
     Fields,
+    /// Position of the point [m].
+    Position,
     /// Columns of an array of particle data.
     Data(&'a [usize], ArrayView2<'a, f64>),
     /// Means over the particles of the cell.
@@ -373,6 +375,7 @@ impl<const P: usize> Points<P> {
                         self.packed.push(value);
                     }
                 }
+                PointSlot::Position => self.packed.extend(grid.position(cell, xi)),
                 PointSlot::Data(columns, data) => {
                     self.packed.resize(start + columns.len(), 0.0);
                     data_at(columns, data, &mut self.packed[start..]);

@@ -16,7 +16,7 @@ pub use location::Location;
 pub use rule::{Rule, MAX_POINTS};
 
 use crate::error::{Error, Result};
-use crate::space::{count, index_of, Index, Point, DIM};
+use crate::space::{count, index_of, Geometry, Index, Point, DIM};
 
 /// Largest number of cells along an axis.
 pub const MAX_CELLS: usize = 1 << 15;
@@ -30,16 +30,20 @@ pub struct Grid {
     pub h: f64,
     /// Number of cells along each axis.
     pub cells: Index,
+    /// Meaning of the axes.
+    pub geometry: Geometry,
 }
 
 impl Grid {
-    /// A grid; `h` must be positive and finite, and there must be at least one cell along each axis.
+    /// A grid in plane strain; `h` must be positive and finite, and there must be at least one cell along
+    /// each axis.
     ///
     /// # Errors
     /// [`Error::Parameter`] with the parameter that is out of range.
     pub fn new(origin: Point, h: f64, cells: Index) -> Result<Self> {
         const ORIGIN: [&str; 3] = ["origin[0]", "origin[1]", "origin[2]"];
         const CELLS: [&str; 3] = ["cells[0]", "cells[1]", "cells[2]"];
+        let geometry = Geometry::PlaneStrain;
         let refuse = |name, value, expected| Err(Error::Parameter { name, value, expected });
         if !(h.is_finite() && h > 0.0) {
             return refuse("h", h, "a positive cell size in m");
@@ -54,7 +58,20 @@ impl Grid {
                 return refuse(CELLS[axis], cells[axis] as f64, "between 1 and 32768 cells");
             }
         }
-        Ok(Self { origin, h, cells })
+        Ok(Self { origin, h, cells, geometry })
+    }
+
+    /// The grid with another meaning of its axes.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if cells lie left of the axis.
+    pub fn with(self, geometry: Geometry) -> Result<Self> {
+        let (name, value) = ("origin[0]", self.origin[0]);
+        if geometry == Geometry::Axisymmetric && value < 0.0 {
+            let expected = "at least 0 in axisymmetry, where x is the distance from the axis";
+            return Err(Error::Parameter { name, value, expected });
+        }
+        Ok(Self { geometry, ..self })
     }
 
     /// Number of cells.
@@ -67,6 +84,12 @@ impl Grid {
     #[must_use]
     pub fn cell_index(&self, cell: usize) -> Index {
         index_of(cell, self.cells)
+    }
+
+    /// Coordinates [m] of a position in a cell.
+    #[must_use]
+    pub fn position(&self, cell: Index, xi: Point) -> Point {
+        std::array::from_fn(|axis| self.origin[axis] + self.h * (cell[axis] as f64 + xi[axis]))
     }
 
     /// Upper corner [m].

@@ -7,16 +7,15 @@
 //! | `cell`         | dev(sym grad u)           | div u at the cell's centre |
 //! | `deviatoric`   | dev(sym grad u)           | 0 (the form has p)         |
 //!
-//! At finite strain, ln J_f takes the place of div u. With `mixed` and `deviatoric` the law receives the
+//! In axisymmetry grad u has the hoop strain u_r / r. At finite strain, ln J_f takes the place of div u. With `mixed` and `deviatoric` the law receives the
 //! mean stress, old + K eps_v or old + p, and answers with the plastic volumetric strain.
 
 use std::str::FromStr;
 
 use crate::error::Error;
 use crate::grid::Location;
-use crate::space::DIM;
-use crate::tensor::matrix::trace;
-use crate::tensor::{small_strain, Matrix, Strain};
+use crate::space::{Geometry, Index, Point, DIM};
+use crate::tensor::{Gradient, Strain};
 use crate::transfer::to_particles::Field;
 
 /// How the strain follows from the fields; see the table above.
@@ -59,17 +58,28 @@ pub struct Increments<'a> {
     pub volumetric: Option<Field<'a, 1>>,
 }
 
+/// Gradient of a displacement at a position in a cell, in axisymmetry with the hoop strain u_r / r.
+#[must_use]
+pub fn gradient(u: &Field<DIM>, cell: Index, xi: Point) -> Gradient {
+    let in_space = u.gradient(cell, xi);
+    let hoop = match u.grid.geometry {
+        Geometry::PlaneStrain => 0.0,
+        Geometry::Axisymmetric => u.value(cell, xi)[0] / u.grid.position(cell, xi)[0],
+    };
+    Gradient { in_space, hoop }
+}
+
 impl Increments<'_> {
     /// Displacement gradient at particle `p`.
     #[must_use]
-    pub fn grad_u(&self, location: &Location, p: usize) -> Matrix {
-        self.u.gradient(location.cell_of(p), location.xi[p])
+    pub fn grad_u(&self, location: &Location, p: usize) -> Gradient {
+        gradient(&self.u, location.cell_of(p), location.xi[p])
     }
 
     /// Displacement gradient at the centre of the cell of particle `p`.
     #[must_use]
-    pub fn grad_u_of_cell(&self, location: &Location, p: usize) -> Matrix {
-        self.u.gradient(location.cell_of(p), [0.5; DIM])
+    pub fn grad_u_of_cell(&self, location: &Location, p: usize) -> Gradient {
+        gradient(&self.u, location.cell_of(p), [0.5; DIM])
     }
 
     /// Displacement of particle `p` [m].
@@ -87,11 +97,11 @@ impl Increments<'_> {
     /// Small strain increment at particle `p`.
     #[must_use]
     pub fn strain(&self, kinematics: Kinematics, location: &Location, p: usize) -> Strain {
-        let strain = small_strain(&self.grad_u(location, p));
+        let strain = self.grad_u(location, p).small_strain();
         let volume = match kinematics {
             Kinematics::Displacement => strain.volume,
             Kinematics::Mixed => self.volumetric_at(location, p),
-            Kinematics::Cell => trace(&self.grad_u_of_cell(location, p)),
+            Kinematics::Cell => self.grad_u_of_cell(location, p).trace(),
             Kinematics::Deviatoric => 0.0,
         };
         Strain { volume, ..strain }

@@ -16,23 +16,24 @@ pub use column::{Column, Role, Values};
 use ndarray::{s, Array1, Array2, ArrayView2, Axis};
 
 use crate::error::{Error, Result};
-use crate::space::{self, COMPONENTS, DIM};
+use crate::space::{Geometry, COMPONENTS, DIM};
 
-/// Name of the column with the displacement gradient F - I since the start, row by row.
+/// Name of the column with the displacement gradient F - I since the start, row by row: 2 x 2, or in
+/// axisymmetry 3 x 3 with the hoop direction last.
 pub const GRADIENT: &str = "displacement_gradient";
 
-/// The particles of a scene. Volumes are per metre depth.
+/// The particles of a scene. Volumes are per metre depth, or in axisymmetry of the whole ring.
 ///
 /// | column         | content                                               | shape   |
 /// |----------------|-------------------------------------------------------|---------|
 /// | `x`            | position [m]                                          | n x 2   |
-/// | `volume`       | volume V_p [m2]                                       | n       |
+/// | `volume`       | volume V_p [m2, m3]                                   | n       |
 /// | `material`     | number of the material                                | n       |
 /// | `number`       | number of the particle in the body, used in messages  | n       |
 /// | `stress`       | stress [Pa], order of [`crate::tensor`]               | n x 4   |
 /// | `displacement` | displacement since the start [m]                      | n x 2   |
 /// | `strain`       | strain since the start, at small strain               | n x 4   |
-/// | [`GRADIENT`]   | F - I since the start, at finite strain               | n x 4   |
+/// | [`GRADIENT`]   | F - I since the start, at finite strain               | n x 4 (9) |
 /// | `eps_v`        | volumetric strain, with forms that have this field    | n       |
 /// | history        | one column per history variable of the laws           | n       |
 /// | carried        | arrays of a time integration (velocity, ...)          | n x any |
@@ -119,7 +120,7 @@ impl Particles {
         self.columns[place].reals_mut()
     }
 
-    /// Volumes V_p [m2].
+    /// Volumes V_p [m2], in axisymmetry [m3].
     #[must_use]
     pub fn volume(&self) -> &[f64] {
         self.reals(Self::VOLUME)
@@ -231,9 +232,9 @@ impl Particles {
     }
 
     /// Add the column from which the strain since the start follows, zero at first.
-    pub fn add_strain(&mut self, finite: bool) {
+    pub fn add_strain(&mut self, finite: bool, geometry: Geometry) {
         if finite {
-            self.add(Role::State, GRADIENT, Some(space::GRADIENT));
+            self.add(Role::State, GRADIENT, Some(geometry.tensor()));
         } else {
             self.add(Role::State, "strain", Some(COMPONENTS));
         }

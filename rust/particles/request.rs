@@ -4,20 +4,20 @@ use std::str::FromStr;
 
 use crate::error::Error;
 use crate::law::interned;
-use crate::space::{GRADIENT, SYMMETRIC};
+use crate::space::Geometry;
 
 /// A quantity of the law that a form may name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Operator {
-    /// Stress in space (xx, yy, xy) [Pa].
+    /// Stress (xx, yy, xy, and in axisymmetry zz) [Pa].
     Sigma,
-    /// Components in space (xx, yy, xy) of the three-dimensional deviator [Pa].
+    /// The same components of the three-dimensional deviator [Pa].
     Deviator,
     /// Mean stress [Pa].
     Mean,
-    /// P = tau f^-T (xx, xy, yx, yy) [Pa]; finite strain only.
+    /// P = tau f^-T (xx, xy, yx, yy, and in axisymmetry zz) [Pa]; finite strain only.
     Nominal,
-    /// P_s = s f^-T (xx, xy, yx, yy) [Pa], the part of P from the deviator; finite strain only.
+    /// P_s = s f^-T [Pa], the part of P from the deviator; finite strain only.
     NominalDeviator,
     /// Mean Kirchhoff stress [Pa]; finite strain only.
     MeanKirchhoff,
@@ -32,10 +32,10 @@ pub enum Operator {
 impl Operator {
     /// Number of components.
     #[must_use]
-    pub fn components(self) -> usize {
+    pub fn components(self, geometry: Geometry) -> usize {
         match self {
-            Self::Nominal | Self::NominalDeviator => GRADIENT,
-            Self::Sigma | Self::Deviator => SYMMETRIC,
+            Self::Nominal | Self::NominalDeviator => geometry.gradients(),
+            Self::Sigma | Self::Deviator => geometry.strains(),
             Self::Mean
             | Self::MeanKirchhoff
             | Self::LnJ
@@ -59,10 +59,11 @@ impl Operator {
 pub enum Part {
     /// Its value.
     Value,
-    /// Its derivative with respect to the strain in space (xx, yy, gamma_xy) of `sym grad u`, strain
-    /// fastest; small strain only.
+    /// Its derivative with respect to the strain of the displacement (xx, yy, gamma_xy, and in axisymmetry
+    /// zz), strain fastest; small strain only.
     Strain,
-    /// Its derivative with respect to grad u (xx, xy, yx, yy), gradient fastest; finite strain only.
+    /// Its derivative with respect to grad u (xx, xy, yx, yy, and in axisymmetry zz), gradient fastest; finite
+    /// strain only.
     Gradient,
     /// Its derivative with respect to the volumetric field of the form: eps_v, or p.
     Volume,
@@ -71,11 +72,11 @@ pub enum Part {
 impl Part {
     /// Numbers per component.
     #[must_use]
-    pub fn width(self) -> usize {
+    pub fn width(self, geometry: Geometry) -> usize {
         match self {
             Self::Value | Self::Volume => 1,
-            Self::Strain => SYMMETRIC,
-            Self::Gradient => GRADIENT,
+            Self::Strain => geometry.strains(),
+            Self::Gradient => geometry.gradients(),
         }
     }
 }
@@ -108,8 +109,8 @@ impl Request {
 
     /// Number of columns that are written.
     #[must_use]
-    pub fn width(&self) -> usize {
-        self.operator.components() * self.part.width()
+    pub fn width(&self, geometry: Geometry) -> usize {
+        self.operator.components(geometry) * self.part.width(geometry)
     }
 }
 

@@ -12,10 +12,9 @@ use super::{finite, small, Particles, Role, GRADIENT};
 use crate::error::{Error, Result};
 use crate::grid::Location;
 use crate::law::{Law, MAX_HISTORY};
-use crate::space::{self, COMPONENTS, DIM};
+use crate::space::{COMPONENTS, DIM};
 use crate::tensor::hencky::Trial;
-use crate::tensor::matrix::{det_minus_one, flat, matrix, multiply, trace};
-use crate::tensor::{dot, symmetric_part, AtMean, Moduli, Strain, Stress, Sym, UNIT};
+use crate::tensor::{dot, AtMean, Gradient, Moduli, Strain, Stress, Sym, UNIT};
 
 /// One array of particle data: the requests that are written into its columns.
 pub struct Output<'a> {
@@ -198,7 +197,7 @@ impl Stage<'_> {
             Kinematics::Mixed => Some(self.increments.volumetric_at(self.location, p)),
             Kinematics::Cell => {
                 let g = self.increments.grad_u_of_cell(self.location, p);
-                let change = det_minus_one(&g);
+                let change = g.det_minus_one();
                 Some((change > -1.0).then(|| change.ln_1p())?)
             }
             Kinematics::Deviatoric => Some(0.0),
@@ -294,9 +293,9 @@ impl Stage<'_> {
         let g = self.increments.grad_u(self.location, p);
         if self.finite {
             // NaN where f turns the particle inside out: such an iterate is not accepted
-            return det_minus_one(&g).ln_1p();
+            return g.det_minus_one().ln_1p();
         }
-        trace(&g)
+        g.trace()
     }
 
     /// Write the requested quantities into all arrays of particle data. Each law is evaluated once.
@@ -341,15 +340,20 @@ impl Stage<'_> {
         let own = self.kinematics != Kinematics::Displacement;
         let row = &mut output.data[output.columns * row..][..output.columns];
         let Answer { stress, moduli, plastic, trial, .. } = answer;
+        let geometry = self.location.grid.geometry;
         for request in output.requests {
-            let out = &mut row[request.column..][..request.width()];
+            let out = &mut row[request.column..][..request.width(geometry)];
             let scalar = match request.operator {
                 Operator::History(name) => &self.variable(name, request.part, old, answer, p),
                 _ => plastic,
             };
             match trial {
-                Some(trial) => finite::write(request, trial, own, stress, moduli, scalar, out),
-                None => small::write(request, self.kinematics, stress, moduli, scalar, out),
+                Some(trial) => {
+                    finite::write(request, geometry, trial, own, stress, moduli, scalar, out);
+                }
+                None => {
+                    small::write(request, geometry, self.kinematics, stress, moduli, scalar, out);
+                }
             }
             if let Some(factor) = &request.factor {
                 for value in out {
@@ -422,16 +426,14 @@ impl Stage<'_> {
         if let Some(strain) = particles.place(Role::State, "strain") {
             let strain = particles.reals_mut(strain).par_chunks_exact_mut(COMPONENTS);
             strain.enumerate().for_each(|(p, strain)| {
-                strain.iter_mut().zip(symmetric_part(&grad_u(p))).for_each(|(e, new)| *e += new);
+                strain.iter_mut().zip(grad_u(p).symmetric_part()).for_each(|(e, new)| *e += new);
             });
         }
         if let Some(gradient) = particles.place(Role::State, GRADIENT) {
-            let gradient = particles.reals_mut(gradient).par_chunks_exact_mut(space::GRADIENT);
+            let geometry = self.location.grid.geometry;
+            let gradient = particles.reals_mut(gradient).par_chunks_exact_mut(geometry.tensor());
             gradient.enumerate().for_each(|(p, h)| {
-                // f F - I = g + h + g h
-                let g = grad_u(p);
-                let product = flat(&multiply(&g, &matrix(h)));
-                h.iter_mut().zip(flat(&g)).zip(product).for_each(|((h, g), gh)| *h += g + gh);
+                grad_u(p).after(&Gradient::of_rows(h)).write(geometry, h); // f F - I
             });
         }
     }

@@ -17,11 +17,16 @@ use crate::assembly::{
     PointSlot, Selection, Slot, State, TabulateTensor,
 };
 use crate::grid::{Grid, Location};
-use crate::space::{Index, NODES, NODES_1D, VERTICES};
+use crate::space::{Index, DIM, NODES, NODES_1D, VERTICES};
 
-/// Coefficient of a kernel: number of the array of particle data, whether it is its means over cells, and
-/// columns.
-type SlotOf = (usize, bool, Vec<usize>);
+/// Coefficient of a kernel.
+#[derive(FromPyObject)]
+enum SlotOf {
+    /// `fields`, or `position`.
+    Name(String),
+    /// Number of the array of particle data, whether it is its means over cells, and columns.
+    Data(usize, bool, Vec<usize>),
+}
 
 /// Component of the fields and axes of its derivatives.
 type EntryOf = (usize, Vec<usize>);
@@ -30,24 +35,28 @@ type EntryOf = (usize, Vec<usize>);
 type PointOf = (String, Vec<EntryOf>, Vec<EntryOf>, Vec<EntryOf>);
 
 /// Owner of an FFCx kernel, its address, its rank, the number of its packed coefficients, these in packed
-/// order (none stands for the fields), its constants, and its points; without them it is one of cells.
-type KernelOf = (Py<PyAny>, usize, usize, usize, Vec<Option<SlotOf>>, Vec<f64>, Option<PointOf>);
+/// order, its constants, whether it reads the position, and its points; without them it is one of cells.
+type KernelOf = (Py<PyAny>, usize, usize, usize, Vec<SlotOf>, Vec<f64>, bool, Option<PointOf>);
 
 /// A kernel and where its coefficients come from.
 struct Plan {
     /// Keeps the code loaded.
     _owner: Py<PyAny>,
     tabulate: TabulateTensor,
-    slots: Vec<Option<Source>>,
+    slots: Vec<Source>,
     constants: Vec<f64>,
+    reads_position: bool,
     point: Option<(Place, Entries)>,
 }
 
-/// Some columns of an array of particle data, or their means over cells.
-struct Source {
-    array: usize,
-    means: bool,
-    columns: Vec<usize>,
+/// Where the coefficients of a kernel come from.
+enum Source {
+    /// Values of the fields.
+    Fields,
+    /// Position of a point.
+    Position,
+    /// Columns of an array of particle data, or their means over cells.
+    Data { array: usize, means: bool, columns: Vec<usize> },
 }
 
 /// Element kernels of one rank, with the sources of their coefficients; made once.
@@ -59,22 +68,27 @@ pub(super) struct PyKernels {
 }
 
 impl Source {
-    fn new((array, means, columns): SlotOf) -> PyResult<Self> {
-        require(!columns.is_empty(), "columns")?;
-        Ok(Self { array, means, columns })
+    fn new(slot: SlotOf) -> PyResult<Self> {
+        match slot {
+            SlotOf::Name(name) if name == "fields" => Ok(Self::Fields),
+            SlotOf::Name(name) => {
+                require(name == "position", "a coefficient of no kernel")?;
+                Ok(Self::Position)
+            }
+            SlotOf::Data(array, means, columns) => {
+                require(!columns.is_empty(), "columns")?;
+                Ok(Self::Data { array, means, columns })
+            }
+        }
     }
 
-    fn data<'a>(
-        &self,
-        location: &Location,
-        data: &'a [Read2<f64>],
-    ) -> PyResult<ArrayView2<'a, f64>> {
-        let Some(data) = data.get(self.array) else {
-            return Err(PyRuntimeError::new_err("internal: kernels of other data"));
-        };
-        let data: ArrayView2<f64> = data.as_array();
-        check_data(location, &data, &self.columns)?;
-        Ok(data)
+    /// Number of packed coefficients; `fields` of the fields.
+    fn len(&self, fields: usize) -> usize {
+        match self {
+            Self::Fields => fields,
+            Self::Position => DIM,
+            Self::Data { columns, .. } => columns.len(),
+        }
     }
 
     fn at_points<'a>(
@@ -82,18 +96,42 @@ impl Source {
         location: &Location,
         data: &'a [Read2<f64>],
     ) -> PyResult<PointSlot<'a>> {
-        let data = self.data(location, data)?;
-        Ok(if self.means {
-            PointSlot::Means(&self.columns, data)
-        } else {
-            PointSlot::Data(&self.columns, data)
+        Ok(match self {
+            Self::Fields => PointSlot::Fields,
+            Self::Position => PointSlot::Position,
+            Self::Data { array, means: true, columns } => {
+                PointSlot::Means(columns, array_of(*array, columns, location, data)?)
+            }
+            Self::Data { array, columns, .. } => {
+                PointSlot::Data(columns, array_of(*array, columns, location, data)?)
+            }
         })
     }
 
     fn on_cells<'a>(&'a self, location: &Location, data: &'a [Read2<f64>]) -> PyResult<Slot<'a>> {
-        require(self.means, "an integral over cells that reads particles")?;
-        Ok(Slot::Means(&self.columns, self.data(location, data)?))
+        match self {
+            Self::Fields => Ok(Slot::Fields),
+            Self::Data { array, means: true, columns } => {
+                Ok(Slot::Means(columns, array_of(*array, columns, location, data)?))
+            }
+            _ => Err(PyRuntimeError::new_err("internal: an integral over cells at particles")),
+        }
     }
+}
+
+/// One of the arrays of particle data, with these columns.
+fn array_of<'a>(
+    array: usize,
+    columns: &[usize],
+    location: &Location,
+    data: &'a [Read2<f64>],
+) -> PyResult<ArrayView2<'a, f64>> {
+    let Some(data) = data.get(array) else {
+        return Err(PyRuntimeError::new_err("internal: kernels of other data"));
+    };
+    let data: ArrayView2<f64> = data.as_array();
+    check_data(location, &data, columns)?;
+    Ok(data)
 }
 
 #[pymethods]
@@ -101,20 +139,19 @@ impl PyKernels {
     #[new]
     fn new(assembler: &PyAssembler, rank: usize, kernels: Vec<KernelOf>) -> PyResult<Self> {
         let (cells, dofs) = (&assembler.cells, assembler.cells.dofs());
-        let plan = |(owner, address, its_rank, width, slots, constants, point): KernelOf| {
+        let plan = |kernel: KernelOf| {
+            let (owner, address, its_rank, width, slots, constants, reads_position, point) = kernel;
             require(address != 0 && its_rank == rank, "a kernel of another rank")?;
             let point = point.map(|point| entries(point, rank, cells)).transpose()?;
             let fields = point.as_ref().map_or(dofs, |(_, entries)| entries.num_fields());
-            let source = |slot: Option<SlotOf>| slot.map(Source::new).transpose();
-            let slots: Vec<_> = slots.into_iter().map(source).collect::<PyResult<_>>()?;
-            let packed: usize =
-                slots.iter().map(|s| s.as_ref().map_or(fields, |s| s.columns.len())).sum();
+            let slots: Vec<_> = slots.into_iter().map(Source::new).collect::<PyResult<_>>()?;
+            let packed: usize = slots.iter().map(|slot| slot.len(fields)).sum();
             require(packed == width, "a kernel of other coefficients")?;
             // SAFETY: the address is that of an FFCx kernel, which its owner keeps loaded. Rank and
             // number of coefficients are checked against what the caller says of it.
             let tabulate =
                 unsafe { std::mem::transmute::<*const (), TabulateTensor>(address as *const ()) };
-            Ok(Plan { _owner: owner, tabulate, slots, constants, point })
+            Ok(Plan { _owner: owner, tabulate, slots, constants, reads_position, point })
         };
         let plans = kernels.into_iter().map(plan).collect::<PyResult<_>>()?;
         Ok(Self { plans, rank, dofs })
@@ -160,20 +197,15 @@ impl PyKernels {
             let (tabulate, constants) = (plan.tabulate, plan.constants.as_slice());
             let mut kernels = Kernels::default();
             if let Some((place, entries)) = &plan.point {
-                let slot = |source: &'a Option<Source>| match source {
-                    None => Ok(PointSlot::Fields),
-                    Some(source) => source.at_points(location, data),
-                };
+                let slot = |source: &'a Source| source.at_points(location, data);
                 let slots = plan.slots.iter().map(slot).collect::<PyResult<_>>()?;
                 let place = *place;
                 kernels.points.push(PointKernel { tabulate, place, entries, slots, constants });
             } else {
-                let slot = |source: &'a Option<Source>| match source {
-                    None => Ok(Slot::Fields),
-                    Some(source) => source.on_cells(location, data),
-                };
+                let slot = |source: &'a Source| source.on_cells(location, data);
                 let slots = plan.slots.iter().map(slot).collect::<PyResult<_>>()?;
-                kernels.cells.push(Kernel { tabulate, slots, constants });
+                let reads_position = plan.reads_position;
+                kernels.cells.push(Kernel { tabulate, slots, constants, reads_position });
             }
             Ok(kernels)
         };

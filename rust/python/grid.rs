@@ -21,8 +21,9 @@ pub(super) struct PyGrid(pub(super) Grid);
 #[pymethods]
 impl PyGrid {
     #[new]
-    fn new(origin: Point, h: f64, cells: Index) -> PyResult<Self> {
-        Ok(Self(Grid::new(origin, h, cells)?))
+    #[pyo3(signature = (origin, h, cells, geometry = "plane_strain"))]
+    fn new(origin: Point, h: f64, cells: Index, geometry: &str) -> PyResult<Self> {
+        Ok(Self(Grid::new(origin, h, cells)?.with(geometry.parse()?)?))
     }
 
     /// Cells of points [m] and positions in them.

@@ -11,9 +11,8 @@ use super::threads::detached;
 use super::{require, InputError};
 use crate::particles::stage::check_materials;
 use crate::particles::{Particles, Role, Values, GRADIENT};
-use crate::space::{self, COMPONENTS, DIM};
-use crate::tensor::hencky::logarithmic;
-use crate::tensor::matrix::matrix;
+use crate::space::{Geometry, COMPONENTS, DIM};
+use crate::tensor::Gradient;
 
 /// Most columns of an array of a time integration.
 const MAX_WIDTH: usize = 64;
@@ -60,27 +59,30 @@ fn optional<'py>(
     column(particles, place)
 }
 
-/// Logarithmic strains of displacement gradients, one after the other.
+/// Logarithmic strains of displacement gradients of some width, one after the other.
 fn logarithmic_rows<'py>(
     py: Python<'py>,
     gradients: &[f64],
+    width: usize,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let rows: Vec<_> = detached(py, || {
-        let gradients = gradients.par_chunks_exact(space::GRADIENT);
-        gradients.map(|h| logarithmic(&matrix(h))).collect()
+        let gradients = gradients.par_chunks_exact(width);
+        gradients.map(|h| Gradient::of_rows(h).logarithmic()).collect()
     });
     rows.as_flattened().to_pyarray(py).reshape([rows.len(), COMPONENTS])
 }
 
-/// Logarithmic strains (shear as eps_xy) of displacement gradients, rows xx, xy, yx, yy.
+/// Logarithmic strains (shear as eps_xy) of displacement gradients, row by row 2 x 2, or 3 x 3 in axisymmetry.
 #[pyfunction]
 pub(super) fn logarithmic_strain<'py>(
     py: Python<'py>,
     gradients: Read2<f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let gradients = gradients.as_array();
-    require(gradients.ncols() == space::GRADIENT, "gradients of another space")?;
-    logarithmic_rows(py, gradients.as_standard_layout().as_slice().unwrap_or_default())
+    let width = gradients.ncols();
+    let known = [Geometry::PlaneStrain, Geometry::Axisymmetric].map(Geometry::tensor);
+    require(known.contains(&width), "gradients of another space")?;
+    logarithmic_rows(py, gradients.as_standard_layout().as_slice().unwrap_or_default(), width)
 }
 
 #[pymethods]
@@ -194,8 +196,10 @@ impl PyParticles {
     }
 
     /// Add what the strain since the start follows from.
-    fn add_strain(&mut self, finite: bool) {
-        self.0.add_strain(finite);
+    #[pyo3(signature = (finite, geometry = "plane_strain"))]
+    fn add_strain(&mut self, finite: bool, geometry: &str) -> PyResult<()> {
+        self.0.add_strain(finite, geometry.parse()?);
+        Ok(())
     }
 
     /// Name of each array, and bytes that one particle takes in it.
@@ -253,7 +257,9 @@ impl PyParticles {
         match (small, gradient) {
             (Some(place), _) => read_only(slf, place),
             (None, Some(place)) => {
-                Ok(logarithmic_rows(slf.py(), slf.try_borrow()?.0.reals(place))?.into_any())
+                let particles = &slf.try_borrow()?.0;
+                let (h, n) = (particles.reals(place), particles.len());
+                Ok(logarithmic_rows(slf.py(), h, (h.len() / n.max(1)).max(1))?.into_any())
             }
             (None, None) => Err(InputError::new_err("internal: particles without a scene")),
         }
@@ -267,7 +273,9 @@ impl PyParticles {
              scene.particles.strain, or Scene(..., form='u_epsv_finite')"
                 .to_owned()
         })?;
-        view.call_method1("reshape", (slf.try_borrow()?.0.len(), DIM, DIM))
+        let columns: usize = view.getattr("shape")?.get_item(1)?.extract()?;
+        let rows = (1..columns).find(|rows| rows * rows == columns).unwrap_or(1);
+        view.call_method1("reshape", (slf.try_borrow()?.0.len(), rows, rows))
     }
 
     #[getter]

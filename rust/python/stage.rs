@@ -64,12 +64,13 @@ impl PyRequests {
 
 impl PyRequests {
     /// Check that the requests belong to particles with `finite` strains and to arrays of these columns.
-    fn check(&self, particles: usize, finite: bool, columns: &[usize]) -> PyResult<()> {
+    fn check(&self, location: &Location, finite: bool, columns: &[usize]) -> PyResult<()> {
+        let (particles, geometry) = (location.len(), location.grid.geometry);
         require(self.finite.is_none_or(|mine| mine == finite), "requests of other strains")?;
         require(self.arrays.len() == columns.len(), "requests of other arrays")?;
         for (requests, &columns) in self.arrays.iter().zip(columns) {
             let fits = |request: &Request| {
-                request.column <= columns && request.width() <= columns - request.column
+                request.column <= columns && request.width(geometry) <= columns - request.column
             };
             require(requests.iter().all(fits), "a request reaches outside the particle data")?;
             let mut factors = requests.iter().flat_map(|request| &request.factor);
@@ -201,7 +202,7 @@ impl PyStage {
         let particles = self.particles.try_borrow(py)?;
         let particles = &particles.0;
         let columns: Vec<usize> = data.iter().map(|data| data.as_array().ncols()).collect();
-        requests.check(particles.len(), self.finite, &columns)?;
+        requests.check(&self.location, self.finite, &columns)?;
         let rows = data.iter().all(|data| data.as_array().nrows() == particles.len());
         require(rows, "data of other particles")?;
         let mut outputs = Vec::with_capacity(data.len());

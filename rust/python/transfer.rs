@@ -4,13 +4,15 @@ use ndarray::ArrayView2;
 use numpy::{PyArray2, PyArrayMethods, ToPyArray};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use rayon::prelude::*;
 
 use super::array::{Read1, Read2, Write2};
 use super::grid::PyLocation;
 use super::require;
 use super::threads::detached;
 use crate::grid::{Basis, Functions, Grid, Location, Rule, MAX_POINTS};
-use crate::space::{Index, DIM, GRADIENT};
+use crate::particles::kinematics::gradient;
+use crate::space::{Index, DIM};
 use crate::transfer::cells::{cell_sums as sums_of_cells, mean_of_cell};
 use crate::transfer::densities::{pack, Densities};
 use crate::transfer::to_grid::nodal_sums as sums_of_functions;
@@ -51,7 +53,8 @@ pub(super) fn interpolate<'py>(
     values.to_pyarray(py).reshape([location.len(), components])
 }
 
-/// Gradients of a displacement at points (xx, xy, yx, yy: d u_x/dx, d u_x/dy, ...): points x 4.
+/// Gradients of a displacement at points, row by row (d u_x/dx, d u_x/dy, ...): points x 4. In axisymmetry
+/// the tensor has a third row with the hoop strain: points x 9.
 #[pyfunction]
 pub(super) fn gradients<'py>(
     py: Python<'py>,
@@ -61,8 +64,15 @@ pub(super) fn gradients<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let location = &*location.0;
     let u = field::<DIM>(location.grid, basis.parse()?, &coefficients)?;
-    let gradients = detached(py, || u.gradients(location));
-    gradients.as_flattened().as_flattened().to_pyarray(py).reshape([location.len(), GRADIENT])
+    let geometry = location.grid.geometry;
+    let width = geometry.tensor();
+    let mut gradients = vec![0.0; location.len() * width];
+    detached(py, || {
+        gradients.par_chunks_exact_mut(width).enumerate().for_each(|(p, row)| {
+            gradient(&u, location.cell_of(p), location.xi[p]).write(geometry, row);
+        });
+    });
+    gradients.to_pyarray(py).reshape([location.len(), width])
 }
 
 /// Points per axis of a tensor rule with these points; 0 for means over cells, which have no points.

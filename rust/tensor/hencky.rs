@@ -11,11 +11,10 @@
 //! strains (Simo and Hughes 1998, chapter 9).
 
 use super::matrix::{
-    det_minus_one, diagonal, eigen, flat, inverse, multiply, rotated, trace, transposed, unit_plus,
-    Matrix,
+    det_minus_one, diagonal, eigen, flat, inverse, multiply, rotated, transposed, unit_plus, Matrix,
 };
-use super::symmetric::{deviator, dot, in_space, symmetric_part, Sym};
-use super::{Moduli, Strain, Stress};
+use super::symmetric::{deviator, dot, in_space, Sym};
+use super::{Gradient, Moduli, Strain, Stress, MAX_GRADIENT};
 use crate::space::GRADIENT;
 
 /// Trial state of a particle in a step.
@@ -25,8 +24,9 @@ pub struct Trial {
     pub strain: Strain,
     /// ln J_f.
     pub ln_j: f64,
-    /// Inverse of f, in the plane.
+    /// Inverse of f, in the plane and in the hoop direction.
     inverse: Matrix,
+    inverse_hoop: f64,
     /// Isochoric part of be_trial, in the plane.
     be: Matrix,
     /// Eigenvectors of `be` (columns) and divided differences of ln/2 at its eigenvalues.
@@ -51,32 +51,23 @@ fn be_of(deviator: &Sym) -> Matrix {
     rotated(&diagonal(b), &v)
 }
 
-/// Logarithmic strain `1/2 ln(F F^T)` of a displacement gradient `h = F - I`, the shear as eps_xy. It keeps
-/// its digits where h is small.
-#[must_use]
-pub fn logarithmic(h: &Matrix) -> Sym {
-    let square = multiply(h, &transposed(h));
-    let stretch: Matrix =
-        std::array::from_fn(|i| std::array::from_fn(|j| h[i][j] + h[j][i] + square[i][j]));
-    let (lambda, vectors) = eigen(&stretch);
-    symmetric_part(&rotated(&diagonal(lambda.map(|l| 0.5 * l.ln_1p())), &vectors))
-}
-
 impl Trial {
     /// Trial state from the gradient of the displacement increment and the elastic strain before it.
     ///
     /// The volume changes by `volume`, or by ln J_f where the form has no field for it. `None` if f is not
     /// invertible or turns the particle inside out.
     #[must_use]
-    pub fn new(g: &Matrix, volume: Option<f64>, old: &Strain) -> Option<Self> {
-        let f = unit_plus(g);
-        let change = det_minus_one(g);
+    pub fn new(g: &Gradient, volume: Option<f64>, old: &Strain) -> Option<Self> {
+        let f = unit_plus(&g.in_space);
+        let (change, hoop) = (det_minus_one(&g.in_space), 1.0 + g.hoop);
         let j = 1.0 + change;
-        if !j.is_finite() || j <= 0.0 {
+        let finite = (j * hoop).is_finite();
+        if !finite || j <= 0.0 || hoop <= 0.0 {
             return None;
         }
-        let ln_j = change.ln_1p();
-        let inverse = inverse(&f, j);
+        let ln_hoop = if g.hoop == 0.0 { 0.0 } else { g.hoop.ln_1p() };
+        let ln_j = change.ln_1p() + ln_hoop;
+        let (inverse, inverse_hoop) = (inverse(&f, j), 1.0 / hoop);
         let isochoric = (-2.0 / 3.0 * ln_j).exp();
         let pushed = rotated(&be_of(&old.deviator), &f);
         let be = pushed.map(|row| row.map(|b| b * isochoric));
@@ -88,31 +79,42 @@ impl Trial {
         let split = 0.5 * ln_1p_over((lambda[0] - lambda[1]) / lambda[1]) / lambda[1];
         let theta = [[0.5 / lambda[0], split], [split, 0.5 / lambda[1]]];
         let log = rotated(&diagonal(e), &vectors);
-        let zz = old.deviator[2] - ln_j / 3.0;
+        let zz = old.deviator[2] + ln_hoop - ln_j / 3.0;
         // det be = 1: the trace is round-off, and the deviator removes it
         let strain = Strain {
             deviator: deviator(&[log[0][0], log[1][1], zz, 2.0 * log[0][1]]),
             volume: old.volume + volume.unwrap_or(ln_j),
         };
-        Some(Self { strain, ln_j, inverse, be, vectors, theta })
+        Some(Self { strain, ln_j, inverse, inverse_hoop, be, vectors, theta })
     }
 
-    /// `P = tau f^-T` (xx, xy, yx, yy), conjugate to grad w on the grid at the start of the step.
+    /// `P = tau f^-T` (xx, xy, yx, yy, zz), conjugate to grad w on the grid at the start of the step.
     #[must_use]
-    pub fn nominal(&self, tau: &Stress) -> [f64; GRADIENT] {
+    pub fn nominal(&self, tau: &Stress) -> [f64; MAX_GRADIENT] {
         let t = in_space(&tau.deviator, tau.mean);
-        flat(&multiply(&t, &transposed(&self.inverse)))
+        let hoop = (tau.deviator[2] + tau.mean) * self.inverse_hoop;
+        with_hoop(&multiply(&t, &transposed(&self.inverse)), hoop)
     }
 
-    /// Derivative of ln J_f with respect to grad u (xx, xy, yx, yy): f^-T.
+    /// Derivative of ln J_f with respect to grad u (xx, xy, yx, yy, zz): f^-T.
     #[must_use]
-    pub fn ln_j_gradient(&self) -> [f64; GRADIENT] {
-        flat(&transposed(&self.inverse))
+    pub fn ln_j_gradient(&self) -> [f64; MAX_GRADIENT] {
+        with_hoop(&transposed(&self.inverse), self.inverse_hoop)
+    }
+
+    /// `dl = dg f^-1`, the change of f with a change `dg` of grad u, seen from the end of the step.
+    fn turned(&self, dg: &Gradient) -> Gradient {
+        Gradient {
+            in_space: multiply(&dg.in_space, &self.inverse),
+            hoop: dg.hoop * self.inverse_hoop,
+        }
     }
 
     /// Change of the deviator of the elastic strain with a change `dl = dg f^-1`.
-    fn strain_change(&self, dl: &Matrix) -> Sym {
-        let third = trace(dl) / 3.0;
+    fn strain_change(&self, dl: &Gradient) -> Sym {
+        let third = dl.trace() / 3.0;
+        let zz = dl.hoop - third;
+        let dl = &dl.in_space;
         let iso = [[dl[0][0] - third, dl[0][1]], [dl[1][0], dl[1][1] - third]];
         let half = multiply(&iso, &self.be);
         let db = [
@@ -124,14 +126,14 @@ impl Trial {
         let scaled: Matrix =
             std::array::from_fn(|i| std::array::from_fn(|j| self.theta[i][j] * turned[i][j]));
         let de = rotated(&scaled, &self.vectors);
-        [de[0][0], de[1][1], -third, 2.0 * de[0][1]]
+        [de[0][0], de[1][1], zz, 2.0 * de[0][1]]
     }
 
     /// Change of a number with a change `dg` of grad u, from its derivative with respect to the deviatoric
     /// strain.
     #[must_use]
-    pub fn change(&self, slope: &Sym, dg: &Matrix) -> f64 {
-        dot(slope, &self.strain_change(&multiply(dg, &self.inverse)))
+    pub fn change(&self, slope: &Sym, dg: &Gradient) -> f64 {
+        dot(slope, &self.strain_change(&self.turned(dg)))
     }
 
     /// Change of P with a change `dg` of grad u and a change `dv` of the volume.
@@ -140,23 +142,31 @@ impl Trial {
         &self,
         tau: &Stress,
         c: &Moduli,
-        dg: &Matrix,
+        dg: &Gradient,
         dv: f64,
-    ) -> [f64; GRADIENT] {
-        let dl = multiply(dg, &self.inverse);
+    ) -> [f64; MAX_GRADIENT] {
+        let dl = self.turned(dg);
         let strain = self.strain_change(&dl);
         let ds: Sym = std::array::from_fn(|k| dot(&c.dev_dev[k], &strain) + c.dev_vol[k] * dv);
-        let dt = in_space(&ds, dot(&c.mean_dev, &strain) + c.mean_vol * dv);
-        let t = in_space(&tau.deviator, tau.mean);
+        let dm = dot(&c.mean_dev, &strain) + c.mean_vol * dv;
+        let (dt, t) = (in_space(&ds, dm), in_space(&tau.deviator, tau.mean));
         // d(tau f^-T) = d tau f^-T - tau dl^T f^-T
-        let turn = multiply(&t, &transposed(&dl));
+        let turn = multiply(&t, &transposed(&dl.in_space));
         let sum: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| dt[i][j] - turn[i][j]));
-        flat(&multiply(&sum, &transposed(&self.inverse)))
+        let hoop = ds[2] + dm - (tau.deviator[2] + tau.mean) * dl.hoop;
+        with_hoop(&multiply(&sum, &transposed(&self.inverse)), hoop * self.inverse_hoop)
     }
 
     /// Change of ln J_f with a change `dg` of grad u.
     #[must_use]
-    pub fn volume_change(&self, dg: &Matrix) -> f64 {
-        trace(&multiply(dg, &self.inverse))
+    pub fn volume_change(&self, dg: &Gradient) -> f64 {
+        self.turned(dg).trace()
     }
+}
+
+/// Components of a tensor row by row, then the component zz.
+fn with_hoop(in_space: &Matrix, hoop: f64) -> [f64; MAX_GRADIENT] {
+    let mut out = [hoop; MAX_GRADIENT];
+    out[..GRADIENT].copy_from_slice(&flat(in_space));
+    out
 }

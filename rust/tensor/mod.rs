@@ -5,17 +5,19 @@
 //! engineering shear `gamma_xy = 2 eps_xy`. Then `stress . strain` is the work, and a tangent
 //! `C[i][j] = d stress_i / d strain_j` is symmetric where the material has a potential.
 //! Symmetric tensors in space keep the order without zz: **xx, yy, xy**. Gradients have the order
-//! **xx, xy, yx, yy**: d u_x/dx, d u_x/dy, and so on.
+//! **xx, xy, yx, yy**: d u_x/dx, d u_x/dy, and so on. In axisymmetry x is the radius and zz the hoop
+//! direction, whose component is last in both.
 
+mod gradient;
 pub mod hencky;
 pub mod matrix;
 mod parts;
 mod principal;
 mod symmetric;
 
+pub use gradient::{Gradient, MAX_GRADIENT};
 pub use matrix::Matrix;
 pub use parts::{AtMean, Moduli, Strain, Stress};
 pub(crate) use principal::Principal;
-pub(crate) use symmetric::symmetric_part;
-pub use symmetric::{deviator, dot, mean, trace, Sym, Tangent, IN_SPACE, UNIT};
-pub(crate) use symmetric::{deviatoric_stiffness, norm, small_strain, UNIT_DEVIATORS};
+pub use symmetric::{deviator, dot, mean, trace, Sym, Tangent, MAX_STRAINS, STRAINS, UNIT};
+pub(crate) use symmetric::{deviatoric_stiffness, norm, UNIT_DEVIATORS};

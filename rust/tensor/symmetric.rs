@@ -1,6 +1,6 @@
 //! Symmetric tensors as rows of components; for their order see [`super`].
 
-use super::{Matrix, Strain};
+use super::Matrix;
 use crate::space::{COMPONENTS, SYMMETRIC};
 
 /// Stress [Pa] (xx, yy, zz, xy) or strain (xx, yy, zz, gamma_xy).
@@ -12,14 +12,18 @@ pub type Tangent = [[f64; COMPONENTS]; COMPONENTS];
 /// Unit tensor.
 pub const UNIT: Sym = [1.0, 1.0, 1.0, 0.0];
 
-/// Positions of the components in space (xx, yy, xy) in a [`Sym`].
-pub const IN_SPACE: [usize; SYMMETRIC] = [0, 1, 3];
+/// Most components of a strain that follows from a displacement: those in space, and the hoop strain.
+pub const MAX_STRAINS: usize = SYMMETRIC + 1;
 
-/// Deviators of the unit strains in space: xx, yy and gamma_xy.
-pub(crate) const UNIT_DEVIATORS: [Sym; SYMMETRIC] = [
+/// Positions of these components (xx, yy, xy, and in axisymmetry zz) in a [`Sym`].
+pub const STRAINS: [usize; MAX_STRAINS] = [0, 1, 3, 2];
+
+/// Deviators of the unit strains xx, yy, gamma_xy and zz.
+pub(crate) const UNIT_DEVIATORS: [Sym; MAX_STRAINS] = [
     [2.0 / 3.0, -1.0 / 3.0, -1.0 / 3.0, 0.0],
     [-1.0 / 3.0, 2.0 / 3.0, -1.0 / 3.0, 0.0],
     [0.0, 0.0, 0.0, 1.0],
+    [-1.0 / 3.0, -1.0 / 3.0, 2.0 / 3.0, 0.0],
 ];
 
 /// Sum of the products of the components: the work of a stress on a strain.
@@ -57,16 +61,9 @@ pub(crate) fn deviatoric_stiffness(mu: f64) -> Sym {
     [2.0 * mu, 2.0 * mu, 2.0 * mu, mu]
 }
 
-/// Small strain of a displacement gradient.
-pub(crate) fn small_strain(g: &Matrix) -> Strain {
-    let volume = g[0][0] + g[1][1];
-    let third = volume / 3.0;
-    Strain { deviator: [g[0][0] - third, g[1][1] - third, -third, g[0][1] + g[1][0]], volume }
-}
-
-/// Symmetric part of a displacement gradient, the shear as eps_xy.
-pub(crate) fn symmetric_part(g: &Matrix) -> Sym {
-    [g[0][0], g[1][1], 0.0, 0.5 * (g[0][1] + g[1][0])]
+/// Symmetric part of a tensor with a component zz, the shear as eps_xy.
+pub(crate) fn symmetric_part(g: &Matrix, zz: f64) -> Sym {
+    [g[0][0], g[1][1], zz, 0.5 * (g[0][1] + g[1][0])]
 }
 
 /// Stress in space from its deviator and its mean.

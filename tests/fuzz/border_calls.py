@@ -52,7 +52,7 @@ class Sample:
         self.rows = np.arange(len(self.location.active), dtype=np.uint32)
         self.packed = np.zeros((len(self.rows), 12))
         self.few = np.array([0, 2], dtype=np.uint32)
-        self.given = (np.zeros(4 * N), np.zeros(16 * N), np.zeros(N))
+        self.given = (np.zeros(4 * N), np.zeros(16 * N), np.zeros(N), np.zeros(N), np.zeros(0))
         self.wanted = [[("sigma", "value", 0, None), ("sigma_m", "value", 3, np.ones(N))]]
         self.requests = _rust.Requests(self.wanted)
         self.none = [_rust.Kernels(self.assembler, rank, []) for rank in (1, 2)]
@@ -84,6 +84,7 @@ CALLS: dict[str, Callable[[Sample], tuple[Any, ...]]] = {
     "Material.linear_elastic_e_one_minus_2nu": lambda s: (
         _rust.Material.linear_elastic_e_one_minus_2nu, 1.0, 0.3,
     ),
+    "Material.external": lambda s: (_rust.Material.external, "law", (2.0, 1.0), ["a"]),
     "Material.of": lambda s: (_rust.Material.of, "von_mises", (1.0, 0.3), [1.0, 0.0]),
     "Assembler": lambda s: (_rust.Assembler, s.location, FIELDS, NODES, TERMS),
     "Assembler.vector": lambda s: (s.assembler.vector, s.none[0], [s.data], s.volume, s.all),

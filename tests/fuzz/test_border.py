@@ -193,7 +193,7 @@ def test_positions_may_be_a_view_of_those_of_the_particles():
 def test_the_stress_of_a_law_may_be_a_view_of_that_of_the_particles():
     s = Sample()
     s.particles.stress[:] = np.arange(4.0 * N).reshape(N, 4)
-    s.stage.commit(s.u, s.v, (s.particles.stress.ravel(), np.zeros(16 * N), np.zeros(N)))
+    s.stage.commit(s.u, s.v, (s.particles.stress.ravel(), *s.given[1:]))
     np.testing.assert_allclose(s.particles.stress.ravel(), np.arange(4.0 * N), atol=1e-12)
 
 

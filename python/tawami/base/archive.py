@@ -104,19 +104,19 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     return identity, state
 
 
-def particles(path: Path) -> dict[str, Any]:
-    """Arrays of the particles in a checkpoint, by name, each particles x components.
+def particles(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Identity of a checkpoint, and arrays of its particles by name, each particles x components.
 
     Raises:
         CheckpointError: As :func:`read`, or its content is not that of a checkpoint.
     """
-    _, state = read(path)
+    identity, state = read(path)
     try:
         arrays: dict[str, Any] = state["scene"]["particles"]
         check_particles(arrays)
     except (LookupError, TypeError, ValueError) as error:
         raise unusable(path, error) from error
-    return arrays
+    return identity, arrays
 
 
 def unusable(path: Path | None, error: Exception) -> CheckpointError:

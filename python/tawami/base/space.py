@@ -87,9 +87,30 @@ class Space:
         """Tensors, n x dim x dim, of their components in one array, as :meth:`vectors`."""
         return components.reshape(-1, self.dim, self.dim)
 
+    def gradients(self, components: Array) -> Array:
+        """Gradients of displacements, n x rows x rows: the hoop direction has a row too."""
+        rows = self.dim + self.hoop
+        return components.reshape(-1, rows, rows)
+
     def unit(self, unit: str) -> str:
-        """Unit of an extensive quantity per metre depth: 'N per m'."""
+        """Unit of an extensive quantity, per metre depth or of the whole body: 'N per m', 'N'."""
         return unit + self.depth
+
+    def short(self, unit: str) -> str:
+        """The same in short: 'N/m', 'N'."""
+        return unit + self.depth.replace(" per ", "/")
+
+    def thickness(self, x: Array) -> Array:
+        """Volume per area of the plane at positions x, n x dim: 1, or 2 pi r, r the radius [m]."""
+        return 2 * np.pi * x[:, 0] if self.hoop else np.ones(len(x))
+
+    def resultant(self, vector: Array) -> Array:
+        """A sum of vectors over the body; those along a radius cancel."""
+        return vector * [0.0 if self.hoop and axis == 0 else 1.0 for axis in range(self.dim)]
+
+    def in_space(self, gradients: Array) -> Array:
+        """Gradients, n x rows x rows, without the hoop direction: n x dim x dim."""
+        return gradients[:, : self.dim, : self.dim]
 
     def axis(self, component: str) -> int:
         """Number of the axis with that name.

@@ -11,6 +11,7 @@ UNITS: dict[str, dict[str, float]] = {
     "m": {"m": 1.0, "km": 1e3, "dm": 1e-1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6},
     "m/s": {"m/s": 1.0, "km/s": 1e3, "cm/s": 1e-2, "mm/s": 1e-3},
     "m2 per m": {"m2 per m": 1.0, "m2": 1.0, "cm2": 1e-4, "mm2": 1e-6},
+    "m3": {"m3": 1.0, "dm3": 1e-3, "cm3": 1e-6, "mm3": 1e-9},
     "-": {"-": 1.0, "%": 1e-2, "1": 1.0},
 }  # fmt: skip
 #: Other ways of writing a unit.

@@ -33,7 +33,8 @@ def disc(
     per_axis: int = PER_AXIS,
     gauss: bool = False,
 ) -> Body:
-    """A disc, or a ring, filled with particles.
+    """A disc, or a ring, filled with particles; a sphere, or a spherical shell, where its centre is on
+    the axis of an axisymmetric grid.
 
     A full cell gets `per_axis` x `per_axis` particles. A cut cell gets at most 28, which integrate
     exactly over its part of the disc up to degree 6. Area and first moments are those of the circle to
@@ -62,6 +63,8 @@ def disc(
     middle, r = grid.in_cells(np.array([x, y])), radius / grid.h
     ends = np.array([middle - r, middle + r])
     margin = clipping.tolerance(ends)
+    if grid.on_axis and x == 0:
+        ends[:, 0] = np.maximum(ends[:, 0], 0.0)  # the half on the right of the axis
     if (ends < -margin).any() or (ends > np.add(grid.cells, margin)).any():
         raise InputError(
             f"disc: the circle around ({x:g}, {y:g}) m with a radius of {radius:g} m leaves the grid, "
@@ -106,10 +109,15 @@ def _circle(grid: Grid, middle: Array, r: float, chords: int) -> tuple[Array, Po
 
 
 def _caps(grid: Grid, middle: Array, r: float, ends: Array) -> Points:
-    """Points that integrate over the caps of a circle; `ends` are the angles of the ends of the arcs."""
+    """Points that integrate over the caps of a circle right of x = 0; `ends` are the angles of the ends
+    of the arcs.
+    """
     (t, wt), (s, ws) = _rust.gauss(ALONG), _rust.gauss(ACROSS)
     span = np.diff(ends)
-    large = np.flatnonzero(span**3 > ROUND_OFF * 1e-2)  # smaller caps are round-off of r^2
+    right = middle[0] + r * np.cos(ends[:-1] + span / 2) > 0
+    large = np.flatnonzero(
+        right & (span**3 > ROUND_OFF * 1e-2)
+    )  # smaller caps are round-off of r^2
     begin, span = ends[large, None], span[large, None]
 
     def at(angle: Array) -> Array:

@@ -118,7 +118,7 @@ def level_set(
             f"{grid.h / samples:g} m apart, so the body has no particles: expected f < 0 inside the "
             "body; change its sign, move it into the grid, or use more samples"
         )
-    _check_ends(signs, ended)
+    _check_ends(signs, [*ended, "left"] if grid.on_axis else ended)
     corners = signs[:-1, :-1], signs[:-1, 1:], signs[1:, :-1], signs[1:, 1:]
     least, most = reduce(np.minimum, corners), reduce(np.maximum, corners)
     border = _grown(least != most)

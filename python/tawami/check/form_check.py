@@ -239,6 +239,21 @@ def _paths(form: Form, given: Settings) -> Found:
         yield _judged(error, ROUND_OFF, words)
 
 
+def _axisymmetry(form: Form, given: Settings) -> Found:
+    try:
+        scene = scenes.cloud(form, given, geometry="axisymmetric")
+    except FormError as reason:
+        yield "note", f"for plane strain only: {reason}"
+        return
+    yield _judged(scenes.tangent_error(scene), DIFFERENCES, "tangent, random particles")
+    yield _judged(scenes.axial_motion(form, given), ROUND_OFF, "forces of an axial translation")
+    error = scenes.stretched_ring(form, given)
+    if form.kinematics.volume_at_centre:
+        yield "note", f"B-bar finds a uniform stress of a ring up to {error:.1e}"
+    else:
+        yield _judged(error, UNIFORM, "error of the stress of a ring, border displaced")
+
+
 def _locking(form: Form, given: Settings) -> Found:
     if not _has_edge_term(form, given):
         yield "not tried", "it needs a term - dot(t, w) * ds"
@@ -275,6 +290,7 @@ CHECKS: tuple[tuple[str, Check, tuple[str, ...]], ...] = (
     ("dolfinx", _paths, ("kernels",)),
     ("patch test, displaced", _displaced, ("kernels", "tangent")),
     ("patch test, loaded", _compressed, ("kernels", "tangent")),
+    ("axisymmetry", _axisymmetry, ("kernels", "tangent")),
     ("stability", _stability, ("kernels", "tangent")),
     ("locking", _locking, ("kernels", "tangent", "patch test, loaded")),
 )

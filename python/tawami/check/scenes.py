@@ -22,7 +22,7 @@ from tawami.form.compilation import compile_form
 from tawami.form.form import Form
 from tawami.grid.basis import Basis
 from tawami.grid.edges import Component
-from tawami.grid.grid import EDGES, Grid
+from tawami.grid.grid import EDGES, Geometry, Grid
 from tawami.particles.laws import drucker_prager, linear_elastic, von_mises
 from tawami.scene.scene import Scene
 
@@ -39,10 +39,13 @@ RATIO = 1e4
 
 
 def grid_of(
-    cells: tuple[int, int], origin: tuple[float, float] = (0.0, 0.0), h: float = 0.5
+    cells: tuple[int, int],
+    origin: tuple[float, float] = (0.0, 0.0),
+    h: float = 0.5,
+    geometry: Geometry = "plane_strain",
 ) -> Grid:
     """A grid on this rank alone."""
-    return Grid(MPI.COMM_SELF, origin=origin, h=h, cells=cells)
+    return Grid(MPI.COMM_SELF, origin=origin, h=h, cells=cells, geometry=geometry)
 
 
 def soil(form: Form, given: Settings) -> Law:
@@ -58,10 +61,16 @@ def preserves_volume(form: Form, given: Settings) -> bool:
     return form.kinematics.has_mean_stress and not compiled.names("eps_p")
 
 
-def cloud(form: Form, given: Settings, law: Law | None = None, **options: Any) -> Scene:
+def cloud(
+    form: Form,
+    given: Settings,
+    law: Law | None = None,
+    geometry: Geometry = "plane_strain",
+    **options: Any,
+) -> Scene:
     """A scene of random particles of two materials."""
     random = np.random.default_rng(0)
-    grid = grid_of((4, 3))
+    grid = grid_of((4, 3), geometry=geometry)
     x = grid.h * np.array(grid.cells) * random.random((60, 2))
     body = Body(x, random.uniform(0.01, 0.1, len(x)))
     elastic = [linear_elastic(E=2.0, nu=0.3), linear_elastic(E=7.0, nu=0.45)]
@@ -122,6 +131,33 @@ def rigid_motion(form: Form, given: Settings) -> float:
     return max(map(force, rigid)) / force(0.3 * points)
 
 
+def axial_motion(form: Form, given: Settings) -> float:
+    """Largest force of a translation along the axis of axisymmetry, divided by that of a stretch."""
+    scene = cloud(form, given, geometry="axisymmetric")
+    points = scene.configuration.domain.layout.greville
+
+    def force(u: Array) -> float:
+        coefficients = np.zeros(scene.num_coefficients)
+        coefficients[: u.size] = u.ravel()
+        return float(np.abs(scene.residual(coefficients)).max())
+
+    return force(np.ones_like(points) * [0.0, 0.3]) / force(0.3 * points)
+
+
+def stretched_ring(form: Form, given: Settings) -> float:
+    """Largest error of the uniform stress of a ring with u_r = a r and u_z = b z on its border."""
+    grid = grid_of((4, 3), origin=(1.0, 0.0), geometry="axisymmetric")
+    body = box(grid, grid.origin, grid.upper, per_axis=3, gauss=True)
+    law = linear_elastic(K=K, mu=MU)
+    scene = Scene(grid, body, law, form=form, tolerance=1e-11, **given)
+    gradient = np.diag([-0.03, 0.01, -0.03])  # radial, axial, hoop
+    for edge in EDGES:
+        for axis, component in enumerate(COMPONENTS):
+            scene.fix(edge, component, _linear(gradient[axis]))
+    scene.solve()
+    return _error(scene, stress_of(form.strain.of_gradient(gradient)))
+
+
 def _filled(form: Form, given: Settings, basis: Basis = "quadratic_spline", rows: int = 3) -> Scene:
     """Four columns and some rows of cells, three rows filled with particles at Gauss points."""
     grid = grid_of((4, rows))
@@ -131,10 +167,10 @@ def _filled(form: Form, given: Settings, basis: Basis = "quadratic_spline", rows
 
 
 def stress_of(strain: Array) -> Array:
-    """Stress (xx, yy, zz, xy) of a (logarithmic) strain tensor in the plane."""
-    volume = np.trace(strain)
-    stress = K * volume + 2 * MU * (np.array([strain[0, 0], strain[1, 1], 0.0]) - volume / 3)
-    return np.append(stress, 2 * MU * strain[0, 1])
+    """Stress (xx, yy, zz, xy) of a (logarithmic) strain tensor in the plane or in space."""
+    strain, volume = np.pad(strain, (0, 3 - len(strain))), np.trace(strain)
+    stress = K * volume * np.eye(3) + 2 * MU * (strain - volume / 3 * np.eye(3))
+    return np.append(np.diagonal(stress), stress[0, 1])
 
 
 def _linear(slope: Array) -> Callable[[Array, Array], Array]:

@@ -120,12 +120,14 @@ class GhostPenalty:
         rows, cols, entries = [], [], []
         for here, there, names in sides(attached.active):
             shift = grid.h * np.array([*np.subtract(there, here), 0])
-            x = np.concatenate([vertices, vertices + shift]).ravel()
+            x = np.concatenate([vertices, vertices + shift])
+            if integral.reads_position:
+                x[:, : grid.space.dim] += grid.in_metres(np.array(here))
             facets = np.array([grid.rectangle.facet_of_edge(n) for n in names], dtype=np.int32)
             packed = means[grid.cell_numbers(np.array([here, there]))][:, columns].ravel()
             (c0, t0), (c1, t1) = (layout.on_cell(np.array(cell)) for cell in (here, there))
             element = np.zeros((2 * len(t0), 2 * len(t0)))
-            kernel(element, packed, constants, x, facets)
+            kernel(element, packed, constants, x.ravel(), facets)
             coefficients = np.concatenate([c0, c1])
             t = sp.block_diag([t0, t1]).toarray()
             rows.append(np.repeat(coefficients, len(coefficients)))

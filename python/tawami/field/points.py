@@ -69,10 +69,10 @@ class PointAssembly(Assembly):
     def _kernel(self, integral: Integral) -> tuple[Any, ...]:
         """An integral as `_rust.Kernels` reads it."""
         rules = list(self._compiled.densities)
-        slots: list[tuple[Any, ...] | None] = []
+        slots: list[tuple[Any, ...] | str] = []
         for slot in integral.slots:
-            if slot.source == "fields":
-                slots.append(None)
+            if slot.source in ("fields", "position"):
+                slots.append(slot.source)
                 continue
             assert slot.source != "traction"  # compilation rejects it in integrals over cells
             slots.append((rules.index(slot.data), slot.source == "mean", slot.columns))
@@ -81,8 +81,9 @@ class PointAssembly(Assembly):
         if integral.points is not None:
             place, entries = integral.points
             point = (place, entries.fields, entries.test, entries.trial)
+        reads_position = integral.reads_position
         code = kernel.module, kernel.address
-        return *code, integral.rank, integral.width, slots, constants, point
+        return *code, integral.rank, integral.width, slots, constants, reads_position, point
 
     def _kernels(self, rank: int, integrals: Sequence[Integral]) -> _rust.Kernels:
         return _rust.Kernels(self._assembler, rank, list(map(self._kernel, integrals)))

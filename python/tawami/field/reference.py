@@ -109,10 +109,9 @@ class ReferenceAssembly(Assembly):
             if slot.source == "fields":
                 packed[:, offset : offset + slot.width] = nodal[self._space.dofs[self._cells]]
             else:
-                assert slot.source != "traction"  # compilation rejects it in integrals over cells
-                rule = slot.source
+                rule = slot.data  # compilation rejects the traction in integrals over cells
                 _rust.densities(
-                    attached.location, attached.volume, data[slot.data], attached.points[rule],
+                    attached.location, attached.volume, data[rule], attached.points[rule],
                     rule == "vertex", attached.rows, list(slot.columns), offset, packed,
                 )  # fmt: skip
             offset += slot.width

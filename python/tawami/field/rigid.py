@@ -9,6 +9,7 @@ import numpy as np
 
 from tawami.base.arrays import Array, Mask
 from tawami.base.errors import SupportError
+from tawami.base.space import Space
 from tawami.field.constraints import PointHeld
 from tawami.field.layout import Layout
 
@@ -16,13 +17,19 @@ from tawami.field.layout import Layout
 FREE, ZERO = 1e-10, 1e-8
 
 
-def rigid_motions(points: Array) -> Array:
+def rigid_motions(points: Array, space: Space) -> Array:
     """Displacements at points (points x dim) of translations and of rotations about the origin.
+
+    In axisymmetry only the translation along the axis of rotation is rigid.
 
     Returns:
         Components x motions, where the components are those of one point after the other.
     """
     dim = points.shape[1]
+    if space.hoop:
+        along = np.zeros_like(points)
+        along[:, -1] = 1.0
+        return along.reshape(-1, 1)
     planes = list(combinations(range(dim), 2))
     motions = np.zeros((*points.shape, dim + len(planes)))
     for axis in range(dim):
@@ -47,7 +54,7 @@ def rigid_modes(layout: Layout, part: Mask) -> tuple[Array, Array, float]:
     mine = layout.greville[part[::dim]]
     centre = mine.mean(axis=0)
     length = float(np.ptp(mine, axis=0).max())
-    modes = rigid_motions(layout.greville - centre)
+    modes = rigid_motions(layout.greville - centre, layout.grid.space)
     modes[:, dim:] /= length
     return modes, centre, length
 
@@ -63,6 +70,7 @@ def check_rigid_motions(layout: Layout, fixed: Mask, points: Sequence[PointHeld]
     Raises:
         SupportError: A motion is free; the message names it.
     """
+    axes = layout.grid.space.axes
     for number in range(layout.num_parts):
         mine = layout.part == number
         modes, centre, length = rigid_modes(layout, mine)
@@ -73,6 +81,8 @@ def check_rigid_motions(layout: Layout, fixed: Mask, points: Sequence[PointHeld]
         free = vectors[singular < FREE * max(singular[0], 1e-300)]
         if not len(free):
             continue
+        hoop = layout.grid.space.hoop
+        names = [f"translation in {axes[-1]}"] if hoop else _names(free, centre, length)
         what = "the body"
         if layout.num_parts > 1:
             what = (
@@ -80,7 +90,7 @@ def check_rigid_motions(layout: Layout, fixed: Mask, points: Sequence[PointHeld]
                 f"function with the others ({layout.num_parts} parts),"
             )
         raise SupportError(
-            f"the supports leave {what} free to move: {', '.join(_names(free, centre, length))}. "
+            f"the supports leave {what} free to move: {', '.join(names)}. "
             "A static scene needs supports that prevent it: add scene.fix(...) or scene.hold(...)"
         )
 

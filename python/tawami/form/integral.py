@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import ufl
+from ufl.algorithms.analysis import has_type
+from ufl.classes import SpatialCoordinate
 
 from tawami.fem import kernels
 from tawami.fem.kernels import Kernel, Kind
@@ -24,12 +26,13 @@ class Slot:
     """One coefficient of a kernel, in packed order.
 
     Attributes:
-        source: 'fields' (the increments), 'traction', or the rule of particle densities.
+        source: 'fields' (the increments), 'traction', 'position' (x of a point), or the rule of particle
+            densities.
         width: Entries per cell.
         columns: Columns of the particle data (densities only).
     """
 
-    source: Literal["fields", "traction"] | Rule
+    source: Literal["fields", "traction", "position"] | Rule
     width: int
     columns: tuple[int, ...] = ()
 
@@ -38,6 +41,7 @@ class Slot:
         """The rule of its particle data (densities only)."""
         assert self.source != "fields"
         assert self.source != "traction"
+        assert self.source != "position"
         return self.source
 
 
@@ -51,6 +55,7 @@ class Integral:
         slots: Coefficients that the kernel reads.
         constants: Names of the constants that it reads.
         points: Place of its points and what its numbers stand for; None for an integral over cells.
+        reads_position: Whether an integral over cells reads the position x.
     """
 
     rank: int
@@ -58,6 +63,7 @@ class Integral:
     slots: tuple[Slot, ...]
     constants: tuple[str, ...]
     points: tuple[Rule, PointForm] | None = None
+    reads_position: bool = False
 
     @property
     def width(self) -> int:
@@ -99,7 +105,8 @@ class KernelBuilder:
             num_points = max(len(rule_points(rule)), 1)
             slots[vector] = Slot(rule, num_points * len(columns), columns)
         form = ufl.Form([without_line(part) for part in ufl.replace(form, packed).integrals()])
-        return self._compiled(form, slots, kind)
+        reads = any(has_type(part.integrand(), SpatialCoordinate) for part in form.integrals())
+        return replace(self._compiled(form, slots, kind), reads_position=reads)
 
     def at_points(self, form: Any, place: Rule) -> Integral:
         """Compile sums over particles with the fields at points of one kind.
@@ -110,13 +117,17 @@ class KernelBuilder:
         """
         slots: dict[Any, Slot] = {}
         where: dict[Density, tuple[Any, int]] = {}
-        with self._symbols.lines.errors(form):
-            integrand = Integrand(form, self._symbols)
+        symbols = self._symbols
+        with symbols.lines.errors(form):
+            integrand = Integrand(form, symbols)
             for rule, first, columns in self._columns(integrand.data):
                 vector = points.vector(len(columns), 1 + len(slots))
                 slots[vector] = Slot(rule, len(columns), columns)
                 where |= {data: (vector, start) for data, start in first.items()}
-            found = integrand.form(where)
+            position = points.vector(symbols.space.dim, 1 + len(slots))
+            if integrand.reads_position:
+                slots[position] = Slot("position", symbols.space.dim)
+            found = integrand.form(where, position)
         size = len(found.fields)
         slots |= {points.vector(size, 0): Slot("fields", size)}
         return replace(self._compiled(found.form, slots), points=(place, found))

@@ -77,7 +77,7 @@ class StrainMeasure:
         return self.name
 
     def metric_change(self, gradient: Array) -> Array:
-        """Twice the strain that vanishes for rigid motions; `gradient` is (n x dim x dim)."""
+        """Twice the strain that vanishes for rigid motions; `gradient` is n x rows x rows."""
         transposed = gradient.transpose(0, 2, 1)
         change = gradient + transposed
         return change + transposed @ gradient if self.finite else change

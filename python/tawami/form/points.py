@@ -15,7 +15,7 @@ from typing import Any
 import ufl
 from ufl.algorithms.expand_indices import expand_indices
 from ufl.algorithms.remove_complex_nodes import remove_complex_nodes
-from ufl.classes import Argument, Constant, Grad, Indexed, Variable
+from ufl.classes import Argument, Constant, Grad, Indexed, SpatialCoordinate, Variable
 from ufl.corealg.traversal import unique_pre_traversal
 
 from tawami.base.errors import FormError
@@ -52,6 +52,7 @@ class Integrand:
 
     Attributes:
         data: Particle data that it reads.
+        reads_position: Whether it reads the position x of the point.
 
     Raises:
         FormError: It contains derivatives that the functions or the particles do not have.
@@ -63,6 +64,7 @@ class Integrand:
         self._integrand = expand_indices(lowered)
         self._of_fields: dict[Any, tuple[Any, Entry]] = {}
         self._of_data: dict[Any, tuple[Density, int]] = {}
+        self._of_position: dict[Any, int] = {}
         self._constants: list[Any] = []
         for node in unique_pre_traversal(self._integrand):
             if isinstance(node, Constant):
@@ -70,6 +72,7 @@ class Integrand:
             elif isinstance(node, Indexed):
                 self._read(node, symbols)
         self.data = list(dict.fromkeys(density for density, _ in self._of_data.values()))
+        self.reads_position = bool(self._of_position)
 
     def _read(self, node: Any, symbols: Symbols) -> None:
         """Find what a component of a symbol or of its derivatives stands for."""
@@ -77,6 +80,9 @@ class Integrand:
         while isinstance(symbol, Grad):
             (symbol,) = symbol.ufl_operands
         if isinstance(symbol, Constant):
+            return
+        if isinstance(symbol, SpatialCoordinate):
+            self._of_position[node] = int(index[0])
             return
         component, *derivatives = map(int, index)
         axes = tuple(sorted(derivatives))
@@ -97,10 +103,11 @@ class Integrand:
         elif (density := symbols.data_of(symbol, component, axes)) is not None:
             self._of_data[node] = density, 0
 
-    def form(self, columns: Mapping[Density, tuple[Any, int]]) -> PointForm:
+    def form(self, columns: Mapping[Density, tuple[Any, int]], position: Any) -> PointForm:
         """The form on a unit interval.
 
         Args:
+            position: The vector coefficient of the position of the point.
             columns: Of the data, the vector coefficient on the interval (see :func:`vector`) and its
                 first component there.
         """
@@ -115,6 +122,8 @@ class Integrand:
             node: ufl.Constant(domain, node.ufl_shape, count=node.count())
             for node in self._constants
         }
+        for node, axis in self._of_position.items():
+            replaced[node] = position[axis]
         for node, (density, component) in self._of_data.items():
             to, first = columns[density]
             replaced[node] = to[first + component]

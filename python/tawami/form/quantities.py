@@ -26,7 +26,7 @@ HISTORY = "history:"
 
 @dataclass(frozen=True)
 class ParticleScalar:
-    """A number of each particle: K, rho, x[0], or an expression of such numbers.
+    """A number of each particle: K, rho, or an expression of such numbers.
 
     Attributes:
         text: Its name or the expression; two with the same text are the same.

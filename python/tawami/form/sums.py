@@ -103,7 +103,8 @@ class Sums:
         *weight, f = self._arguments(caller, given)
         quantity = self._quantity(weight[0], caller) if weight else ONE
         read = [self._data.of(symbol) for symbol in extract_coefficients(f)]
-        if any(data is not None for data in read) or has_type(f, SpatialCoordinate):
+        position = self._reference and has_type(f, SpatialCoordinate)
+        if position or any(data is not None for data in read):
             way = " with assembly='dolfinx'" if caller == "sum_p" else ""
             raise FormError(
                 f"{caller}{way}: particle data or the position in the expression: expected "

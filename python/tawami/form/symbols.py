@@ -120,15 +120,13 @@ class Symbols:
         return Measure(self.lines, "dx", self.domain, metadata, self.operators.volume)
 
     def data_of(self, symbol: Any, component: int, axes: tuple[int, ...]) -> Density | None:
-        """Particle data that a symbol which is no placeholder stands for: an old field, or x.
+        """Particle data that a symbol which is no placeholder stands for: an old field.
 
         Args:
             symbol: A terminal of UFL.
             component: Its component.
             axes: Axes of the derivatives of this component.
         """
-        if isinstance(symbol, SpatialCoordinate):
-            return density("particle", named(f"x[{component}]"), self.space)
         if symbol != self.old:
             return None
         if len(axes) > 1:

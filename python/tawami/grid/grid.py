@@ -13,15 +13,16 @@ from mpi4py import MPI
 from tawami import _rust
 from tawami.base import program, ranks
 from tawami.base.arrays import Array, Indices
-from tawami.base.checks import number, one_of, pair, point, room, shown, whole_number
+from tawami.base.checks import choice, number, one_of, pair, point, room, shown, whole_number
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
-from tawami.base.space import PLANE, Counts, Position
+from tawami.base.space import SPACES, Counts, Position
 from tawami.base.text import meant
 from tawami.fem import mesh
 
 Edge = Literal["left", "right", "bottom", "top"]
 EDGES: tuple[Edge, ...] = get_args(Edge)
+Geometry = Literal["plane_strain", "axisymmetric"]
 #: A position is on a line of the grid if it is this near to it [cells].
 ON_LINE = 1e-6
 #: Largest distance of the origin from (0, 0) [cells]: beyond it, positions are off by over 1e-7 cells.
@@ -37,19 +38,29 @@ class Grid(Unique):
 
     Attributes:
         space: Dimension, names of components and units.
+        geometry: As given.
 
     Args:
         comm: Communicator, such as MPI.COMM_WORLD; its ranks share the cells.
         origin: Lower left corner [m].
         h: Side of a cell [m].
         cells: Number of cells in x and y.
+        geometry: 'plane_strain', where volumes, forces and energies are per metre depth; or
+            'axisymmetric' about the line x = 0, where x is the radius, y the axis and zz the hoop
+            direction, and they are those of the whole revolution.
 
     Raises:
         InputError: A parameter is out of its range, or `comm` is not a communicator.
     """
 
     def __init__(
-        self, comm: Any, *, origin: Sequence[float], h: float, cells: Sequence[int]
+        self,
+        comm: Any,
+        *,
+        origin: Sequence[float],
+        h: float,
+        cells: Sequence[int],
+        geometry: Geometry = "plane_strain",
     ) -> None:
         if not isinstance(comm, MPI.Comm) or comm == MPI.COMM_NULL:
             raise InputError(
@@ -58,13 +69,14 @@ class Grid(Unique):
         check_process()
         program.watch(comm)
         self.comm = comm
-        self.space = PLANE
+        self.geometry = choice("geometry", geometry, SPACES)
+        self.space = SPACES[geometry]
         self.origin = point("origin", origin)
         self.h = number("h", h)
         self.cells = _cells(cells)
         advice = "expected fewer cells, or more ranks"
         room(f"cells = {shown(cells)}", self.num_cells, BYTES_PER_CELL / comm.size, advice)
-        self.rust = _rust.Grid(self.origin, self.h, self.cells)
+        self.rust = _rust.Grid(self.origin, self.h, self.cells, geometry)
         number("h", h, low=SMALLEST, high=LARGEST)
         if max(map(abs, self.origin)) > FARTHEST * self.h:
             raise InputError(
@@ -86,6 +98,11 @@ class Grid(Unique):
         return cast(Position, tuple(corner))
 
     @property
+    def on_axis(self) -> bool:
+        """Whether its left edge is the axis of axisymmetry."""
+        return self.space.hoop and self.origin[0] == 0
+
+    @property
     def extent(self) -> str:
         """Its range along each axis [m], as text."""
         ends = zip(self.origin, self.upper, strict=True)
@@ -96,7 +113,8 @@ class Grid(Unique):
         """The grid in words, for the header of a run."""
         cells = " x ".join(map(str, self.cells))
         corners = (", ".join(f"{x:g}" for x in corner) for corner in (self.origin, self.upper))
-        return f"{cells} cells of {self.h:g} m from ({next(corners)}) to ({next(corners)})"
+        about = ", axisymmetric about x = 0" if self.space.hoop else ""
+        return f"{cells} cells of {self.h:g} m from ({next(corners)}) to ({next(corners)}){about}"
 
     def __repr__(self) -> str:
         cells = " x ".join(map(str, self.cells))
@@ -109,7 +127,10 @@ class Grid(Unique):
 
     def identity(self) -> dict[str, Any]:
         """Facts that identify the grid, for checkpoints."""
-        return {"grid": [list(self.origin), self.h, list(self.cells)]}
+        return {
+            "grid": [list(self.origin), self.h, list(self.cells)],
+            "geometry": self.geometry,
+        }
 
     @property
     def rectangle(self) -> mesh.Rectangle:

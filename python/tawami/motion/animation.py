@@ -48,7 +48,7 @@ class Camera:
             self.name, self.unit, values = pick(self._quantity, arrays, of_scene(scene))
             moved, deformed = scene.form.strain.finite, self._deformed
             x = positions(arrays, moved=moved, deformed=deformed)
-            shape = shapes(arrays, moved=moved, deformed=deformed)
+            shape = shapes(arrays, scene.grid.space, moved=moved, deformed=deformed)
             self.frames.append(film.Frame(f"$t$ = {time:.4g} s", x, shape, values))
 
 

@@ -314,14 +314,18 @@ class Dynamics(Sealed, Unique):
 
     @property
     def linear_momentum(self) -> Array:
-        """sum m v [kg m/s per metre depth]."""
-        return ranks.sum_of(self.scene.grid.comm, np.asarray(self.mass @ self.velocity))
+        """sum m v [kg m/s per metre depth]; in axisymmetry along the axis, 0 across it."""
+        momentum = ranks.sum_of(self.scene.grid.comm, np.asarray(self.mass @ self.velocity))
+        return self.scene.grid.space.resultant(momentum)
 
     def angular_momentum(self, about: Sequence[float] = (0.0, 0.0)) -> float:
         """sum m (x - about) x v [kg m2/s per metre depth].
 
-        The part of the affine velocity fields, of the order of the size of a particle, is left out.
+        The part of the affine velocity fields, of the order of the size of a particle, is left out. In
+        axisymmetry it is 0: a body does not turn.
         """
+        if self.scene.grid.space.hoop:
+            return 0.0
         x, v = np.array(self.scene.particles.x) - checks.point("about", about), self.velocity
         return self._balance.sum(self.mass @ (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0]))
 

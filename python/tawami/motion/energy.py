@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -46,6 +46,8 @@ class Energies:
         integration: Remainder of the balance.
     """
 
+    unit: ClassVar[str] = "J/m"
+
     kinetic: float = 0.0
     elastic: float = 0.0
     dissipated: float = 0.0
@@ -57,7 +59,16 @@ class Energies:
     integration: float = 0.0
 
     def __str__(self) -> str:
-        return ", ".join(f"{f.name} {getattr(self, f.name):.4g}" for f in fields(self)) + " J/m"
+        return (
+            ", ".join(f"{f.name} {getattr(self, f.name):.4g}" for f in fields(self))
+            + f" {self.unit}"
+        )
+
+
+class EnergiesOfBody(Energies):
+    """The same of the whole body [J], in axisymmetry."""
+
+    unit = "J"
 
 
 class Growth:
@@ -98,9 +109,10 @@ class Growth:
             return
         self._warned = True
         warn(
-            f"after {steps} steps, at {time:g} s, the body has {grown:.3g} J/m more energy than loads "
-            f"and supports supplied, {100 * grown / self._most:.2g} % of its largest energy: its stress "
-            "is not reliable. Use shorter steps or more particles; motion.energies is the balance",
+            f"after {steps} steps, at {time:g} s, the body has {grown:.3g} {energies.unit} more energy "
+            f"than loads and supports supplied, {100 * grown / self._most:.2g} % of its largest energy: "
+            "its stress is not reliable. Use shorter steps or more particles; motion.energies is the "
+            "balance",
             EnergyWarning,
         )
 
@@ -118,7 +130,8 @@ class Balance:
 
     def __init__(self, configuration: Configuration, carried: Carried) -> None:
         self._now, self._carried = configuration, carried
-        self.energies = Energies(kinetic=self.kinetic, elastic=self.elastic)
+        kind = EnergiesOfBody if configuration.model.space.hoop else Energies
+        self.energies = kind(kinetic=self.kinetic, elastic=self.elastic)
         self._growth = Growth(self.energies.kinetic + self.energies.elastic)
         #: Kinetic energy of the particles when the last step was stored.
         self._stored_kinetic = self.energies.kinetic
@@ -212,7 +225,7 @@ class Balance:
         lost = step.dissipated + step.friction + step.transfer + step.impact
         step.integration = step.external - gained - lost
         sums = {f.name: getattr(before, f.name) + getattr(step, f.name) for f in fields(Energies)}
-        self.energies = Energies(**sums | {"kinetic": kinetic, "elastic": elastic})
+        self.energies = replace(before, **sums | {"kinetic": kinetic, "elastic": elastic})
         if self._now.model.grid.comm.rank == 0:
             self._growth.check(self.energies, steps, time)
 
@@ -242,7 +255,7 @@ class Balance:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`state`."""
-        self.energies = Energies(**state["energies"])
+        self.energies = replace(self.energies, **state["energies"])
         self._growth.restore(state["growth"])
         self._stored_kinetic = state["stored_kinetic"]
         self._removed = np.reshape(state["removed"], 2)

@@ -111,7 +111,8 @@ class Responses:
     def _constant(self, scalar: ParticleScalar) -> Array:
         with np.errstate(all="ignore"):
             values = np.asarray(scalar.evaluate(self._values), dtype=float)
-        bad = np.flatnonzero(~np.isfinite(values))
+        incompressible = scalar.text == "K" and self.form.kinematics.deviatoric
+        bad = np.flatnonzero(~np.isfinite(values) & (not incompressible))
         if len(bad):
             p = bad[0]
             K, mu = (self.constants[name][p] for name in ("K", "mu"))

@@ -70,7 +70,8 @@ def usual_columns(subject: Subject) -> tuple[str, ...]:
 def _columns(name: str, subject: Subject) -> Columns:
     if name == "energies":
         names = [field.name for field in fields(Energies)]
-        labels = tuple(f"energy {part} [J/m]" for part in names)
+        unit = subject.scene.grid.space.short("J")
+        labels = tuple(f"energy {part} [{unit}]" for part in names)
         _ = getattr(subject, name)  # or the error of the scene that has none
         return Columns(labels, lambda now, _: [getattr(_moving(now).energies, n) for n in names])
     if name in ("momentum", "angular momentum"):
@@ -106,10 +107,15 @@ def _momentum(name: str, subject: Subject) -> Columns:
             _ = subject.scene.velocity
         except NotModelledError as error:
             raise NotModelledError(f"{name} needs a {error}") from None
+    space = subject.scene.grid.space
     if name == "momentum":
-        labels = ("momentum x [kg m/s per m]", "momentum y [kg m/s per m]")
+        labels = tuple(f"momentum {axis} [{space.unit('kg m/s')}]" for axis in space.axes)
         return Columns(labels, lambda now, _: list(_moving(now).linear_momentum))
-    label = "angular momentum [kg m2/s per m]"
+    if space.hoop:
+        raise NotModelledError(
+            "angular momentum: in axisymmetry a body does not turn; expected 'momentum'"
+        )
+    label = f"angular momentum [{space.unit('kg m2/s')}]"
     return Columns((label,), lambda now, _: [_moving(now).angular_momentum()])
 
 

@@ -85,7 +85,7 @@ def _of_grid(scene: Scene) -> dict[str, GridQuantity]:
     found = {
         "displacement": GridQuantity("displacement [m]", _displacement),
         "velocity": GridQuantity("velocity [m/s]", _velocity),
-        "reaction": GridQuantity("reaction [N/m]", _reaction),
+        "reaction": GridQuantity(f"reaction [{scene.grid.space.short('N')}]", _reaction),
         "particles": GridQuantity(
             "particles [-]", lambda now: now.scene.particles_per_cell.astype(float), cells=True
         ),

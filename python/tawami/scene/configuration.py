@@ -87,7 +87,7 @@ class Configuration:
         mine, location = placement.distributed(model.grid, particles, moving=model.moves)
         if model.form.kinematics.has_eps_v:
             mine.add_eps_v()
-        mine.add_strain(finite=model.moves)
+        mine.add_strain(model.moves, model.grid.geometry)
         own_fields.carry(model.form, mine, model.space.dim)
         self._attach(mine, location)
         self.activity = Activity()

@@ -134,7 +134,7 @@ def _remove(now: Configuration, mask: Mask) -> Removed:
                 mass.sum(),
                 kinetic,
                 before.stage.elastic_energy() - after.stage.elastic_energy(),
-                *momentum,
+                *model.space.resultant(momentum),
             ]
         ),
     )

@@ -46,7 +46,7 @@ def _moments(domain: Domain) -> tuple[Array, Array, Array]:
     location, grid = domain.location, domain.model.grid
     off = np.asarray(location.xi) - 0.5
     columns = np.column_stack([np.ones(len(off)), off, off**2])
-    columns *= np.asarray(domain.particles.volume)[:, None]
+    columns *= domain.areas[:, None]
     sums = domain.responses.cell_sums(columns / grid.space.measure(grid.h))
     sums = sums.reshape(*grid.cells[::-1], columns.shape[1])
     area = sums[..., 0]

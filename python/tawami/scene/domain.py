@@ -138,6 +138,11 @@ class Domain:
         return mask
 
     @property
+    def areas(self) -> Array:
+        """Area of each particle in the plane of the grid [m2]."""
+        return np.asarray(self.particles.volume / self.model.space.thickness(self.particles.x))
+
+    @property
     def mass(self) -> Array:
         """Mass of each particle [kg per metre depth].
 
@@ -177,9 +182,13 @@ class Domain:
 
     def gradients(self, values: Array) -> Array:
         """Gradient of a displacement field (functions x dim) at the particles, particles x dim x dim."""
+        return self.model.space.in_space(self.all_gradients(values))
+
+    def all_gradients(self, values: Array) -> Array:
+        """The same with the row and the column of the hoop direction where there is one."""
         flat = np.ascontiguousarray(values).ravel()
         gradients = _rust.gradients(self.location, self.layout.basis, flat)
-        return self.model.space.tensors(np.asarray(gradients))
+        return self.model.space.gradients(np.asarray(gradients))
 
     @property
     def particles_per_cell(self) -> npt.NDArray[np.int64]:
@@ -198,7 +207,7 @@ class Domain:
 
     def _warn_of_partial_cells(self, option: str) -> None:
         grid = self.model.grid
-        areas = self.responses.cell_sums(self.particles.volume[:, None])[:, 0]
+        areas = self.responses.cell_sums(self.areas[:, None])[:, 0]
         shares = np.where(areas > 0, areas / self.model.space.measure(grid.h), 1.0)
         c = int(shares.argmin())
         if shares[c] < WHOLE and not grid.comm.rank:

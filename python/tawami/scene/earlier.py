@@ -18,7 +18,7 @@ from tawami.base import archive, checks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.files import reason, unreadable
-from tawami.base.space import PLANE
+from tawami.base.space import AXISYMMETRIC, PLANE, SPACES
 from tawami.body.body import Body
 from tawami.scene.scattered import AXES, Column, Numbers, Outside, Scattered, check_plane, split
 
@@ -40,8 +40,14 @@ class Earlier(Scattered):
 
     @property
     def body(self) -> Body:
-        """Positions and volumes of these particles, for a scene that starts from them."""
-        return Body(self.x, self.field("volume", [""], "m2 per m")[:, 0])
+        """Positions and volumes of these particles, for a scene that starts from them.
+
+        Those of an axisymmetric run are of rings, volume [m3]: a body has their areas.
+        """
+        labels = {column.label for column in self.columns}
+        space = AXISYMMETRIC if f"volume [{AXISYMMETRIC.volume}]" in labels else PLANE
+        volume = self.field("volume", [""], space.unit(space.volume))[:, 0]
+        return Body(self.x, volume / space.thickness(self.x))
 
     def at(
         self, field: str, components: Sequence[str], unit: str, x: Array, number: Numbers, h: float
@@ -111,8 +117,12 @@ def earlier(path: str | Path, *, outside: Outside = "stop") -> Earlier:
 
 def _checkpoint(file: Path) -> tuple[Any, dict[str, Any]]:
     """Positions and arrays of a checkpoint, the tensors with the names of their components."""
-    arrays = archive.particles(file)
-    labels = {"stress": f"stress {' '.join(PLANE.tensor)}"}
+    identity, arrays = archive.particles(file)
+    space = SPACES.get(identity.get("geometry", ""), PLANE)
+    labels = {
+        "stress": f"stress {' '.join(space.tensor)}",
+        "volume": f"volume [{space.unit(space.volume)}]",
+    }
     return arrays["x"], {labels.get(k, k): values for k, values in arrays.items() if k != "x"}
 
 

@@ -14,7 +14,7 @@ from tawami.base.errors import InputError
 from tawami.base.identity import text
 from tawami.field.constraints import edge_load
 from tawami.grid.edges import Interval
-from tawami.grid.grid import Edge
+from tawami.grid.grid import Edge, Grid
 from tawami.scene.action import Action, Owner, Term, Value
 from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor
@@ -40,10 +40,20 @@ class Load(Action):
 class Weight(Load):
     """The weight of the body; its values are the components of an acceleration [m/s2]."""
 
-    __slots__ = ()
+    __slots__ = ("_hoop",)
+
+    def __init__(self, owner: Owner[Any], grid: Grid, value: Any, factor: Factor) -> None:
+        self._hoop = grid.space.hoop
+        super().__init__(owner, value, factor)
 
     def _checked(self, value: Any) -> tuple[Value, ...]:
-        return checks.point("gravity", value)
+        given = checks.point("gravity", value)
+        if self._hoop and given[0] != 0:
+            raise InputError(
+                f"gravity = {checks.shown(value)}: expected (0, g) in axisymmetry, along the axis; a "
+                "weight across it is not axisymmetric"
+            )
+        return given
 
     @property
     def acceleration(self) -> Array:

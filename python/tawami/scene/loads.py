@@ -62,7 +62,7 @@ class Loads(Owner[Load]):
 
     def add_gravity(self, acceleration: Any, amplitude: Any) -> Load:
         """Load the body by its weight."""
-        weight = Weight(self, acceleration, self._factor("gravity(...)", amplitude))
+        weight = Weight(self, self.grid, acceleration, self._factor("gravity(...)", amplitude))
         self.all.append(weight)
         return weight
 

@@ -20,6 +20,7 @@ from tawami.base.meaning import meaning
 from tawami.base.sealed import Settings
 from tawami.base.space import Space
 from tawami.base.warn import warn
+from tawami.body import rings
 from tawami.body.body import Body
 from tawami.form.compilation import CompiledForm, check_used, compile_form
 from tawami.form.form import Form
@@ -192,7 +193,7 @@ def build(
     values, options = loaded.settings(numbers, static=density is None, others=KEYWORDS)
     for message in [] if grid.comm.rank else loaded.unusual(values):
         warn(message, ParameterWarning)
-    particles, laws = _particles(body, material, material_of, loaded)
+    particles, laws = _particles(grid, body, material, material_of, loaded)
     materials = assignment.materials_of(laws)
     densities = assignment.densities(density, len(materials), body.names)
     ratios = np.array([m.bulk_modulus / m.shear_modulus for m in materials])[particles.material]
@@ -273,10 +274,15 @@ def _names(body: Body, materials: int) -> tuple[str, ...]:
 
 
 def _particles(
-    body: Body, material: assignment.Given, material_of: npt.ArrayLike | None, form: Form
+    grid: Grid,
+    body: Body,
+    material: assignment.Given,
+    material_of: npt.ArrayLike | None,
+    form: Form,
 ) -> tuple[_rust.Particles, list[Law]]:
     """All particles of the body with their materials and history variables."""
     x, volume = checks.array("x", body.x, 2), checks.array("volume", body.volume, 1)
+    volume = rings.volumes(grid, x, volume)
     assigned = assignment.assigned(material, material_of, body, len(x))
     particles = _rust.Particles(x, volume, assigned.number)
     materials = assignment.materials_of(assigned.laws)

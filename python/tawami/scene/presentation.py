@@ -11,6 +11,7 @@ from tawami.base import checks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.optional import optional
+from tawami.base.space import Space
 from tawami.grid.grid import Grid
 from tawami.picture import style
 from tawami.picture.figure import lay_out, shown_axes
@@ -42,18 +43,19 @@ def positions(arrays: Arrays, *, moved: bool, deformed: float) -> Array:
     return np.asarray(arrays["x"] + (deformed - moved) * arrays["displacement"])
 
 
-def shapes(arrays: Arrays, *, moved: bool, deformed: float) -> Array:
-    """Sides of squares with the volumes of the particles [m]; at finite strain the edges of the
+def shapes(arrays: Arrays, space: Space, *, moved: bool, deformed: float) -> Array:
+    """Sides of squares with the areas of the particles [m]; at finite strain the edges of the
     parallelograms that these have become, as columns.
 
     Args:
         arrays, moved, deformed: As in :func:`positions`.
+        space: The space of the grid.
     """
-    dim = arrays["x"].shape[1]
-    side = np.asarray(arrays["volume"] ** (1 / dim))
+    dim, start = space.dim, positions(arrays, moved=moved, deformed=0.0)
+    side = np.asarray((arrays["volume"] / space.thickness(start)) ** (1 / dim))
     if not moved:
         return side
-    f = np.eye(dim) + deformed * arrays[GRADIENT]
+    f = np.eye(dim) + deformed * space.in_space(arrays[GRADIENT])
     f[np.linalg.norm(f, 2, axis=(1, 2)) > MOST_STRETCH] = np.eye(dim)
     return np.asarray(side[:, None, None] * f)
 
@@ -97,7 +99,7 @@ def plot(
         checks.instance("plot: axes", axes, Axes, "axes of matplotlib, or None")
     draw_frame(axes, lower, upper, corners)
     squares = Squares(axes, scale_of(name, unit, [values], limits))
-    squares.show(x, shapes(arrays, moved=moved, deformed=deformed), values)
+    squares.show(x, shapes(arrays, grid.space, moved=moved, deformed=deformed), values)
     (squares.add_bar if new else squares.add_bar_beside)(axes)
     factor = "at the start" if deformed == 0 else f"displacements x {deformed:g}"
     axes.set_title(name if deformed == 1 else f"{name}, {factor}")

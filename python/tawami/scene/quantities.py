@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,7 +19,7 @@ from tawami import _rust
 from tawami.base import checks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError, NotModelledError
-from tawami.base.space import PLANE
+from tawami.base.space import PLANE, Space
 from tawami.base.text import meant
 from tawami.particles import placement
 
@@ -142,6 +142,10 @@ def _deviatoric_stress(p: Arrays) -> Array:
     return np.asarray(np.sqrt(1.5 * ((s**2).sum(axis=1) + 2 * (stress[:, 3:] ** 2).sum(axis=1))))
 
 
+def _volume(space: Space) -> str:
+    return f"volume [{space.unit(space.volume)}]"
+
+
 #: Quantities that follow from arrays of the particles.
 DERIVED = {"mean stress": _mean_stress, "deviatoric stress q": _deviatoric_stress}
 #: Quantities of the particles. History variables of the laws, which are strains, are added to them.
@@ -151,7 +155,7 @@ PARTICLES = {
     "mean stress": Quantity("mean stress [Pa]", _mean_stress),
     "deviatoric stress q": Quantity("deviatoric stress q [Pa]", _deviatoric_stress),
     "strain": Quantity(f"strain {TENSOR} [-]", _stored("strain")),
-    "volume": Quantity("volume [m2 per m]", _stored("volume"), nodal=False),
+    "volume": Quantity(_volume(PLANE), _stored("volume"), nodal=False),
     "eps_v": Quantity("eps_v [-]", _stored("eps_v")),
     "velocity": Quantity("velocity [m/s]", _stored("velocity"), nodal=False),
     "acceleration": Quantity("acceleration [m/s2]", _stored("acceleration"), nodal=False),
@@ -181,7 +185,10 @@ def of_scene(scene: Any) -> dict[str, Quantity]:
         for name, field in form.own_fields.items()
     }
     given = {name: form.data_unit(name) for name in form.data if name in dict(particles.arrays)}
-    return found | {n: Quantity(f"{n} [{unit}]", _stored(n)) for n, unit in given.items()}
+    found |= {n: Quantity(f"{n} [{unit}]", _stored(n)) for n, unit in given.items()}
+    if scene.grid.space != PLANE:  # the same name, with its unit there
+        found["volume"] = replace(PARTICLES["volume"], label=_volume(scene.grid.space))
+    return found
 
 
 def history(name: str) -> Quantity:

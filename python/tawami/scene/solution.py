@@ -258,7 +258,7 @@ class Solution(Elsewhere, Sealed, Unique):
         more = quantities.of_scene(self.scene)
         known = {*self._arrays, "strain"} - {"number"}
         stored = [name for name in quantities.PARTICLES if name in known]
-        return [*stored, *quantities.DERIVED, *more], more
+        return [*dict.fromkeys([*stored, *quantities.DERIVED, *more])], more
 
     def _repr_html_(self) -> str:
         momentum, volume, *others = zip(*self.history, strict=True)

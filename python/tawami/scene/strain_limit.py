@@ -49,10 +49,10 @@ def _digits_lost(domain: Domain, coefficients: Array) -> float:
         coefficients: Increments of all fields at the end of a step.
     """
     comm, fields = domain.model.grid.comm, domain.layout.split(coefficients)
-    gradients = domain.gradients(domain.model.space.vectors(fields[0]))
+    gradients = domain.all_gradients(domain.model.space.vectors(fields[0]))
     strains = 0.5 * (gradients + gradients.transpose(0, 2, 1))
     volume = np.trace(strains, axis1=1, axis2=2)
-    strains -= volume[:, None, None] / 3 * np.eye(domain.model.space.dim)
+    strains -= volume[:, None, None] / 3 * np.eye(gradients.shape[1])
     sizes = np.sqrt(np.einsum("pij,pij->p", strains, strains))
     if ranks.largest(comm, float(sizes.max(initial=0.0))) <= HARMLESS:
         return 0.0
@@ -74,7 +74,7 @@ def exceeded(domain: Domain, total: Array) -> tuple[int, float] | None:
         domain: The particles.
         total: Coefficients of the displacement since the start [m].
     """
-    gradients = domain.gradients(domain.model.space.vectors(total))
+    gradients = domain.all_gradients(domain.model.space.vectors(total))
     # the Frobenius norm is an upper bound, and costs less
     bound = np.einsum("pij,pij->p", gradients, gradients)
     suspects = np.flatnonzero(bound > LARGEST**2)

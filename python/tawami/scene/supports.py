@@ -45,6 +45,7 @@ class Supports(Owner[Support]):
     Attributes:
         all: The supports along edges and at points.
         walls: The walls.
+        axis: In axisymmetry, u_x = 0 along the axis if it is an edge of the grid; else none.
         version: A number that changes with every change of a support or wall by the driver script.
     """
 
@@ -54,6 +55,10 @@ class Supports(Owner[Support]):
         super().__init__(activity)
         self.grid, self.basis, self._fields = grid, basis, fields
         self.walls: list[Wall] = []
+        self.axis: list[Support] = []
+        if grid.on_axis:
+            zero = Factor("the axis")
+            self.axis.append(Support(self, "left", 0, "x", 0.0, zero))
 
     def remove(self, action: Support | Wall) -> None:
         """Remove a support or a wall."""
@@ -195,16 +200,13 @@ class Supports(Owner[Support]):
         Raises:
             SupportError: The body has left an edge with a prescribed motion, or a point.
         """
-        layout, held, points = (
-            domain.layout,
-            list[Held](),
-            list[PointHeld](),
-        )
-        for support in self.all:
+        layout, held, points = domain.layout, list[Held](), list[PointHeld]()
+        for support in [*self.all, *self.axis]:
             if isinstance(support.component, str):
                 held.append(step_values.of_field(domain, support, start, fields))
             elif isinstance(support.place, str):
-                if not (moving and not support.moves and step_values.is_left(domain, support)):
+                may_be_left = support in self.axis or (moving and not support.moves)
+                if not (may_be_left and step_values.is_left(domain, support)):
                     held.append(step_values.on_edge(domain, support, amount))
             else:
                 points.append(step_values.at_point(domain, support, amount))
@@ -304,7 +306,9 @@ class Supports(Owner[Support]):
     @property
     def line(self) -> str:
         """The supports in words, for the header of a run."""
-        return listed([*(support.line for support in self.all), *map(str, self.walls)])
+        given = [support.line for support in self.all]
+        axis = [f"axis of symmetry ({support.axis} = 0)" for support in self.axis]
+        return listed([*given, *axis, *map(str, self.walls)])
 
     def identity(self) -> list[list[Any]]:
         """Facts that decide the results of a run, in the types of JSON."""

@@ -203,7 +203,7 @@ class Measures:
         location, basis = self._responses.location, self._layout.basis
         gradient = np.asarray(_rust.gradients(location, basis, np.ascontiguousarray(u)))
         strain = self._responses.form.strain.metric_change(
-            self._layout.grid.space.tensors(gradient)
+            self._layout.grid.space.gradients(gradient)
         )
         largest = self._comm.allreduce(float(np.abs(strain).max(initial=0.0)), op=MPI.MAX)
         return bool(prescribed == 0 or largest <= NO_STRAIN * prescribed / self._layout.grid.h)

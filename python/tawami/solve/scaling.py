@@ -103,6 +103,7 @@ class Scaling:
         """Fields of this rank's unknowns, with the rigid motions at the Greville points."""
         own = reduction.unknowns[reduction.own]
         of_u = own < self._layout.num_displacement
-        points = self._layout.greville - self._layout.grid.origin
+        grid = self._layout.grid
+        points = self._layout.greville - grid.origin
         fields = [self._layout.fields[name].holds(own) for name in self._responses.form.own_fields]
-        return Blocks(of_u, rigid_motions(points)[own[of_u]], fields)
+        return Blocks(of_u, rigid_motions(points, grid.space)[own[of_u]], fields)
