@@ -46,6 +46,7 @@ def residual(
     R_q = sum_p(K * q * (div(u) - eps_v - eps_p))
     R_q -= sum_p(K**2 / mu * alpha * h**2 * dot(grad(q), grad(eps_v)))
     R_r = sum_p(r * (biot * div(u) + storage * p_w) / dt)
-    R_r += sum_p(kappa / mu_w * dot(grad(r), grad(p) - rho_w * b))
+    weight = sum(rho_w * b[i] * grad(r)[i] for i in range(len(b)))
+    R_r += sum_p(kappa / mu_w * (dot(grad(r), grad(p)) - weight))
     R_r += sum_p(alpha_w * h**2 / (K + 4 * mu / 3) * dot(grad(r), grad(p_w)) / dt)
     return R_u + R_q + R_r

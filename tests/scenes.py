@@ -30,6 +30,13 @@ FINITE: dict[str, dict[str, Any]] = {
 #: Shipped forms that read dt or have fields of their own: a step of them needs time.
 COUPLED: dict[str, dict[str, Any]] = {
     "u_epsv_pw": {"form": "u_epsv_pw", "biot": 0.8, "storage": 0.3, "mu_w": 0.7, "rho_w": 1.3},
+    "u_epsv_pw_finite": {
+        "form": "u_epsv_pw_finite",
+        "mu_w": 0.7,
+        "rho_w": 1.3,
+        "m": 2.0,
+        "leak": 0.2,
+    },
 }
 #: Bases of the displacement.
 BASES = ("quadratic_spline", "bilinear", "biquadratic")

@@ -102,12 +102,21 @@ def mandel_settlement(T: float) -> float:
     return float(LOAD * B / (2 * mu) * (1 - NU_SLAB - decay.sum()))
 
 
-def times(first: float, last: float, growth: float, most: float) -> list[float]:
-    """T_v of the steps, of which each is the share `growth` of the time so far, but at most `most`."""
+def times(
+    first: float,
+    last: float,
+    growth: float,
+    most: float,
+    more: Sequence[float] = (*SHOWN, *PROFILES),
+) -> list[float]:
+    """T_v of the steps, of which each is the share `growth` of the time so far, but at most `most`.
+
+    Those of `more` are added.
+    """
     found = [first]
     while found[-1] < last:
         found.append(min(last, found[-1] + min(growth * found[-1], most)))
-    return sorted({*found, *(T for T in (*SHOWN, *PROFILES) if first < T < last)})
+    return sorted({*found, *(T for T in more if first < T < last)})
 
 
 @dataclass

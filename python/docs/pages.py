@@ -35,6 +35,7 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "one_line": ("One line of the weak form", "showcase", ()),
     "self_weight": ("Self-weight", "verification", ()),
     "consolidation": ("Consolidation", "verification", ()),
+    "soft_clay": ("Soft clay", "verification", ()),
     "elastica": ("Elastica", "verification", ("strip",)),
     "footing": ("Footing", "verification", ()),
     "bearing_capacity": ("Bearing capacity", "verification", ()),
