@@ -37,6 +37,8 @@ COUPLED: dict[str, dict[str, Any]] = {
         "m": 2.0,
         "leak": 0.2,
     },
+    "u_epsv_theta": {"form": "u_epsv_theta"},
+    "u_epsv_visco": {"form": "u_epsv_visco"},
 }
 #: Bases of the displacement.
 BASES = ("quadratic_spline", "bilinear", "biquadratic")

@@ -131,7 +131,7 @@ assert "empty" in tawami.__file__, tawami.__file__
 for options in {[*FORMS.values(), *FINITE.values(), *COUPLED.values()]!r}:
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.5, cells=(4, 2))
     body = tawami.box(grid, (0, 0), (2, 1))
-    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1e3, nu=0.4999), **options)
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1e3, nu=0.4999), density=1.0, **options)
     scene.fix("left", "x")
     scene.fix("left", "y")
     scene.traction("right", (0.0, -1.0))
