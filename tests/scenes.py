@@ -27,6 +27,19 @@ FINITE: dict[str, dict[str, Any]] = {
     "u_epsv_finite": {"form": "u_epsv_finite", "alpha": 0.1},
     "u_bbar_finite": {"form": "u_bbar_finite"},
 }
+#: Shipped forms that read dt or have fields of their own: a step of them needs time.
+COUPLED: dict[str, dict[str, Any]] = {
+    "u_epsv_pw": {"form": "u_epsv_pw", "biot": 0.8, "storage": 0.3, "mu_w": 0.7, "rho_w": 1.3},
+    "u_epsv_pw_finite": {
+        "form": "u_epsv_pw_finite",
+        "mu_w": 0.7,
+        "rho_w": 1.3,
+        "m": 2.0,
+        "leak": 0.2,
+    },
+    "u_epsv_theta": {"form": "u_epsv_theta"},
+    "u_epsv_visco": {"form": "u_epsv_visco"},
+}
 #: Bases of the displacement.
 BASES = ("quadratic_spline", "bilinear", "biquadratic")
 

@@ -34,6 +34,8 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "cut_cells": ("Cut cells", "showcase", ()),
     "one_line": ("One line of the weak form", "showcase", ()),
     "self_weight": ("Self-weight", "verification", ()),
+    "consolidation": ("Consolidation", "verification", ()),
+    "soft_clay": ("Soft clay", "verification", ()),
     "elastica": ("Elastica", "verification", ("strip",)),
     "footing": ("Footing", "verification", ()),
     "bearing_capacity": ("Bearing capacity", "verification", ()),

@@ -17,6 +17,8 @@ PARTS: dict[str, tuple[str, tuple[float, float, float, float]]] = {
     "footing": ("zones.png", (0.0, 0.0, 0.86, 0.5)),
     "vibrating_beam": ("motion.png", (0.0, 0.0, 0.5, 0.33)),
     "spinning_disc": ("film.png", (0.0, 0.0, 0.262, 0.315)),
+    "consolidation": ("consolidation.png", (0.333, 0.0, 0.667, 1.0)),
+    "soft_clay": ("soft_clay.png", (0.0, 0.0, 0.333, 1.0)),
     "collapse": ("film.png", (0.0, 0.165, 0.305, 0.645)),
 }
 #: Cases of README's gallery.

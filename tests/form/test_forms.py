@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from declared import BOTH, form_of
-from scenes import FINITE, FORMS, grid_of
+from scenes import COUPLED, FINITE, FORMS, grid_of
 from ufl import div, dot, grad, inner, sqrt, sym
 
 import tawami
@@ -61,7 +61,7 @@ def test_a_form_in_a_file_works_like_a_shipped_one(random_scene, tmp_path):
 
 
 def test_every_shipped_form_is_in_the_tests():
-    tested = [*FORMS.values(), *FINITE.values()]
+    tested = [*FORMS.values(), *FINITE.values(), *COUPLED.values()]
     assert {options["form"] for options in tested} == set(shipped())
 
 

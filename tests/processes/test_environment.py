@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from programs import PYTHONPATH, ROOT, python
-from scenes import FINITE, FORMS
+from scenes import COUPLED, FINITE, FORMS
 
 from tawami.fem import environment
 from tawami.form.files import shipped
@@ -128,20 +128,24 @@ import logging; logging.disable(logging.INFO)
 from mpi4py import MPI
 import tawami
 assert "empty" in tawami.__file__, tawami.__file__
-for options in {[*FORMS.values(), *FINITE.values()]!r}:
+for options in {[*FORMS.values(), *FINITE.values(), *COUPLED.values()]!r}:
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.5, cells=(4, 2))
     body = tawami.box(grid, (0, 0), (2, 1))
-    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1e3, nu=0.4999), **options)
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1e3, nu=0.4999), density=1.0, **options)
     scene.fix("left", "x")
     scene.fix("left", "y")
     scene.traction("right", (0.0, -1.0))
-    print(options["form"], scene.solve().displacement((2, 0.5))[1] < 0)
+    for name in scene.form.data:
+        scene.data(name, 1.0)
+    print(options["form"], scene.solve(until=1.0).displacement((2, 0.5))[1] < 0)
 """
     run = subprocess.run(
         [installed, "-c", code], cwd=tmp_path, env=without_path(), capture_output=True, text=True,
         check=False,
     )  # fmt: skip
     assert run.returncode == 0, run.stderr
-    lines = run.stdout.splitlines()[-len(FORMS) - len(FINITE) :]  # MPI may print lines before
+    lines = run.stdout.splitlines()[
+        -len(FORMS) - len(FINITE) - len(COUPLED) :
+    ]  # MPI may print lines before
     assert {line.split()[0] for line in lines} == set(shipped())
     assert all(line.endswith("True") for line in lines)

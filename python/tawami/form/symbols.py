@@ -98,7 +98,7 @@ class Symbols:
         ready = {
             **self.fields, **self.tests, **self.constants, **options, **self.operators.names,
             **sums.names, "t": self.traction, "x": SpatialCoordinate(self.domain),
-            "old": Old(form, self._split(self.old)),
+            "old": Old(form, self._split(self.old), data),
             "dx": self.measure("particle"), "dx_c": self.measure("centre"),
             "ds": self._sides("exterior_facet"), "dG": self._sides("interior_facet"),
             "jump_n": self._jump_n, "jump_nn": self._jump_nn,
@@ -228,13 +228,15 @@ class Symbols:
 
 
 class Old:
-    """The fields at the start of the step: `old.p_w`."""
+    """The fields at the start of the step, as `old.p_w`, and at finite strain `old.J` = det F."""
 
-    def __init__(self, form: Form, fields: Mapping[str, Any]) -> None:
-        self._form, self._fields = form, fields
+    def __init__(self, form: Form, fields: Mapping[str, Any], data: ParticleData) -> None:
+        self._form, self._fields, self._data = form, fields, data
 
     def __getattr__(self, name: str) -> Any:
         known = [*self._form.own_fields]
+        if name == "J" and self._form.strain.finite:
+            return self._data.scalar(named("old J", varies=True))
         if name not in known:
             if name in self._form.fields:
                 why = "only fields without a role have an old value; those of the law are in its stress"

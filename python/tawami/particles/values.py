@@ -15,6 +15,8 @@ from tawami.form.form import Form
 class ParticleValues(Mapping[str, Array]):
     """K, mu, rho, the position, old fields, data and parameters of this rank's particles.
 
+    `old J` is the volume of each particle over that at the start of the scene, det F.
+
     Args:
         form: The form.
         particles: The particles.
@@ -48,6 +50,9 @@ class ParticleValues(Mapping[str, Array]):
         if name in self._old:
             field, column = self._old[name]
             return np.array(self._particles.carried(field)[:, column])
+        if name == "old J":
+            gradient = np.asarray(self._particles.displacement_gradient)
+            return np.asarray(np.linalg.det(np.eye(gradient.shape[-1]) + gradient))
         if name == "rho":
             if self._density is None:
                 raise InputError(

@@ -273,10 +273,10 @@ class Configuration:
         particles, gone = placement.removed(grid, self.domain.particles, outside)
         self.left += [(number, x, time) for number, x in gone]
         self._attach(*placement.migrated(grid, particles))
-        self.projected = 0.0
-        if projects:
-            with self.stopwatch("commit"):
-                self.projected = mean_stress.project(self.domain)
+        with self.stopwatch("commit"):
+            self.projected = mean_stress.project(self.domain) if projects else 0.0
+            if projects:
+                own_fields.project(self.domain)
         return outcome
 
     def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:

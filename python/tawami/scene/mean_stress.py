@@ -36,11 +36,12 @@ class Travel:
         self.cells = 0.0
 
     def must_project(self, domain: Domain, moved: Array) -> bool:
-        """Add the way to new positions, and whether the mean stress must be projected there.
+        """Add the way to new positions, and whether mean stress and fields must be projected there.
 
         A call for all ranks.
         """
-        if not domain.model.form.kinematics.has_eps_v:
+        form = domain.model.form
+        if not form.kinematics.has_eps_v and not form.own_fields:
             return False
         squares = ((moved - domain.particles.x) ** 2).sum(axis=1) / domain.model.grid.h**2
         sums = ranks.sum_of(domain.model.grid.comm, np.array([squares.sum(), len(squares)]))
@@ -57,6 +58,8 @@ def project(domain: Domain) -> float:
     Returns:
         Elastic energy that this takes from the particles of this rank [J per metre depth].
     """
+    if not domain.model.form.kinematics.has_eps_v:
+        return 0.0
     particles = domain.particles
     moduli, material = domain.constants["K"], particles.material
     stress = particles.stress

@@ -75,6 +75,19 @@ def accept(domain: Domain, coefficients: Array) -> None:
             column[:, 1:] = np.linalg.solve(f.transpose(0, 2, 1), column[:, 1:, None])[..., 0]
 
 
+def project(domain: Domain) -> None:
+    """Replace the fields of the particles by their projections, as `mean_stress` does with the stress.
+
+    After resets of the grid a field is a sum of functions of many grids. Their differences within a cell
+    are invisible to the present functions, so that no equation would reduce them. A call for all ranks.
+    """
+    for name in domain.model.form.own_fields:
+        place, column = domain.layout.fields[name], domain.particles.carried(name)
+        values = np.array(column[:, 0])
+        found, _ = least_squares(domain, place.basis, domain.particles.volume, values)
+        column[:] = at_particles(domain, place.basis, found)
+
+
 def start(domain: Domain, name: str, values: Array) -> Array:
     """Give a field values at the particles, and the gradient of their projection on its functions.
 

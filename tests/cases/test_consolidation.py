@@ -1,0 +1,52 @@
+"""Consolidation: Terzaghi's column and Mandel's slab against their series."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cases.verification import consolidation as case
+
+
+def test_the_series_agree_with_known_numbers():
+    """U = 0.5 at T_v = 0.197 and 0.9 at 0.848; Mandel's slab starts at half the load."""
+    assert case.degree(0.197) == pytest.approx(0.5, abs=5e-4)
+    assert case.degree(0.848) == pytest.approx(0.9, abs=5e-4)
+    assert case.mandel_pressure(1e-6, 0.0)[0] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_terzaghi_early():
+    run = case.terzaghi(n=8, first=1e-3, last=0.1, growth=0.1)
+    assert abs(run.error(0.1)) < 0.5
+    assert run.rms[0.1] < 0.005
+
+
+@pytest.mark.slow
+def test_terzaghi():
+    run = case.terzaghi()
+    for T in case.SHOWN:
+        assert abs(run.error(T)) < 0.5
+        assert run.rms[T] < 0.005
+
+
+def test_the_pressure_of_mandel_rises_before_it_falls():
+    run = case.mandel(n=8, first=5e-3, last=0.3, growth=0.25, most=0.04)
+    assert max(run.value) > run.value[0] + 0.03
+    np.testing.assert_allclose(run.value, run.exact, atol=0.01)
+    assert run.force == pytest.approx(np.ones(len(run.force)), abs=0.02)
+
+
+def test_alpha_w_removes_the_overshoot_of_a_small_step():
+    """The bound of Vermeer and Verruijt, c_v dt = h^2/6, is 1/384 for 8 cells."""
+    peaks = {a: case.terzaghi(8, 1e-5, 1e-5, alpha_w=a).peak for a in (0.0, 1 / 6)}
+    assert peaks[0.0] > 1.15
+    assert peaks[1 / 6] < 1.005
+
+
+def test_water_enters_as_the_flux_says():
+    """A tight column swells by the water that enters: flux [m/s] times time."""
+    scene = case.column(4)
+    scene.release("top", "p_w")
+    scene.flux("top", "p_w", 2e-6)
+    solution = scene.solve(until=3.0)
+    assert case.H * solution.strain[:, 1].mean() == pytest.approx(6e-6, rel=1e-6)
