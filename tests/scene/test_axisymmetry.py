@@ -153,7 +153,7 @@ def thick_sphere(n, **options):
 
 
 def test_the_stress_of_a_thick_sphere_converges_to_lames():
-    """0.88 % on 4 cells over the thickness, 0.22 % on 8, 0.06 % on 16."""
+    """0.88 % on 4 cells over the thickness, 0.22 % on 8."""
     coarse, fine = (thick_sphere(n) for n in (4, 8))
     assert fine < 2.5e-3
     assert coarse / fine > 3.5
