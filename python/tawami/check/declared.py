@@ -86,3 +86,11 @@ def kernels(form: Form, given: Settings) -> Found:
         trial.compiled(form, {**given, **choice})
     number = len({tuple(choice.items()) for choice in chosen})
     yield "pass", f"compiled, with {number} choice{'s' if number > 1 else ''} of its options"
+    taken = {name: trial.natural(form, name) for name in form.data}
+    usual = form.settings(given)[0]
+    taken |= {n: v for n, v in trial.values(form, given).items() if usual.get(n, v) != v}
+    if taken:
+        said = ", ".join(
+            f"{name} = {value:g} {units.unit_of(form, name)}" for name, value in taken.items()
+        )
+        yield "pass", f"checks use {said}, which suit K = 5 Pa, h = 0.5 m and 1 s"
