@@ -52,8 +52,8 @@ RESERVED = frozenset(
 )  # fmt: skip
 #: Arrays of the particles that no field and no data may be called after.
 ARRAYS = frozenset(
-    ("volume", "material", "number", "stress", "displacement", "strain", "velocity", "acceleration",
-     "velocity_gradient", "acceleration_gradient", "displacement_gradient")
+    ("x", "eps_v", "volume", "material", "number", "stress", "displacement", "strain", "velocity",
+     "acceleration", "velocity_gradient", "acceleration_gradient", "displacement_gradient")
 )  # fmt: skip
 
 

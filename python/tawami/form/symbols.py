@@ -92,7 +92,9 @@ class Symbols:
     ) -> dict[str, Callable[[], Any]]:
         """Function that makes the symbol of each name: particle data are read only if asked for."""
         form, data = self.form, self.data
-        sums = Sums(form, data, self.lines, self.measure, reference=self.assembly == "dolfinx")
+        sums = Sums(
+            form, data, self.lines, self.measure, self.old, reference=self.assembly == "dolfinx"
+        )
         ready = {
             **self.fields, **self.tests, **self.constants, **options, **self.operators.names,
             **sums.names, "t": self.traction, "x": SpatialCoordinate(self.domain),

@@ -21,6 +21,7 @@ from tawami.fem.rules import Rule
 from tawami.form.arity import check_arity
 from tawami.form.lines import line_of
 from tawami.form.particle_data import PLACEHOLDERS
+from tawami.form.points import Integrand
 from tawami.form.symbols import Symbols
 
 
@@ -79,8 +80,17 @@ def _check(symbols: Symbols, part: Any) -> None:
             symbols.operators.check(part.integrand())
         check_arity(ufl.Form([part]), where)
     if "place" in part.metadata():
+        with symbols.lines.errors(ufl.Form([part])):
+            expanded = expand_derivatives(ufl.Form([part]))
+            if not expanded.empty():
+                Integrand(expanded, symbols)
         return
-    read = [symbols.data.of(symbol) for symbol in extract_coefficients(part.integrand())]
+    coefficients = extract_coefficients(part.integrand())
+    if symbols.old in coefficients:
+        raise FormError(
+            f"{where}: an old field outside a sum over particles: expected old fields in sum_p(...) only"
+        )
+    read = [symbols.data.of(symbol) for symbol in coefficients]
     if symbols.assembly == "points" and any(data and data.rule != "mean" for data in read):
         raise FormError(
             f"{where}: particle data outside a sum over particles: expected sum_p(...), or cell_mean(K) "

@@ -150,6 +150,8 @@ def _remove(now: Configuration, mask: Mask) -> Removed:
 def _replace(now: Configuration, after: Domain) -> None:
     """Let a scene continue with other particles or laws; a call for all ranks."""
     before, zero = now.domain, np.zeros(after.layout.size)
+    for domain in (before, after):
+        now.inputs.repeat(domain, now.moment(), now.loads.acceleration(now.moment()))
     internal = after.newton.internal(zero)
     forces = internal - before.newton.internal(zero)
     first = now.moment(0.0)
