@@ -71,8 +71,12 @@ def check_units(form: Form, given: Settings) -> Found:
         silent = [
             name for name in form.parameters if name in read and "unit" not in form.parameters[name]
         ]
-        cause = f"; give {quoted(silent)} a \"unit\", as 'Pa s'" if silent else ""
-        yield "cost", f"{sentence}: results depend on the choice of units{cause}"
+        remedy = (
+            f"give {quoted(silent)} a \"unit\", as 'Pa s'"
+            if silent
+            else "check its factors, such as dt and h, and the declared units"
+        )
+        yield "cost", f"{sentence}: results depend on the choice of units; {remedy}"
     if not found:
         yield "pass", "each equation keeps its form if metre, second and kilogram are replaced"
 
