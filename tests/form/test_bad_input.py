@@ -12,12 +12,13 @@ from scenes import random_scene
 from ufl import dot, inner
 
 import tawami
+from tawami.fem.dolfinx import lagrange
 from tawami.form import scalar, vector
 
 ALONE = {"u": vector("w")}
 WATER = {**ALONE, "p_w": scalar("r", unit="Pa")}
 DATA = {"kappa": "permeability [m2]"}
-LINEAR = ufl.FiniteElement("Q", "quadrilateral", 1)
+LINEAR = lagrange(1)
 
 
 def scene_of(residual, fields=ALONE, **more):

@@ -71,8 +71,12 @@ def check_units(form: Form, given: Settings) -> Found:
         silent = [
             name for name in form.parameters if name in read and "unit" not in form.parameters[name]
         ]
-        cause = f"; give {quoted(silent)} a \"unit\", as 'Pa s'" if silent else ""
-        yield "cost", f"{sentence}: results depend on the choice of units{cause}"
+        remedy = (
+            f"give {quoted(silent)} a \"unit\", as 'Pa s'"
+            if silent
+            else "check its factors, such as dt and h, and the declared units"
+        )
+        yield "cost", f"{sentence}: results depend on the choice of units; {remedy}"
     if not found:
         yield "pass", "each equation keeps its form if metre, second and kilogram are replaced"
 
@@ -86,3 +90,11 @@ def kernels(form: Form, given: Settings) -> Found:
         trial.compiled(form, {**given, **choice})
     number = len({tuple(choice.items()) for choice in chosen})
     yield "pass", f"compiled, with {number} choice{'s' if number > 1 else ''} of its options"
+    taken = {name: trial.natural(form, name) for name in form.data}
+    usual = form.settings(given)[0]
+    taken |= {n: v for n, v in trial.values(form, given).items() if usual.get(n, v) != v}
+    if taken:
+        said = ", ".join(
+            f"{name} = {value:g} {units.unit_of(form, name)}" for name, value in taken.items()
+        )
+        yield "pass", f"checks use {said}, which suit K = 5 Pa, h = 0.5 m and 1 s"

@@ -45,7 +45,7 @@ def check_form(form: str | Path | ModuleType | Form, **parameters: Any) -> FormR
     with warnings.catch_warnings():
         # random particles and the K/mu of the beam cause warnings on purpose
         warnings.simplefilter("ignore")
-        for subject, check, needs, whole in _checks(loaded):
+        for subject, check, needs, whole in checks_of(loaded):
             wrong = {line.subject for line in lines if line.verdict in ("broken", "not tried")}
             missing = next((need for need in needs if need in wrong), None)
             if missing is not None:
@@ -67,7 +67,7 @@ def _tried(subject: str, check: Check, form: Form, parameters: Settings) -> list
     return lines
 
 
-def _checks(form: Form) -> Iterator[tuple[str, Check, tuple[str, ...], bool]]:
+def checks_of(form: Form) -> Iterator[tuple[str, Check, tuple[str, ...], bool]]:
     """Subject, check, earlier checks that must not be broken, and whether all fields are meant."""
     built, right = ("kernels",), ("kernels", "tangent")
     yield "declaration", declared.declaration, (), True

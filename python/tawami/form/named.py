@@ -24,7 +24,8 @@ def first_lines(residual: Callable[..., Any], objects: Mapping[str, Any]) -> dic
     for function in _functions(residual):
         line, before = function.__code__.co_firstlineno, None
         for instruction in dis.get_instructions(function):
-            line = instruction.starts_line or line
+            # a line number in `starts_line` before Python 3.13, a bool since
+            line = getattr(instruction, "line_number", instruction.starts_line) or line
             name, value = instruction.argval, None
             if instruction.opname == "LOAD_GLOBAL":
                 value = function.__globals__.get(name)

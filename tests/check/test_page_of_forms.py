@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import tawami
+from tawami.check.form_check import checks_of
 from tawami.form import form, scalar, vector
 from tawami.form.symbols import Symbols
 
@@ -33,3 +34,13 @@ def test_every_name_of_a_residual():
         names |= set(Symbols(made, {}).names)
     assert first_column("Names of a residual") == names - {"u", "w", "p", "q"}
     assert set(form.RESERVED) == names - {"u", "w", "p", "q"}
+
+
+def test_every_subject_of_the_form_check():
+    table = PAGE.read_text().split("## The form check\n", 1)[1].split("| --- |", 1)[1]
+    rows = table.split("\n\n", 1)[0].splitlines()[1:]
+    subjects = {row.split("|")[1].strip() for row in rows}
+    made = tawami.Form(fields={"u": vector("w"), "p": scalar("q")}, residual=lambda w: w)
+    asked = [subject.replace("field p", "field") for subject, *_ in checks_of(made)]
+    first = "declaration, parameters, arguments, kernels"
+    assert subjects == {first, *asked} - {*first.split(", ")}
