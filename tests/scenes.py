@@ -39,6 +39,7 @@ COUPLED: dict[str, dict[str, Any]] = {
     },
     "u_epsv_theta": {"form": "u_epsv_theta"},
     "u_epsv_visco": {"form": "u_epsv_visco"},
+    "u_epsv_damage": {"form": "u_epsv_damage"},
 }
 #: Bases of the displacement.
 BASES = ("quadratic_spline", "bilinear", "biquadratic")

@@ -36,6 +36,7 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "self_weight": ("Self-weight", "verification", ()),
     "consolidation": ("Consolidation", "verification", ()),
     "soft_clay": ("Soft clay", "verification", ()),
+    "fracture": ("Fracture", "verification", ()),
     "elastica": ("Elastica", "verification", ("strip",)),
     "footing": ("Footing", "verification", ()),
     "bearing_capacity": ("Bearing capacity", "verification", ()),
