@@ -50,7 +50,7 @@ def residual(
     g_r, g_p = dot(F, grad(r)), dot(F, grad(p))
     R_u = sum_p(inner(P, grad(w)) - J * p * inner(F, grad(w))) - dot(t, w) * ds
     R_u -= sum_p(rho_w * (J - 1) * dot(b, w))
-    R_q = sum_p(K * q * (ln_J - eps_p - (1 - theta) * eps_v)) + sum_v(K, theta * q * eps_v)
+    R_q = sum_p(K * q * (ln_J - eps_p - (1 - theta) * eps_v)) - sum_v(K, theta * q * eps_v)
     R_q -= sum_p(K**2 / mu * alpha * h**2 * dot(grad(q), grad(eps_v)))
     weight = sum(rho_w * b[i] * g_r[i] for i in range(len(b)))
     R_r = sum_p(r * (J - old.J) / dt + leak * J * r * p)

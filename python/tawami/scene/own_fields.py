@@ -81,11 +81,13 @@ def project(domain: Domain) -> None:
     After resets of the grid a field is a sum of functions of many grids. Their differences within a cell
     are invisible to the present functions, so that no equation would reduce them. A call for all ranks.
     """
+    # few particles in a cell do not determine the gradient of a field there
+    enough = domain.particles_per_cell[domain.location.cell] >= domain.model.space.num_vertices
     for name in domain.model.form.own_fields:
         place, column = domain.layout.fields[name], domain.particles.carried(name)
         values = np.array(column[:, 0])
         found, _ = least_squares(domain, place.basis, domain.particles.volume, values)
-        column[:] = at_particles(domain, place.basis, found)
+        column[enough] = at_particles(domain, place.basis, found)[enough]
 
 
 def start(domain: Domain, name: str, values: Array) -> Array:
