@@ -20,4 +20,4 @@ def test_creep_and_recovery():
     runs = [creep.solve(steps) for steps in (10, 20)]
     assert [run.from_euler for run in runs] == pytest.approx([0.0, 0.0], abs=1e-10)
     assert runs[0].error / runs[1].error == pytest.approx(2, rel=0.05)
-    assert runs[1].strains[-1] == pytest.approx(creep.exact(creep.END), abs=0.01)
+    assert runs[1].strains[-1] == pytest.approx(creep.exact(creep.END), abs=0.02)
