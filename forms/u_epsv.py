@@ -44,9 +44,8 @@ def residual(
         R_u += k * facet_mean(mu) * h**3 * inner(jump_nn(u), jump_nn(w)) * dG
         R_q -= k * facet_mean(K**2 / mu) * h**3 * jump_n(eps_v) * jump_n(q) * dG
     if stabilisation == "projection":
-        c = alpha * cell_mean(
-            K**2 / mu
-        )  # int (q - q_c) (eps_v - eps_v,c), _c at the centre of the cell
+        # int (q - q_c) (eps_v - eps_v,c), _c at the centre of the cell
+        c = alpha * cell_mean(K**2 / mu)
         twist = grad(grad(q))[0, 1] * grad(grad(eps_v))[0, 1]
         S = c * (h**2 / 12 * dot(grad(q), grad(eps_v)) + h**4 / 144 * twist) * dx_c
         return R_u + R_q - S

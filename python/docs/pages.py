@@ -52,7 +52,7 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "writing": ("Writing results", "costs", ()),
 }
 #: Pages that can be downloaded as notebooks.
-TUTORIALS = ("start", "slope", "collapse", "edit_a_form", "add_a_law", "ranks")
+TUTORIALS = ("start", "slope", "collapse", "edit_a_form", "add_a_law", "cam_clay", "ranks")
 TRADE = ("cantilever", "cook", "collapse", "self_weight", "spinning_disc")
 LINK = re.compile(r"https?://[^\s)>\"'`]+")
 #: Elements of HTML that a browser loads with the page.

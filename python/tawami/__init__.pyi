@@ -36,7 +36,8 @@ from tawami.body.disc import disc
 from tawami.body.level_set import level_set
 from tawami.body.mesh import mesh
 from tawami.body.polygon import polygon
-from tawami.check.form_check import FormReport, check_form
+from tawami.check.form_check import check_form
+from tawami.check.report import FormReport
 from tawami.form.form import Form
 from tawami.grid.grid import Grid
 from tawami.motion.dynamics import Dynamics

@@ -187,14 +187,15 @@ impl<const P: usize> Work<P> {
         let mut out = Row::ZERO;
         if !kernels.cells.is_empty() {
             self.nodal.set(state.cells, state.location, a);
-            let element = &mut self.element[..state.cells.dofs()];
+            let dofs = state.cells.dofs();
             let numbers = local.numbers();
             // SAFETY: the caller's; kernels of rank 1 write `dofs` numbers.
             unsafe {
                 let (nodal, packed) = (&self.nodal, &mut self.packed);
+                let element = &mut self.element[..dofs];
                 state.tabulate(&kernels.cells, a, nodal, numbers, packed, element);
             };
-            self.nodal.transposed(element, 1, &mut out.0);
+            self.nodal.transposed(&self.element[..dofs], 1, &mut out.0);
             if absolute {
                 out.0 = out.0.map(f64::abs);
             }
@@ -220,15 +221,15 @@ impl<const P: usize> Work<P> {
         let (n, m) = (state.cells.dofs(), out.len());
         if !form.kernels.cells.is_empty() {
             self.nodal.set(state.cells, state.location, a);
-            let (nodal, element) = (&self.nodal, &mut self.element[..n * n]);
+            let nodal = &self.nodal;
             let numbers = local.numbers();
             // SAFETY: the caller's; kernels of rank 2 write `dofs x dofs` numbers.
             unsafe {
-                let packed = &mut self.packed;
+                let (packed, element) = (&mut self.packed, &mut self.element[..n * n]);
                 state.tabulate(&form.kernels.cells, a, nodal, numbers, packed, element);
             };
             // T^T A, then (T^T (T^T A)^T)^T = T^T A T
-            nodal.transposed(element, n, &mut self.half);
+            nodal.transposed(&self.element[..n * n], n, &mut self.half);
             transpose(&self.half[..m * n], n, &mut self.turned);
             nodal.transposed(&self.turned[..n * m], m, &mut self.half);
             for (i, row) in out.iter_mut().enumerate() {

@@ -22,7 +22,7 @@ use ndarray::ArrayView2;
 use super::cell::{Cells, Local};
 use super::kernel::{State, TabulateTensor};
 use crate::grid::{products_of, Functions};
-use crate::space::{Index, Point, DIM, FUNCTIONS, FUNCTIONS_1D, SYMMETRIC};
+use crate::space::{Index, Point, DIM, FUNCTIONS, FUNCTIONS_1D, SYMMETRIC, VERTICES};
 use crate::transfer::cells::{mean_of_cell, sum_of_cell};
 
 /// A function, its first derivatives, and its second ones (xx, yy, xy).
@@ -196,6 +196,8 @@ impl<const P: usize> Row<P> {
 pub(super) struct Points<const P: usize> {
     /// Coefficients of each component on the cell.
     coefficients: Vec<[f64; FUNCTIONS]>,
+    /// Vector of each component on the cell.
+    sums: Vec<[f64; FUNCTIONS]>,
     /// The functions of each basis.
     tables: Vec<Derivatives>,
     /// `rows[e]`: entry e of the functions behind each coefficient, zero for other components.
@@ -211,6 +213,7 @@ impl<const P: usize> Points<P> {
     pub(super) fn new(cells: &Cells) -> Self {
         Self {
             coefficients: vec![[0.0; FUNCTIONS]; cells.components().len()],
+            sums: vec![[0.0; FUNCTIONS]; cells.components().len()],
             tables: vec![[[0.0; FUNCTIONS]; DERIVATIVES]; cells.bases().len()],
             rows: Vec::new(),
             half: Vec::new(),
@@ -233,11 +236,16 @@ impl<const P: usize> Points<P> {
         absolute: bool,
         out: &mut Row<P>,
     ) {
+        self.sums.fill([0.0; FUNCTIONS]);
         // SAFETY: the caller's.
         unsafe {
             self.evaluate(kernels, state, a, local, |points, entries, weight| {
-                points.add_vector(entries, state.cells, weight, absolute, out);
+                points.add_vector(entries, state.cells, weight, absolute);
             });
+        }
+        for (sums, component) in self.sums.iter().zip(state.cells.components()) {
+            let places = out.0[component.first..].iter_mut().step_by(component.step);
+            places.zip(&sums[..component.functions]).for_each(|(out, sum)| *out += sum);
         }
     }
 
@@ -256,6 +264,7 @@ impl<const P: usize> Points<P> {
         for kernel in kernels {
             self.rows.clear();
             self.rows.resize(kernel.entries.distinct.len(), Row::ZERO);
+            self.half.resize(kernel.entries.test.len(), Row::ZERO);
             let kernel = std::slice::from_ref(kernel);
             // SAFETY: the caller's.
             unsafe {
@@ -357,10 +366,19 @@ impl<const P: usize> Points<P> {
         let cell = state.location.active_index(a);
         for (table, &basis) in self.tables.iter_mut().zip(cells.bases()) {
             let functions = Functions { basis, cells: grid.cells };
-            *table = match basis.per_cell() {
-                2 => derivatives::<2>(&functions, cell, xi, grid.h, entries.second),
-                _ => derivatives::<FUNCTIONS_1D>(&functions, cell, xi, grid.h, entries.second),
-            };
+            match basis.per_cell() {
+                2 => derivatives::<2>(&functions, cell, xi, grid.h, entries.second, table),
+                _ => {
+                    derivatives::<FUNCTIONS_1D>(
+                        &functions,
+                        cell,
+                        xi,
+                        grid.h,
+                        entries.second,
+                        table,
+                    );
+                }
+            }
         }
         self.packed.clear();
         for slot in &kernel.slots {
@@ -388,8 +406,8 @@ impl<const P: usize> Points<P> {
             }
         }
         let (rows, columns) = (entries.test.len(), entries.trial.len());
-        self.result.clear();
         self.result.resize(rows * columns.max(1), 0.0);
+        self.result.fill(0.0);
         // SAFETY: the caller guarantees the kernel, which writes rows x columns numbers.
         unsafe {
             (kernel.tabulate)(
@@ -404,67 +422,99 @@ impl<const P: usize> Points<P> {
         }
     }
 
-    /// `out += weight B^T r`, or its absolute value.
-    fn add_vector(
-        &self,
-        entries: &Entries,
-        cells: &Cells,
-        weight: f64,
-        absolute: bool,
-        out: &mut Row<P>,
-    ) {
+    /// `sums += weight B^T r`, or its absolute value.
+    #[inline(always)]
+    fn add_vector(&mut self, entries: &Entries, cells: &Cells, weight: f64, absolute: bool) {
         for group in &entries.components {
             let mut sum = [0.0; FUNCTIONS];
             for (r, &e) in self.result[group.clone()].iter().zip(&entries.test[group.clone()]) {
                 let (r, functions) = (weight * r, self.functions(entries.distinct[e], cells));
                 sum.iter_mut().zip(functions).for_each(|(s, b)| *s += r * b);
             }
-            let component =
-                cells.components()[entries.distinct[entries.test[group.start]].component];
-            let places = out.0[component.first..].iter_mut().step_by(component.step);
-            for (out, sum) in places.zip(&sum[..component.functions]) {
-                *out += if absolute { sum.abs() } else { *sum };
+            let sums = &mut self.sums[entries.distinct[entries.test[group.start]].component];
+            if absolute {
+                sum = sum.map(f64::abs);
             }
+            sums.iter_mut().zip(sum).for_each(|(sums, s)| *sums += s);
         }
     }
 
     /// `out += weight B^T D B`.
+    #[inline(always)]
     fn add_matrix(&mut self, entries: &Entries, cells: &Cells, weight: f64, out: &mut [Row<P>]) {
-        for (row, &entry) in self.rows.iter_mut().zip(&entries.distinct) {
-            let component = cells.components()[entry.component];
+        let (components, distinct) = (cells.components(), &entries.distinct);
+        for (row, entry) in self.rows.iter_mut().zip(distinct) {
+            let component = &components[entry.component];
             let functions = &self.tables[component.basis][entry.derivative];
-            let places = row.0[component.first..].iter_mut().step_by(component.step);
-            places.zip(&functions[..component.functions]).for_each(|(place, b)| *place = *b);
+            // constant numbers of functions, so that the loops are unrolled
+            match (component.functions, component.step) {
+                (FUNCTIONS, DIM) => place::<FUNCTIONS, DIM, P>(functions, component.first, row),
+                (FUNCTIONS, _) => place::<FUNCTIONS, 1, P>(functions, component.first, row),
+                (_, DIM) => place::<VERTICES, DIM, P>(functions, component.first, row),
+                _ => place::<VERTICES, 1, P>(functions, component.first, row),
+            }
         }
-        self.half.clear();
-        for d in self.result.chunks_exact(entries.trial.len()).take(entries.test.len()) {
+        let lines = self.result.chunks_exact(entries.trial.len());
+        for (half, d) in self.half.iter_mut().zip(lines) {
             let mut sum = Row::ZERO;
             for (d, &column) in d.iter().zip(&entries.trial).filter(|(d, _)| **d != 0.0) {
                 sum.add(weight * d, &self.rows[column]);
             }
-            self.half.push(sum);
+            *half = sum;
         }
         for group in &entries.components {
-            let half = &self.half[group.clone()];
-            let mut functions: [&[f64]; DERIVATIVES] = [&[]; DERIVATIVES];
-            for (functions, &e) in functions.iter_mut().zip(&entries.test[group.clone()]) {
-                *functions = self.functions(entries.distinct[e], cells);
+            let (half, test) = (&self.half[group.clone()], &entries.test[group.clone()]);
+            let component = &components[distinct[test[0]].component];
+            let table = &self.tables[component.basis];
+            let mut functions = [&table[0]; DERIVATIVES];
+            for (functions, &e) in functions.iter_mut().zip(test) {
+                *functions = &table[distinct[e].derivative];
             }
-            let component =
-                cells.components()[entries.distinct[entries.test[group.start]].component];
-            let lines = out[component.first..].iter_mut().step_by(component.step);
-            for (f, out) in (0..component.functions).zip(lines) {
-                let mut sum = *out;
-                for (functions, half) in functions.iter().zip(half) {
-                    sum.add(functions[f], half);
+            match (component.functions, component.step) {
+                (FUNCTIONS, DIM) => {
+                    add_rows::<FUNCTIONS, DIM, P>(&functions, half, component.first, out);
                 }
-                *out = sum;
+                (FUNCTIONS, _) => {
+                    add_rows::<FUNCTIONS, 1, P>(&functions, half, component.first, out);
+                }
+                (_, DIM) => add_rows::<VERTICES, DIM, P>(&functions, half, component.first, out),
+                _ => add_rows::<VERTICES, 1, P>(&functions, half, component.first, out),
             }
         }
     }
 }
 
-/// Values and derivatives of the functions of a cell at a position in it, `W` along each axis.
+/// Put the values of `F` functions to the coefficients of a component, one of `S` of its field.
+#[inline(always)]
+fn place<const F: usize, const S: usize, const P: usize>(
+    functions: &[f64; FUNCTIONS],
+    first: usize,
+    row: &mut Row<P>,
+) {
+    let places = &mut row.0[first..][..=S * (F - 1)];
+    (0..F).for_each(|f| places[S * f] = functions[f]);
+}
+
+/// Add `sum_k functions_k half_k` to the rows of the `F` functions of a component, one of `S` of its field.
+#[inline(always)]
+fn add_rows<const F: usize, const S: usize, const P: usize>(
+    functions: &[&[f64; FUNCTIONS]; DERIVATIVES],
+    half: &[Row<P>],
+    first: usize,
+    out: &mut [Row<P>],
+) {
+    let lines = &mut out[first..][..=S * (F - 1)];
+    for f in 0..F {
+        let mut sum = lines[S * f];
+        for (functions, half) in functions.iter().zip(half) {
+            sum.add(functions[f], half);
+        }
+        lines[S * f] = sum;
+    }
+}
+
+/// Values and derivatives of the functions of a cell at a position in it, `W` along each axis. The second
+/// ones are left out if they are not needed.
 #[inline(always)]
 fn derivatives<const W: usize>(
     functions: &Functions,
@@ -472,10 +522,10 @@ fn derivatives<const W: usize>(
     xi: Point,
     h: f64,
     second: bool,
-) -> Derivatives {
+    out: &mut Derivatives,
+) {
     let along = functions.at(cell, xi);
     let values = along.each_ref().map(|local| &local.value);
-    let mut out = [[0.0; FUNCTIONS]; DERIVATIVES];
     out[0] = products_of::<W>(values);
     for axis in 0..DIM {
         let mut factors = values;
@@ -490,7 +540,6 @@ fn derivatives<const W: usize>(
             *out = products_of::<W>(factors).map(|value| value / (h * h));
         }
     }
-    out
 }
 
 /// Value of the linear function of a vertex at a position in a cell.

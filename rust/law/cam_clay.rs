@@ -13,7 +13,7 @@
 //!
 //! For a given d_gamma the last equation has one solution p_c; then F = 0 is one equation for d_gamma.
 //! At a given mean stress the return has K = 0 here, and the plastic volumetric strain is -v. Dry of
-//! critical, g < 0, the clay softens.
+//! critical, g < 0, the clay softens, until p_c = p_t.
 
 use std::sync::Arc;
 
@@ -36,9 +36,6 @@ pub(super) const MAKER: Maker = Maker {
         Ok(Arc::new(CamClay::new(elastic, m, lambda_star, kappa_star, p_c, tension)?))
     },
 };
-
-/// Softening ends when p_c is this share of the parameter `preconsolidation`.
-const LEAST: f64 = 1e-6;
 
 /// Most Newton iterations of a return; about 10 are usual.
 const ITERATIONS: usize = 200;
@@ -139,7 +136,7 @@ impl CamClay {
     /// p_c at the start of a step.
     fn old(&self, history: &[f64]) -> f64 {
         let stored = if history[0] == 0.0 { self.preconsolidation } else { history[0] };
-        stored.max(LEAST * self.preconsolidation)
+        stored.max(self.tension)
     }
 
     /// `ln(p_c / p_c_old)` after flow of d_gamma: the root x of
@@ -165,7 +162,7 @@ impl CamClay {
 
     /// The state after plastic flow of d_gamma.
     fn after(&self, trial: &Trial, gamma: f64) -> Flow {
-        let least = (LEAST * self.preconsolidation / trial.p_c).ln();
+        let least = (self.tension / trial.p_c).ln();
         let x = self.growth(trial, gamma).max(least);
         let p_c = trial.p_c * x.exp();
         let stiffness = if x > least { p_c / self.theta } else { 0.0 };
@@ -296,8 +293,8 @@ impl Law for CamClay {
         (Stress { deviator, mean: -flow.p }, moduli)
     }
 
-    /// Beyond half the tensile strength, p + p_t = p_t/2, the deviator is the one there, and the clay opens as
-    /// in [`SOFT`]. To this the slope of the plastic volume is added, which is near 1 / sqrt(p + p_t).
+    /// Beyond half the tensile strength the deviator is the one there, and the clay opens by [`SOFT`] and by
+    /// the slope theta / (p + p_t) of an open clay: with a smaller one Newton's method would go in cycles.
     fn respond_at_mean(
         &self,
         increment: &Sym,
@@ -332,10 +329,9 @@ impl Law for CamClay {
         }
         if mean > limit {
             let x = mean - limit;
-            let soft = 1.0 / (SOFT * mu) + answer.plastic_volume / self.tension;
-            new[0] = (new[0] * (-soft * x / self.theta).exp()).max(LEAST * self.preconsolidation);
+            let soft = 1.0 / (SOFT * mu) + self.theta / (self.tension - limit);
+            new[0] = (new[0] * (-soft * x / self.theta).exp()).max(self.tension);
             answer.plastic_volume += soft * x;
-            answer.volume_dev = answer.volume_dev.map(|v| v * (1.0 + x / self.tension));
             answer.dev_mean = [0.0; COMPONENTS];
             answer.volume_mean = soft;
         }

@@ -42,7 +42,11 @@ pub(super) fn write(
         (Operator::MeanKirchhoff, Part::Value) => out[0] = tau.mean,
         (Operator::MeanKirchhoff, Part::Volume) => out[0] = c.mean_vol,
         (Operator::MeanKirchhoff, Part::Gradient) => {
-            (0..n).for_each(|k| out[k] = trial.change(&c.mean_dev, &Gradient::unit(k)));
+            for (k, o) in out.iter_mut().enumerate() {
+                let dg = Gradient::unit(k);
+                let dv = if own { 0.0 } else { trial.volume_change(&dg) };
+                *o = trial.change(&c.mean_dev, &dg) + c.mean_vol * dv;
+            }
         }
         (Operator::PlasticVolume | Operator::History(_), Part::Value) => out[0] = scalar.value,
         (Operator::PlasticVolume | Operator::History(_), Part::Volume) => out[0] = scalar.field,

@@ -186,6 +186,7 @@ impl Stage<'_> {
     }
 
     /// The strain that the law of particle `p` receives; `None` if the particle is turned inside out.
+    #[inline(always)]
     fn received(&self, law: &dyn Law, old: &Old, p: usize) -> Option<Received> {
         let stress = Stress::from(&old.stress_of(p));
         if !self.finite {

@@ -195,6 +195,28 @@ def test_an_equation_whose_terms_cancel_at_each_particle_converges(basis):
     assert [step.iterations for step in steps] == [1, 0]
 
 
+@pytest.mark.parametrize("basis", ["bilinear", "quadratic_spline"])
+def test_a_spline_field_that_a_particle_hardly_reaches_follows_its_neighbour(basis):
+    """A particle 1e-8 of a cell inside a support gives its function no stiffness."""
+    grid = grid_of()
+    inside = tawami.box(grid, grid.origin, (0.0, 2.0), per_axis=2)
+    x = np.vstack([inside.x, [[1e-8 * grid.h, 1.1]]])
+    body = tawami.Body(x, np.append(inside.volume, 0.01))
+    form = heated.form_of(basis="quadratic_spline")
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3), form=form, basis=basis)
+    layout = scene.configuration.domain.layout
+    place = layout.fields["theta"]
+    followers, leaders = layout.tied[place.holds(layout.tied[:, 0])].T
+    assert len(followers) == 3  # the functions of the last column on the row of the particle
+    assert place.holds(leaders).all()
+    assert not layout.active[followers].any()
+    scene.fix("bottom", "x")
+    scene.fix("bottom", "y")
+    tied = scene.reduction().selection
+    for follower, leader in zip(followers, leaders, strict=True):
+        assert (tied[follower] != tied[leader]).nnz == 0
+
+
 def test_the_message_of_a_step_names_the_field():
     def residual(u, p, w, r, sigma, sum_p):
         return sum_p(sigma, grad(w)) + sum_p((p**3 + 0.01 * p - 1) * r)
@@ -204,6 +226,21 @@ def test_the_message_of_a_step_names_the_field():
     scene.fix("bottom", "x")
     scene.fix("bottom", "y")
     with pytest.raises(tawami.ConvergenceError, match=r"momentum, volume and 'p' by iteration: 0:"):
+        scene.solve()
+
+
+def test_a_field_without_stiffness_is_named():
+    def residual(u, p, w, r, sigma, sum_p, source):
+        return sum_p(sigma, grad(w)) + sum_p(dot(grad(p), grad(r)) - source * r)
+
+    fields = {"u": vector("w"), "p": scalar("r")}
+    form = Form(fields, residual, parameters={"source": {"default": 1.0}})
+    grid = grid_of()
+    body = tawami.box(grid, grid.origin, grid.upper)
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.2), form=form)
+    scene.fix("bottom", "x")
+    scene.fix("bottom", "y")
+    with pytest.raises(tawami.SingularError, match=r"\d\) with \d+ particles in field 'p'"):
         scene.solve()
 
 

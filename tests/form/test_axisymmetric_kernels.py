@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import ufl
 from mpi4py import MPI
 from scenes import FINITE, FORMS
 from scipy.interpolate import BSpline
@@ -71,8 +72,10 @@ def test_sums_are_those_of_splines_of_scipy(place):
     np.testing.assert_allclose(scene.residual(c), expected, atol=1e-12 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("basis", ["quadratic_spline", "bilinear"])
-@pytest.mark.parametrize("name", FORMS | FINITE)
+@pytest.mark.parametrize(
+    ("name", "basis"),
+    [*((name, "quadratic_spline") for name in FORMS | FINITE), ("u_epsv", "bilinear")],
+)
 def test_tangents_are_those_of_the_residuals(name, basis):
     law = tawami.neo_hookean(K=2.0, mu=1.0) if name in FINITE else None
     scene = scene_of(law=law, basis=basis, **(FORMS | FINITE)[name])
@@ -134,3 +137,21 @@ def test_integrals_over_cells_edges_and_sides_have_the_length_of_the_circle():
     scene.traction("bottom", (3.0, 0.0))
     forces = scene.configuration.external()
     assert forces.sum() == pytest.approx(3 * np.pi * (1.2**2 - 0.6**2), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("residual", "message"),
+    [
+        (lambda w, sigma, sum_p: sum_p(sigma, ufl.grad(w)),
+         r"line \d+ .*shape \(2, 2\): expected the same shape; expected grad, div, eps and I as arg"),
+        (lambda w, sigma, sum_p: sum_p(inner(sigma, ufl.grad(w))),
+         r"its residual raised .*If shapes differ: expected grad, div, eps and I as arguments"),
+        (lambda w, sigma, sigma_m, eps, sum_p: sum_p(sigma, eps(w)) + sum_p(sigma_m, ufl.div(w)),
+         r"line \d+ .*a derivative of a vector by UFL, div\(.*: expected grad, div, eps and I as ar"),
+        (lambda u, w, mu, sum_p: sum_p(mu, inner(ufl.grad(u), ufl.grad(w))),
+         r"a derivative of a vector by UFL, grad\(.*: in axisymmetry tensors have a third row"),
+    ],
+)  # fmt: skip
+def test_derivatives_without_the_hoop_direction_are_rejected(residual, message):
+    with pytest.raises(tawami.FormError, match=message):
+        scene_of(Form({"u": vector("w")}, residual))

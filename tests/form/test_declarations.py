@@ -43,6 +43,14 @@ WRONG = [
         lambda: scalar("q", role="damage"),
         "role='damage'.*: expected 'volumetric_strain', 'pressure'",
     ),
+    (
+        lambda: scalar("q", role="pressure", basis="quadratic_spline"),
+        "role='pressure', basis='quadratic_spline'.*: leave it out",
+    ),
+    (
+        lambda: scalar("q", role="volumetric_strain", scale=1e-3),
+        "role='volumetric_strain', scale=0.001.*: leave it out",
+    ),
     (lambda: scalar("q", basis="cubic"), "basis='cubic'.*: expected one of 'bilinear'"),
     (lambda: scalar("q", role="pressure", unit="kPa"), "unit='kPa'.*: expected 'Pa', or no unit"),
     (lambda: scalar("q", scale=-1), "scale = -1: expected a finite number above 0"),

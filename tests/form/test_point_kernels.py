@@ -191,3 +191,21 @@ def test_terms_that_vanish_and_sums_that_are_not_used(cloud):
 def test_terms_that_cannot_be_evaluated_are_rejected(cloud, residual, message):
     with pytest.raises(tawami.FormError, match=message):
         scene_of(cloud, residual)
+
+
+@pytest.mark.parametrize("quantity", ["tau_m", "ln_J"])
+def test_the_tangent_of_volumes_and_mean_stresses_at_finite_strain(cloud, quantity):
+    """R(w) = sum_p V_p (tau f^-T : grad w + q^2 div w), for a law of the whole strain."""
+
+    def residual(w, P, tau_m, ln_J, sum_p):
+        q = tau_m if quantity == "tau_m" else ln_J
+        return sum_p(P, grad(w)) + sum_p((q + q**2) * div(w))
+
+    grid, x, volume, _ = cloud
+    form = Form({"u": vector("w")}, residual, strain="finite")
+    material = tawami.linear_elastic(K=2.0, mu=1.0)
+    scene = tawami.Scene(grid, tawami.Body(x, volume), material, form=form)
+    c, direction, step = 0.3 * H * increments(scene), increments(scene)[::-1], 1e-6
+    ahead, behind = (scene.residual(c + s * step * direction) for s in (1, -1))
+    change = scene.tangent(c) @ direction
+    assert np.abs((ahead - behind) / (2 * step) - change).max() < 1e-7 * np.abs(change).max()

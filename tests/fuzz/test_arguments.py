@@ -146,7 +146,7 @@ ELASTIC = tawami.linear_elastic(E=1e3, nu=0.3)
 FRICTION = {"phi": 30.0, "c": 1.0, "psi": 0.0, "eps_v_max": math.inf, "tiny_angle": False}
 
 
-def law(strain: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def law(strain: np.ndarray, stress: np.ndarray, history: Any = None) -> tuple[Any, Any]:
     return stress + strain, np.tile(np.eye(4), (len(strain), 1, 1))
 
 
@@ -265,7 +265,7 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "cam_clay": (tawami.cam_clay, {
         "elastic": ELASTIC, "M": 1.0, "lambda_star": 0.2, "kappa_star": 0.05,
         "preconsolidation": 0.1, "tension": 1e-3}),
-    "NumpyLaw": (tawami.NumpyLaw, {"respond": law, "K": 1.0, "mu": 1.0}),
+    "NumpyLaw": (tawami.NumpyLaw, {"respond": law, "K": 1.0, "mu": 1.0, "history": ("kappa",)}),
     "Form": (lambda **a: scene_of(form=tawami.Form(**a)), {
         "fields": {"u": vector("w")}, "residual": residual,
         "parameters": {}, "options": {}, "strain": "small", "whole_cells": (), "name": "own"}),

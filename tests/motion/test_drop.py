@@ -19,7 +19,9 @@ def drop(form, nu, transfer):
     return scene, tawami.Dynamics(scene, velocity=(0.0, -SPEED), transfer=transfer)
 
 
-@pytest.mark.parametrize("form", ["u_finite", "u_epsv_finite"])
+@pytest.mark.parametrize(
+    "form", [pytest.param("u_finite", marks=pytest.mark.slow), "u_epsv_finite"]
+)
 def test_a_drop_falls_and_bounces_with_its_momentum(form):
     scene, motion = drop(form, 0.3 if form == "u_finite" else 0.45, "affine_flip")
     scene.gravity((0.0, -G))

@@ -9,7 +9,7 @@ from scenes import grid_of
 
 import tawami
 from tawami.motion.observer import NullObserver
-from tawami.motion.pace import Pace
+from tawami.motion.pace import Pace, Step, pack, unpack
 from tawami.motion.stepping import march
 from tawami.scene.activity import Activity
 
@@ -210,3 +210,13 @@ def test_wrong_input_is_rejected():
         tawami.InputError, match=r"fix\(edge='right'\) has a velocity, which static"
     ):
         tawami.ramp(scene)
+
+
+@pytest.mark.parametrize("more", [(), (2e-3,)])
+def test_stored_steps_are_read_again(more):
+    """Two measures, and a third one with fields without a role."""
+    history = [(1.0, None, *more), (1e-7, None, *more)]
+    steps = [Step(0.5, 0.5, history, (0,)), Step(1.0, 0.5, history[:1], ())]
+    assert unpack(pack(steps)) == steps
+    volume = [Step(0.5, 0.5, [(1.0, 0.3, *more)], (0,))]
+    assert unpack(pack(volume)) == volume

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -18,9 +20,9 @@ MIXED = ("u_epsv", "u_p")
 SMALL = ("u", "u_bbar", *MIXED)
 
 
-def block(form, p, bulk=K, **options):
+def block(form, p, bulk=K, geometry="plane_strain", **options):
     """A square of 1 m that fills its grid, under the pressure p [Pa], on a smooth floor and side."""
-    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.5, cells=(2, 2))
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.5, cells=(2, 2), geometry=geometry)
     body = tawami.box(grid, (0, 0), (1, 1), per_axis=3, gauss=True)
     law = tawami.cam_clay(tawami.linear_elastic(K=bulk, mu=MU), **(CLAY | options))
     scene = tawami.Scene(grid, body, law, form=form, tolerance=1e-10)
@@ -142,6 +144,25 @@ def test_drained_compression_ends_at_the_critical_state(form):
     assert p_c == pytest.approx(2 * p + P_T, rel=0.1)
 
 
+@pytest.mark.parametrize("form", ["u", "u_epsv", "u_p"])
+def test_drained_triaxial_compression_has_the_stress_path_and_volume_of_its_closed_form(form):
+    """A cylinder under a constant pressure on its side: q = 3 (p - p_0) up to q = M (p + p_t)."""
+    scene = block(form, P_C, geometry="axisymmetric", kappa_star=CLAY["lambda_star"] - 0.01)
+    scene.traction("right", (-P_C, 0.0))
+    top = scene.fix("top", "y", 0.0)
+    for strain in (0.01, 0.02, 0.04, 0.08, 0.12, 0.16):
+        top.change(-strain)
+        solution = scene.solve()
+        p, q, p_c = state(scene)
+        assert q == pytest.approx(3 * (p - P_C), rel=1e-6)
+        assert excess(p, q, p_c) == pytest.approx(0, abs=1e-8)
+        radial = solution.displacement((1.0, 0.5))[0]
+        volume = 0.01 * np.log(p_c / P_C) + (p - P_C) / K
+        assert strain - 2 * radial == pytest.approx(volume, rel=1e-5)
+    p_f = (3 * P_C + M * P_T) / (3 - M)
+    assert (p, q, p_c) == pytest.approx((p_f, M * (p_f + P_T), 2 * p_f + P_T), rel=0.02)
+
+
 @pytest.mark.parametrize("form", ["u_finite", "u_bbar_finite", "u_epsv_finite"])
 def test_finite_compression_satisfies_the_implicit_equations_in_logarithmic_strains(form):
     """A step without strain sideways; two equations for plastic compression and multiplier."""
@@ -162,6 +183,25 @@ def test_finite_compression_satisfies_the_implicit_equations_in_logarithmic_stra
 
     v, multiplier = fsolve(equations, [0.05, 1.0], xtol=1e-13) * [1.0, 1e-7]
     assert state(scene) == pytest.approx(after(v, multiplier), rel=1e-7)
+
+
+@pytest.mark.parametrize("form", ["u", "u_epsv"])
+def test_softening_dry_of_critical_is_a_warning(form):
+    """A clay of overconsolidation ratio 6 is sheared with its volume free."""
+    scene = block(form, P_C / 6)
+    scene.initial("preconsolidation", P_C)
+    scene.traction("right", (-P_C / 6, 0.0))
+    top = scene.fix("top", "y", 0.0)
+    for strain in (0.005, 0.01, 0.015):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            top.change(-strain)
+            scene.solve()
+        if caught:
+            break
+    assert [w.category for w in caught] == [tawami.SofteningWarning]
+    assert "the preconsolidation pressure of particle" in str(caught[0].message)
+    assert scene.particles.history("preconsolidation").min() < P_C
 
 
 def test_initial_preconsolidation():

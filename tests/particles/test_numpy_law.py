@@ -6,6 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from numpy_laws import drucker_prager, hooke, stiffening, von_mises
 from scenes import grid_of, linear_field
 
@@ -155,6 +156,15 @@ def test_wrong_moduli_are_rejected(bulk, mu):
         tawami.NumpyLaw(elastic, bulk, mu)
 
 
+def test_a_function_of_other_arguments_is_rejected():
+    with pytest.raises(
+        tawami.InputError, match=r"takes \(strain, stress\): expected .*stress, history"
+    ):
+        tawami.NumpyLaw(elastic, K, MU, history=("kappa",))
+    with pytest.raises(tawami.InputError, match="stress; with history variables NumpyLaw"):
+        tawami.NumpyLaw(NUMPY.respond, K, MU)
+
+
 @pytest.mark.parametrize(
     ("history", "message"),
     [
@@ -164,12 +174,13 @@ def test_wrong_moduli_are_rejected(bulk, mu):
         (("plastic strain",), "history variable 'plastic strain': expected a name of letters"),
         ((3,), "history variable 3: expected a name of letters"),
         (("stress",), "that particles do not have already"),
+        ({"p_c": 3}, "unit of p_c = 3: expected text, as 'Pa'"),
     ],
 )
 def test_wrong_names_of_history_variables_are_rejected(history, message):
     with pytest.raises(tawami.InputError, match=message):
-        tawami.NumpyLaw(elastic, K, MU, history)
-    tawami.NumpyLaw(elastic, K, MU, history=("plastic_strain",))  # the advice
+        tawami.NumpyLaw(NUMPY.respond, K, MU, history)
+    tawami.NumpyLaw(NUMPY.respond, K, MU, history=("plastic_strain",))  # the advice
 
 
 @pytest.mark.parametrize(
@@ -183,6 +194,26 @@ def test_von_mises_in_numpy_is_that_in_rust(form, law):
     assert plastic.max() > 0.01
     assert plastic.min() == 0
     assert_same(mine, other, 1e-9)
+
+
+@pytest.mark.parametrize("form", ["u_epsv", "u_epsv_finite"])
+def test_laws_in_numpy_and_in_rust_agree_in_axisymmetry(form):
+    """A cylinder that is pressed around its axis: the hoop is the component zz of the law."""
+    solutions = []
+    for law in (NUMPY, RUST):
+        grid = tawami.Grid(
+            MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.25, cells=(6, 6), geometry="axisymmetric"
+        )
+        body = tawami.box(grid, (0.0, 0.0), (1.0, 1.0), per_axis=2)
+        scene = tawami.Scene(grid, body, law, form=form, tolerance=1e-10)
+        for edge, component in (("left", "x"), ("bottom", "x"), ("bottom", "y")):
+            scene.fix(edge, component)
+        scene.load(lambda x, y: (y > 0.75) & (x < 0.5), (0.0, -60.0))
+        solutions.append(scene.solve())
+    plastic, stress = (solutions[1].scene.particles.history("plastic_strain"), solutions[1].stress)
+    assert plastic.max() > 0.01
+    assert np.abs(stress[:, 2]).max() > 1.0
+    assert_same(*solutions, 1e-9)
 
 
 @pytest.mark.parametrize("form", ["u", "u_epsv", "u_p", "u_epsv_finite"])
@@ -306,3 +337,14 @@ def test_initial_history_moves_the_yield_surface():
     scene.initial("plastic_strain", 0.1)
     scene.initial("stress", beyond * (1 - 1e-12))
     assert scene.particles.history("plastic_strain") == pytest.approx(0.1)
+
+
+@pytest.mark.filterwarnings("ignore::tawami.TangentWarning")
+def test_the_units_of_history_variables_are_in_the_labels():
+    def respond(strain, stress, history):
+        return stress + strain @ ELASTIC, {"p_c": history["p_c"] + 2.0, "alpha": history["alpha"]}
+
+    law = tawami.NumpyLaw(respond, K, MU, history={"p_c": "Pa", "alpha": "-"})
+    table = scene_with(law, "u").solve().to_pandas("p_c", "alpha")
+    assert list(table.columns[2:]) == ["p_c [Pa]", "alpha [-]"]
+    assert (table["p_c [Pa]"] == 2.0).all()

@@ -15,6 +15,7 @@ import compatibility
 import executed
 import messages
 import notebooks
+import numpy as np
 import pages
 import pytest
 import sources
@@ -230,7 +231,14 @@ def test_tutorials_can_be_downloaded_as_notebooks(name):
     assert len(code) >= 3
     assert not re.search(r"\{\w+\}`|eval-rst", text)
     imported = set(re.findall(r"^(?:import|from) (\w+)", "\n".join(code), flags=re.MULTILINE))
-    assert imported <= sys.stdlib_module_names | {"tawami", "numpy", "matplotlib", "mpi4py", "ufl"}
+    assert imported <= sys.stdlib_module_names | {
+        "tawami",
+        "numpy",
+        "matplotlib",
+        "mpi4py",
+        "scipy",
+        "ufl",
+    }
     assert any("plot" in source for source in code)
     assert any("print(" in source for source in code)
     assert notebooks.download(PAGES[name]) == notebooks.download(PAGES[name])
@@ -406,6 +414,15 @@ def test_stress_of_a_compressed_block_of_a_linear_law(tried):
     for cell in tried:
         if (cell.law, cell.time, cell.error) == ("linear_elastic", "static", ""):
             assert cell.numbers[0] == pytest.approx(exact, rel=0.03)
+
+
+def test_a_compressed_cylinder_of_the_table():
+    """With a free side the axial stress is E times the strain, on the area pi r^2."""
+    exact = np.pi * compatibility.E * compatibility.PRESSED
+    pressed = compatibility.attempt("u_epsv, axisymmetric", "linear_elastic", "static")
+    np.testing.assert_allclose(pressed.numbers[:2], [exact, -exact], rtol=1e-4)
+    falling = compatibility.attempt("u_epsv, alpha(x, y)", "linear_elastic", "dynamic")
+    assert falling.error == ""
 
 
 def test_the_table_shows_the_results(tried):

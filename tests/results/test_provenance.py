@@ -58,7 +58,12 @@ def test_a_script_is_described(tmp_path):
     assert (tmp_path / "results" / "script.py").read_text() == SCRIPT
     assert (run["ranks"], run["git"], run["phases"]) == (1, None, [])
     assert run["threads"]["OMP_NUM_THREADS"] == "1"
-    assert run["grid"] == {"origin": [0, 1], "h": 0.5, "cells": [4, 2]}
+    assert run["grid"] == {
+        "origin": [0, 1],
+        "h": 0.5,
+        "cells": [4, 2],
+        "geometry": "plane_strain",
+    }
     assert run["form"] == {"name": "u_epsv", "source": str(ROOT / "forms" / "u_epsv.py")}
     assert (tmp_path / "results" / "form.py").read_bytes() == (
         ROOT / "forms/u_epsv.py"

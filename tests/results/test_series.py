@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import meshio
 import numpy as np
 import pytest
@@ -82,7 +84,7 @@ def test_a_table_has_a_row_for_each_step(written):
     np.testing.assert_array_equal(found["step [-]"], np.arange(26))
     np.testing.assert_array_equal(found["time [s]"], times)
     np.testing.assert_allclose(found["step size [s]"], np.diff(times, prepend=0.0), atol=1e-15)
-    for name in Energies.__dataclass_fields__:
+    for name in (field.name for field in fields(Energies)):
         values = [getattr(now["energies"], name) for now in kept]
         np.testing.assert_array_equal(found[f"energy {name} [J/m]"], values)
     assert np.isnan(found["reaction bottom y [N/m]"][0])

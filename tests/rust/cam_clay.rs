@@ -52,7 +52,7 @@ proptest! {
         });
         prop_assume!(new[1] > 0.2);
         prop_assert!(excess(&stress, new[0]).abs() < 1e-11);
-        let expected = (p_c * (v / THETA).exp()).max(1e-6 * P_C);
+        let expected = (p_c * (v / THETA).exp()).max(P_T);
         prop_assert!((new[0] - expected).abs() < 1e-9 * expected.max(p_c));
         // plastic deviator : v = 3 s / M^2 : g
         let g = P_T - 2.0 * stress.mean - new[0];
@@ -101,7 +101,7 @@ fn isotropic_compression_follows_the_virgin_line() {
     }
 }
 
-/// Isotropic expansion ends at the tensile strength, and softening at a millionth of the parameter.
+/// Isotropic expansion ends at the tensile strength, and softening when p_c is as small.
 #[test]
 fn tension_is_limited() {
     let law = clay();
@@ -112,10 +112,26 @@ fn tension_is_limited() {
     assert!((new[0] / (P_C * (v / THETA).exp()) - 1.0).abs() < 1e-12);
     assert!(moduli.mean_vol.abs() < 1e-9 * law.bulk_modulus());
     let (stress, new, _) = step(&law, &[0.9, 0.5, 0.9, 0.3], &free, &[0.0; 2]);
-    assert!((new[0] / (1e-6 * P_C) - 1.0).abs() < 1e-12 && excess(&stress, new[0]).abs() < 1e-9);
+    assert!((new[0] / P_T - 1.0).abs() < 1e-12 && excess(&stress, new[0]).abs() < 1e-9);
     // an opened clay closes before it carries load again
-    let (stress, _, _) = step(&law, &[-0.02, -0.02, -0.02, 0.0], &free, &[1e-6 * P_C, 0.0]);
-    assert!(-stress.mean < 0.01 * P_C && -stress.mean > 1e-6 * P_C);
+    let (stress, _, _) = step(&law, &[-0.02, -0.02, -0.02, 0.0], &free, &[P_T, 0.0]);
+    assert!(-stress.mean < 0.01 * P_C && -stress.mean > P_T);
+}
+
+/// A mean stress beyond half the tensile strength opens the clay, with a slope, and lowers p_c.
+#[test]
+fn tension_at_a_mean_stress_opens_the_clay() {
+    let (law, mu) = (clay(), 2.0);
+    let at = |mean: f64| {
+        let mut new = [0.0; 2];
+        (law.respond_at_mean(&[0.02, -0.02, 0.0, 0.0], &[0.0; 4], mean, &[0.0; 2], &mut new), new)
+    };
+    let ((limit, before), (beyond, after)) = (at(0.5 * P_T), at(0.6 * P_T));
+    let opened = 0.1 * P_T * (1.0 / (0.1 * mu) + THETA / (0.5 * P_T));
+    assert!((beyond.plastic_volume - limit.plastic_volume - opened).abs() < 1e-12);
+    assert_eq!(beyond.deviator, limit.deviator);
+    let expected = (before[0] * (-opened / THETA).exp()).max(P_T);
+    assert!((after[0] / expected - 1.0).abs() < 1e-12 && after[0] < before[0]);
 }
 
 #[test]

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from scenes import FINITE, FORMS
+from ufl import dot, inner
 
 import tawami
+from tawami.form import scalar, vector
 from tawami.results import write_particles
 
 E, NU = 1e4, 0.3
@@ -202,6 +204,11 @@ TRIAXIAL = {
     "numpy": (_numpy_law(), -20 - 0.04 * E),
     "von_mises": (tawami.von_mises(ELASTIC, yield_stress=30.0), -50.0),
     "tresca": (tawami.mohr_coulomb(ELASTIC, phi=0.0, c=15.0), -50.0),
+    # sqrt(J2) + A p = c B with A = 3 t / sqrt(9 + 12 t^2), B = A / t, t = tan(phi), for psi = phi
+    "drucker_prager": (
+        tawami.drucker_prager(ELASTIC, phi=30.0, c=5.0, psi=30.0),
+        -20 - (15 / 13**0.5 + 20 * (3 / 13) ** 0.5) / (1 / 3**0.5 - (1 / 39) ** 0.5),
+    ),
     "mohr_coulomb": (  # s1 = N s3 + 2 c sqrt(N), N = tan^2(45 deg + phi/2) = 3
         tawami.mohr_coulomb(ELASTIC, phi=30.0, c=5.0, psi=10.0), -60 - 10 * np.sqrt(3.0)
     ),
@@ -308,3 +315,42 @@ def test_a_body_of_an_earlier_run_has_its_areas(tmp_path):
     np.testing.assert_allclose(again.particles.volume, solution.volume, rtol=1e-12)
     again.initial("stress", earlier)
     np.testing.assert_array_equal(again.particles.stress, solution.stress)
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("form", ["u_epsv", "u_epsv_finite"])
+def test_results_do_not_depend_on_the_unit_of_length(form, size):
+    scene = ring(size, h=0.25 * size, form=form)
+    scene.fix("bottom", "y", 0.02 * size)
+    solution = scene.solve()  # a translation along the axis
+    assert np.abs(solution.stress).max() < 1e-8 * E
+    scene.traction("right", (-10.0, 0.0))
+    inner = scene.solve().stress[0]
+    reference = ring(1.0, form=form)
+    reference.fix("bottom", "y", 0.02)
+    reference.solve()
+    reference.traction("right", (-10.0, 0.0))
+    np.testing.assert_allclose(inner, reference.solve().stress[0], rtol=1e-6, atol=1e-6)
+
+
+def test_conduction_through_a_pipe_has_the_logarithmic_profile():
+    """lap c = 0, c = 0 at r = 2, a flux of 3 into the wall at r = 1: c = 3 ln(2 / r)."""
+
+    def residual(w, r, c, sigma, old, grad, sum_p):
+        return sum_p(inner(sigma, grad(w))) + sum_p(dot(grad(r), grad(old.c + c)))
+
+    fields = {"u": vector("w"), "c": scalar("r", unit="K")}
+    scene = ring(1.0, cells=(8, 2), h=0.125, form=tawami.Form(fields, residual))
+    for edge in ("left", "right", "bottom", "top"):
+        scene.fix(edge, "y")
+        scene.fix(edge, "x")
+    scene.fix("right", "c", 0.0)
+    scene.flux("left", "c", 3.0)
+    solution = scene.solve()
+    exact = 3 * np.log(2 / solution.x[:, 0])
+    assert np.abs(solution.field("c") - exact).max() < 0.01 * exact.max()
+    forces = scene.configuration.external()
+    assert forces.sum() == pytest.approx(3 * 2 * np.pi * 1.0 * 0.25)
+    scene.flux("top", "c", 1.0)
+    forces = scene.configuration.external() - forces
+    assert forces.sum() == pytest.approx(np.pi * (2**2 - 1**2))

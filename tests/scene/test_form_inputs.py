@@ -241,3 +241,142 @@ def test_fields_data_and_parameters_are_in_checkpoints(tmp_path):
     other = made()
     other.restore(state)
     np.testing.assert_allclose(other.solve(until=0.2).field("c"), expected, rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("residual", "words"),
+    [
+        (
+            lambda w, r, c, sigma, old, grad, sum_p, sum_v: (
+                stiff(w, sigma, grad, sum_p) + sum_v(r * (old.c + c))
+            ),
+            "sum_v: particle data, old fields",
+        ),
+        (
+            lambda w, r, c, sigma, old, grad, sum_p, dx: (
+                stiff(w, sigma, grad, sum_p) + r * (old.c + c) * dx
+            ),
+            "an old field outside a sum over particles",
+        ),
+        (
+            lambda w, r, c, sigma, old, grad, sum_p: (
+                stiff(w, sigma, grad, sum_p) + sum_p(r * (old.u[0] + c))
+            ),
+            "old.u: only fields without a role have an old value",
+        ),
+        (
+            lambda w, r, c, sigma, old, grad, sum_p: (
+                stiff(w, sigma, grad, sum_p) + sum_p(r * grad(grad(old.c))[0, 0])
+            ),
+            "a second derivative of an old field",
+        ),
+        (
+            lambda w, r, c, sigma, kappa, grad, sum_p: (
+                stiff(w, sigma, grad, sum_p) + sum_p(r * grad(kappa)[0])
+            ),
+            r"a derivative of particle data \(kappa\)",
+        ),
+    ],
+)
+def test_what_a_form_cannot_read_is_reported_with_its_line(residual, words):
+    with pytest.raises(tawami.FormError, match=rf"line \d+ .*{words}"):
+        scene_of(residual, more={"data": {"kappa": "conductivity [m2/s]"}})
+
+
+def test_an_affine_expression_of_a_stress_is_rejected_at_the_centre():
+    def residual(w, s, sigma_m, grad, div, sum_p, sum_c):
+        return sum_p(inner(s, grad(w))) + sum_c(sigma_m - 100.0, div(w))
+
+    with pytest.raises(tawami.FormError, match="combines with particle constants only"):
+        scene_of(residual, {"u": vector("w")}, more={"kinematics": "cell"})
+
+
+def test_a_penalty_follows_data_that_change():
+    def residual(u, w, r, c, sigma, kappa, grad, sum_p, facet_mean, jump_nn, dG, h):
+        penalty = facet_mean(kappa) * h**3 * inner(jump_nn(u), jump_nn(w)) * dG
+        return stiff(w, sigma, grad, sum_p) + sum_p(r * c) + penalty
+
+    form = tawami.Form(FIELDS, residual, data={"kappa": "stiffness [Pa]"})
+    grid = grid_of((8, 8), h=0.25)
+    body = tawami.disc(grid, np.add(grid.origin, 1.0), 0.7)
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(**LAW), form=form)
+    random = np.random.default_rng(0).standard_normal(scene.num_coefficients)
+    sizes = []
+    for kappa in (0.0, 1.0, 10.0):
+        scene.data("kappa", kappa)
+        sizes.append(scene.residual(random))
+    np.testing.assert_allclose(sizes[2] - sizes[0], 10 * (sizes[1] - sizes[0]), atol=1e-10)
+    assert np.abs(sizes[1] - sizes[0]).max() > 0.1
+
+
+def test_a_ramp_takes_a_field_from_its_present_value_to_the_prescribed_one():
+    def residual(w, r, c, sigma, old, grad, sum_p):
+        return stiff(w, sigma, grad, sum_p) + sum_p(dot(grad(r), grad(old.c + c)))
+
+    scene = scene_of(residual)
+    scene.initial("c", 100.0)
+    scene.fix("left", "c", 50.0)
+    seen = []
+    tawami.ramp(scene, 0.25, each=lambda solution: seen.append(solution.field("c").mean()))
+    np.testing.assert_allclose(seen, [87.5, 75.0, 62.5, 50.0], rtol=1e-9)
+
+
+def test_names_of_arrays_and_histories_are_taken():
+    def residual(w, r, c, sigma, plastic_strain, grad, sum_p):
+        return stiff(w, sigma, grad, sum_p) + sum_p(r * (c - plastic_strain))
+
+    law = tawami.von_mises(tawami.linear_elastic(**LAW), yield_stress=1.0)
+    grid = grid_of((2, 2), h=0.5)
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
+    form = tawami.Form(FIELDS, residual, data={"plastic_strain": "given [-]"})
+    with pytest.raises(tawami.InputError, match="'plastic_strain' is also an array"):
+        tawami.Scene(grid, body, law, form=form)
+
+    def scaled(w, r, c, sigma, stress, grad, sum_p):
+        return stiff(w, sigma, grad, sum_p) + sum_p(r * (c - stress))
+
+    more = {"parameters": {"stress": {"default": 1.0}}}
+    with pytest.raises(tawami.InputError, match="'stress' is also an array"):
+        scene_of(scaled, more=more, stress=lambda x, y: x)
+
+
+def test_a_checkpoint_keeps_which_parameters_are_functions_of_time():
+    def residual(w, r, c, sigma, beta, grad, sum_p):
+        return stiff(w, sigma, grad, sum_p) + sum_p(r * (c - beta))
+
+    more = {"parameters": {"beta": {"default": 1.0}}}
+    scene = scene_of(residual, more=more, beta=lambda t: 2 + t)
+    scene.parameter("beta", 6.0)
+    other = scene_of(residual, more=more, beta=lambda t: 2 + t)
+    other.restore(scene.state())
+    np.testing.assert_allclose(other.solve().field("c"), 6.0, rtol=1e-9)
+    scene.parameter("beta", lambda t: 3.0 * t)
+    with pytest.raises(tawami.CheckpointError, match="'beta' was a function of time"):
+        scene_of(residual, more=more).restore(scene.state())
+
+
+@pytest.mark.parametrize("rate", [False, True])
+def test_removed_weight_fades_in_a_ramp_also_where_a_form_reads_dt(rate):
+    def residual(w, r, c, sigma, old, dt, grad, sum_p):
+        new = old.c + c
+        flow = sum_p(r * (c / dt if rate else c) + dot(grad(r), grad(new)))
+        return stiff(w, sigma, grad, sum_p) + flow
+
+    def plain(w, r, c, sigma, old, grad, sum_p):
+        return residual(w, r, c, sigma, old, 1.0, grad, sum_p)
+
+    def timed(w, r, c, sigma, old, dt, grad, sum_p):
+        return residual(w, r, c, sigma, old, dt, grad, sum_p)
+
+    scene = scene_of(timed if rate else plain, density=[1.0])
+    scene.gravity((0.0, -1e-3))
+    scene.solve(until=1.0)
+    top = np.flatnonzero(scene.particles.x[:, 1] > scene.grid.upper[1] - 0.5)
+    scene.remove(scene.particles.number[top].astype(int))
+    before, seen = scene.particles.displacement[:, 1].copy(), []
+    tawami.ramp(
+        scene, 0.5, until=2.0,
+        each=lambda solution: seen.append(solution.displacement_of_particles[:, 1] - before),
+    )  # fmt: skip
+    np.testing.assert_allclose(seen[0], seen[1] / 2, rtol=1e-6)
+    assert seen[1].max() > 0

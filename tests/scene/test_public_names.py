@@ -58,7 +58,7 @@ def test_every_object_says_what_it_is(scene):
     motion = tawami.Dynamics(scene)
     assert repr(scene.grid) == "Grid(4 x 3 cells of 0.5 m, [-1, 1] x [0.5, 2] m)"
     body = tawami.Body(scene.particles.x, scene.particles.volume, names=("clay",))
-    assert repr(body) == "Body(48 particles, 3 m2 per metre depth, materials clay)"
+    assert repr(body) == "Body(48 particles, 3 m2, materials clay)"
     assert repr(scene) == (
         "Scene(48 particles on 4 x 3 cells of 0.5 m, form 'u_epsv', linear_elastic)"
     )

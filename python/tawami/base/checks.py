@@ -220,12 +220,14 @@ def real_values(values: Any) -> Array:
     """An array of real numbers, from what a function of the driver script returned.
 
     Raises:
-        TypeError: Complex numbers, whose imaginary parts NumPy would drop, or no numbers.
+        TypeError: Complex numbers, whose imaginary parts NumPy would drop, text, or no numbers.
         ValueError: No array.
     """
     raw = np.asarray(values)
     if raw.dtype.kind == "c":
         raise TypeError("complex numbers")
+    if raw.dtype.kind in "US":
+        raise TypeError("text")
     return raw.astype(float)
 
 

@@ -106,7 +106,7 @@ class Space:
 
     def resultant(self, vector: Array) -> Array:
         """A sum of vectors over the body; those along a radius cancel."""
-        return vector * [0.0 if self.hoop and axis == 0 else 1.0 for axis in range(self.dim)]
+        return np.array([0.0, *vector[1:]]) if self.hoop else vector
 
     def in_space(self, gradients: Array) -> Array:
         """Gradients, n x rows x rows, without the hoop direction: n x dim x dim."""

@@ -27,7 +27,8 @@ class Body:
 
     Attributes:
         x: Positions [m], particles x 2.
-        volume: Volumes per metre depth [m2], one per particle.
+        volume: Volumes per metre depth [m2], one per particle. In axisymmetry, areas: the scene
+            multiplies them by 2 pi r.
         material_of: Number of the material of each particle. None: all have the first material.
         names: Names of the materials, in the order of their numbers. Empty: they have no names.
         lattice: Origin [m], side of a cell [m] and numbers of cells of the grid that it was made for.
@@ -42,9 +43,7 @@ class Body:
 
     def __repr__(self) -> str:
         materials = f", materials {', '.join(self.names)}" if self.names else ""
-        return (
-            f"Body({len(self.x)} particles, {np.sum(self.volume):g} m2 per metre depth{materials})"
-        )
+        return f"Body({len(self.x)} particles, {np.sum(self.volume):g} m2{materials})"
 
     def named(self, name: str) -> Body:
         """The same body as one group, to which a scene gives a material by this name.

@@ -210,9 +210,10 @@ def _add_form(commands: Any) -> None:
     )
     actions = form.add_subparsers(title="commands", metavar="COMMAND", required=True)
     check = _add(actions, "check", _form_check, "test a weak form", (
-        "Loads a form and tests it: declaration, arguments, symmetry, the tangent against differences,\n"
-        "rigid motions, patch tests, both assemblies, stability and locking. Prints a table.\n"
-        "FAILED (exit code 1): the form cannot be used. A note (exit code 0): it is slow or inaccurate."
+        "Loads a form and tests it: names, operators, units, symmetry, the tangent against differences\n"
+        "at several dt, each field, rigid motions, patch tests, axisymmetry, both assemblies,\n"
+        "stability and locking. Prints a table with the number and what to do in each line:\n"
+        "pass; cost (exit code 0): a price or a limit; broken (exit code 1): it cannot be used."
     ), under="tawami form", epilog=(
         "examples:\n"
         "  tawami form check my_form.py\n"

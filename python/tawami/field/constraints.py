@@ -106,7 +106,9 @@ def held_edge(
     indices = place.start + place.components * functions + component
     if not callable(value) and np.ndim(value) == 0:
         return Held(indices, np.full(len(used), float(value)))  # the functions add up to 1
-    weights, values, prescribed = _sampled(grid, place, touched, edge, value, f"fix(edge='{edge}')")
+    _, weights, values, prescribed = _sampled(
+        grid, place, touched, edge, value, f"fix(edge='{edge}')"
+    )
     values = values[:, used]
     weighted = sp.diags(weights) @ values
     coefficients = spsolve((weighted.T @ values).tocsc(), weighted.T @ prescribed)
@@ -142,8 +144,8 @@ def edge_load(
             f"{where}: no cell along that edge of the grid holds particles; let the grid end where the "
             "body is loaded"
         )
-    weights, values, given = _sampled(grid, place, touched, edge, value, where)
-    integrals = values.T @ (grid.h * weights * given)
+    x, weights, values, given = _sampled(grid, place, touched, edge, value, where)
+    integrals = values.T @ (grid.h * grid.space.thickness(x) * weights * given)
     return place.start + edge_functions(grid, place.basis, edge), np.asarray(integrals)
 
 
@@ -155,9 +157,9 @@ def _touched(grid: Grid, active: Mask, edge: Edge, between: Interval | None) -> 
 
 def _sampled(
     grid: Grid, place: Place, touched: Indices, edge: Edge, value: Profile, where: str
-) -> tuple[Array, sp.csr_matrix, Array]:
-    """Gauss points of some cells along an edge: weights [cells], functions of the edge there (points x
-    functions), and values of a profile.
+) -> tuple[Array, Array, sp.csr_matrix, Array]:
+    """Gauss points of some cells along an edge: positions [m], weights [cells], functions of the edge
+    there (points x functions), and values of a profile.
     """
     axis, end = grid.edge(edge)
     along = 1 - axis
@@ -167,7 +169,8 @@ def _sampled(
     fixed = np.full_like(position, grid.upper[axis] if end else grid.origin[axis])
     x, y = (fixed, position) if axis == 0 else (position, fixed)
     functions = values_1d(place.basis, grid.cells[along], cell, t)
-    return np.tile(weights, len(touched)), functions, evaluate(value, x, y, where)
+    values = evaluate(value, x, y, where)
+    return np.stack([x, y], axis=-1), np.tile(weights, len(touched)), functions, values
 
 
 def held_point(

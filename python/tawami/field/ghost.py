@@ -16,6 +16,7 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 from tawami import _rust
+from tawami.base import ranks
 from tawami.base.arrays import Array, Mask
 from tawami.base.petsc import Handles, aij
 from tawami.fem import dolfinx
@@ -58,8 +59,8 @@ class GhostPenalty:
     def __init__(self, attachment: Attachment) -> None:
         self._attachment = attachment
         self._matrix: sp.csr_matrix | None = None
-        #: Values of the constants in it.
-        self._constants = np.zeros(0)
+        #: Values of the constants and of the particle data in it.
+        self._read = np.zeros(0)
         #: The tangent whose sum with the penalty is in `_petsc`.
         self._tangent: Any = None
         self._petsc = Handles(self, attachment.grid.comm)
@@ -102,11 +103,15 @@ class GhostPenalty:
         integral = self._attachment.compiled.ghost
         if integral is None:
             return None
-        constants = self._attachment.constants(integral)
-        if self._matrix is None or not np.array_equal(constants, self._constants):
+        columns = list(integral.slots[0].columns) if integral.slots else []
+        read = np.concatenate(
+            [self._attachment.constants(integral), data["mean"][:, columns].ravel()]
+        )
+        changed = np.array([self._matrix is None or not np.array_equal(read, self._read)])
+        if ranks.any_of(self._attachment.grid.comm, changed)[0]:
             with self._attachment.stopwatch("set-up"):
                 self._matrix = self._assembled(integral, data["mean"])
-            self._constants, self._tangent = constants, None
+            self._read, self._tangent = read, None
         return self._matrix
 
     def _assembled(self, integral: Integral, data: Array) -> sp.csr_matrix:

@@ -99,8 +99,8 @@ def scalar(
             default it divides by the square root of the diagonal of the tangent.
 
     Raises:
-        FormError: An unknown role or basis, a unit that contradicts the role, or a scale that is no
-            positive number.
+        FormError: An unknown role or basis, a unit, basis or scale that contradicts the role, or a scale
+            that is no positive number.
     """
     roles = [name for name in ROLES if name != "displacement"]
     if role is not None and not one_of(role, roles):
@@ -111,6 +111,12 @@ def scalar(
     if not one_of(basis, BASES):
         raise FormError(
             f"scalar({shown(test)}, basis={shown(basis)}): expected one of {quoted(BASES)}"
+        )
+    if role is not None and (basis != "bilinear" or scale is not None):
+        what = f"scale={shown(scale)}" if basis == "bilinear" else f"basis='{basis}'"
+        raise FormError(
+            f"scalar({shown(test)}, role='{role}', {what}): the law and the solver expect a bilinear "
+            "field with the scale of the material: leave it out"
         )
     fixed = ROLES.get(role or "")
     if unit is not None and (not isinstance(unit, str) or fixed not in (None, unit)):

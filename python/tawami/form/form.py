@@ -40,7 +40,7 @@ DECLARATIONS = (
 #: The unit at the end of the meaning of data.
 UNIT = re.compile(r"\[([^\[\]]+)\]$")
 #: Keys that a parameter may declare.
-LIMITS = ("default", "minimum", "maximum", "usual")
+LIMITS = ("default", "minimum", "maximum", "usual", "unit")
 #: Names that every form has.
 RESERVED = frozenset(
     (
@@ -52,8 +52,8 @@ RESERVED = frozenset(
 )  # fmt: skip
 #: Arrays of the particles that no field and no data may be called after.
 ARRAYS = frozenset(
-    ("volume", "material", "number", "stress", "displacement", "strain", "velocity", "acceleration",
-     "velocity_gradient", "acceleration_gradient", "displacement_gradient")
+    ("x", "eps_v", "volume", "material", "number", "stress", "displacement", "strain", "velocity",
+     "acceleration", "velocity_gradient", "acceleration_gradient", "displacement_gradient")
 )  # fmt: skip
 
 
@@ -71,8 +71,9 @@ class Form:
         data: Numbers of each particle that a scene gives with `scene.data(name, ...)`: name -> what they
             are with their unit, as {"kappa": "permeability [m2]"}.
         parameters: Numbers that may change without another compilation: name -> {"default": ...,
-            "minimum": ..., "maximum": ..., "usual": ...}. Only the default is required. A maximum may
-            depend on an option: {option: maximum}. A scene warns of a value above the usual one.
+            "minimum": ..., "maximum": ..., "usual": ..., "unit": "Pa s"}. Only the default is required.
+            A maximum may depend on an option: {option: maximum}. A scene warns of a value above the
+            usual one. The unit is for `tawami form check`.
         options: Choices that make a different form: name -> the possible values, default first.
         strain: 'small', or 'finite' for logarithmic elastic strains, with a reset of the grid after each
             step. The attribute is a `StrainMeasure`.
@@ -206,10 +207,12 @@ class Form:
             if not isinstance(limits, Mapping) or "default" not in limits:
                 self._fail(f"parameter '{name}' has no \"default\"")
             for limit, value in limits.items():
-                numbers = list(value.values()) if isinstance(value, Mapping) else [value]
-                if not all(isinstance(number, Real) for number in numbers):
+                numbers = value.values() if isinstance(value, Mapping) else (value,)
+                kind: Any = str if limit == "unit" else Real
+                if not all(isinstance(number, kind) for number in numbers):
+                    expected = "text" if limit == "unit" else "a number"
                     self._fail(
-                        f"parameter '{name}': {shown(limit)}: {shown(value)}: expected a number"
+                        f"parameter '{name}': {shown(limit)}: {shown(value)}: expected {expected}"
                     )
         for name, choices in self.options.items():
             if not _are_names(choices) or not choices:

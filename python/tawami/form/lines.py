@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import inspect
 import linecache
+import logging
 import sys
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NoReturn
 
 import ufl
 
 from tawami.base.errors import FormError, TawamiError
 
+# errors of UFL become messages of tawami, and need not be printed besides
+logging.getLogger("UFL").setLevel(logging.CRITICAL)
 #: Longest piece of source in a message.
 LONGEST = 60
 
@@ -24,12 +27,16 @@ class Lines:
     Args:
         name: Name of the form in messages.
         residual: Its residual.
+
+    Attributes:
+        first: Its first line; None for a function that is not written in Python.
     """
 
     def __init__(self, name: str, residual: Callable[..., Any]) -> None:
         self._name = name
         code = getattr(inspect.unwrap(residual), "__code__", None)
         self._file = None if code is None else code.co_filename
+        self.first = None if code is None else code.co_firstlineno
 
     def here(self) -> int | None:
         """The line of the residual's file that is being run; None outside it."""
@@ -71,7 +78,8 @@ class Lines:
                 raise
             raise type(error)(f"{where}: {error}") from error
         except Exception as error:
-            raise FormError(f"{where}: UFL or FFCx rejected it: {error}") from error
+            cause = " ".join(str(error).split())
+            raise FormError(f"{where}: UFL or FFCx rejected it: {cause}") from error
 
 
 class Measure(ufl.Measure):  # type: ignore[misc]
@@ -82,6 +90,14 @@ class Measure(ufl.Measure):  # type: ignore[misc]
     ) -> None:
         super().__init__(kind, domain=domain, metadata=metadata)
         self._lines, self._factor = lines, factor
+
+    def __call__(self, *given: Any, **_: Any) -> NoReturn:
+        """Raise an error: the particles determine the domain."""
+        what = ", ".join(map(str, given)) or "..."
+        raise FormError(
+            f"a measure with a number, as dx({what}): expected dx, dx_c and ds without a number; the "
+            "particles determine the domain"
+        )
 
     def __rmul__(self, integrand: Any) -> Any:
         metadata = {**self.metadata(), "line": self._lines.here()}

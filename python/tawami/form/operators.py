@@ -20,10 +20,18 @@ from itertools import combinations, product
 from typing import Any, NoReturn
 
 import ufl
+from ufl.classes import Curl, Div, Grad, NablaDiv, NablaGrad
+from ufl.corealg.traversal import unique_pre_traversal
 from ufl.domain import extract_domains
 
 from tawami.base.errors import FormError
 from tawami.base.space import Space
+
+#: What a form must do to work in axisymmetry.
+ADVICE = (
+    "expected grad, div, eps and I as arguments of the residual, not from UFL: in axisymmetry tensors "
+    "have a third row, for the hoop direction"
+)
 
 
 @dataclass(frozen=True)
@@ -150,6 +158,19 @@ class Operators:
         if finite:
             return ufl.inner(ufl.inv(self.I + self.grad(u)).T, self.grad(du))
         return self.div(du)
+
+    def check(self, expression: Any) -> None:
+        """Check that an expression has no derivative of UFL that lacks the hoop direction.
+
+        Raises:
+            FormError: In axisymmetry, the gradient or divergence of a vector by UFL.
+        """
+        if not self.space.hoop:
+            return
+        for node in unique_pre_traversal(expression):
+            of_vector = isinstance(node, Grad) and node.ufl_operands[0].ufl_shape
+            if of_vector or isinstance(node, (Curl, Div, NablaDiv, NablaGrad)):
+                raise FormError(f"a derivative of a vector by UFL, {node}: {ADVICE}")
 
     @property
     def _radius(self) -> Any:

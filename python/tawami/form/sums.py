@@ -24,6 +24,7 @@ from tawami.fem import dolfinx
 from tawami.fem.rules import Rule
 from tawami.form.form import Form
 from tawami.form.lines import Lines
+from tawami.form.operators import ADVICE
 from tawami.form.particle_data import PLACEHOLDERS, ParticleData
 from tawami.form.quantities import ONE, LawQuantity, ParticleScalar, Quantity
 
@@ -41,6 +42,7 @@ class Sums:
         data: Its particle data.
         lines: The source of its residual.
         measure: Gives the measure of a rule.
+        old: The fields at the start of the step.
         reference: Whether sums over particles are integrals of densities over cells.
     """
 
@@ -50,11 +52,12 @@ class Sums:
         data: ParticleData,
         lines: Lines,
         measure: Callable[..., Any],
+        old: Any,
         *,
         reference: bool,
     ) -> None:
         self._form, self._data, self._lines = form, data, lines
-        self._measure, self._reference = measure, reference
+        self._measure, self._old, self._reference = measure, old, reference
 
     @property
     def names(self) -> dict[str, Callable[..., Any]]:
@@ -104,10 +107,11 @@ class Sums:
         quantity = self._quantity(weight[0], caller) if weight else ONE
         read = [self._data.of(symbol) for symbol in extract_coefficients(f)]
         position = self._reference and has_type(f, SpatialCoordinate)
-        if position or any(data is not None for data in read):
+        old = self._old in extract_coefficients(f)
+        if position or old or any(data is not None for data in read):
             way = " with assembly='dolfinx'" if caller == "sum_p" else ""
             raise FormError(
-                f"{caller}{way}: particle data or the position in the expression: expected "
+                f"{caller}{way}: particle data, old fields or the position in the expression: expected "
                 f"{caller}(D, f), where D is one quantity of the law or an expression of K, mu, ... and "
                 "f is one of the fields"
             )
@@ -157,11 +161,14 @@ class Sums:
         if D.ufl_shape == () and len(symbol) == 1:
             slope = expand_derivatives(ufl.derivative(D, symbol, direction))
             factor = ufl.replace(D, {symbol: ufl.as_vector([1.0])})
-            if symbol not in extract_coefficients(slope):
-                return LawQuantity(quantity.name, self._scalar(factor))
+            at_zero = ufl.replace(D, {symbol: ufl.as_vector([0.0])})
+            if symbol not in extract_coefficients(slope) and isinstance(at_zero, Zero):
+                scalar = self._scalar(factor)
+                if not scalar.varies:  # its columns are filled once
+                    return LawQuantity(quantity.name, scalar)
         raise FormError(
             f"{caller}({quantity.name} ...): a quantity of the law combines with particle constants "
-            f"only: expected {caller}({quantity.name}, f)"
+            f"only, as K * {quantity.name}: expected {caller}({quantity.name}, f)"
         )
 
     def _scalar(self, D: Any) -> ParticleScalar:
@@ -254,6 +261,6 @@ def _product(caller: str, D: Any, f: Any) -> Any:
     if D.ufl_shape != f.ufl_shape:
         raise FormError(
             f"{caller} got a quantity of shape {D.ufl_shape} and an expression of shape {f.ufl_shape}: "
-            "expected the same shape"
+            f"expected the same shape{'; ' + ADVICE if 3 in D.ufl_shape else ''}"
         )
     return ufl.inner(D, f)

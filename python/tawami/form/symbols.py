@@ -16,9 +16,10 @@ from tawami.base.text import meant, quoted
 from tawami.fem import dolfinx
 from tawami.fem.rules import DEGREE, FAMILY, Rule
 from tawami.form.fields import element_of
+from tawami.form.foreign import Known, check_symbols
 from tawami.form.form import Form
 from tawami.form.lines import Lines, Measure
-from tawami.form.operators import Operators
+from tawami.form.operators import ADVICE, Operators
 from tawami.form.particle_data import PLACEHOLDERS, ParticleData
 from tawami.form.quantities import HISTORY, Density, density, named
 from tawami.form.sums import Sums
@@ -42,11 +43,12 @@ class Symbols:
     Attributes:
         data: Placeholders of the particle data that the residual, or its tangent, uses.
         constants: Constants by name: h, time, dt, b and the parameters.
-        increments, trial: Increments of all fields, and their trial function.
+        increments, trial, test_function: Increments of all fields, their trial and their test function.
         old: All fields at the start of the step.
         fields, tests, trials: The parts of these for each field; test functions by their own name.
         operators: Differential operators of the geometry.
         lines: Source of the residual.
+        names: Function that makes the symbol of each name that the residual may ask for.
     """
 
     def __init__(
@@ -69,18 +71,18 @@ class Symbols:
         self.increments, self.old = (ufl.Coefficient(functions, count=k) for k in (0, 2))
         self.trial = ufl.TrialFunction(functions)
         self.fields, self.trials = self._split(self.increments), self._split(self.trial)
-        tests = self._split(ufl.TestFunction(functions))
+        self.test_function = ufl.TestFunction(functions)
+        tests = self._split(self.test_function)
         self.tests = {field.test: tests[name] for name, field in form.fields.items()}
         traction = ufl.FunctionSpace(domain, dolfinx.lagrange(2, PLANE.dim))
         self.traction = ufl.Coefficient(traction, count=1)
         shapes = dict.fromkeys(("h", "time", "dt"), ()) | {"b": (space.dim,)}
         shapes |= dict.fromkeys(form.parameters, ())
         self.constants = {
-            name: ufl.Constant(domain, shape, count=k)
-            for k, (name, shape) in enumerate(shapes.items())
+            name: Known(domain, shape, count=k) for k, (name, shape) in enumerate(shapes.items())
         }
         self.data = ParticleData(self.operators, plastic_volume=plastic_volume)
-        self._names = self._all_names(options, histories, fields_of_particles)
+        self.names = self._all_names(options, histories, fields_of_particles)
 
     def _all_names(
         self,
@@ -90,7 +92,9 @@ class Symbols:
     ) -> dict[str, Callable[[], Any]]:
         """Function that makes the symbol of each name: particle data are read only if asked for."""
         form, data = self.form, self.data
-        sums = Sums(form, data, self.lines, self.measure, reference=self.assembly == "dolfinx")
+        sums = Sums(
+            form, data, self.lines, self.measure, self.old, reference=self.assembly == "dolfinx"
+        )
         ready = {
             **self.fields, **self.tests, **self.constants, **options, **self.operators.names,
             **sums.names, "t": self.traction, "x": SpatialCoordinate(self.domain),
@@ -176,15 +180,15 @@ class Symbols:
                 f"form {form.name}: the arguments of its residual cannot be read ({error}): expected a "
                 "function written in Python"
             ) from None
-        unknown = [name for name in wanted if name not in self._names]
+        unknown = [name for name in wanted if name not in self.names]
         if unknown:
-            hint = meant(unknown[0], self._names)
+            hint = meant(unknown[0], self.names)
             raise FormError(
-                f"form {form.name}: residual asks for {quoted(unknown)}, which is not defined: expected "
-                f"names among {quoted(sorted(self._names))}{hint}"
+                f"{self.lines.text(self.lines.first)}: residual asks for {quoted(unknown)}, which is "
+                f"not defined: expected names among {quoted(sorted(self.names))}{hint}"
             )
         try:
-            made = {name: self._names[name]() for name in wanted}
+            made = {name: self.names[name]() for name in wanted}
             return form.residual(**(made | {n: s for n, s in other.items() if n in made}))
         except FormError as error:
             raise self._located(error) from None
@@ -192,7 +196,8 @@ class Symbols:
             raise
         except Exception as error:
             where = self.lines.text(self.lines.of(error))
-            raise FormError(f"{where}: its residual raised {error!r}") from error
+            advice = f". If shapes differ: {ADVICE}" if self.space.hoop else ""
+            raise FormError(f"{where}: its residual raised {error!r}{advice}") from error
 
     def _located(self, error: FormError) -> FormError:
         """An error of a name of the residual, with form and line."""
@@ -208,14 +213,16 @@ class Symbols:
                 f"form {self.form.name}: residual returned {type(residual).__name__}: expected a UFL "
                 "form (sums of sum_p(...) and of expressions * dx or * ds)"
             )
+        check_symbols(self, residual)
         for unknown, field in self.form.fields.items():
             space = ufl.FunctionSpace(self.domain, dolfinx.lagrange(1, field.components))
             stranger = ufl.Coefficient(space, count=PLACEHOLDERS - 1)
             named = field.test in inspect.signature(self.form.residual).parameters
             if not named or residual.equals(self.call(**{field.test: stranger})):
                 raise FormError(
-                    f"form {self.form.name}: the test function '{field.test}' of field '{unknown}' does "
-                    "not appear in its residual: every field needs its equation"
+                    f"{self.lines.text(self.lines.first)}: the test function '{field.test}' of field "
+                    f"'{unknown}' does not appear in its residual: every field needs its equation, as "
+                    f"a term sum_p({field.test} * ...)"
                 )
         return residual
 
@@ -231,8 +238,11 @@ class Old:
         if name == "J" and self._form.strain.finite:
             return self._data.scalar(named("old J", varies=True))
         if name not in known:
-            others = "" if name not in self._form.fields else (
-                "; its law has the old state of that field"
-            )  # fmt: skip
-            raise FormError(f"old.{name}: expected {quoted(known) or 'no old field'}{others}")
+            if name in self._form.fields:
+                why = "only fields without a role have an old value; those of the law are in its stress"
+                raise FormError(f"old.{name}: {why}: expected {quoted(known) or 'none here'}")
+            raise FormError(
+                f"old.{name}: expected {quoted(known) or 'no old field: each field has a role'}"
+                f"{meant(name, known)}"
+            )
         return self._fields[name]

@@ -11,7 +11,6 @@ from ufl.algorithms import expand_derivatives
 from ufl.algorithms.analysis import (
     extract_arguments,
     extract_coefficients,
-    extract_constants,
     has_type,
 )
 from ufl.algorithms.check_arities import ArityMismatch, check_form_arity
@@ -22,6 +21,7 @@ from tawami.fem.rules import Rule
 from tawami.form.arity import check_arity
 from tawami.form.lines import line_of
 from tawami.form.particle_data import PLACEHOLDERS
+from tawami.form.points import Integrand
 from tawami.form.symbols import Symbols
 
 
@@ -52,8 +52,9 @@ def terms_of(symbols: Symbols, residual: Any) -> Terms:
     kinds = ("cell", "exterior_facet", "interior_facet")
     cells, edges, sides = (_of_type(residual, kind) for kind in kinds)
     if edges is not None and not _is_linear_in(edges, symbols.traction):
+        where = symbols.lines.text(line_of(edges.integrals()[0]))
         raise FormError(
-            f"form {name}: expected edge terms that are linear in the traction t and contain nothing "
+            f"{where}: expected edge terms that are linear in the traction t and contain nothing "
             "else but test functions, as - dot(t, w) * ds; give other loads through scene.traction(...)"
         )
     parts = [part for part in (cells, edges, sides) if part is not None]
@@ -72,24 +73,24 @@ def terms_of(symbols: Symbols, residual: Any) -> Terms:
 def _check(symbols: Symbols, part: Any) -> None:
     """Check one integral of a residual."""
     where = symbols.lines.text(line_of(part))
-    if part.ufl_domain() != symbols.domain or "quadrature_degree" not in part.metadata():
-        raise FormError(
-            f"{where}: a measure of UFL: expected dx, dx_c or ds as arguments, residual(..., dx)"
-        )
     if not extract_arguments(part) and not isinstance(part.integrand(), Zero):
         raise FormError(f"{where}: a term has no test function: expected one in each term")
     with symbols.lines.errors(ufl.Form([part])):
+        if part.integral_type() != "interior_facet":  # jumps are of derivatives across a side
+            symbols.operators.check(part.integrand())
         check_arity(ufl.Form([part]), where)
-    if part.subdomain_id() != "everywhere":
-        raise FormError(
-            f"{where}: a measure with a number, as dx({part.subdomain_id()}): expected dx, dx_c and ds "
-            "without a number; the particles determine the domain"
-        )
-    if not {*extract_constants(part.integrand())} <= {*symbols.constants.values()}:
-        raise FormError(f"{where}: a Constant of UFL: expected a number, or one of 'parameters'")
     if "place" in part.metadata():
+        with symbols.lines.errors(ufl.Form([part])):
+            expanded = expand_derivatives(ufl.Form([part]))
+            if not expanded.empty():
+                Integrand(expanded, symbols)
         return
-    read = [symbols.data.of(symbol) for symbol in extract_coefficients(part.integrand())]
+    coefficients = extract_coefficients(part.integrand())
+    if symbols.old in coefficients:
+        raise FormError(
+            f"{where}: an old field outside a sum over particles: expected old fields in sum_p(...) only"
+        )
+    read = [symbols.data.of(symbol) for symbol in coefficients]
     if symbols.assembly == "points" and any(data and data.rule != "mean" for data in read):
         raise FormError(
             f"{where}: particle data outside a sum over particles: expected sum_p(...), or cell_mean(K) "

@@ -130,8 +130,7 @@ class NewmarkStep:
         """The problem in the present states of the walls."""
         now, dt = self._now, self._dt
         crossings = now.supports.crossings(self._displacement) if now.model.moves else {}
-        at_end: Fields = (now.old, lambda term: term.at(self._finish))
-        reduction, contact = self._constraints(self._displacement, at_end)
+        reduction, contact = self._constraints(self._displacement, now.fields_at(self._finish))
         v, a = self._mapped
         if self._loads != self._clock.loads:  # a belongs to other loads
             a = self._first_acceleration(a)

@@ -156,7 +156,8 @@ def cam_clay(
 
     p is the mean stress, compression positive, q = sqrt(3/2 s : s), p_t = tension * preconsolidation.
     With plastic compression v, d ln p_c = d v / (lambda_star - kappa_star) (Roscoe and Burland 1968;
-    Butterfield 1979). Dry of critical, 2 p < p_c - p_t, the clay softens: results depend on the grid.
+    Butterfield 1979). Dry of critical, 2 p < p_c - p_t, the clay softens until p_c = p_t, and results
+    depend on the grid.
 
     Args:
         elastic: Elastic part, a material of linear_elastic(...) with nu < 0.5. K and mu are constant:

@@ -64,7 +64,8 @@ def write(folder: str | Path, subject: Subject) -> None:
                 "form": {"name": scene.form.name.strip("'"), "source": _file_of(scene.form)},
                 "input": header.splitlines(),
                 "grid": {
-                    "origin": scene.grid.origin, "h": scene.grid.h, "cells": scene.grid.cells
+                    "origin": scene.grid.origin, "h": scene.grid.h, "cells": scene.grid.cells,
+                    "geometry": scene.grid.geometry,
                 },
                 "started": now(),
                 "phases": [],

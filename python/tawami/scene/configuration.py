@@ -31,6 +31,7 @@ from tawami.scene.model import Model
 from tawami.scene.reactions import Reactions
 from tawami.scene.share import Moment
 from tawami.scene.step import Accepted, Problem, StepKind
+from tawami.scene.step_values import Fields
 from tawami.scene.strain_limits import StrainLimits
 from tawami.scene.supports import Supports
 from tawami.solve.newton import Converged
@@ -96,7 +97,6 @@ class Configuration:
         self.total = np.zeros(self.domain.layout.size)
         self.inputs = FormInputs(model, self.activity.time)
         self.inputs.begin(model, self.domain)
-        self._latest = self.activity.time
         self.left, self.removed = list[tuple[int, tuple[float, float], float]](), np.zeros(2)
         self.begun = self._coverage_checked = False
         self.projected = 0.0
@@ -118,17 +118,13 @@ class Configuration:
         return own_fields.on_grid(self.domain) if self.model.moves else self.total
 
     def prepare(self, now: Moment, dt: float | None = None) -> None:
-        """Hand the form what it reads in a step that ends at a moment; a call for all ranks.
+        """Hand the form what it reads in a step; see `FormInputs.prepare`."""
+        self.inputs.prepare(self.domain, now, self.loads.acceleration(now), dt)
 
-        Args:
-            now: The end of the step.
-            dt: Length of the step [s]; by default since the last one.
-
-        Raises:
-            InputError: Data that are missing, or a form that reads dt where no time passes.
-        """
-        passed = now.time - self._latest if dt is None else dt
-        self.inputs.prepare(self.domain, now.time, passed, self.loads.acceleration(now))
+    def fields_at(self, now: Moment) -> Fields:
+        """Prescribed values of fields without a role at a moment; a call for all ranks."""
+        whole = replace(now, part=1.0)
+        return Fields(self.old, lambda term: term.at(whole), self.inputs.share(now))
 
     def moment(self, part: float = 1.0, until: float | None = None) -> Moment:
         """A part of a static phase that ends at a time [s], that of the scene by default.
@@ -200,7 +196,7 @@ class Configuration:
                     own_fields.accept(self.domain, accepted.step.coefficients)
                 committed = True
                 update.store(dissipated)
-                self._latest = kind.moment.time
+                self.inputs.finish(kind.moment)
                 outcome = self._store(accepted, moved, kind.end)
                 update.finish()
                 return outcome
@@ -310,7 +306,6 @@ class Configuration:
         return {
             "particles": placement.gathered(self.model.grid, self.domain.particles),
             "time": self.activity.time,
-            "latest": self._latest,
             "inputs": self.inputs.state(),
             "total": self.total,
             "left": self.left,
@@ -341,7 +336,7 @@ class Configuration:
         self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
         self.removed = np.reshape(state["removed"], 2)
         self._coverage_checked, self.begun = state["coverage_checked"], True
-        self._travel.cells, self._latest = state["travel"], state["latest"]
+        self._travel.cells = state["travel"]
         self.inputs.restore(state["inputs"])
         self.supports.restore(state["supports"])
         self.loads.restore(state["loads"])

@@ -78,10 +78,10 @@ class Construction:
     def change_material(self, where: Where, material: Law) -> None:
         """Replace the material law of particles.
 
-        Stress and density stay. A law of the same name keeps its history variables; those of another
-        law begin at 0. If the stress is beyond the yield surface of the new law, it returns to it with
-        the next step; forces out of balance then fade like a released load. `scene.particles`
-        is another object afterwards. A call for all ranks.
+        Stress and density stay. A law of the same name keeps its history variables, and a `NumpyLaw` has
+        the name of its function; those of another law begin at 0. If the stress is beyond the yield
+        surface of the new law, it returns to it with the next step; forces out of balance then fade like
+        a released load. `scene.particles` is another object afterwards. A call for all ranks.
 
         Args:
             where: The particles, as in `load`.
@@ -150,6 +150,8 @@ def _remove(now: Configuration, mask: Mask) -> Removed:
 def _replace(now: Configuration, after: Domain) -> None:
     """Let a scene continue with other particles or laws; a call for all ranks."""
     before, zero = now.domain, np.zeros(after.layout.size)
+    for domain in (before, after):
+        now.inputs.repeat(domain, now.moment(), now.loads.acceleration(now.moment()))
     internal = after.newton.internal(zero)
     forces = internal - before.newton.internal(zero)
     first = now.moment(0.0)

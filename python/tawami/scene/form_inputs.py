@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from tawami.base import checks, ranks
-from tawami.base.errors import InputError
+from tawami.base.arrays import Array
+from tawami.base.errors import CheckpointError, InputError
 from tawami.base.sealed import Settings
 from tawami.base.text import meant, quoted
 from tawami.scene import sources
@@ -16,6 +17,7 @@ from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor
 from tawami.scene.model import Model
 from tawami.scene.parameters import by_kind
+from tawami.scene.share import Moment
 
 
 class FormInputs:
@@ -27,7 +29,9 @@ class FormInputs:
     """
 
     def __init__(self, model: Model, time: float) -> None:
-        self._form = model.form
+        self._form, self._is_checked = model.form, False
+        #: Time of the last step [s], its length [s], and its part of a phase, 0 at the end of one.
+        self._latest, self._dt, self._part = time, 0.0, 0.0
         self._values: dict[str, Any] = dict(model.values)
         self._numbers = frozenset(model.parameters)
         self._in_time = {
@@ -45,6 +49,24 @@ class FormInputs:
         for name, source in model.in_space.items():
             domain.particles.carry(name, 1)
             self._to_particles(domain, name, source, "")
+        if "dt" not in model.compiled.used and not self._form.data:
+            self._hand(domain, 0.0, 0.0, np.zeros(model.space.dim))
+
+    def _check_incompressible(self, model: Model, domain: Domain) -> None:
+        """Check that a form of an incompressible material contains its K in no other way than 1 / K.
+
+        Raises:
+            InputError: It has a term that is infinite.
+        """
+        bulk = domain.responses.constants["K"]
+        infinite = ranks.any_of(domain.model.grid.comm, np.array([np.isinf(bulk).any()]))[0]
+        if infinite and not np.isfinite(domain.newton.internal(np.zeros(domain.layout.size))).all():
+            mine = domain.particles.number[np.isinf(bulk)]
+            which = f"particle {mine[0]}" if len(mine) else "a particle of another rank"
+            raise InputError(
+                f"form {self._form.name}: 'K' is not finite at {which}, where nu = 0.5: expected 1 / K "
+                "in its terms, as in form 'u_p', or nu < 0.5"
+            )
 
     def set_data(self, domain: Domain, name: str, source: Any) -> None:
         """Give the particles the data of the form with this name; see `Scene.data`."""
@@ -101,35 +123,70 @@ class FormInputs:
         """A value within the limits of the parameter."""
         return self._form.settings({**model.options, name: value})[0][name]
 
-    def prepare(self, domain: Domain, time: float, dt: float, gravity: Any) -> None:
+    def prepare(self, domain: Domain, now: Moment, gravity: Array, dt: float | None = None) -> None:
         """Hand the form its inputs before a step; a call for all ranks.
 
         Args:
             domain: The particles.
-            time: At the end of the step [s].
-            dt: Length of the step [s].
-            gravity: Acceleration at the end of the step [m/s2].
+            now: The end of the step.
+            gravity: Acceleration then [m/s2].
+            dt: Length of the step [s]; by default since the last one.
 
         Raises:
             InputError: The form reads dt and no time passes, or data that the scene does not have.
         """
+        self._dt = now.time - self._latest if dt is None else dt
+        self._hand(domain, now.time, self._dt, gravity)
+
+    def repeat(self, domain: Domain, now: Moment, gravity: Array) -> None:
+        """Hand the form its inputs at the end of the last step; a call for all ranks."""
+        self._hand(domain, now.time, self._dt or 1.0, gravity)
+
+    def share(self, now: Moment) -> float:
+        """Share of the way from the present state to that at the end of a phase which a step goes."""
+        done = self._part if self._part < now.part else 0.0
+        return (now.part - done) / (1.0 - done)
+
+    def finish(self, now: Moment) -> None:
+        """Note that a step was stored."""
+        self._latest, self._part = now.time, now.part if now.part < 1.0 else 0.0
+
+    def _hand(self, domain: Domain, time: float, dt: float, gravity: Array) -> None:
         model = domain.model
         if "dt" in model.compiled.used and not dt > 0:
             raise InputError(
                 f"form {self._form.name} reads dt, and no time passes in this step (dt = {dt:g} s): "
                 "expected solve(until=...) or ramp(..., until=...) with a later time, or Dynamics(scene)"
             )
-        values: dict[str, Any] = {"time": time, "dt": dt, "b": np.asarray(gravity, dtype=float)}
+        values: dict[str, Any] = {"time": time, "dt": dt, "b": gravity}
         values |= self._values
         for name, factor in self._in_time.items():
             values[name] = self._checked(name, factor.at(time), model)
         domain.assembly.attachment.change(values)
         domain.responses.refresh()
+        if not self._is_checked:
+            self._check_incompressible(model, domain)
+            self._is_checked = True
 
     def state(self) -> dict[str, Any]:
         """Values of the parameters, for a checkpoint."""
-        return {"values": dict(self._values)}
+        changing = {name: factor.identity() for name, factor in self._in_time.items()}
+        passed = [self._latest, self._dt, self._part]
+        return {"values": dict(self._values), "in time": changing, "passed": passed}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """The reverse of :meth:`state`."""
+        """The reverse of :meth:`state`.
+
+        Raises:
+            CheckpointError: A parameter was another function of time.
+        """
+        present = {name: factor.identity() for name, factor in self._in_time.items()}
+        for name, identity in state["in time"].items():
+            if present.get(name) != identity:
+                raise CheckpointError(
+                    f"the parameter '{name}' was a function of time that the script does not give: "
+                    "expected the same Scene(...) and scene.parameter(...) before the run is resumed"
+                )
+        self._in_time = {name: self._in_time[name] for name in state["in time"]}
         self._values |= state["values"]
+        self._latest, self._dt, self._part = state["passed"]

@@ -29,7 +29,7 @@ from tawami.grid.basis import BASES, Basis
 from tawami.grid.grid import Grid
 from tawami.particles import assignment
 from tawami.particles.assignment import Law
-from tawami.scene.parameters import by_kind
+from tawami.scene.parameters import by_kind, check_names
 
 Array = npt.NDArray[np.float64]
 Leaving = Literal["stop", "remove"]
@@ -199,6 +199,7 @@ def build(
     ratios = np.array([m.bulk_modulus / m.shear_modulus for m in materials])[particles.material]
     warn_of_locking(grid, loaded, float(ratios.max()), int(ratios.argmax()))
     compiled = _compiled(grid, loaded, options, assembly, laws, in_space)
+    check_names(loaded, in_space, materials)
     if "rho" in compiled.used and densities is None:
         raise InputError(
             f"form {loaded.name} reads the density rho: expected Scene(..., density=...) [kg/m3]"
@@ -256,6 +257,7 @@ def with_laws(
     form, materials = model.form, assignment.materials_of(laws)
     with ranks.raise_together(model.grid.comm):
         particles.check_materials(materials, form.kinematics.name, form.strain.finite)
+    check_names(form, model.in_space, materials)
     compiled = _compiled(model.grid, form, model.options, assembly, laws, model.in_space)
     with ranks.raise_together(model.grid.comm):
         _check_plastic_volume(compiled, laws, particles)

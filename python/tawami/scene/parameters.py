@@ -1,14 +1,17 @@
-"""Parameters of a form by kind: numbers, functions of time, one number for each particle."""
+"""Parameters of a form: numbers, functions of time or numbers of the particles, and their names."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from tawami.form.form import Form
+from tawami import _rust
+from tawami.base.errors import InputError
+from tawami.base.text import quoted
+from tawami.form.form import ARRAYS, Form
 from tawami.scene.scattered import Scattered
 
 
@@ -42,3 +45,18 @@ def _arguments(function: Any) -> int:
         return 1
     positional = ("POSITIONAL_ONLY", "POSITIONAL_OR_KEYWORD")
     return sum(p.kind.name in positional and p.default is p.empty for p in parameters)
+
+
+def check_names(form: Form, in_space: Iterable[str], materials: Sequence[_rust.Material]) -> None:
+    """Check that fields, data and parameters of each particle have names of their own.
+
+    Raises:
+        InputError: One is called as an array of the particles or a history variable of a law.
+    """
+    histories = {name for one in materials for name in one.history_names}
+    taken = ({*form.own_fields, *form.data} & histories) | ({*in_space} & (histories | ARRAYS))
+    if taken:
+        raise InputError(
+            f"form {form.name}: {quoted(sorted(taken))} is also an array of the particles: expected "
+            "another name in the form"
+        )

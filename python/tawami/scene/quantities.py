@@ -21,7 +21,7 @@ from tawami.base.arrays import Array
 from tawami.base.errors import InputError, NotModelledError
 from tawami.base.space import PLANE, Space
 from tawami.base.text import meant
-from tawami.particles import placement
+from tawami.particles import assignment, placement
 
 #: Arrays of the particles that are carried by a motion.
 CARRIED = ("velocity", "acceleration")
@@ -179,7 +179,10 @@ class Subject(Protocol):
 def of_scene(scene: Any) -> dict[str, Quantity]:
     """The quantities that the laws and the form of a scene add: history variables, fields and data."""
     form, particles = scene.form, scene.particles
-    found = {name: history(name) for name in particles.history_names}
+    units = dict(HISTORY)
+    for law in assignment.in_numpy(scene.configuration.model.given).values():
+        units |= law.units
+    found = {name: history(name, units.get(name, "-")) for name in particles.history_names}
     found |= {
         name: Quantity(f"{name} [{field.unit}]", _stored(name))
         for name, field in form.own_fields.items()
@@ -191,9 +194,9 @@ def of_scene(scene: Any) -> dict[str, Quantity]:
     return found
 
 
-def history(name: str) -> Quantity:
+def history(name: str, unit: str = "-") -> Quantity:
     """The quantity of a history variable."""
-    return Quantity(f"{name} [{HISTORY.get(name, '-')}]", _stored(name))
+    return Quantity(f"{name} [{unit}]", _stored(name))
 
 
 # -- arrays of particles -----------------------------------------------------

@@ -48,7 +48,7 @@ class StaticStep:
             crossings = now.supports.crossings(amount) if moves else {}
             reduction, contact = now.supports.constraints(
                 now.domain, amount, now.before, now.before, moving=self.stressed,
-                fields=(now.old, lambda term: term.at(self.now)),
+                fields=now.fields_at(self.now),
             )  # fmt: skip
             external = now.external(self.now)
         return Problem(reduction, contact, external, crossings=crossings, load=self.now.part)

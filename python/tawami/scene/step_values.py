@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,17 +14,29 @@ from tawami.scene.action import Term
 from tawami.scene.domain import Domain
 from tawami.scene.support import Support
 
-#: Fields without a role at the start of a step, on all coefficients, and the factor of each value that
-#: is prescribed for them at its end.
-Fields = tuple[Array, Callable[[Term], float]]
+
+@dataclass(frozen=True)
+class Fields:
+    """Fields without a role in a step.
+
+    Attributes:
+        old: Their coefficients at its start.
+        amount: Factor of each prescribed value.
+        share: Share of the way from the old to the prescribed value at its end.
+    """
+
+    old: Array
+    amount: Callable[[Term], float]
+    share: float
 
 
 def of_field(domain: Domain, support: Support, start: Array, fields: Fields | None) -> Held:
     """Prescribed values of a field, counted as the coefficients at the start."""
-    old, amount = fields or (start, lambda _: 0.0)
-    held = on_edge(domain, support, amount)
+    held = on_edge(domain, support, fields.amount if fields else lambda _: 0.0)
     at_start = start[held.indices]
-    increments = held.values - old[held.indices] if fields else np.zeros_like(at_start)
+    if fields is None:
+        return Held(held.indices, at_start, held.where)
+    increments = fields.share * (held.values - fields.old[held.indices])
     return Held(held.indices, at_start + increments, held.where)
 
 

@@ -203,6 +203,8 @@ class Supports(Owner[Support]):
         layout, held, points = domain.layout, list[Held](), list[PointHeld]()
         for support in [*self.all, *self.axis]:
             if isinstance(support.component, str):
+                if moving and step_values.is_left(domain, support):
+                    continue
                 held.append(step_values.of_field(domain, support, start, fields))
             elif isinstance(support.place, str):
                 may_be_left = support in self.axis or (moving and not support.moves)

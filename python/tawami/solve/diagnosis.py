@@ -180,6 +180,8 @@ class Diagnosis:
     def _weakest_cells(self, reduction: Reduction, direction: Array) -> list[str]:
         """The cells where a singular system is weakest, with their numbers of particles.
 
+        A field without a role is named with its cells.
+
         Args:
             reduction: The unknowns.
             direction: This rank's entries of the direction in which the system is weakest.
@@ -191,10 +193,13 @@ class Diagnosis:
         counts = self._responses.particles_per_cell
         found: list[str] = []
         for unknown in unknowns[np.argsort(-entries, kind="stable")][:ENTRIES]:
-            cells = self._layout.cells_of(reduction.unknowns[unknown])
+            coefficient = int(reduction.unknowns[unknown])
+            cells, name = self._layout.cells_of(coefficient), self._layout.name_of(coefficient)
             number = counts[grid.cell_numbers(cells)]
             i, j = cells[number.argmin()]
             text = f"({i}, {j}) with {number.min()} particles"
+            if name in self._responses.form.own_fields:
+                text += f" in field '{name}'"
             if text not in found:
                 found.append(text)
         return found[:CELLS]

@@ -188,8 +188,10 @@ class Measures:
         distance = prescribed = float(np.abs(offset).max())
         if inertia is not None:
             distance = max(prescribed, float(np.abs(inertia.coasting).max(initial=0.0)))
-        distance = 10 * min(distance, float(np.abs(u).max())) + self._layout.grid.h
-        largest = NO_FORCE * self._responses.stiffest * distance * np.sqrt(len(u))
+        grid = self._layout.grid
+        distance = 10 * min(distance, float(np.abs(u).max())) + grid.h
+        (thickness,) = grid.space.thickness(np.array([grid.upper]))
+        largest = NO_FORCE * self._responses.stiffest * distance * thickness * np.sqrt(len(u))
         at_rest = ranks.same(self._comm, bool(scale <= largest))  # the same branch on all ranks
         if at_rest and inertia is None:
             return self._moves_rigidly(u, prescribed)

@@ -21,7 +21,7 @@ class Numerics:
     """Numerical settings of a scene.
 
     Args:
-        tolerance: Newton stops when both measures of `tawami.solve.measures` are below it, 1e-14 to 0.1.
+        tolerance: Newton stops when all measures of `tawami.solve.measures` are below it, 1e-14 to 0.1.
         max_iterations: Newton iterations after which the step fails.
         assembly: 'points' evaluates the form at the particles; 'dolfinx' integrates over cells and
             computes P^T K P. They agree up to round-off for sums of expressions up to degree 4.

@@ -1,0 +1,78 @@
+"""Forms as users edit them: rate terms, springs, further fields, and their declarations."""
+
+from __future__ import annotations
+
+import ufl
+from ufl import dot, inner
+
+import tawami
+from tawami.form import scalar, vector
+
+ALONE = {"u": vector("w")}
+
+
+def form(residual, fields=ALONE, **more):
+    return tawami.Form(fields=fields, residual=residual, **more)
+
+
+def foundation(u, w, sigma, t, k_s, grad, sum_p, ds):
+    return sum_p(sigma, grad(w)) + k_s * sum_p(dot(u, w)) - dot(t, w) * ds
+
+
+def drag(u, w, sigma, t, dt, c_d, grad, sum_p, ds):
+    return sum_p(sigma, grad(w)) + c_d * sum_p(dot(u, w) / dt) - dot(t, w) * ds
+
+
+def viscosity(u, w, sigma, t, dt, eta, eps, grad, sum_p, ds):
+    return sum_p(sigma, grad(w)) + sum_p(2 * eta * inner(eps(u) / dt, eps(w))) - dot(t, w) * ds
+
+
+def viscosity_of_rotations(u, w, sigma, t, dt, eta, grad, sum_p, ds):
+    return sum_p(sigma, grad(w)) + sum_p(eta * inner(grad(u) / dt, grad(w))) - dot(t, w) * ds
+
+
+def operators_of_ufl(w, sigma, t, sum_p, ds):
+    return sum_p(sigma, ufl.grad(w)) - dot(t, w) * ds
+
+
+def consolidation(u, p_w, w, r, sigma, t, kappa, mu_w, dt, old, grad, div, sum_p, ds):
+    p = old.p_w + p_w
+    R_u = sum_p(inner(sigma, grad(w)) - p * div(w)) - dot(t, w) * ds
+    return R_u - sum_p(r * div(u)) - sum_p(dt * kappa / mu_w * dot(grad(r), grad(p)))
+
+
+def conduction(theta, w, r, sigma, c, k, t, dt, old, grad, sum_p, ds):
+    T = old.theta + theta
+    R_u = sum_p(inner(sigma, grad(w))) - dot(t, w) * ds
+    return R_u + sum_p(c * theta * r + dt * k * dot(grad(T), grad(r)))
+
+
+def conduction_backwards(theta, w, r, sigma, c, k, t, dt, old, grad, sum_p, ds):
+    T = old.theta + theta
+    R_u = sum_p(inner(sigma, grad(w))) - dot(t, w) * ds
+    return R_u + sum_p(c * theta * r - dt * k * dot(grad(T), grad(r)))
+
+
+def damage(d, w, r, sigma, G_c, t, old, grad, sum_p, ds, h):
+    D = old.d + d
+    R_u = sum_p((1 - D) ** 2 * inner(sigma, grad(w))) - dot(t, w) * ds
+    return R_u + sum_p(G_c * (D * r / h + h * dot(grad(D), grad(r))))
+
+
+def without_dt(theta, w, r, sigma, c, k, t, old, grad, sum_p, ds):
+    R_u = sum_p(inner(sigma, grad(w))) - dot(t, w) * ds
+    return R_u + sum_p(c * theta * r) + sum_p(k * dot(grad(old.theta + theta), grad(r)))
+
+
+HEAT = {
+    "fields": ALONE | {"theta": scalar("r", unit="K")},
+    "parameters": {
+        "c": {"default": 2e6, "unit": "J/(m3 K)"}, "k": {"default": 1.5, "unit": "W/(m K)"}
+    },
+}  # fmt: skip
+WATER = {
+    "fields": ALONE | {"p_w": scalar("r", unit="Pa")},
+    "data": {"kappa": "permeability [m2]"},
+    "parameters": {"mu_w": {"default": 1e-3, "unit": "Pa s"}},
+}
+VISCOUS = {"parameters": {"eta": {"default": 1e9, "unit": "Pa s"}}}
