@@ -36,6 +36,8 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "self_weight": ("Self-weight", "verification", ()),
     "consolidation": ("Consolidation", "verification", ()),
     "soft_clay": ("Soft clay", "verification", ()),
+    "heated_wall": ("Heated wall", "verification", ()),
+    "creep": ("Creep", "verification", ()),
     "fracture": ("Fracture", "verification", ()),
     "elastica": ("Elastica", "verification", ("strip",)),
     "footing": ("Footing", "verification", ()),

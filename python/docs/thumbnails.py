@@ -19,6 +19,8 @@ PARTS: dict[str, tuple[str, tuple[float, float, float, float]]] = {
     "spinning_disc": ("film.png", (0.0, 0.0, 0.262, 0.315)),
     "consolidation": ("consolidation.png", (0.333, 0.0, 0.667, 1.0)),
     "soft_clay": ("soft_clay.png", (0.0, 0.0, 0.333, 1.0)),
+    "heated_wall": ("heated_wall.png", (0.0, 0.0, 0.5, 1.0)),
+    "creep": ("creep.png", (0.0, 0.0, 0.5, 1.0)),
     "fracture": ("fracture.png", (0.343, 0.14, 0.63, 0.78)),
     "collapse": ("film.png", (0.0, 0.165, 0.305, 0.645)),
 }
