@@ -26,10 +26,10 @@ parameters = {
     "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0},
     "theta": {"default": 0.01, "minimum": 0.0, "maximum": 1.0},
     "alpha_w": {"default": 1 / 6, "minimum": 0.0, "usual": 1.0},
-    "mu_w": {"default": 1e-3, "minimum": 0.0},
-    "rho_w": {"default": 1e3, "minimum": 0.0},
+    "mu_w": {"default": 1e-3, "minimum": 0.0, "unit": "Pa s"},
+    "rho_w": {"default": 1e3, "minimum": 0.0, "unit": "kg/m3"},
     "m": {"default": 0.0},
-    "leak": {"default": 0.0, "minimum": 0.0},
+    "leak": {"default": 0.0, "minimum": 0.0, "unit": "1/(Pa s)"},
     "k": {"default": 0.01, "minimum": 0.0},
 }
 options = {"ghost_penalty": ("on", "off")}
@@ -50,7 +50,7 @@ def residual(
     g_r, g_p = dot(F, grad(r)), dot(F, grad(p))
     R_u = sum_p(inner(P, grad(w)) - J * p * inner(F, grad(w))) - dot(t, w) * ds
     R_u -= sum_p(rho_w * (J - 1) * dot(b, w))
-    R_q = sum_p(K * q * (ln_J - eps_p - (1 - theta) * eps_v)) + sum_v(K, theta * q * eps_v)
+    R_q = sum_p(K * q * (ln_J - eps_p - (1 - theta) * eps_v)) - sum_v(K, theta * q * eps_v)
     R_q -= sum_p(K**2 / mu * alpha * h**2 * dot(grad(q), grad(eps_v)))
     weight = sum(rho_w * b[i] * g_r[i] for i in range(len(b)))
     R_r = sum_p(r * (J - old.J) / dt + leak * J * r * p)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from cases.verification import soft_clay as case
+from tawami.scene import own_fields
 
 
 @pytest.fixture(scope="module")
@@ -29,6 +30,13 @@ def test_the_layer_settles_as_far_as_the_closed_form(run):
     assert run.settlement[-1] == pytest.approx(case.final_settlement(), rel=0.015)
     _, Z, _, J = run.profiles[2.0]
     assert np.sqrt(np.mean((J - case.final_J(Z)) ** 2)) < 0.01
+
+
+def test_without_projections_of_the_pressure_the_layer_stops_early(run, monkeypatch):
+    """Differences of p_w within a cell, which the functions of the grid do not see, carry its weight."""
+    monkeypatch.setattr(own_fields, "project", lambda domain: None)
+    other = case.solve(10, first=5e-3, growth=0.3, most=0.15)
+    assert other.settlement[-1] < 0.95 * run.settlement[-1]
 
 
 def test_the_water_that_leaves_is_the_settlement(run):
