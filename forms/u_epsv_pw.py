@@ -26,9 +26,9 @@ parameters = {
     "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0},
     "alpha_w": {"default": 1 / 6, "minimum": 0.0, "usual": 1.0},
     "biot": {"default": 1.0, "minimum": 0.0, "maximum": 1.0},
-    "storage": {"default": 0.0, "minimum": 0.0},
-    "mu_w": {"default": 1e-3, "minimum": 0.0},
-    "rho_w": {"default": 1e3, "minimum": 0.0},
+    "storage": {"default": 0.0, "minimum": 0.0, "unit": "1/Pa"},
+    "mu_w": {"default": 1e-3, "minimum": 0.0, "unit": "Pa s"},
+    "rho_w": {"default": 1e3, "minimum": 0.0, "unit": "kg/m3"},
 }
 
 

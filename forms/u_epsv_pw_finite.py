@@ -26,10 +26,10 @@ parameters = {
     "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0},
     "theta": {"default": 0.01, "minimum": 0.0, "maximum": 1.0},
     "alpha_w": {"default": 1 / 6, "minimum": 0.0, "usual": 1.0},
-    "mu_w": {"default": 1e-3, "minimum": 0.0},
-    "rho_w": {"default": 1e3, "minimum": 0.0},
+    "mu_w": {"default": 1e-3, "minimum": 0.0, "unit": "Pa s"},
+    "rho_w": {"default": 1e3, "minimum": 0.0, "unit": "kg/m3"},
     "m": {"default": 0.0},
-    "leak": {"default": 0.0, "minimum": 0.0},
+    "leak": {"default": 0.0, "minimum": 0.0, "unit": "1/(Pa s)"},
     "k": {"default": 0.01, "minimum": 0.0},
 }
 options = {"ghost_penalty": ("on", "off")}

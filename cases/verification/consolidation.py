@@ -29,6 +29,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -153,7 +154,7 @@ class Run:
         self.exact.append(exact)
 
 
-def column(n: int = 16, **parameters: float) -> tawami.Scene:
+def column(n: int = 16, **parameters: Any) -> tawami.Scene:
     """Terzaghi's column of n cells with its load."""
     h = H / n
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=h, cells=(1, n))

@@ -18,7 +18,8 @@ the grains (Gibson, England and Hussey 1967, Geotechnique 17, 261), with the exc
 
 J = 1 at the surface, dp/dZ = 0 at the base. It is solved with finite differences in Z, stiff in time.
 
-The top row of particles is drained by a large `leak`; it is a sixth of a cell below the surface.
+The top row of particles is drained by a large `leak`; it is a sixth of a cell below the surface. While
+the drained layer is thinner than a cell, the settlement is too large.
 
 python -m cases.verification.soft_clay
 """

@@ -21,7 +21,7 @@ PARTS: dict[str, tuple[str, tuple[float, float, float, float]]] = {
     "soft_clay": ("soft_clay.png", (0.0, 0.0, 0.333, 1.0)),
     "heated_wall": ("heated_wall.png", (0.0, 0.0, 0.5, 1.0)),
     "creep": ("creep.png", (0.0, 0.0, 0.5, 1.0)),
-    "fracture": ("fracture.png", (0.343, 0.14, 0.63, 0.78)),
+    "fracture": ("fracture.png", (0.37, 0.17, 0.62, 0.745)),
     "collapse": ("film.png", (0.0, 0.165, 0.305, 0.645)),
 }
 #: Cases of README's gallery.

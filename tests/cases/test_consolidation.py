@@ -50,3 +50,27 @@ def test_water_enters_as_the_flux_says():
     scene.flux("top", "p_w", 2e-6)
     solution = scene.solve(until=3.0)
     assert case.H * solution.strain[:, 1].mean() == pytest.approx(6e-6, rel=1e-6)
+
+
+@pytest.mark.parametrize("biot", [1.0, 0.7])
+def test_undrained_pressure_of_a_compressible_fluid(biot):
+    """biot e = S p and M e + biot p = q under the load q: p = biot q/(biot^2 + S M)."""
+    storage, M = 2e-7, case.lame(case.NU_COLUMN)[1]
+    scene = case.column(4, storage=storage, biot=biot)
+    scene.release("top", "p_w")
+    for until in (1.0, 5.0):
+        solution = scene.solve(until=until)
+    expected = biot * case.LOAD / (biot**2 + storage * M)
+    np.testing.assert_allclose(solution.field("p_w"), expected, rtol=1e-8)
+
+
+def test_water_at_rest_is_hydrostatic():
+    """After a long time p_w = rho_w g (H - z), and the effective stress carries load and weight."""
+    scene = case.column(4, density=2000.0)
+    scene.gravity((0.0, -10.0))
+    for until in (1e9, 2e9):
+        solution = scene.solve(until=until)
+    depth = case.H - scene.particles.x[:, 1]
+    np.testing.assert_allclose(solution.field("p_w"), 1e4 * depth, rtol=1e-6)
+    mean = -(case.LOAD + 1e4 * case.H / 2)
+    assert solution.stress[:, 1].mean() == pytest.approx(mean, rel=1e-6)

@@ -7,8 +7,10 @@ import pytest
 from mpi4py import MPI
 from scenes import COUPLED
 from scipy.special import erfc
+from ufl import inner
 
 import tawami
+from tawami.form import scalar, vector
 
 GEOMETRIES = ("plane_strain", "axisymmetric")
 
@@ -40,6 +42,29 @@ def test_the_tangent_is_the_difference_of_residuals(name, geometry):
     difference = (ends[0] - ends[1]) / (2 * step)
     predicted = scene.tangent(c, dt=0.3) @ d
     assert np.abs(difference - predicted).max() < 1e-7 * np.abs(predicted).max()
+
+
+def test_old_j_is_det_f_at_the_start_of_the_step():
+    """A field that grows by old.J: its sum over the particles is that of det F (1 plus grad u once)."""
+
+    def residual(w, r, P, c, old, grad, sum_p):
+        return sum_p(inner(P, grad(w))) + sum_p(r * (c - old.J))
+
+    form = tawami.Form({"u": vector("w"), "c": scalar("r")}, residual, strain="finite")
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.5, cells=(2, 3))
+    body = tawami.box(grid, (0, 0), (1, 1))
+    law = tawami.linear_elastic(E=1.0, nu=0.0)
+    scene = tawami.Scene(grid, body, law, form=form, density=1.0)
+    for edge, component in (("left", "x"), ("right", "x"), ("bottom", "y")):
+        scene.fix(edge, component)
+    scene.gravity((0.0, -0.3))
+    expected = 0.0
+    for _ in range(3):
+        J = np.linalg.det(np.eye(2) + scene.particles.displacement_gradient)
+        expected += scene.particles.volume @ J
+        solution = scene.solve()
+    assert J.mean() < 0.9
+    assert scene.particles.volume @ solution.field("c") == pytest.approx(expected, rel=1e-9)
 
 
 # -- heat ----------------------------------------------------------------------
