@@ -53,6 +53,24 @@ def conduction_backwards(theta, w, r, sigma, c, k, t, dt, old, grad, sum_p, ds):
     return R_u + sum_p(c * theta * r - dt * k * dot(grad(T), grad(r)))
 
 
+def conduction_of_increments(theta, w, r, sigma, c, k, t, dt, grad, sum_p, ds):
+    R_u = sum_p(inner(sigma, grad(w))) - dot(t, w) * ds
+    return R_u + sum_p(c * theta / dt * r + k * dot(grad(theta), grad(r)))
+
+
+def expansion(of):
+    """A mixed form with conduction, whose volume follows the value or the increment of theta."""
+
+    def residual(u, eps_v, theta, w, q, r, sigma, K, c, k, a, t, dt, old, grad, div, sum_p, ds):
+        T = old.theta + theta
+        acts = {"value": T, "increment": theta, "rate": theta + dt * old.theta}[of]
+        R_q = sum_p(K * q * (div(u) - eps_v - 3 * a * acts))
+        R_u = sum_p(inner(sigma, grad(w))) - dot(t, w) * ds
+        return R_u + R_q + sum_p(c * theta * r + dt * k * dot(grad(T), grad(r)))
+
+    return residual
+
+
 def damage(d, w, r, sigma, G_c, t, old, grad, sum_p, ds, h):
     D = old.d + d
     R_u = sum_p((1 - D) ** 2 * inner(sigma, grad(w))) - dot(t, w) * ds
@@ -69,6 +87,12 @@ HEAT = {
     "parameters": {
         "c": {"default": 2e6, "unit": "J/(m3 K)"}, "k": {"default": 1.5, "unit": "W/(m K)"}
     },
+}  # fmt: skip
+EXPANSION = {
+    "fields": {
+        "u": vector("w"), "eps_v": scalar("q", role="volumetric_strain"), "theta": scalar("r", unit="K")
+    },
+    "parameters": {**HEAT["parameters"], "a": {"default": 1e-5, "unit": "1/K"}},
 }  # fmt: skip
 WATER = {
     "fields": ALONE | {"p_w": scalar("r", unit="Pa")},

@@ -10,7 +10,7 @@ from ufl import div, dot, grad, inner
 
 import tawami
 from tawami.base import dimensions
-from tawami.check import assembled, declared, motions, scenes
+from tawami.check import assembled, declared, fields, motions, scenes
 from tawami.form import scalar, tangent, vector
 
 ALL = {**FORMS, **FINITE}
@@ -215,6 +215,30 @@ def test_a_flux_of_the_wrong_sign_is_broken():
     [_, (verdict, words)] = assembled.field("theta")(form, {})
     assert verdict == "broken"
     assert "opposite signs" in words
+
+
+def test_a_flux_that_forgets_the_old_field_is_broken():
+    forgetful = edited.form(edited.conduction_of_increments, **edited.HEAT)
+    [(verdict, words)] = assembled.field("theta")(forgetful, {})
+    assert verdict == "broken"
+    assert words == (
+        "the flux acts on the increment of theta alone: expected grad(old.theta + theta)"
+    )
+    right = edited.form(edited.conduction, **edited.HEAT)
+    assert not fields.forgets(right, {}, "theta")
+    assert not fields.forgets(edited.form(edited.consolidation, **edited.WATER), {}, "p_w")
+
+
+@pytest.mark.parametrize(("of", "wrong"), [("value", True), ("increment", False), ("rate", False)])
+def test_a_volume_equation_with_the_value_of_an_old_field_is_broken(of, wrong):
+    form = edited.form(edited.expansion(of), **edited.EXPANSION)
+    broken = [words for verdict, words in assembled.field("theta")(form, {}) if verdict == "broken"]
+    assert len(broken) == wrong
+    if wrong:
+        assert broken[0].startswith(
+            "the volume equation of increments contains the value old.theta: the body expands in each "
+            "step at rest"
+        )
 
 
 def test_units_that_contradict_name_the_line():

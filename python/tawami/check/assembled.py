@@ -70,6 +70,18 @@ def field(name: str) -> Check:
 
     def check(form: Form, given: Settings) -> Found:
         unit = form.fields[name].unit
+        if fields.forgets(form, given, name):
+            yield (
+                "broken",
+                f"the flux acts on the increment of {name} alone: expected grad(old.{name} + {name})",
+            )
+            return
+        if fields.expands(form, given, name):
+            yield (
+                "broken",
+                f"the volume equation of increments contains the value old.{name}: the body expands in "
+                f"each step at rest; expected the increment {name} alone",
+            )
         found = fields.balance(form, given, name)
         words = f"a linear {name} [{unit}] at rest is in balance"
         if found.uniform > UNIFORM:
