@@ -90,6 +90,28 @@ def misspelt(w, sigm, grad, sum_p):
     return sum_p(sigm, grad(w))
 
 
+def forgotten(u, w, sigma, grad, sum_p):
+    return sum_p(sigma, grad(w)) + sum_p(dot(u / dt, w))  # noqa: F821
+
+
+def misspelt_inside(u, w, sigma, grad, sum_p):
+    return sum_p(sigma, grad(w)) + sum_p(dot(u, w) * sigm)  # noqa: F821
+
+
+def not_imported(u, w, sigma, grad, sum_p):
+    return sum_p(sigma, grad(w)) + sum_p(sqrt(2.0) * dot(u, w))  # noqa: F821
+
+
+def sum_of_shapes(u, w, sigma, grad, sum_p):
+    R = sum_p(sigma, grad(w))
+    return R + sum_p(grad(u) + dot(u, w))
+
+
+def product_of_shapes(u, w, sigma, grad, sum_p):
+    R = sum_p(sigma, grad(w))
+    return R + sum_p(u * w)
+
+
 @pytest.mark.parametrize(
     ("residual", "source", "message"),
     [
@@ -106,6 +128,12 @@ def misspelt(w, sigm, grad, sum_p):
         (without_a_test_function, "R + sum_p(dot(u, u))", "expected one in each term"),
         (old_displacement, "old.u", "only fields without a role have an old value"),
         (misspelt, "def misspelt(w, sigm", "did you mean 'sigma'?"),
+        (forgotten, "u / dt", "the residual uses 'dt', which is not among its arguments: expected "
+                              "residual(..., dt)"),
+        (misspelt_inside, "* sigm)", "'sigm', which is not defined; did you mean 'sigma'?"),
+        (not_imported, "sqrt(2.0)", "'sqrt', which is not defined; 'from ufl import sqrt' is missing"),
+        *((one, "return R + sum_p(", "a number in each term of sum_p, as dot(a, b) of vectors or inner")
+          for one in (sum_of_shapes, product_of_shapes)),
     ],
 )  # fmt: skip
 def test_a_message_names_form_line_and_remedy(residual, source, message, capsys):
@@ -165,9 +193,25 @@ def test_data_that_are_not_given_or_of_another_shape():
                        r"does not have: expected scene.data\('kappa', ...\)"):  # fmt: skip
         scene.residual([0.0] * scene.num_coefficients)
     for wrong in ([1.0, 2.0], [[1.0, 2.0]] * 60, 1 + 2j, "1e-12"):
-        with pytest.raises(tawami.InputError, match="kappa has .*expected a number, 60 of them"):
+        with pytest.raises(
+            tawami.InputError,
+            match=r"data 'kappa' has .*expected a number, an array of 60 \(one for each particle\), a",
+        ):
             scene.data("kappa", wrong)
     with pytest.raises(tawami.InputError, match="declares no such data: .* did you mean 'kappa'"):
         scene.data("kapa", 1.0)
     scene.data("kappa", 1e-12)
     scene.residual([0.0] * scene.num_coefficients)
+
+
+def test_an_edge_term_of_the_user_is_named_with_its_line():
+    def residual(w, r, p_w, sigma, t, grad, sum_p, ds):
+        R = sum_p(sigma, grad(w)) + sum_p(dot(grad(p_w), grad(r))) - dot(t, w) * ds
+        R -= 3.0 * r * ds
+        return R
+
+    with pytest.raises(tawami.FormError) as caught:
+        scene_of(residual, WATER)
+    said = str(caught.value)
+    assert "(R -= 3.0 * r * ds): expected edge terms" in said
+    assert said.endswith("give other loads through scene.flux(edge, 'p_w', value)")

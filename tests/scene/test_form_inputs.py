@@ -76,7 +76,7 @@ def test_data_are_numbers_functions_or_arrays():
     np.testing.assert_array_equal(scene.solve().arrays["kappa"], x[:, 1])
     for name, source, words in (
         ("kapa", 1.0, "expected one of 'kappa'"),
-        ("kappa", [1.0, 2.0], "kappa has shape"),
+        ("kappa", [1.0, 2.0], "data 'kappa' has shape"),
         ("kappa", np.nan, "expected finite numbers"),
     ):
         with pytest.raises(tawami.InputError, match=words):
@@ -380,3 +380,29 @@ def test_removed_weight_fades_in_a_ramp_also_where_a_form_reads_dt(rate):
     )  # fmt: skip
     np.testing.assert_allclose(seen[0], seen[1] / 2, rtol=1e-6)
     assert seen[1].max() > 0
+
+
+def test_each_input_of_a_form_names_its_call():
+    def residual(w, r, c, sigma, grad, beta, kappa, sum_p):
+        return stiff(w, sigma, grad, sum_p) + sum_p(beta * r + kappa * dot(grad(c), grad(r)))
+
+    more = {"parameters": {"beta": {"default": 1.0}}, "data": {"kappa": "diffusivity [m2/s]"}}
+    scene = scene_of(residual, more=more)
+    for call, words in (
+        (lambda: scene.data("beta", 1.0), r"is a parameter .*: expected scene.parameter\('beta'"),
+        (lambda: scene.data("c", 1.0), r"'c' is a field .*: expected scene.initial\('c'"),
+        (lambda: scene.parameter("kappa", 1.0), r"'kappa' is data .*: expected scene.data\('kappa'"),
+        (lambda: scene_of(residual, more=more, kappa=3.0), r"Scene\(..., kappa=...\): 'kappa' is data .*"
+         r": expected scene.data\('kappa', ...\), after the scene is made"),
+        (lambda: scene.parameter("beta", lambda t: "x"), "^parameter 'beta' at 0 s = 'x': expected a"),
+        (lambda: scene.parameter("beta", lambda t: 1 / t), r"^parameter 'beta'\(0\) gave ZeroDivis"),
+        (lambda: scene.data("kappa", np.ones(5)), r"^data 'kappa' has shape \(5,\): expected a number"),
+    ):  # fmt: skip
+        with pytest.raises(tawami.InputError, match=words):
+            call()
+    scene.data("kappa", 1.0)  # as the messages tell
+    scene.parameter("beta", 0.0)
+    scene.initial("c", 1.0)
+    scene.fix("bottom", "c", 1.0)
+    with pytest.raises(tawami.InputError, match="did you mean 'c'"):
+        scene.solve().field("cc")

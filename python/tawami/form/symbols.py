@@ -26,6 +26,11 @@ from tawami.form.sums import Sums
 
 #: Evaluation of a form: by kernels at the particles, or by integrals over cells in plain dolfinx.
 Assembly = Literal["points", "dolfinx"]
+#: What the terms of a residual are.
+TERMS = (
+    "expressions of one shape in a sum, and a number in each term of sum_p, as dot(a, b) of vectors or "
+    "inner(A, B) of tensors"
+)
 
 
 class Symbols:
@@ -196,8 +201,26 @@ class Symbols:
             raise
         except Exception as error:
             where = self.lines.text(self.lines.of(error))
-            advice = f". If shapes differ: {ADVICE}" if self.space.hoop else ""
-            raise FormError(f"{where}: its residual raised {error!r}{advice}") from error
+            raise FormError(f"{where}: {self._reason(error)}") from error
+
+    def _reason(self, error: Exception) -> str:
+        """Reason and remedy of an error that a residual raised."""
+        name = error.name if isinstance(error, NameError) else None
+        if name in self.names:
+            return (
+                f"the residual uses '{name}', which is not among its arguments: expected "
+                f"residual(..., {name})"
+            )
+        if name is not None:
+            hint = meant(name, self.names) or f"; 'from ufl import {name}' is missing" * hasattr(
+                ufl, name
+            )
+            return f"the residual uses '{name}', which is not defined{hint}"
+        said, advice = str(error).lower(), ""
+        if any(word in said for word in ("shape", "rank", "dimension", "scalar")):
+            advice = f": expected {TERMS}"
+            advice += f". If shapes differ: {ADVICE}" if self.space.hoop else ""
+        return f"its residual raised {error!r}{advice}"
 
     def _located(self, error: FormError) -> FormError:
         """An error of a name of the residual, with form and line."""

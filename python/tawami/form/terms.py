@@ -51,12 +51,8 @@ def terms_of(symbols: Symbols, residual: Any) -> Terms:
         _check(symbols, part)
     kinds = ("cell", "exterior_facet", "interior_facet")
     cells, edges, sides = (_of_type(residual, kind) for kind in kinds)
-    if edges is not None and not _is_linear_in(edges, symbols.traction):
-        where = symbols.lines.text(line_of(edges.integrals()[0]))
-        raise FormError(
-            f"{where}: expected edge terms that are linear in the traction t and contain nothing "
-            "else but test functions, as - dot(t, w) * ds; give other loads through scene.traction(...)"
-        )
+    for part in [] if edges is None else edges.integrals():
+        _check_edge(symbols, part)
     parts = [part for part in (cells, edges, sides) if part is not None]
     if cells is None or len(residual.integrals()) > sum(len(part.integrals()) for part in parts):
         raise FormError(
@@ -101,6 +97,31 @@ def _check(symbols: Symbols, part: Any) -> None:
         raise FormError(
             f"{where}: the position x outside a sum over particles: expected x in sum_p(...) only"
         )
+
+
+def _check_edge(symbols: Symbols, part: Any) -> None:
+    """Check one integral over edges."""
+    term = ufl.Form([part])
+    if _is_linear_in(term, symbols.traction):
+        return
+    tested = [n for n, f in symbols.form.own_fields.items() if _has_test(symbols, term, f.test)]
+    flux = f"scene.flux(edge, '{tested[0]}', value)" if tested else "scene.traction(...)"
+    raise FormError(
+        f"{symbols.lines.text(line_of(part))}: expected edge terms that are linear in the traction t "
+        f"and contain nothing else but test functions, as - dot(t, w) * ds; give other loads "
+        f"through {flux}"
+    )
+
+
+def _has_test(symbols: Symbols, term: Any, test: str) -> bool:
+    """Whether a term contains the test function of this name."""
+    parts = list[Any]()
+    for field in symbols.form.fields.values():
+        chosen, found = field.test == test, symbols.tests[field.test]
+        split = [found[k] for k in range(field.components)] if found.ufl_shape else [found]
+        parts += split if chosen else [ufl.as_ufl(0.0)] * len(split)
+    alone = ufl.replace(term, {symbols.test_function: ufl.as_vector(parts)})
+    return not expand_derivatives(alone).empty()
 
 
 def by_rule(form: Any) -> list[Any]:

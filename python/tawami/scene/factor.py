@@ -23,6 +23,8 @@ class Factor:
         where: The load or support, for messages.
         amplitude: Factor, constant or a function of time [s].
         velocity: Rate of the factor [1/s], in place of an amplitude.
+        name: What the factor is called in messages; empty if `where` says it.
+        time: Time at which it is checked [s].
 
     Raises:
         InputError: Both, neither a number nor a function, or a function that is not finite at `time`.
@@ -34,12 +36,15 @@ class Factor:
         amplitude: InTime | None = None,
         velocity: InTime | None = None,
         *,
+        name: str | None = None,
         time: float = 0.0,
     ) -> None:
         if amplitude is not None and velocity is not None:
             raise InputError(f"{where}: expected an amplitude or a velocity, not both")
         self._name = "amplitude" if velocity is None else "velocity"
-        self._where, self.has_velocity = where, velocity is not None
+        said = self._name if name is None else name
+        self._what = f"{where}: {said}" if said else where
+        self.has_velocity = velocity is not None
         self._given: InTime = (
             (1.0 if amplitude is None else amplitude) if velocity is None else velocity
         )
@@ -47,8 +52,7 @@ class Factor:
         self._value(time)
 
     def _evaluated(self, time: float) -> float:
-        given = self._given
-        what = f"{self._where}: {self._name}"
+        given, what = self._given, self._what
         try:
             value = given(time) if callable(given) else given
         except Exception as error:

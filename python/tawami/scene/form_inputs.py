@@ -16,7 +16,7 @@ from tawami.scene import sources
 from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor
 from tawami.scene.model import Model
-from tawami.scene.parameters import by_kind
+from tawami.scene.parameters import by_kind, misplaced
 from tawami.scene.share import Moment
 
 
@@ -35,7 +35,8 @@ class FormInputs:
         self._values: dict[str, Any] = dict(model.values)
         self._numbers = frozenset(model.parameters)
         self._in_time = {
-            name: Factor(name, given, time=time) for name, given in model.in_time.items()
+            name: Factor(f"parameter '{name}'", given, name="", time=time)
+            for name, given in model.in_time.items()
         }
 
     @property
@@ -72,14 +73,16 @@ class FormInputs:
         """Give the particles the data of the form with this name; see `Scene.data`."""
         declared = self._form.data
         if not checks.one_of(name, declared):
-            known = quoted(declared) or "none"
+            known, what = quoted(declared) or "none", f"data({checks.shown(name)}, ...)"
+            if other := misplaced(self._form, name):
+                raise InputError(f"{what}: {other}")
             raise InputError(
-                f"data({checks.shown(name)}, ...): form {self._form.name} declares no such data: "
+                f"{what}: form {self._form.name} declares no such data: "
                 f"expected one of {known}{meant(str(name), declared)}"
             )
         unit = self._form.data_unit(name)
         with ranks.raise_together(domain.model.grid.comm):
-            found = sources.values(domain, name, source, "value", unit)
+            found = sources.values(domain, name, source, "value", unit, f"data '{name}'")
         domain.particles.carry(name, 1)
         domain.particles.carried(name)[:, 0] = found[:, 0]
 
@@ -87,8 +90,11 @@ class FormInputs:
         """Change a parameter; see `Scene.parameter`."""
         model, form = domain.model, self._form
         if not checks.one_of(name, form.parameters):
+            what = f"parameter({checks.shown(name)}, ...)"
+            if other := misplaced(form, name):
+                raise InputError(f"{what}: {other}")
             raise InputError(
-                f"parameter({checks.shown(name)}, ...): form {form.name} has {quoted(form.parameters)}"
+                f"{what}: form {form.name} has {quoted(form.parameters)}"
                 f"{meant(str(name), form.parameters)}"
             )
         if name not in model.compiled.used:
@@ -105,7 +111,7 @@ class FormInputs:
                 f"expected a number or a function of time, or Scene(..., {name}=...) with a field"
             )
         if in_time:
-            factor = Factor(name, in_time[name], time=0.0)
+            factor = Factor(f"parameter '{name}'", in_time[name], name="", time=0.0)
             self._checked(name, factor.at(0.0), model)
             self._in_time[name] = factor
             return
@@ -114,7 +120,7 @@ class FormInputs:
 
     def _to_particles(self, domain: Domain, name: str, source: Any, unit: str) -> None:
         with ranks.raise_together(domain.model.grid.comm):
-            found = sources.values(domain, name, source, "value", unit)[:, 0]
+            found = sources.values(domain, name, source, "value", unit, f"parameter '{name}'")[:, 0]
             for value in (found.min(), found.max()) if len(found) else ():
                 self._checked(name, float(value), domain.model)
         domain.particles.carried(name)[:, 0] = found

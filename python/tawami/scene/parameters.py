@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tawami import _rust
+from tawami.base import checks
 from tawami.base.errors import InputError
 from tawami.base.text import quoted
 from tawami.form.form import ARRAYS, Form
@@ -21,6 +22,11 @@ def by_kind(
     """Parameters and options that are numbers or text, parameters that are functions of time, and those
     with one number for each particle.
     """
+    for name in given:
+        if name in form.data:
+            raise InputError(
+                f"Scene(..., {name}=...): {misplaced(form, name)}, after the scene is made"
+            )
     numbers = dict(given)
     in_time, in_space = dict[str, Any](), dict[str, Any]()
     for name in form.parameters:
@@ -35,6 +41,20 @@ def by_kind(
         ):
             in_space[name] = numbers.pop(name)
     return numbers, in_time, in_space
+
+
+def misplaced(form: Form, name: Any) -> str:
+    """The kind of an input of a form, and the call that gives it; empty for another name."""
+    ways = (
+        ("data", form.data, f"scene.data('{name}', ...)"),
+        ("a parameter", form.parameters, f"scene.parameter('{name}', ...)"),
+        ("an option", form.options, f"Scene(..., {name}=...)"),
+        ("a field", form.own_fields, f"scene.initial('{name}', ...)"),
+    )
+    for what, known, call in ways:
+        if checks.one_of(name, known):
+            return f"'{name}' is {what} of form {form.name}: expected {call}"
+    return ""
 
 
 def _arguments(function: Any) -> int:

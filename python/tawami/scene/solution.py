@@ -13,7 +13,7 @@ from tawami.base import checks, html
 from tawami.base.errors import InputError, NotModelledError
 from tawami.base.process import Unique
 from tawami.base.sealed import Sealed
-from tawami.base.text import quoted
+from tawami.base.text import meant, quoted
 from tawami.field.constraints import LEAST_SHARE
 from tawami.form.kinematics import KINEMATICS
 from tawami.grid import edges
@@ -131,7 +131,7 @@ class Solution(Elsewhere, Sealed, Unique):
         if not checks.one_of(name, known):
             raise InputError(
                 f"field({checks.shown(name)}): form {form.name} has {quoted(known) or 'no such field'}: "
-                "displacement_of_particles and stress have the rest"
+                f"displacement_of_particles and stress have the rest{meant(str(name), known)}"
             )
         return np.asarray(self._array(name))
 

@@ -21,15 +21,18 @@ Numbers = npt.NDArray[Any]
 Source = npt.ArrayLike | Callable[[Array, Array], Any] | Scattered
 
 
-def values(domain: Domain, name: str, source: Any, components: str, unit: str) -> Array:
+def values(
+    domain: Domain, name: str, source: Any, components: str, unit: str, label: str | None = None
+) -> Array:
     """A field of this rank's particles.
 
     Args:
         domain: The particles.
-        name: Name of the field in messages and in the file of an earlier run.
+        name: Name of the field in the file of an earlier run, and in messages without a label.
         source: Source of the values.
         components: Of the field, as 'x y'.
         unit: Unit in messages.
+        label: What the field is called in messages.
 
     Returns:
         Particles x components.
@@ -38,7 +41,7 @@ def values(domain: Domain, name: str, source: Any, components: str, unit: str) -
         InputError: Another shape, numbers that are not finite, or an error of the source.
     """
     x, number = np.asarray(domain.particles.x), np.asarray(domain.particles.number)
-    width = len(components.split())
+    width, said = len(components.split()), label or name
     at_positions = isinstance(source, Scattered) or callable(source)
     if at_positions and not len(x):  # a rank without particles
         return np.empty((0, width))
@@ -46,12 +49,12 @@ def values(domain: Domain, name: str, source: Any, components: str, unit: str) -
         columns = components.split() if width > 1 else [""]
         found = source.at(name, columns, unit or "-", x, number, domain.model.grid.h)
     elif callable(source):
-        found = _of_function(source, x, name, components)
+        found = _of_function(source, x, said, components)
     else:
-        of_body = _of_numbers(source, domain.model.num_particles, width, name)
-        _check_finite(of_body, np.arange(len(of_body)), name, unit)
+        of_body = _of_numbers(source, domain.model.num_particles, width, said)
+        _check_finite(of_body, np.arange(len(of_body)), said, unit)
         found = of_body[number]
-    _check_finite(found, number, name, unit)
+    _check_finite(found, number, said, unit)
     return found
 
 
@@ -65,10 +68,10 @@ def _of_numbers(source: Any, n: int, width: int, name: str) -> Array:
             raise ValueError
         given = np.broadcast_to(array, shape)
     except (TypeError, ValueError, OverflowError):
-        more = f"{n} x {width}" if width > 1 else f"{n} of them"
+        size = f"{n} x {width} (one row" if width > 1 else f"{n} (one"
         raise InputError(
-            f"{name} has {_shape(source)}: expected {few}, {more}, a function f(x, y) on arrays, "
-            "tawami.table(...) or tawami.earlier(...)"
+            f"{name} has {_shape(source)}: expected {few}, an array of {size} for each particle), a "
+            "function f(x, y) on arrays, tawami.table(...) or tawami.earlier(...)"
         ) from None
     return np.reshape(given, (n, width))
 
