@@ -21,8 +21,14 @@ from tawami.form import scalar, vector
 
 fields = {"u": vector("w"), "eps_v": scalar("q", role="volumetric_strain")}
 parameters = {
-    "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0, "maximum": {"residual_based": 0.14}},
-    "k": {"default": 0.01, "minimum": 0.0},
+    "alpha": {
+        "default": 0.01,
+        "minimum": 0.0,
+        "usual": 1.0,
+        "maximum": {"residual_based": 0.14},
+        "unit": "-",
+    },
+    "k": {"default": 0.01, "minimum": 0.0, "unit": "-"},
 }
 options = {
     "stabilisation": ("laplacian", "residual_based", "projection"),

@@ -27,8 +27,8 @@ data = {
     "l": "length of the phase field [m]",
 }
 parameters = {
-    "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0},
-    "k": {"default": 1e-6, "minimum": 0.0},
+    "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0, "unit": "-"},
+    "k": {"default": 1e-6, "minimum": 0.0, "unit": "-"},
 }
 
 

@@ -14,9 +14,9 @@ from tawami.form import scalar, vector
 fields = {"u": vector("w"), "eps_v": scalar("q", role="volumetric_strain")}
 strain = "finite"
 parameters = {
-    "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0},
-    "theta": {"default": 0.01, "minimum": 0.0, "maximum": 1.0},
-    "k": {"default": 0.01, "minimum": 0.0},
+    "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0, "unit": "-"},
+    "theta": {"default": 0.01, "minimum": 0.0, "maximum": 1.0, "unit": "-"},
+    "k": {"default": 0.01, "minimum": 0.0, "unit": "-"},
 }
 options = {"ghost_penalty": ("off", "on")}
 static_options = {"ghost_penalty": "on"}

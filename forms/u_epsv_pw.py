@@ -23,9 +23,9 @@ fields = {
 }
 data = {"kappa": "permeability [m2]"}
 parameters = {
-    "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0},
-    "alpha_w": {"default": 1 / 6, "minimum": 0.0, "usual": 1.0},
-    "biot": {"default": 1.0, "minimum": 0.0, "maximum": 1.0},
+    "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0, "unit": "-"},
+    "alpha_w": {"default": 1 / 6, "minimum": 0.0, "usual": 1.0, "unit": "-"},
+    "biot": {"default": 1.0, "minimum": 0.0, "maximum": 1.0, "unit": "-"},
     "storage": {"default": 0.0, "minimum": 0.0, "unit": "1/Pa"},
     "mu_w": {"default": 1e-3, "minimum": 0.0, "unit": "Pa s"},
     "rho_w": {"default": 1e3, "minimum": 0.0, "unit": "kg/m3"},

@@ -23,14 +23,14 @@ fields = {
 strain = "finite"
 data = {"kappa": "permeability [m2]"}
 parameters = {
-    "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0},
-    "theta": {"default": 0.01, "minimum": 0.0, "maximum": 1.0},
-    "alpha_w": {"default": 1 / 6, "minimum": 0.0, "usual": 1.0},
+    "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0, "unit": "-"},
+    "theta": {"default": 0.01, "minimum": 0.0, "maximum": 1.0, "unit": "-"},
+    "alpha_w": {"default": 1 / 6, "minimum": 0.0, "usual": 1.0, "unit": "-"},
     "mu_w": {"default": 1e-3, "minimum": 0.0, "unit": "Pa s"},
     "rho_w": {"default": 1e3, "minimum": 0.0, "unit": "kg/m3"},
-    "m": {"default": 0.0},
+    "m": {"default": 0.0, "unit": "-"},
     "leak": {"default": 0.0, "minimum": 0.0, "unit": "1/(Pa s)"},
-    "k": {"default": 0.01, "minimum": 0.0},
+    "k": {"default": 0.01, "minimum": 0.0, "unit": "-"},
 }
 options = {"ghost_penalty": ("on", "off")}
 

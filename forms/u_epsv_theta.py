@@ -23,7 +23,7 @@ data = {
     "conductivity": "thermal conductivity k [W/(m K)]",
     "capacity": "heat capacity c [J/(kg K)]",
 }
-parameters = {"alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0}}
+parameters = {"alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0, "unit": "-"}}
 
 
 def residual(

@@ -10,7 +10,7 @@ from tawami.form import scalar, vector
 
 fields = {"u": vector("w"), "eps_v": scalar("q", role="volumetric_strain")}
 data = {"eta": "viscosity [Pa s]"}
-parameters = {"alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0}}
+parameters = {"alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0, "unit": "-"}}
 
 
 def residual(

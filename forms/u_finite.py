@@ -9,7 +9,7 @@ from tawami.form import vector
 
 fields = {"u": vector("w")}
 strain = "finite"
-parameters = {"k": {"default": 0.01, "minimum": 0.0}}
+parameters = {"k": {"default": 0.01, "minimum": 0.0, "unit": "-"}}
 options = {"ghost_penalty": ("off", "on")}
 static_options = {"ghost_penalty": "on"}
 

@@ -9,7 +9,7 @@ from ufl import dot
 from tawami.form import scalar, vector
 
 fields = {"u": vector("w"), "p": scalar("q", role="pressure")}
-parameters = {"alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0}}
+parameters = {"alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0, "unit": "-"}}
 
 
 def residual(u, p, w, q, sigma, eps_p, K, mu, t, h, grad, div, sum_p, ds, alpha):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import edited
 import numpy as np
 import pytest
@@ -252,6 +254,17 @@ def test_units_that_contradict_name_the_line():
     assert "give 'k_s' a \"unit\"" in words
     as_asked = edited.form(edited.foundation, parameters={"k_s": {"default": 1e6, "unit": "Pa/m2"}})
     assert [verdict for verdict, _ in declared.check_units(as_asked, {})] == ["pass"]
+
+
+SHIPPED = sorted(path.stem for path in (Path(tawami.__file__).parent / "forms").glob("u*.py"))
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_forms_declare_the_units_of_their_parameters(name):
+    form = tawami.Form.load(name)
+    assert [n for n, given in form.parameters.items() if "unit" not in given] == []
+    for options in ({}, *({n: c} for n, many in form.options.items() for c in many[1:])):
+        assert [verdict for verdict, _ in declared.check_units(form, options)] == ["pass"]
 
 
 @pytest.mark.parametrize(
