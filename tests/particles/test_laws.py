@@ -1,6 +1,8 @@
 """Laws by their names."""
 
+import numpy as np
 import pytest
+from scenes import grid_of
 
 import tawami
 
@@ -61,3 +63,13 @@ def test_a_law_by_its_name_is_that_of_its_function(by_name, function):
 def test_a_wrong_law_or_parameter_is_named(make, message):
     with pytest.raises(tawami.InputError, match=message):
         make()
+
+
+def test_several_laws_need_the_number_of_each_particle():
+    grid = grid_of()
+    body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
+    laws = [tawami.linear_elastic(E=E, nu=0.3) for E in (1.0, 2.0)]
+    with pytest.raises(tawami.InputError, match="2 materials, and nothing says which particle"):
+        tawami.Scene(grid, body, laws)
+    numbers = np.arange(len(body.x)) % 2
+    assert len(tawami.Scene(grid, body, laws, material_of=numbers).laws) == 2

@@ -11,6 +11,7 @@ from numpy_laws import drucker_prager, hooke, stiffening, von_mises
 from scenes import grid_of, linear_field
 
 import tawami
+from tawami.scene import presentation, quantities
 
 K, MU = 5e3, 1e3
 ELASTIC = hooke(K, MU)
@@ -345,6 +346,8 @@ def test_the_units_of_history_variables_are_in_the_labels():
         return stress + strain @ ELASTIC, {"p_c": history["p_c"] + 2.0, "alpha": history["alpha"]}
 
     law = tawami.NumpyLaw(respond, K, MU, history={"p_c": "Pa", "alpha": "-"})
-    table = scene_with(law, "u").solve().to_pandas("p_c", "alpha")
-    assert list(table.columns[2:]) == ["p_c [Pa]", "alpha [-]"]
+    solution = scene_with(law, "u").solve()
+    more = quantities.of_scene(solution.scene)
+    table = presentation.columns(solution.arrays, ("p_c", "alpha"), (), more)
+    assert list(table)[2:] == ["p_c [Pa]", "alpha [-]"]
     assert (table["p_c [Pa]"] == 2.0).all()

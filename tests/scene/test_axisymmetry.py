@@ -11,6 +11,7 @@ from ufl import dot, inner
 import tawami
 from tawami.form import scalar, vector
 from tawami.results import write_particles
+from tawami.scene import presentation, quantities
 
 E, NU = 1e4, 0.3
 K, MU = E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU))
@@ -310,7 +311,8 @@ def test_what_has_no_axis_of_symmetry_is_rejected():
 def test_results_have_the_units_of_the_whole_body(tmp_path):
     scene = ring(density=1.0, form="u_finite")
     solution = stretch(scene, 1e-3, 0.0)
-    assert "volume [m3]" in solution.to_pyvista("volume").point_data
+    more = quantities.of_scene(scene)
+    assert "volume [m3]" in presentation.columns(solution.arrays, ("volume",), (), more)
     motion = tawami.Dynamics(scene, velocity=lambda x, y: (x, 0 * y + 2.0))
     assert str(motion.energies).endswith(" J")
     assert motion.linear_momentum == pytest.approx([0.0, 2 * scene.mass.sum()])

@@ -69,6 +69,11 @@ def assigned(material: Given, material_of: npt.ArrayLike | None, body: Body, n: 
             f"material = {checks.shown(material)}: expected a material as linear_elastic(...) makes "
             "it, a NumpyLaw, or a list or a dictionary of these"
         )
+    if numbers is None and len(materials) > 1:
+        raise InputError(
+            f"{len(materials)} materials, and nothing says which particle has which: expected "
+            "material_of=..., with the number of the material of each particle, or a body with names"
+        )
     number = checks.numbering("material_of", np.zeros(n) if numbers is None else numbers, n)
     return Assignment(materials, number)
 

@@ -52,7 +52,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
             every rank.
         material: The material law, in Rust or a `NumpyLaw`, or several as a list or, by the names of
             the body, as a dictionary.
-        material_of: Number of the law of each particle; that of the body by default, or the first.
+        material_of: Number of the law of each particle; that of the body by default.
         form: Weak form: the name of a shipped one ('u_epsv', 'u_p', 'u_bbar', 'u'), the path of a
             file, a module, or a `Form`.
         basis: Basis of the displacement: 'quadratic_spline', 'bilinear' or 'biquadratic'.
