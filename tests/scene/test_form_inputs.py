@@ -393,9 +393,10 @@ def test_each_input_of_a_form_names_its_call():
     for call, words in (
         (lambda: scene.data("beta", 1.0), r"is a parameter .*: expected scene.parameter\('beta'"),
         (lambda: scene.data("c", 1.0), r"'c' is a field .*: expected scene.initial\('c'"),
+        (lambda: scene.initial("kappa", 1.0), r"'kappa' is data .*: expected scene.data\('kappa'"),
         (lambda: scene.parameter("kappa", 1.0), r"'kappa' is data .*: expected scene.data\('kappa'"),
         (lambda: scene_of(residual, more=more, kappa=3.0), r"Scene\(..., kappa=...\): 'kappa' is data .*"
-         r": expected scene.data\('kappa', ...\), after the scene is made"),
+         r": expected scene.data\('kappa', ...\)"),
         (lambda: scene.parameter("beta", lambda t: "x"), "^parameter 'beta' at 0 s = 'x': expected a"),
         (lambda: scene.parameter("beta", lambda t: 1 / t), r"^parameter 'beta'\(0\) gave ZeroDivis"),
         (lambda: scene.data("kappa", np.ones(5)), r"^data 'kappa' has shape \(5,\): expected a number"),

@@ -200,27 +200,26 @@ class Symbols:
         except Warning:
             raise
         except Exception as error:
-            where = self.lines.text(self.lines.of(error))
-            raise FormError(f"{where}: {self._reason(error)}") from error
+            raise self._failed(error) from error
 
-    def _reason(self, error: Exception) -> str:
-        """Reason and remedy of an error that a residual raised."""
+    def _failed(self, error: Exception) -> FormError:
+        """The error of a residual that raised another one, with line and remedy."""
+        where = self.lines.text(self.lines.of(error))
         name = error.name if isinstance(error, NameError) else None
         if name in self.names:
-            return (
-                f"the residual uses '{name}', which is not among its arguments: expected "
+            return FormError(
+                f"{where}: the residual uses '{name}', which is not among its arguments: expected "
                 f"residual(..., {name})"
             )
         if name is not None:
-            hint = meant(name, self.names) or f"; 'from ufl import {name}' is missing" * hasattr(
-                ufl, name
-            )
-            return f"the residual uses '{name}', which is not defined{hint}"
+            of_ufl = f"; 'from ufl import {name}' is missing" if hasattr(ufl, name) else ""
+            hint = of_ufl or meant(name, self.names)
+            return FormError(f"{where}: the residual uses '{name}', which is not defined{hint}")
         said, advice = str(error).lower(), ""
         if any(word in said for word in ("shape", "rank", "dimension", "scalar")):
             advice = f": expected {TERMS}"
             advice += f". If shapes differ: {ADVICE}" if self.space.hoop else ""
-        return f"its residual raised {error!r}{advice}"
+        return FormError(f"{where}: its residual raised {error!r}{advice}")
 
     def _located(self, error: FormError) -> FormError:
         """An error of a name of the residual, with form and line."""

@@ -74,8 +74,8 @@ class FormInputs:
         declared = self._form.data
         if not checks.one_of(name, declared):
             known, what = quoted(declared) or "none", f"data({checks.shown(name)}, ...)"
-            if other := misplaced(self._form, name):
-                raise InputError(f"{what}: {other}")
+            if wrong := misplaced(self._form, name, what):
+                raise wrong
             raise InputError(
                 f"{what}: form {self._form.name} declares no such data: "
                 f"expected one of {known}{meant(str(name), declared)}"
@@ -91,8 +91,8 @@ class FormInputs:
         model, form = domain.model, self._form
         if not checks.one_of(name, form.parameters):
             what = f"parameter({checks.shown(name)}, ...)"
-            if other := misplaced(form, name):
-                raise InputError(f"{what}: {other}")
+            if wrong := misplaced(form, name, what):
+                raise wrong
             raise InputError(
                 f"{what}: form {form.name} has {quoted(form.parameters)}"
                 f"{meant(str(name), form.parameters)}"

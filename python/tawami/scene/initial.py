@@ -21,6 +21,7 @@ from tawami.scene import own_fields, sources
 from tawami.scene.configuration import Configuration
 from tawami.scene.domain import Domain
 from tawami.scene.earlier import Earlier
+from tawami.scene.parameters import misplaced
 from tawami.scene.sources import Source
 
 Array = npt.NDArray[np.float64]
@@ -78,6 +79,8 @@ def _check(now: Configuration, name: str, beyond: Beyond) -> None:
     if now.model.form.kinematics.has_eps_v:
         known.append("eps_v")
     if not checks.one_of(name, known):
+        if wrong := misplaced(now.model.form, name, f"initial({checks.shown(name)})"):
+            raise wrong
         moves = checks.one_of(name, ("velocity",))
         more = "; velocities come in as Dynamics(scene, velocity=...)" if moves else ""
         raise InputError(

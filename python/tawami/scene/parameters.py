@@ -23,10 +23,8 @@ def by_kind(
     with one number for each particle.
     """
     for name in given:
-        if name in form.data:
-            raise InputError(
-                f"Scene(..., {name}=...): {misplaced(form, name)}, after the scene is made"
-            )
+        if name in form.data and (wrong := misplaced(form, name, f"Scene(..., {name}=...)")):
+            raise wrong
     numbers = dict(given)
     in_time, in_space = dict[str, Any](), dict[str, Any]()
     for name in form.parameters:
@@ -43,8 +41,8 @@ def by_kind(
     return numbers, in_time, in_space
 
 
-def misplaced(form: Form, name: Any) -> str:
-    """The kind of an input of a form, and the call that gives it; empty for another name."""
+def misplaced(form: Form, name: Any, where: str) -> InputError | None:
+    """The error of an input of a form that is given by another call; None for other names."""
     ways = (
         ("data", form.data, f"scene.data('{name}', ...)"),
         ("a parameter", form.parameters, f"scene.parameter('{name}', ...)"),
@@ -53,8 +51,8 @@ def misplaced(form: Form, name: Any) -> str:
     )
     for what, known, call in ways:
         if checks.one_of(name, known):
-            return f"'{name}' is {what} of form {form.name}: expected {call}"
-    return ""
+            return InputError(f"{where}: '{name}' is {what} of form {form.name}: expected {call}")
+    return None
 
 
 def _arguments(function: Any) -> int:
