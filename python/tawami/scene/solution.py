@@ -175,8 +175,9 @@ class Solution(Elsewhere, Sealed, Unique):
         """Displacement (u_x, u_y) [m] of the grid at a point.
 
         At small strain it is the displacement since the start. At finite strain, where the grid is reset
-        after each step, it is the increment of the last step only: the total is in
-        `displacement_of_particles`, at the particle nearest to the point.
+        after each step, it is the increment of the last step only: `displacement_of_particles` has the
+        total, at the particle nearest to the point, and so has the column 'displacement (x, y)' of a
+        `TableOutput`.
 
         Args:
             point: Position (x, y) [m]; at finite strain at the start of the last step.
