@@ -54,12 +54,22 @@ FORMS: dict[str, dict[str, Any]] = {
     "u_epsv, alpha(time)": {"form": "u_epsv", "alpha": lambda time: 0.01},
     **{
         form: {"form": form}
-        for form in ("u_epsv_pw", "u_epsv_pw_finite", "u_epsv_theta", "u_epsv_visco")
-        if form in shipped()
+        for form in shipped()
+        if form.startswith("u_epsv_") and form != "u_epsv_finite"
     },
 }
-#: Data of the forms that read some: nearly impermeable, so that undrained and total forces are compared.
-DATA = {"kappa": 1e-12}  # [m2]
+#: Data of the forms that read some. The body is nearly impermeable, so that total forces are compared,
+#: and no energy damages it.
+DATA = {
+    "kappa": 1e-12,  # [m2]
+    "expansion": 1e-5,  # [1/K]
+    "conductivity": 1.0,  # [W/(m K)]
+    "capacity": 1e3,  # [J/(kg K)]
+    "eta": 1e3,  # [Pa s]
+    "H": 0.0,  # [J/m3]
+    "G_c": 1.0,  # [J/m2]
+    "l": 0.5,  # [m]
+}
 
 
 def _numpy_law() -> tawami.NumpyLaw:

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
+from mpi4py import MPI
+from ufl import dot, inner
 
+import tawami
 from cases.verification import consolidation as case
+from tawami.form import scalar, vector
 
 
 def test_the_series_agree_with_known_numbers():
@@ -50,6 +57,25 @@ def test_water_enters_as_the_flux_says():
     scene.flux("top", "p_w", 2e-6)
     solution = scene.solve(until=3.0)
     assert case.H * solution.strain[:, 1].mean() == pytest.approx(6e-6, rel=1e-6)
+
+
+def test_water_enters_the_form_of_the_tutorial_as_the_flux_says():
+    """Of python/docs/edit_a_form.md: the sign and the factor of the equation of p_w."""
+    page = Path(tawami.__file__).parents[1] / "docs/edit_a_form.md"
+    cells = re.findall(r"```\{code-cell\}\n(.*?)```", page.read_text(), re.DOTALL)
+    (cell,) = [cell for cell in cells if "biot = tawami.Form" in cell]
+    names = {"inner": inner, "dot": dot, "tawami": tawami, "scalar": scalar, "vector": vector}
+    exec(cell, names)  # a page of the documentation
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(2, 4))
+    law = tawami.linear_elastic(E=1e6, nu=0.3)
+    body = tawami.box(grid, (0, 0), (0.5, 1), gauss=True)
+    scene = tawami.Scene(grid, body, law, form=names["biot"])
+    scene.data("kappa", 1e-12)
+    for edge, component in (("left", "x"), ("right", "x"), ("bottom", "y")):
+        scene.fix(edge, component)
+    scene.flux("top", "p_w", 2e-9)
+    solution = scene.solve(until=3e3)
+    assert solution.strain[:, 1].mean() == pytest.approx(6e-6, rel=1e-6)
 
 
 @pytest.mark.parametrize("biot", [1.0, 0.7])

@@ -24,6 +24,8 @@ from PIL import Image
 
 import tawami
 from tawami.base import errors
+from tawami.form.files import shipped
+from tawami.form.form import Form
 
 DOCS = Path(pages.__file__).parent
 PAGES = {str(p.relative_to(DOCS).with_suffix("")): p.read_text() for p in DOCS.rglob("*.md")}
@@ -399,6 +401,13 @@ def tried():
         compatibility.attempt(form, law, time)
         for form in rows for law in laws for time in compatibility.TIMES
     ]  # fmt: skip
+
+
+def test_every_shipped_form_is_tried_with_its_data():
+    tried = {options["form"] for options in compatibility.FORMS.values()}
+    assert tried == set(shipped())
+    for name in shipped():
+        assert set(Form.load(name).data) <= set(compatibility.DATA), name
 
 
 def test_combinations_that_are_rejected(tried):

@@ -66,3 +66,19 @@ def test_a_point_between_the_particles_of_a_cut_body_is_found():
         for component in "xy":
             scene.hold((0.8 * np.cos(angle), 0.8 * np.sin(angle)), component)
     scene.solve()
+
+
+@pytest.mark.parametrize("form", ["u_epsv", "u_epsv_finite"])
+def test_the_displacement_of_a_point_is_an_increment_at_finite_strain(form):
+    """Of a block that moves as a whole: the total is that of the particles."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(5, 4))
+    body = tawami.box(grid, (0, 0), (1, 1))
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1e6, nu=0.3), form=form)
+    for edge, component in (("left", "x"), ("bottom", "y")):
+        scene.fix(edge, component, 0.03)
+    steps = []
+    tawami.ramp(scene, 0.25, each=steps.append)
+    assert len(steps) == 4
+    moved = 0.03 / 4 if form == "u_epsv_finite" else 0.03
+    assert steps[-1].displacement((0.5, 0.5)) == pytest.approx([moved] * 2, rel=1e-6)
+    np.testing.assert_allclose(steps[-1].displacement_of_particles, 0.03, rtol=1e-6)

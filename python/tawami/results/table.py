@@ -22,9 +22,9 @@ class TableOutput(Output):
 
     Args:
         names: 'energies', 'momentum', 'angular momentum', 'reaction left' or another edge,
-            'reaction (2, 0)' of a point with a support, 'displacement (2, 0)' of a point of the body
-            at the start, 'run-out' (the largest x), 'particles' (those that have not left), 'Newton
-            iterations', 'step size'.
+            'reaction (2, 0)' of a point with a support, 'displacement (2, 0)' since the start of a
+            point of the body at the start, 'run-out' (the largest x), 'particles' (those that have
+            not left), 'Newton iterations', 'step size'.
         every, every_steps: When; see `Output`. Every step by default.
         name: Of the file.
         phases: As in `Output`.

@@ -112,7 +112,9 @@ class Conditions:
     ) -> Load:
         """Let a field flow into the body through an edge of the grid.
 
-        The residual of the field's equation gets - int value r ds, r its test function.
+        The residual of the field's equation gets - int value r ds, r its test function. Write the
+        equation per second, with storage and outflow positive: the flux is then an inflow. If the form
+        multiplies the equation by a factor, the flux is wrong by this factor.
 
         Args:
             edge: 'left', 'right', 'bottom' or 'top'.

@@ -174,6 +174,14 @@ class Solution(Elsewhere, Sealed, Unique):
     def displacement(self, point: Sequence[float]) -> Array:
         """Displacement (u_x, u_y) [m] of the grid at a point.
 
+        At small strain it is the displacement since the start. At finite strain, where the grid is reset
+        after each step, it is the increment of the last step only: `displacement_of_particles` has the
+        total, at the particle nearest to the point, and so has the column 'displacement (x, y)' of a
+        `TableOutput`.
+
+        Args:
+            point: Position (x, y) [m]; at finite strain at the start of the last step.
+
         Raises:
             InputError: The point is outside the grid or the body.
         """
