@@ -182,3 +182,15 @@ def test_a_message_names_the_line_of_the_term():
     message = rf"line {line} \(return R \+ sum_p\(dot\(w, w\)\)\): .*linear in one test function"
     with pytest.raises(tawami.FormError, match=message):
         compile_form(MPI.COMM_SELF, form, {})
+
+
+def test_a_penalty_may_add_inner_products_to_plain_ones():
+    """UFL marks the test function of `inner` as conjugated, which means nothing for real numbers."""
+
+    def residual(u, w, sigma, mu, sum_p, facet_mean, jump_nn, dG):
+        bend, tested = jump_nn(u), jump_nn(w)
+        return (
+            sum_p(sigma, grad(w)) + facet_mean(mu) * (inner(bend, tested) + dot(bend, tested)) * dG
+        )
+
+    assert compile_form(MPI.COMM_SELF, form_of(residual), {}).ghost is not None

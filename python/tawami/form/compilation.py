@@ -36,7 +36,6 @@ class CompiledForm:
         ghost: Integral of rank 2 over sides of partially filled cells, if there is one.
         densities: Particle data of each rule: each density with its first column.
         used: Parameters, data and constants (time, dt, b) that the residual reads with these options.
-        fields_of_particles: Parameters whose value is one number for each particle.
     """
 
     form: Form
@@ -48,7 +47,6 @@ class CompiledForm:
     ghost: Integral | None
     densities: Mapping[Rule, Mapping[Density, int]]
     used: frozenset[str]
-    fields_of_particles: tuple[str, ...]
 
     @functools.cached_property
     def traction(self) -> Integral | None:
@@ -113,11 +111,11 @@ def compile_form(
             histories=histories, fields_of_particles=fields,
         )  # fmt: skip
         with tally.compiling():
-            _compiled[key] = _compile(comm, symbols, fields)
+            _compiled[key] = _compile(comm, symbols)
     return _compiled[key]
 
 
-def _compile(comm: Any, symbols: Symbols, fields: tuple[str, ...]) -> CompiledForm:
+def _compile(comm: Any, symbols: Symbols) -> CompiledForm:
     form, residual = symbols.form, symbols.residual()
     terms = terms_of(symbols, residual)
     with symbols.lines.errors(terms.cells):
@@ -147,7 +145,6 @@ def _compile(comm: Any, symbols: Symbols, fields: tuple[str, ...]) -> CompiledFo
         couplings=tuple(map(of_pair, couplings)),
         densities=builder.densities,
         used=_used(symbols, residual),
-        fields_of_particles=fields,
     )
 
 

@@ -13,12 +13,11 @@ from ufl.algorithms.analysis import (
     extract_coefficients,
     has_type,
 )
-from ufl.algorithms.check_arities import ArityMismatch, check_form_arity
 from ufl.classes import Zero
 
 from tawami.base.errors import FormError
 from tawami.fem.rules import Rule
-from tawami.form.arity import check_arity
+from tawami.form.arity import check_arity, is_multilinear
 from tawami.form.lines import line_of
 from tawami.form.particle_data import PLACEHOLDERS
 from tawami.form.points import Integrand
@@ -176,12 +175,8 @@ def _matrix(symbols: Symbols, sides: Any) -> Any:
     used = set(sides.coefficients())
     others = {data for symbol in used if (data := symbols.data.of(symbol)) is not None}
     matrix = ufl.replace(sides, {symbols.increments: symbols.trial})
-    try:
-        expanded = ufl.algorithms.expand_derivatives(matrix)
-        check_form_arity(expanded, matrix.arguments())
-        linear = len(matrix.arguments()) == 2 and symbols.traction not in used
-    except ArityMismatch:
-        linear = False
+    linear = len(matrix.arguments()) == 2 and symbols.traction not in used
+    linear = linear and is_multilinear(matrix)
     if not linear or any(density.rule != "mean" for density in others):
         raise FormError(
             f"form {symbols.form.name}: expected terms with dG that are linear in the fields and "

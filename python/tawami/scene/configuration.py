@@ -121,8 +121,10 @@ class Configuration:
         """Hand the form what it reads in a step; see `FormInputs.prepare`."""
         self.inputs.prepare(self.domain, now, self.loads.acceleration(now), dt)
 
-    def fields_at(self, now: Moment) -> Fields:
-        """Prescribed values of fields without a role at a moment; a call for all ranks."""
+    def fields_at(self, now: Moment) -> Fields | None:
+        """Prescribed values of fields without a role, if the form has any; a call for all ranks."""
+        if not self.model.form.own_fields:
+            return None
         whole = replace(now, part=1.0)
         return Fields(self.old, lambda term: term.at(whole), self.inputs.share(now))
 

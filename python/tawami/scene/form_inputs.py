@@ -49,11 +49,11 @@ class FormInputs:
         """Give the particles of a new scene the parameters with one number each."""
         for name, source in model.in_space.items():
             domain.particles.carry(name, 1)
-            self._to_particles(domain, name, source, "")
+            self._to_particles(domain, name, source)
         if "dt" not in model.compiled.used and not self._form.data:
             self._hand(domain, 0.0, 0.0, np.zeros(model.space.dim))
 
-    def _check_incompressible(self, model: Model, domain: Domain) -> None:
+    def _check_incompressible(self, domain: Domain) -> None:
         """Check that a form of an incompressible material contains its K in no other way than 1 / K.
 
         Raises:
@@ -103,7 +103,7 @@ class FormInputs:
             )
         numbers, in_time, in_space = by_kind(form, {name: given})
         if name in model.in_space:
-            self._to_particles(domain, name, given, "")
+            self._to_particles(domain, name, given)
             return
         if in_space:
             raise InputError(
@@ -118,9 +118,9 @@ class FormInputs:
         self._values[name] = self._checked(name, numbers[name], model)
         self._in_time.pop(name, None)
 
-    def _to_particles(self, domain: Domain, name: str, source: Any, unit: str) -> None:
+    def _to_particles(self, domain: Domain, name: str, source: Any) -> None:
         with ranks.raise_together(domain.model.grid.comm):
-            found = sources.values(domain, name, source, "value", unit, f"parameter '{name}'")[:, 0]
+            found = sources.values(domain, name, source, "value", "", f"parameter '{name}'")[:, 0]
             for value in (found.min(), found.max()) if len(found) else ():
                 self._checked(name, float(value), domain.model)
         domain.particles.carried(name)[:, 0] = found
@@ -171,7 +171,7 @@ class FormInputs:
         domain.assembly.attachment.change(values)
         domain.responses.refresh()
         if not self._is_checked:
-            self._check_incompressible(model, domain)
+            self._check_incompressible(domain)
             self._is_checked = True
 
     def state(self) -> dict[str, Any]:
