@@ -17,6 +17,7 @@ LEVELS = (
     ("base",),
     ("fem", "picture"),
     ("grid", "form"),
+    ("border",),
     ("body",),
     ("particles",),
     ("field",),
