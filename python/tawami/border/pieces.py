@@ -14,8 +14,9 @@ class Border:
     Attributes:
         start: Where each piece starts [m], pieces x dim.
         end: Where it ends [m].
-        curvature: Of each piece [1/m]: 0 for a straight one, positive for an arc around a centre on the
-            side of the body, negative for one around a centre outside. Arcs are shorter than a half circle.
+        curvature: Of each piece [1/m]: 0 for a straight one, positive for an arc around a centre on
+            the side of the body, negative for one around a centre outside. Arcs are shorter than a
+            half circle.
         tag: Number of the name of each piece among `names`.
         names: Names of the parts of the border.
     """
