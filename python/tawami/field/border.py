@@ -7,8 +7,6 @@ for linear fields, so that no force and no moment of a load is lost.
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 import scipy.sparse as sp
 
@@ -47,6 +45,7 @@ class BorderInCells:
         self, grid: Grid, active: Mask, x: Array, normal: Array, where: str = "border"
     ) -> None:
         self.grid = grid
+        self._known: dict[Basis, tuple[Indices, Array, Array]] = {}
         scaled = (x - np.array(grid.origin)) / grid.h
         most = np.array(grid.cells) - 1
         index = np.clip(np.floor(scaled - INWARD * normal), 0, most).astype(np.int64)
@@ -61,18 +60,24 @@ class BorderInCells:
     def __len__(self) -> int:
         return len(self.location)
 
-    @functools.lru_cache(maxsize=4)  # noqa: B019 (its few results live as long as it does)
-    def _tabulated(self, basis: Basis) -> tuple[Indices, Array, Array]:
-        return _rust.functions_at(self.location, basis)
+    def tabulated(self, basis: Basis) -> tuple[Indices, Array, Array]:
+        """The functions on the cell of each point.
+
+        Returns:
+            Their numbers (points x functions), values, and gradients [1/m] (points x functions x dim).
+        """
+        if basis not in self._known:
+            self._known[basis] = _rust.functions_at(self.location, basis)
+        return self._known[basis]
 
     def values(self, basis: Basis) -> sp.csr_matrix:
         """The functions of a basis at the points, points x functions."""
-        numbers, values, _ = self._tabulated(basis)
+        numbers, values, _ = self.tabulated(basis)
         return self._matrix(basis, numbers, values)
 
     def slopes(self, basis: Basis) -> list[sp.csr_matrix]:
         """Their derivatives along each axis [1/m], points x functions."""
-        numbers, _, gradients = self._tabulated(basis)
+        numbers, _, gradients = self.tabulated(basis)
         return [
             self._matrix(basis, numbers, gradients[..., axis])
             for axis in range(self.grid.space.dim)

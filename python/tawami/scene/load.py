@@ -1,4 +1,4 @@
-"""One load: the weight, a traction or a flux on an edge of the grid, forces on particles."""
+"""One load: the weight, a traction, pressure or flux on the border, forces on particles."""
 
 from __future__ import annotations
 
@@ -11,11 +11,10 @@ import numpy.typing as npt
 from tawami.base import checks
 from tawami.base.arrays import Array, Indices
 from tawami.base.errors import InputError
-from tawami.base.identity import text
-from tawami.field.constraints import edge_load
-from tawami.grid.edges import Interval
-from tawami.grid.grid import Edge, Grid
+from tawami.grid.edges import evaluate
+from tawami.grid.grid import Grid
 from tawami.scene.action import Action, Owner, Term, Value
+from tawami.scene.border import MovingPoints
 from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor
 
@@ -65,74 +64,111 @@ class Weight(Load):
         return f"gravity ({b}) m/s2"
 
 
-class Traction(Load):
-    """A traction on an edge of the grid; its values are components [Pa]."""
+class OnBorder(Load):
+    """A load on a part of the border of the body.
 
-    __slots__ = ("between", "edge")
+    Attributes:
+        points: Points of this part, which move with the body.
+        where: The part in words.
+    """
+
+    __slots__ = ("points", "where")
+    #: The method of a scene that makes it.
+    call: str
 
     def __init__(
-        self, owner: Owner[Any], edge: Edge, value: Any, between: Interval | None, factor: Factor
+        self, owner: Owner[Any], points: MovingPoints, where: str, value: Any, factor: Factor
     ) -> None:
-        self.edge, self.between = edge, between
+        self.points, self.where = points, where
         super().__init__(owner, value, factor)
 
-    def _checked(self, value: Any) -> tuple[Value, ...]:
-        t_x, t_y = checks.pair(f"{self}", value, "components (t_x, t_y)")
-        return checks.profile(f"{self}: t_x", t_x), checks.profile(f"{self}: t_y", t_y)
-
     def place(self) -> list[Any]:
-        """Edge, and part of it."""
-        return [self.edge, text(self.between)]
+        """The part of the border: its name, number of points and length."""
+        made = self.points.made
+        return [self.where, len(made), float(made.length.sum())]
+
+    def at_points(self, term: Term) -> Array:
+        """Components of its value at the points where they are, points x components."""
+        columns = [evaluate(v, *self.points.x.T, f"{self}") for v in term.values]
+        return np.column_stack(columns)
 
     def __str__(self) -> str:
-        return f"traction(edge='{self.edge}')"
+        return f"{self.call}({self.where})"
 
 
-class Flux(Load):
-    """A flux of a field into the body through an edge of the grid.
+class Traction(OnBorder):
+    """A dead traction; its values are components [Pa], per area when the load was made."""
+
+    __slots__ = ()
+    call = "traction"
+
+    def _checked(self, value: Any) -> tuple[Value, ...]:
+        names = self.points.space.axes
+        given = checks.pair(f"{self}", value, "components (t_x, t_y)")
+        return tuple(checks.profile(f"{self}: t_{n}", t) for n, t in zip(names, given, strict=True))
+
+    def on(self, domain: Domain, term: Term) -> Array:
+        """Forces of the whole traction, functions x dim [N per metre depth]."""
+        functions = self.points.cells(domain).values(domain.layout.basis)
+        forces = self.points.reference[:, None] * self.at_points(term)
+        return np.asarray(functions.T @ forces)
+
+
+class Pressure(OnBorder):
+    """A pressure [Pa], positive against the outward normal, which follows the border."""
+
+    __slots__ = ()
+    call = "pressure"
+
+    def _checked(self, value: Any) -> tuple[Value, ...]:
+        return (checks.profile(f"{self}", value),)
+
+    def on(self, domain: Domain, term: Term) -> Array:
+        """Forces of the whole pressure where the border is, functions x dim [N per metre depth]."""
+        functions = self.points.cells(domain).values(domain.layout.basis)
+        thickness = self.points.space.thickness(self.points.x)
+        pressure = self.at_points(term)[:, 0] * thickness
+        return np.asarray(functions.T @ (-pressure[:, None] * self.points.area))
+
+
+class Flux(OnBorder):
+    """A flux of a field into the body.
 
     Attributes:
         field: Name of the field.
-        edge: Name of the edge.
-        between: Part of the edge [m]; None for all of it.
     """
 
-    __slots__ = ("between", "edge", "field")
+    __slots__ = ("field",)
+    call = "flux"
 
     def __init__(
         self,
         owner: Owner[Any],
-        edge: Edge,
+        points: MovingPoints,
+        where: str,
         field: str,
         value: Any,
-        between: Interval | None,
         factor: Factor,
     ) -> None:
-        self.edge, self.field, self.between = edge, field, between
-        super().__init__(owner, value, factor)
+        self.field = field
+        super().__init__(owner, points, where, value, factor)
 
     def _checked(self, value: Any) -> tuple[Value, ...]:
         return (checks.profile(f"{self}", value),)
 
     def place(self) -> list[Any]:
-        """Field, edge, and part of it."""
-        return [self.field, self.edge, text(self.between)]
+        """Field and part of the border."""
+        return [self.field, *super().place()]
 
-    def on(self, domain: Domain, term: Term) -> tuple[Indices, Array]:
-        """Coefficients, and the integrals of the whole flux times their functions."""
+    def on(self, domain: Domain, term: Term) -> tuple[slice, Array]:
+        """Coefficients of the field, and the integrals of the whole flux times their functions."""
         place = domain.layout.fields[self.field]
-        return edge_load(
-            domain.model.grid,
-            place,
-            domain.active,
-            self.edge,
-            term.values[0],
-            self.between,
-            f"{self}",
-        )
+        functions = self.points.cells(domain).values(place.basis)
+        flux = self.points.weight * self.at_points(term)[:, 0]
+        return place.slice, np.asarray(functions.T @ flux)
 
     def __str__(self) -> str:
-        return f"flux(edge='{self.edge}') of {self.field}"
+        return f"{super().__str__()} of {self.field}"
 
 
 class Forces(Load):

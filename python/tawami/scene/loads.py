@@ -1,4 +1,4 @@
-"""Loads of a scene: weight, tractions on edges of the grid, forces on particles that move with them.
+"""Loads of a scene: weight, tractions and pressures on the border, forces on particles.
 
 Loads that are new since the last full solve grow with a part from 0 to 1; the others stay.
 """
@@ -10,17 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from tawami.base.arrays import Array, Indices, Mask
-from tawami.base.errors import SupportError
+from tawami.base.arrays import Array, Indices
 from tawami.base.text import listed
-from tawami.grid import edges
-from tawami.grid.edges import Interval
-from tawami.grid.grid import Edge, Grid
+from tawami.field.follower import FollowerPressure
+from tawami.grid.grid import Grid
 from tawami.scene.action import Owner, Term, restored
 from tawami.scene.activity import Activity
+from tawami.scene.border import MovingPoints
 from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor
-from tawami.scene.load import Flux, Forces, Load, Traction, Weight
+from tawami.scene.load import Flux, Forces, Load, Pressure, Traction, Weight
 from tawami.scene.share import Moment
 
 
@@ -66,23 +65,19 @@ class Loads(Owner[Load]):
         self.all.append(weight)
         return weight
 
-    def add_traction(
-        self, edge: Edge, value: Any, between: Interval | None, amplitude: Any
+    def add_on_border(
+        self, kind: type[Traction | Pressure], points: MovingPoints, where: str, value: Any, amplitude: Any
     ) -> Load:
-        """Load an edge of the grid with a traction [Pa]."""
-        factor = self._factor(f"traction(edge='{edge}')", amplitude)
-        edges.cells_between(self.grid, edge, between)
-        traction = Traction(self, edge, value, between, factor)
-        self.all.append(traction)
-        return traction
+        """Load a part of the border with a traction or a pressure [Pa]."""
+        load = kind(self, points, where, value, self._factor(f"{kind.call}({where})", amplitude))
+        self.all.append(load)
+        return load
 
     def add_flux(
-        self, edge: Edge, field: str, value: Any, between: Interval | None, amplitude: Any
+        self, points: MovingPoints, where: str, field: str, value: Any, amplitude: Any
     ) -> Load:
-        """Load an edge of the grid with a flux of a field."""
-        factor = self._factor(f"flux(edge='{edge}')", amplitude)
-        edges.cells_between(self.grid, edge, between)
-        flux = Flux(self, edge, field, value, between, factor)
+        """Load a part of the border with a flux of a field."""
+        flux = Flux(self, points, where, field, value, self._factor(f"flux({where})", amplitude))
         self.all.append(flux)
         return flux
 
@@ -123,25 +118,43 @@ class Loads(Owner[Load]):
         """
         particles, external = domain.particles, np.zeros(domain.layout.size)
         on_particles, any_on_particles = np.zeros((len(particles), self.grid.space.dim)), False
+        n = domain.layout.num_displacement
         for load, term, factor in self._acting(now):
             if isinstance(load, Flux):
-                indices, integrals = load.on(domain, term)
-                external[indices] += factor * integrals
-                continue
-            if isinstance(load, Traction):
-                external += factor * self._on_edge(domain, load, term)
-                continue
-            if isinstance(load, Forces):
+                place, integrals = load.on(domain, term)
+                external[place] += factor * integrals
+            elif isinstance(load, Traction | Pressure):
+                if not self._follows(load, domain):
+                    external[:n] += factor * load.on(domain, term).ravel()
+            elif isinstance(load, Forces):
                 on_particles += factor * load.on(term, particles.number)
+                any_on_particles = True
             else:
-                on_particles += domain.mass[:, None] * (factor * np.array(term.values, dtype=float))
-            any_on_particles = True
+                acceleration = factor * np.array(term.values, dtype=float)
+                on_particles += domain.mass[:, None] * acceleration
+                any_on_particles = True
         if any_on_particles:
             sums = domain.sums(np.ones(len(particles)), on_particles)
             external[: sums.size] += sums.ravel()
         if self.unbalanced is not None:
             external += (1 - now.part) * self.unbalanced
         return external
+
+    def following(self, domain: Domain, now: Moment) -> list[FollowerPressure]:
+        """Pressures that follow the border within a step."""
+        return [
+            FollowerPressure(
+                domain.layout, load.points.cells(domain), load.points.x, load.points.area,
+                factor * load.at_points(term)[:, 0],
+            )  # fmt: skip
+            for load, term, factor in self._acting(now)
+            if isinstance(load, Pressure) and self._follows(load, domain)
+        ]
+
+    @staticmethod
+    def _follows(load: Load, domain: Domain) -> bool:
+        """Whether a load depends on the displacement in a step."""
+        return isinstance(load, Pressure) and domain.model.moves
 
     def keep_balance(self, forces: Array) -> None:
         """Add forces on all coefficients that fade from now on [N per metre depth]."""
@@ -153,30 +166,8 @@ class Loads(Owner[Load]):
         for load in self.all:
             for term in load.terms:
                 factor = term.at(now)
-                if not term.is_zero and (factor or isinstance(load, Traction | Flux)):
+                if not term.is_zero and factor:
                     yield load, term, factor
-
-    def _on_edge(self, domain: Domain, traction: Traction, term: Term) -> Array:
-        """Forces of the whole traction on all coefficients."""
-        edge = traction.edge
-        nodes, loaded = domain.tractions.nodes(edge), self._cells(domain, traction)
-        if not loaded.any() and traction.released:  # what it loaded was removed
-            return np.zeros(domain.layout.size)
-        if not loaded.any():
-            raise SupportError(
-                f"{traction}: no cell along that edge of the grid holds particles; let the grid end "
-                "where the body is loaded, or use load(particles, force)"
-            )
-        x, y = nodes[..., 0].ravel(), nodes[..., 1].ravel()
-        values = [edges.evaluate(component, x, y, f"{traction}") for component in term.values]
-        at_nodes = np.stack(values, axis=-1).reshape(nodes.shape)
-        return domain.tractions.forces(edge, np.where(loaded[:, None, None], at_nodes, 0.0))
-
-    def _cells(self, domain: Domain, traction: Traction) -> Mask:
-        """Mask of the cells with particles along its edge that a traction loads."""
-        part = edges.cells_between(self.grid, traction.edge, traction.between)
-        mask: Mask = part[domain.tractions.cells(traction.edge)]
-        return mask
 
     def accept(self, now: Moment) -> None:
         """Let later parts grow from this moment; drop loads that have faded."""

@@ -1,0 +1,83 @@
+"""A pressure that follows the border within a step (Nanson: n dA = cof(f) n0 dA0, f = I + grad u).
+
+    f_i = - p sum_b N_i cof(f) n0 dA0
+
+At small strain it is a dead load. In axisymmetry dA contains 2 pi (r + u_r).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse as sp
+
+from tawami.base.arrays import Array
+from tawami.field.border import BorderInCells
+from tawami.field.layout import Layout
+
+
+class FollowerPressure:
+    """A pressure on border points, as forces that depend on the displacement (`tawami.solve.terms`).
+
+    Args:
+        layout: Places of the coefficients.
+        cells: The points in the cells.
+        x: Positions at the start of the step [m], points x dim.
+        area: Outward normals times lengths in the plane then [m], points x dim.
+        pressure: At each point [Pa].
+    """
+
+    #: It prescribes no displacement and has one tangent everywhere.
+    prescribed, smooth = 0.0, True
+
+    def __init__(
+        self, layout: Layout, cells: BorderInCells, x: Array, area: Array, pressure: Array
+    ) -> None:
+        self._layout, self._space = layout, layout.grid.space
+        self._x, self._area, self._pressure = x, area, pressure
+        self._tabulated = cells.tabulated(layout.basis)
+
+    def begin(self, diagonal: Callable[[], Array]) -> None:
+        """See `Term`."""
+
+    def improve(self) -> bool:
+        """See `Term`: there are no multipliers."""
+        return False
+
+    def _at(self, coefficients: Array) -> tuple[Array, Array, Array]:
+        """f^-T and cof(f) n0 dA0 in the plane at the points, and their thickness."""
+        numbers, values, gradients = self._tabulated
+        u = self._space.vectors(coefficients[: self._layout.num_displacement])[numbers]
+        f = np.einsum("pfi,pfj->pij", u, gradients) + np.eye(self._space.dim)
+        inverse = np.linalg.inv(f).transpose(0, 2, 1)
+        area = np.linalg.det(f)[:, None] * np.einsum("pij,pj->pi", inverse, self._area)
+        moved = self._x + np.einsum("pf,pfi->pi", values, u)
+        return inverse, area, self._space.thickness(moved)
+
+    def forces(self, coefficients: Array) -> Array:
+        """See `Term`."""
+        numbers, values, _ = self._tabulated
+        self._inverse, self._now, self._thickness = self._at(coefficients)
+        on_points = -(self._pressure * self._thickness)[:, None] * self._now
+        forces = np.zeros_like(coefficients)
+        parts = values[:, :, None] * on_points[:, None]
+        places = self._space.dim * numbers[:, :, None] + np.arange(self._space.dim)
+        np.add.at(forces, places, parts)
+        return forces
+
+    def stiffness(self) -> sp.csr_matrix:
+        """See `Term`: d(cof(f) a)_i = (B_jl b_i - B_il b_j) df_jl, B = f^-T and b = cof(f) a."""
+        numbers, values, gradients = self._tabulated
+        slope = np.einsum("pjl,pi->pijl", self._inverse, self._now)
+        slope -= np.einsum("pil,pj->pijl", self._inverse, self._now)
+        by_u = np.einsum("pijl,pgl->pijg", slope, gradients) * self._thickness[:, None, None, None]
+        if self._space.hoop:
+            by_u[:, :, 0] += 2 * np.pi * self._now[:, :, None] * values[:, None]
+        local = np.einsum("p,pf,pijg->pfigj", self._pressure, values, by_u)
+        dim, size = self._space.dim, self._layout.size
+        of = (dim * numbers[:, :, None] + np.arange(dim)).reshape(len(numbers), -1)
+        width = of.shape[1]
+        rows, columns = np.repeat(of, width, axis=1), np.tile(of, width)
+        entries = (local.ravel(), (rows.ravel(), columns.ravel()))
+        return sp.coo_matrix(entries, shape=(size, size)).tocsr()

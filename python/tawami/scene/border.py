@@ -1,0 +1,302 @@
+"""The border of the body in a scene: points that move with the body, and the parts that actions own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tawami.base import checks
+from tawami.base.arrays import Array, Indices, Mask
+from tawami.base.errors import CheckpointError, InputError
+from tawami.base.space import Space
+from tawami.base.text import meant, quoted
+from tawami.border.pieces import Border
+from tawami.border.points import BorderPoints
+from tawami.field.border import BorderInCells
+from tawami.grid.grid import EDGES, ON_LINE, Edge, Grid
+from tawami.scene.domain import Domain
+from tawami.scene.model import Model
+
+#: Gauss points on a piece of the border between two lines of the grid: where particles stay, three are
+#: exact; points that move to other places in their cells need five (noise of a pressure .5 and .14 %).
+STAYING, MOVING = 3, 5
+#: Part of a border, as a driver script names it: a name or names, a function f(x, y) on arrays that
+#: returns a mask, or a mask of the points `scene.border.x`.
+Part = str | int | list[str | int] | tuple[str | int, ...] | Callable[[Array, Array], Any] | npt.NDArray[Any]
+
+
+class MovingPoints:
+    """Points of a border that move with the body.
+
+    Args:
+        points: The points at the start.
+        grid: The grid.
+        what: Name of the part, for messages.
+
+    Attributes:
+        what: As given.
+        x: Positions [m], points x dim.
+        area: Outward normals times lengths in the plane of the grid [m], points x dim.
+        reference: Weights when they were made [m2 per metre depth], which dead loads refer to.
+        made: The points when they were made.
+    """
+
+    def __init__(self, points: BorderPoints, grid: Grid, what: str = "border") -> None:
+        self.made, self._grid, self.what = points, grid, what
+        self.x = np.array(points.x)
+        self.area = points.length[:, None] * points.normal
+        self.reference = self.weight
+        self._located: tuple[Domain, BorderInCells] | None = None
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+    @property
+    def space(self) -> Space:
+        """The space of the grid."""
+        return self._grid.space
+
+    @property
+    def length(self) -> Array:
+        """Length of the border that each point integrates over [m], in the plane."""
+        return np.asarray(np.linalg.norm(self.area, axis=1))
+
+    @property
+    def weight(self) -> Array:
+        """Area that each point integrates over [m2 per metre depth], in axisymmetry [m2]."""
+        return np.asarray(self.length * self.space.thickness(self.x))
+
+    @property
+    def normal(self) -> Array:
+        """Outward unit normals, points x dim."""
+        return np.asarray(self.area / self.length[:, None])
+
+    @property
+    def now(self) -> BorderPoints:
+        """The points as they are, with distances along the stretched chains."""
+        length, made = self.length, self.made
+        order = np.lexsort((made.along, made.chain))
+        along, chain = np.empty(len(self)), made.chain[order]
+        ends = np.cumsum(length[order])
+        first = np.searchsorted(chain, chain)
+        along[order] = ends - length[order] / 2 - (ends - length[order])[first]
+        return replace(made, x=self.x, length=length, normal=self.normal, along=along)
+
+    def cells(self, domain: Domain) -> BorderInCells:
+        """The points in the cells of a domain.
+
+        Raises:
+            SupportError: A point has no particles near it.
+        """
+        if self._located is None or self._located[0] is not domain:
+            made = BorderInCells(self._grid, domain.active, self.x, self.normal, self.what)
+            self._located = domain, made
+        return self._located[1]
+
+    def edge(self, edge: Edge) -> Mask:
+        """Mask of the points on an edge of the grid."""
+        axis, end = self._grid.edge(edge)
+        line = self._grid.upper[axis] if end else self._grid.origin[axis]
+        return np.asarray(np.abs(self.x[:, axis] - line) <= ON_LINE * self._grid.h)
+
+    def moved(self, domain: Domain, u: Array) -> tuple[Array, Array]:
+        """Positions and areas after a step (Nanson: n dA = cof(F) n0 dA0).
+
+        Args:
+            domain: The particles at its start.
+            u: Increments of the displacement, functions x dim.
+        """
+        cells, basis = self.cells(domain), domain.layout.basis
+        gradient = np.stack([slope @ u for slope in cells.slopes(basis)], axis=2)
+        f = gradient + np.eye(self.space.dim)
+        cofactor = np.linalg.det(f)[:, None, None] * np.linalg.inv(f).transpose(0, 2, 1)
+        area = np.einsum("nij,nj->ni", cofactor, self.area)
+        return self.x + cells.values(basis) @ u, area
+
+    def state(self) -> dict[str, Any]:
+        """Positions and areas, for a checkpoint."""
+        return {"x": self.x, "area": self.area, "reference": self.reference}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """The reverse of :meth:`state`.
+
+        Raises:
+            CheckpointError: It has another number of points.
+        """
+        if np.shape(state["x"]) != self.x.shape:
+            raise CheckpointError(
+                f"{self.what} had {len(state['x'])} border points when the run was stored and has "
+                f"{len(self)} now: expected the same parts of the border"
+            )
+        self.x, self.area, self.reference = state["x"], state["area"], state["reference"]
+        self._located = None
+
+
+class SceneBorder:
+    """The border of the body of a scene.
+
+    Args:
+        model: Grid, form and laws of the scene.
+        border: The border; None for a body without one.
+
+    Attributes:
+        points: All points; None for a body without a border.
+        parts: Points that actions own.
+    """
+
+    def __init__(self, model: Model, border: Border | None) -> None:
+        self._grid, self._given = model.grid, border
+        self._count = MOVING if model.moves else STAYING
+        self.points: MovingPoints | None = None
+        self._ends: MovingPoints | None = None
+        self._has_moved = False
+        self.parts: list[MovingPoints] = []
+        if border is not None:
+            self.points = MovingPoints(border.points(self._grid, self._count), self._grid)
+            if model.moves:
+                self._ends = MovingPoints(_ends(border.at_lines(self._grid)), self._grid)
+
+    @property
+    def all(self) -> list[MovingPoints]:
+        """All points that move with the body."""
+        own = [points for points in (self.points, self._ends) if points is not None]
+        return own + self.parts
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its parts."""
+        return () if self._given is None else self._given.names
+
+    def part(self, what: str, where: Part) -> MovingPoints:
+        """Points of a part of the border, which are exact for this part at its present place.
+
+        Args:
+            what: The call, for messages.
+            where: The part.
+
+        Raises:
+            InputError: The body has no border, no part of this name, or nothing where the function or
+                mask is true.
+        """
+        if self._given is None or self.points is None:
+            raise InputError(
+                f"{what}: the body has no border, as it was made of loose particles: expected "
+                "Body(x, volume, border=tawami.polyline(corners)), or a body of box, polygon, disc, "
+                "level_set or mesh"
+            )
+        if isinstance(where, np.ndarray):
+            points = self.points.now[self._mask(what, where)]
+        else:
+            points = self._pieces(what, where).points(self._grid, self._count)
+        if not len(points):
+            raise InputError(
+                f"{what}: no point of the border is in this part: expected some of it; the border has "
+                f"{quoted(self.names)}"
+            )
+        made = MovingPoints(points, self._grid, what)
+        self.parts.append(made)
+        return made
+
+    def _pieces(self, what: str, where: Part) -> Border:
+        """The pieces of a part."""
+        border = self._present
+        if callable(where):
+            try:
+                return border.where(self._grid, where)
+            except InputError as error:
+                raise InputError(f"{what}: {error}") from None
+        names = [where] if isinstance(where, str | int) else list(where)
+        found = [self._named(what, border, str(name)) for name in names]
+        chosen = np.any(found, axis=0)
+        return border[chosen]
+
+    def _named(self, what: str, border: Border, name: str) -> Mask:
+        """Mask of the pieces of this name, or on this edge of the grid."""
+        if name in border.names:
+            return np.asarray(border.tag == border.names.index(name))
+        if name in EDGES:
+            axis, end = self._grid.edge(name)
+            line = self._grid.upper[axis] if end else self._grid.origin[axis]
+            ends = np.stack([border.start[:, axis], border.end[:, axis]])
+            along = (np.abs(ends - line) <= ON_LINE * self._grid.h).all(axis=0)
+            mask: Mask = along & (border.curvature == 0)
+            if mask.any():
+                return mask
+        known = quoted(self.names)
+        raise InputError(
+            f"{what}: the border has no part {checks.shown(name)}, and does not lie on an edge of the "
+            f"grid of this name: expected one of {known}, or a function f(x, y)"
+            f"{meant(name, self.names)}"
+        )
+
+    def _mask(self, what: str, where: npt.NDArray[Any]) -> Mask:
+        assert self.points is not None
+        if where.dtype != bool or where.shape != (len(self.points),):
+            raise InputError(
+                f"{what}: a mask of type {where.dtype} and shape {where.shape}: expected True or False "
+                f"for each of the {len(self.points)} points scene.border.x"
+            )
+        return where
+
+    @property
+    def _present(self) -> Border:
+        """The border as it is: after a motion its pieces between lines of the grid are straight."""
+        assert self._given is not None
+        if self._ends is None or not self._has_moved:
+            return self._given
+        start, end = np.split(self._ends.x, 2)
+        tag = self._ends.made.tag[: len(start)]
+        return Border(start, end, np.zeros(len(start)), tag, self._given.names)
+
+    def on_edge(self, edge: Edge) -> float:
+        """Length of the border on an edge of the grid [m]."""
+        if self.points is None:
+            return 0.0
+        return float(self.points.length[self.points.edge(edge)].sum())
+
+    def moved(self, domain: Domain, u: Array) -> list[tuple[Array, Array]]:
+        """Positions and areas of all points after a step, for :meth:`move`."""
+        return [points.moved(domain, u) for points in self.all]
+
+    def move(self, moved: list[tuple[Array, Array]]) -> None:
+        """Move all points."""
+        for points, (x, area) in zip(self.all, moved, strict=True):
+            points.x, points.area = x, area
+        self._has_moved = True
+
+    def state(self) -> dict[str, Any]:
+        """Positions and areas of all points, for a checkpoint."""
+        return {"moved": self._has_moved, "points": [points.state() for points in self.all]}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """The reverse of :meth:`state`.
+
+        Raises:
+            CheckpointError: Other parts of the border.
+        """
+        if len(state["points"]) != len(self.all):
+            raise CheckpointError(
+                f"the run had {len(state['points'])} parts of the border when it was stored, and the "
+                f"script made {len(self.all)}: expected the same loads and supports, made between two "
+                "phases"
+            )
+        for points, stored in zip(self.all, state["points"], strict=True):
+            points.restore(stored)
+        self._has_moved = state["moved"]
+
+
+def _ends(border: Border) -> BorderPoints:
+    """The ends of pieces as points: first where they start, then where they end."""
+    n, x = len(border.start), np.concatenate([border.start, border.end])
+    along = border.end - border.start
+    normal = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    number: Indices = np.zeros(2 * n, dtype=np.int64)
+    tag = np.tile(border.tag, 2)
+    return BorderPoints(
+        x, np.ones(2 * n), np.tile(normal, (2, 1)), tag, border.names, number, np.zeros(2 * n)
+    )
