@@ -74,5 +74,7 @@ def test_passes_remove_the_error():
 
 
 def test_other_components_are_rejected():
-    with pytest.raises(InputError, match="component = 'z': expected one of 'x', 'y', 'normal' or"):
+    with pytest.raises(
+        InputError, match="component = 'z': expected one of 'x', 'y', 'normal', 'tangent'"
+    ):
         directions(PLANE, ["z"], POINTS.normal)

@@ -43,7 +43,7 @@ class Patches:
         Args:
             values: Values at the points, points x ...
         """
-        columns = values.reshape(len(values), -1)
+        columns = values.reshape(len(values), int(np.prod(values.shape[1:])))
         return np.asarray(self.incidence @ columns).reshape(self.count, *values.shape[1:])
 
     def means(self, weights: Array, values: Array) -> Array:
