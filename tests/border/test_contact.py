@@ -31,11 +31,11 @@ def differences(function, size, step=1e-6):
 
 
 @pytest.mark.parametrize("multipliers", [False, True])
-@pytest.mark.parametrize("friction", [0.0, 0.3, 5.0, np.inf])
+@pytest.mark.parametrize("friction", [0.0, 0.3, np.inf])
 @pytest.mark.parametrize("name", SHAPES)
 def test_derivatives_are_those_of_the_forces(name, friction, multipliers):
-    one, x, pose, held, now = loaded(name, friction, multipliers=multipliers)
-    assert (now.state != OPEN).sum() >= 2
+    one, x, pose, held, now = loaded(name, friction, multipliers=multipliers, slip=0.06)
+    assert (now.state == (STICKING if friction == np.inf else SLIDING)).sum() >= 2
 
     def at(change):
         return one.evaluate(x + change.reshape(x.shape), pose, held)
