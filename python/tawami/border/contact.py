@@ -1,0 +1,315 @@
+"""Contact of a border with a rigid obstacle: pressure and Coulomb friction on patches.
+
+On a patch the contact law relates means over its points, weighted with their areas w (Wriggers 2006,
+sections 5.2 and 5.3; Simo and Laursen 1992 for the augmented form):
+
+    pressure   p = [lambda - r g]+ ,                       g = mean distance from the obstacle
+    friction   T = T0 - r s , |T| <= mu p ,                s = mean of t . (slip since the step began)
+    forces     f = w (p n + T t)                           on each point
+
+n is the outward normal of the obstacle at the point and t a tangent. The slip is measured in the frame
+that moves with the obstacle, so rigid motions of both leave all values unchanged.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from tawami.base.arrays import Array, Indices
+from tawami.border.patches import Patches
+from tawami.border.rigid import Pose, generators
+from tawami.border.shapes import Distance, Shape
+
+#: States of a patch.
+OPEN, STICKING, SLIDING = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Multipliers:
+    """Pressure and friction from which a solution starts.
+
+    Attributes:
+        pressure: lambda of each patch [Pa].
+        traction: T0 of each patch [Pa], along the tangents, patches x (dim - 1).
+    """
+
+    pressure: Array
+    traction: Array
+
+    @classmethod
+    def zero(cls, count: int, dim: int) -> Multipliers:
+        """Those of patches that have not touched the obstacle."""
+        return cls(np.zeros(count), np.zeros((count, dim - 1)))
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Contact of the patches of a border with one obstacle during one step.
+
+    Attributes:
+        shape: The obstacle.
+        patches: Patches of the points.
+        weights: Area of each point [m2]: its length in plane strain. It is constant in the step.
+        friction: Coefficient of friction: 0 for a smooth obstacle, infinite for one without sliding.
+        penalty: r of each patch [Pa/m], about 200 mu / h.
+        start: Positions at the start of the step in the frame of the obstacle, `pose.to_local(x)`.
+    """
+
+    shape: Shape
+    patches: Patches
+    weights: Array
+    friction: float
+    penalty: Array
+    start: Array
+
+    def evaluate(
+        self, x: Array, pose: Pose, held: Multipliers, *, sticking: bool = False
+    ) -> ContactForces:
+        """Pressures, friction and forces at present positions.
+
+        Args:
+            x: Positions [m], points x dim.
+            pose: Pose of the obstacle.
+            held: Multipliers: at first pressure zero and friction of the last step, or both from an
+                earlier evaluation, `ContactForces.multipliers`.
+            sticking: Take all touching patches as sticking. It prevents cycles between states in the
+                first iteration of Newton's method; without friction it has no effect.
+        """
+        local = pose.to_local(x)
+        surface = _turned(self.shape.evaluate(local), pose.rotation)
+        moved = (local - self.start) @ pose.rotation.T
+        tangent, turning = tangents(surface)
+        gap = self.patches.means(self.weights, surface.distance)
+        pressure = np.maximum(held.pressure - self.penalty * gap, 0.0)
+        slip = self.patches.means(self.weights, np.einsum("jka,ja->jk", tangent, moved))
+        trial = held.traction - self.penalty[:, None] * slip
+        touching, size = pressure > 0, np.linalg.norm(trial, axis=1)
+        limit = np.zeros_like(pressure)
+        if self.friction > 0:
+            limit[touching] = np.inf if sticking else self.friction * pressure[touching]
+        stuck = touching & (size < limit)
+        scale = stuck.astype(float)  # ratio of the friction to the trial
+        np.divide(limit, size, out=scale, where=~stuck & (size > 0))
+        return ContactForces(
+            contact=self, pose=pose, x=x, surface=surface, tangent=tangent,
+            slip_gradient=tangent + np.einsum("jkab,ja->jkb", turning, moved), turning=turning,
+            gap=gap, slip=slip, trial=trial, scale=scale, pressure=pressure,
+            traction=scale[:, None] * trial, held=held,
+            state=np.where(stuck, STICKING, np.where(touching, SLIDING, OPEN)),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ContactForces:
+    """Contact of one evaluation.
+
+    Attributes:
+        contact: The contact.
+        pose: Pose of the obstacle.
+        x: Positions [m], points x dim.
+        surface: Distances, normals and curvatures of the obstacle at the points.
+        tangent: Tangents, points x (dim - 1) x dim.
+        turning: Derivatives of the tangents by the position [1/m], points x (dim - 1) x dim x dim.
+        slip_gradient: Derivative of the slip of a point by its position, points x (dim - 1) x dim.
+        gap: Mean distance of each patch [m].
+        slip: Mean slip of each patch since the step began [m], patches x (dim - 1).
+        trial: Friction if the patch stuck [Pa], patches x (dim - 1).
+        scale: Ratio of the friction to the trial.
+        pressure: Pressure of each patch [Pa].
+        traction: Friction of each patch along the tangents [Pa], patches x (dim - 1).
+        held: Multipliers of the evaluation.
+        state: `OPEN`, `STICKING` or `SLIDING` for each patch.
+    """
+
+    contact: Contact
+    pose: Pose
+    x: Array
+    surface: Distance
+    tangent: Array
+    turning: Array
+    slip_gradient: Array
+    gap: Array
+    slip: Array
+    trial: Array
+    scale: Array
+    pressure: Array
+    traction: Array
+    held: Multipliers
+    state: Indices
+
+    @cached_property
+    def forces(self) -> Array:
+        """Forces of the obstacle on the points [N per m], points x dim."""
+        number, weights = self.contact.patches.number, self.contact.weights[:, None]
+        normal = self.pressure[number, None] * self.surface.normal
+        along = np.einsum("jk,jka->ja", self.traction[number], self.tangent)
+        return np.asarray(weights * (normal + along))
+
+    @property
+    def resultant(self) -> Array:
+        """Forces on the obstacle [N per m], then the moment about its centre [N m per m]."""
+        return -self.pose.resultant(self.x, self.forces)
+
+    @property
+    def multipliers(self) -> Multipliers:
+        """The multipliers of the next augmented pass, or of the next step."""
+        return Multipliers(self.pressure, self.traction)
+
+    @property
+    def penetration(self) -> float:
+        """Largest mean penetration of a patch [m]."""
+        return float(np.max(-self.gap, initial=0.0))
+
+    @property
+    def violation(self) -> float:
+        """Largest gap of a loaded patch, penetration, or slip of a sticking patch [m].
+
+        It is zero if pressure and friction solve the contact problem without penalty.
+        """
+        held, penalty = self.held, self.contact.penalty
+        normal = np.abs(self.pressure - held.pressure) / penalty
+        change = np.linalg.norm(self.slip, axis=1) * (self.state == STICKING)
+        return float(max(np.max(normal, initial=0.0), np.max(change, initial=0.0)))
+
+    @property
+    def dissipation(self) -> Array:
+        """Energy that friction dissipates on each patch in the step [J per m], never negative.
+
+        It is the work of the friction on the slip that the penalty does not give back.
+        """
+        contact = self.contact
+        sliding = (self.trial - self.traction) / contact.penalty[:, None]
+        work = np.einsum("ak,ak->a", self.traction, sliding)
+        return np.asarray(contact.patches.sums(contact.weights) * work)
+
+    @cached_property
+    def derivative(self) -> sp.csr_matrix:
+        """Derivative of the forces by the positions of all points [N/m per m], exact.
+
+        Rows and columns are the components of the first point, then of the second, and so on. It is
+        symmetric without friction.
+        """
+        number = self.contact.patches.number
+        loaded = np.flatnonzero(self.pressure[number] > 0)
+        blocks = self.pressure[number[loaded], None, None] * self.surface.curvature[loaded]
+        blocks += np.einsum("jk,jkab->jab", self.traction[number[loaded]], self.turning[loaded])
+        blocks *= self.contact.weights[loaded, None, None]
+        by_gap, by_slip = self._law()
+        gap, normal = self._pair(loaded, self.surface.normal, self.surface.normal)
+        total = _block_diagonal(loaded, blocks, self.x.shape)
+        total -= normal @ sp.diags(self.contact.penalty) @ gap
+        directions = range(self.tangent.shape[1])
+        pairs = [
+            self._pair(loaded, self.slip_gradient[:, k], self.tangent[:, k]) for k in directions
+        ]
+        for k, (_, tangent) in enumerate(pairs):
+            change = sp.diags(by_gap[:, k]) @ gap
+            change += sum(sp.diags(by_slip[:, k, m]) @ pairs[m][0] for m in directions)
+            total += tangent @ change
+        return total.tocsr()
+
+    @cached_property
+    def by_motion(self) -> Array:
+        """Derivative of the forces by the motion of the obstacle, points dim x motions.
+
+        A motion of obstacle and points together turns the forces and changes nothing else.
+        """
+        return np.asarray(self._turned_forces - self.derivative @ self._modes)
+
+    @property
+    def resultant_by_positions(self) -> Array:
+        """Derivative of :attr:`resultant` by the positions of all points, motions x points dim."""
+        return np.asarray(self._turned_forces.T - (self.derivative.T @ self._modes).T)
+
+    @property
+    def resultant_by_motion(self) -> Array:
+        """Derivative of :attr:`resultant` by the motion of the obstacle, motions x motions."""
+        change, dim = -self._modes.T @ self.by_motion, self.x.shape[1]
+        change[dim:, :dim] -= generators(dim) @ self.forces.sum(axis=0)
+        return np.asarray(change)
+
+    @property
+    def _modes(self) -> Array:
+        return self.pose.modes(self.x).reshape(self.x.size, -1)
+
+    @property
+    def _turned_forces(self) -> Array:
+        """Change of forces that turn with the obstacle, points dim x motions."""
+        num, dim = self.x.shape
+        turned = np.einsum("kab,jb->jak", generators(dim), self.forces)
+        fixed = np.zeros((num, dim, dim))
+        return np.asarray(np.concatenate([fixed, turned], axis=2).reshape(num * dim, -1))
+
+    def _law(self) -> tuple[Array, Array]:
+        """Derivatives of the friction by the gap and by the slip, for each patch.
+
+        Sticking: dT = -r ds. Sliding, with e the direction of the trial T* and y = mu p:
+        dT = mu dp e - r y / |T*| (1 - e e^T) ds.
+        """
+        contact, size = self.contact, np.linalg.norm(self.trial, axis=1)[:, None]
+        direction = np.divide(self.trial, size, out=np.zeros_like(self.trial), where=size > 0)
+        sliding, minus_r = self.state == SLIDING, -contact.penalty
+        by_gap, num = np.zeros_like(self.trial), self.trial.shape[1]
+        if contact.friction > 0:
+            by_gap[sliding] = contact.friction * (minus_r[:, None] * direction)[sliding]
+        along = np.where(sliding, 1.0, 0.0)[:, None, None]
+        across = np.eye(num) - along * direction[:, :, None] * direction[:, None, :]
+        return by_gap, (minus_r * self.scale)[:, None, None] * across
+
+    def _pair(
+        self, points: Indices, row: Array, column: Array
+    ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+        """Means of row . displacement over patches, and forces w column on points, as matrices.
+
+        Args:
+            points: The points that are in contact.
+            row: Vector at each point, points x dim.
+            column: Vector at each point.
+        """
+        patches, weights = self.contact.patches, self.contact.weights
+        return (
+            _on_patches(patches, points, patches.shares(weights)[:, None] * row),
+            _on_patches(patches, points, weights[:, None] * column).T,
+        )
+
+
+def tangents(surface: Distance) -> tuple[Array, Array]:
+    """Unit tangents and their derivatives by the position.
+
+    In the plane the tangent is the normal turned by a right angle. A surface in space needs two, which
+    this function does not have.
+
+    Returns:
+        Tangents, points x (dim - 1) x dim, and derivatives, points x (dim - 1) x dim x dim.
+    """
+    (turn,) = generators(2)
+    turned = np.asarray(turn @ surface.curvature)
+    return (surface.normal @ turn.T)[:, None], turned[:, None]
+
+
+def _turned(local: Distance, rotation: Array) -> Distance:
+    """Distances in the frame of the obstacle as distances in space."""
+    curvature = rotation @ local.curvature @ rotation.T
+    return Distance(local.distance, local.normal @ rotation.T, curvature)
+
+
+def _on_patches(patches: Patches, points: Indices, vectors: Array) -> sp.csr_matrix:
+    """Vectors at some points as rows of their patches, patches x points dim."""
+    num, dim = vectors.shape
+    columns = dim * points[:, None] + np.arange(dim)
+    rows = np.repeat(patches.number[points], dim)
+    entries = (vectors[points].ravel(), (rows, columns.ravel()))
+    return sp.csr_matrix(entries, shape=(patches.count, num * dim))
+
+
+def _block_diagonal(points: Indices, blocks: Array, shape: tuple[int, ...]) -> sp.csr_matrix:
+    """Blocks of some points as a matrix on all components."""
+    num, dim = shape
+    index = dim * points[:, None] + np.arange(dim)
+    rows, columns = np.broadcast_arrays(index[:, :, None], index[:, None, :])
+    entries = (blocks.ravel(), (rows.ravel(), columns.ravel()))
+    return sp.csr_matrix(entries, shape=(num * dim, num * dim))
