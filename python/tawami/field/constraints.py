@@ -16,14 +16,7 @@ from tawami.base.errors import SupportError
 from tawami.base.space import Position, lattice, tensor_product
 from tawami.field.layout import Place
 from tawami.grid.basis import Basis, functions_on, values_1d
-from tawami.grid.edges import (
-    Interval,
-    Profile,
-    cells_between,
-    edge_functions,
-    evaluate,
-    locate_point,
-)
+from tawami.grid.edges import Profile, edge_functions, evaluate, locate_point
 from tawami.grid.grid import Edge, Grid
 
 #: Points of the Gauss rule along a cell of an edge, for the projection of profiles.
@@ -69,108 +62,38 @@ class PointHeld:
 
 
 def held_edge(
-    grid: Grid,
-    place: Place,
-    active: Mask,
-    edge: Edge,
-    component: int,
-    value: Profile,
-    between: Interval | None = None,
+    grid: Grid, place: Place, edge: Edge, touched: Indices, component: int, value: Profile, where: str
 ) -> Held:
     """Prescribe a component of a field on an edge of the grid.
 
-    A profile is projected in L2. Only cells with particles count, and functions that vanish on all of
-    them are left out.
+    A profile is projected in L2. Functions that vanish on all touched cells are left out.
 
     Args:
         grid: The grid.
         place: Place of the field among the coefficients.
-        active: Whether each cell holds particles, ny x nx.
         edge: Name of the edge.
+        touched: Numbers along the edge of the cells where the body touches it.
         component: Number of the component.
         value: Value along the edge [m], or in the unit of the field.
-        between: Part of the edge [m]; all of it by default.
-
-    Raises:
-        SupportError: No cell along the edge holds particles.
+        where: The support, for messages.
     """
-    touched = _touched(grid, active, edge, between)
-    if len(touched) == 0:
-        raise SupportError(
-            f"fix(edge='{edge}'): no cell along that edge of the grid holds particles: the support "
-            "would not touch the body. Let the grid end where the body is held"
-        )
-    along = 1 - grid.edge(edge)[0]
+    axis, end = grid.edge(edge)
+    along = 1 - axis
     used = functions_on(place.basis, grid.cells[along], touched)
     functions = edge_functions(grid, place.basis, edge)[used]
     indices = place.start + place.components * functions + component
     if not callable(value) and np.ndim(value) == 0:
         return Held(indices, np.full(len(used), float(value)))  # the functions add up to 1
-    _, weights, values, prescribed = _sampled(
-        grid, place, touched, edge, value, f"fix(edge='{edge}')"
-    )
-    values = values[:, used]
-    weighted = sp.diags(weights) @ values
-    coefficients = spsolve((weighted.T @ values).tocsc(), weighted.T @ prescribed)
-    return Held(indices, coefficients)
-
-
-def edge_load(
-    grid: Grid,
-    place: Place,
-    active: Mask,
-    edge: Edge,
-    value: Profile,
-    between: Interval | None,
-    where: str,
-) -> tuple[Indices, Array]:
-    """Integrals of a value times the functions of a scalar field along an edge of the grid.
-
-    Only cells with particles count.
-
-    Args:
-        grid, place, active, edge, value, between: As for :func:`held_edge`.
-        where: The load, for messages.
-
-    Returns:
-        The coefficients, and the integrals of their functions.
-
-    Raises:
-        SupportError: No cell along the edge holds particles.
-    """
-    touched = _touched(grid, active, edge, between)
-    if len(touched) == 0:
-        raise SupportError(
-            f"{where}: no cell along that edge of the grid holds particles; let the grid end where the "
-            "body is loaded"
-        )
-    x, weights, values, given = _sampled(grid, place, touched, edge, value, where)
-    integrals = values.T @ (grid.h * grid.space.thickness(x) * weights * given)
-    return place.start + edge_functions(grid, place.basis, edge), np.asarray(integrals)
-
-
-def _touched(grid: Grid, active: Mask, edge: Edge, between: Interval | None) -> Indices:
-    """Numbers along an edge of its cells with particles."""
-    axis, end = grid.edge(edge)
-    return np.flatnonzero(np.take(active, end, axis=1 - axis) & cells_between(grid, edge, between))
-
-
-def _sampled(
-    grid: Grid, place: Place, touched: Indices, edge: Edge, value: Profile, where: str
-) -> tuple[Array, Array, sp.csr_matrix, Array]:
-    """Gauss points of some cells along an edge: positions [m], weights [cells], functions of the edge
-    there (points x functions), and values of a profile.
-    """
-    axis, end = grid.edge(edge)
-    along = 1 - axis
     points, weights = _rust.gauss(POINTS)
     cell, t = np.repeat(touched, POINTS), np.tile(points, len(touched))
     position = grid.axis_positions(along, cell, t)
     fixed = np.full_like(position, grid.upper[axis] if end else grid.origin[axis])
     x, y = (fixed, position) if axis == 0 else (position, fixed)
-    functions = values_1d(place.basis, grid.cells[along], cell, t)
-    values = evaluate(value, x, y, where)
-    return np.stack([x, y], axis=-1), np.tile(weights, len(touched)), functions, values
+    values = values_1d(place.basis, grid.cells[along], cell, t)[:, used]
+    weighted = sp.diags(np.tile(weights, len(touched))) @ values
+    prescribed = evaluate(value, x, y, where)
+    coefficients = spsolve((weighted.T @ values).tocsc(), weighted.T @ prescribed)
+    return Held(indices, coefficients)
 
 
 def held_point(

@@ -45,6 +45,9 @@ class FollowerPressure:
         """See `Term`: there are no multipliers."""
         return False
 
+    def accept(self) -> None:
+        """See `Term`: there is nothing to keep."""
+
     def _at(self, coefficients: Array) -> tuple[Array, Array, Array]:
         """f^-T and cof(f) n0 dA0 in the plane at the points, and their thickness."""
         numbers, values, gradients = self._tabulated

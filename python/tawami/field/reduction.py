@@ -36,6 +36,7 @@ class Reduction:
         start: Coefficients at the beginning. Values are prescribed for the sum of these and the
             increments; unknowns are increments.
         moving: Whether rigid motions may be free, because inertia holds the body.
+        also: Constraints of supports that are no constraints here, but prevent rigid motions.
 
     Attributes:
         size: Number of unknowns.
@@ -60,6 +61,7 @@ class Reduction:
         start: Array,
         *,
         moving: bool = False,
+        also: Sequence[PointHeld] = (),
     ) -> None:
         self.layout, self.points = layout, points
         sizes = [float(np.abs(support.values).max(initial=0.0)) for support in held]
@@ -67,7 +69,7 @@ class Reduction:
         tolerance = ROUND_OFF * max(sizes, default=0.0)
         self.fixed, total = _prescribed(held, layout.size, tolerance)
         if not moving:
-            check_rigid_motions(layout, self.fixed, points)
+            check_rigid_motions(layout, self.fixed, [*points, *also])
         self.offset = np.where(self.fixed, total - start, 0.0)
         free = layout.active & ~self.fixed
         self._eliminated = None

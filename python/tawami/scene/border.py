@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from tawami.base import checks
 from tawami.base.arrays import Array, Indices, Mask
-from tawami.base.errors import CheckpointError, InputError
+from tawami.base.errors import CheckpointError, InputError, SupportError
 from tawami.base.space import Space
 from tawami.base.text import meant, quoted
 from tawami.border.pieces import Border
@@ -97,11 +97,24 @@ class MovingPoints:
             self._located = domain, made
         return self._located[1]
 
-    def edge(self, edge: Edge) -> Mask:
-        """Mask of the points on an edge of the grid."""
+    def edge(self, edge: Edge, tolerance: float = ON_LINE) -> Mask:
+        """Mask of the points on an edge of the grid, or beyond it.
+
+        Args:
+            edge: Name of the edge.
+            tolerance: Distance that counts as none [cells].
+        """
         axis, end = self._grid.edge(edge)
-        line = self._grid.upper[axis] if end else self._grid.origin[axis]
-        return np.asarray(np.abs(self.x[:, axis] - line) <= ON_LINE * self._grid.h)
+        inside = self._grid.upper[axis] - self.x[:, axis] if end else self.x[:, axis] - self._grid.origin[axis]
+        return np.asarray(inside <= tolerance * self._grid.h)
+
+    def lost(self, domain: Domain) -> bool:
+        """Whether a point has no particles near it."""
+        try:
+            self.cells(domain)
+        except SupportError:
+            return True
+        return False
 
     def moved(self, domain: Domain, u: Array) -> tuple[Array, Array]:
         """Positions and areas after a step (Nanson: n dA = cof(F) n0 dA0).
@@ -252,11 +265,20 @@ class SceneBorder:
         tag = self._ends.made.tag[: len(start)]
         return Border(start, end, np.zeros(len(start)), tag, self._given.names)
 
-    def on_edge(self, edge: Edge) -> float:
-        """Length of the border on an edge of the grid [m]."""
-        if self.points is None:
-            return 0.0
-        return float(self.points.length[self.points.edge(edge)].sum())
+    def whole_edges(self, part: MovingPoints) -> dict[Edge, Mask]:
+        """Edges of the grid that a part covers as far as the border lies on them, with masks of its
+        points there.
+        """
+        found: dict[Edge, Mask] = {}
+        assert self.points is not None
+        for edge in EDGES:
+            length, mask = (
+                float(points.length[points.edge(edge)].sum()) for points in (self.points, part)
+            ), part.edge(edge)
+            all_of_it, covered = length
+            if covered > 0 and abs(covered - all_of_it) <= ON_LINE * self._grid.h:
+                found[edge] = mask
+        return found
 
     def moved(self, domain: Domain, u: Array) -> list[tuple[Array, Array]]:
         """Positions and areas of all points after a step, for :meth:`move`."""
@@ -287,6 +309,16 @@ class SceneBorder:
         for points, stored in zip(self.all, state["points"], strict=True):
             points.restore(stored)
         self._has_moved = state["moved"]
+
+
+def label(where: Part) -> str:
+    """A part of a border in words."""
+    if callable(where):
+        return "where f(x, y)"
+    if isinstance(where, np.ndarray):
+        return f"{np.count_nonzero(where)} points"
+    names = [where] if isinstance(where, str | int) else where
+    return ", ".join(repr(name) for name in names)
 
 
 def _ends(border: Border) -> BorderPoints:

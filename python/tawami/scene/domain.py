@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,7 +19,6 @@ from tawami.field.attachment import Attachment
 from tawami.field.layout import Layout
 from tawami.field.points import PointAssembly
 from tawami.field.reference import ReferenceAssembly
-from tawami.field.tractions import Tractions
 from tawami.form.kinematics import KINEMATICS, Kinematics
 from tawami.grid.basis import Basis
 from tawami.particles import assignment
@@ -47,7 +47,6 @@ class Domain:
         particles: The particles of this rank.
         location: Their cells and positions in them.
         assembly: Assembly of the form over these cells.
-        tractions: Its term on the edges of the grid.
         stage: The material laws of the particles.
         responses: Their responses, as the form reads them.
         newton: The nonlinear problem of a step.
@@ -57,7 +56,6 @@ class Domain:
     particles: _rust.Particles
     location: _rust.Location
     assembly: Assembly
-    tractions: Tractions
     stage: _rust.Stage | NumpyStage
     responses: Responses
     newton: Newton
@@ -107,9 +105,7 @@ class Domain:
         if earlier is not None:
             assembly.follow(earlier.assembly)
             newton.follow(earlier.newton)
-        return cls(
-            model, particles, location, assembly, Tractions(attachment), stage, responses, newton
-        )
+        return cls(model, particles, location, assembly, stage, responses, newton)
 
     @property
     def total_strain_stage(self) -> _rust.Stage | NumpyStage:
@@ -136,6 +132,14 @@ class Domain:
         """Whether the law of each particle has no history."""
         mask: npt.NDArray[np.bool_] = self.model.without_history[self.particles.material]
         return mask
+
+    @functools.cached_property
+    def shear_of_cells(self) -> Array:
+        """Mean shear modulus of the particles in each cell [Pa], 0 without any; a call for all ranks."""
+        columns = np.column_stack([np.ones(len(self.particles)), self.constants["mu"]])
+        sums = _rust.cell_sums(self.location, self.particles.volume, columns)
+        volume, weighted = ranks.sum_of(self.model.grid.comm, sums).T
+        return np.divide(weighted, volume, out=np.zeros_like(volume), where=volume > 0)
 
     @property
     def areas(self) -> Array:

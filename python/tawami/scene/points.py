@@ -9,6 +9,7 @@ import numpy as np
 from tawami.base import ranks
 from tawami.base.errors import InputError
 from tawami.grid import edges
+from tawami.grid.grid import Edge
 from tawami.scene.domain import Domain
 
 #: Share of a cell, or of a value, that is round-off.
@@ -51,3 +52,17 @@ def check_in_body(domain: Domain, point: Sequence[float], what: str) -> None:
     edges.locate_point(domain.model.grid, point, what)
     if not is_in_body(domain, point):
         raise outside(what, _distance(domain, point))
+
+
+def reach(domain: Domain, edge: Edge) -> float:
+    """Distance of a body of loose particles from an edge of the grid [m]; a call for all ranks.
+
+    A particle is a square of its area. It is 0 if the nearest one reaches the edge to a quarter of its
+    size.
+    """
+    grid, particles = domain.model.grid, domain.particles
+    axis, end = grid.edge(edge)
+    x, size = particles.x[:, axis], np.sqrt(domain.areas)
+    away = (grid.upper[axis] - x if end else x - grid.origin[axis]) - 0.75 * size
+    nearest = -ranks.largest(grid.comm, -float(away.min(initial=np.inf)))
+    return max(nearest, 0.0)

@@ -7,12 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tawami.base.arrays import Array
+from tawami.base.arrays import Array, Indices
 from tawami.field.constraints import Held, PointHeld, held_edge, held_point
-from tawami.grid import edges
+from tawami.grid.edges import evaluate
+from tawami.grid.grid import ON_LINE, Edge
 from tawami.scene.action import Term
+from tawami.scene.border import MovingPoints, SceneBorder
 from tawami.scene.domain import Domain
 from tawami.scene.support import Support
+
+#: Distance of a moving border from an edge of the grid below which it has come to it [cells].
+NEAR = 1e-3
 
 
 @dataclass(frozen=True)
@@ -30,9 +35,11 @@ class Fields:
     share: float
 
 
-def of_field(domain: Domain, support: Support, start: Array, fields: Fields | None) -> Held:
-    """Prescribed values of a field, counted as the coefficients at the start."""
-    held = on_edge(domain, support, fields.amount if fields else lambda _: 0.0)
+def of_field(
+    domain: Domain, support: Support, edge: Edge, cells: Indices, start: Array, fields: Fields | None
+) -> Held:
+    """Prescribed values of a field on an edge of the grid, counted as the coefficients at the start."""
+    held = on_edge(domain, support, edge, cells, fields.amount if fields else lambda _: 0.0)
     at_start = start[held.indices]
     if fields is None:
         return Held(held.indices, at_start, held.where)
@@ -40,33 +47,56 @@ def of_field(domain: Domain, support: Support, start: Array, fields: Fields | No
     return Held(held.indices, at_start + increments, held.where)
 
 
-def is_left(domain: Domain, support: Support) -> bool:
-    """Whether no cell along the support's edge holds particles."""
-    assert isinstance(support.place, str)
-    part = edges.cells_between(domain.model.grid, support.place, support.between)
-    return not part[domain.tractions.cells(support.place)].any()
+def touched(domain: Domain, border: SceneBorder, support: Support, edge: Edge) -> Indices:
+    """Numbers along an edge of the grid of the cells in which the body touches it.
+
+    Where particles move, other points of the border than the support's own may have come to the edge.
+    A body without a border touches it with each of its cells there.
+    """
+    grid, active = domain.model.grid, domain.active
+    axis, end = grid.edge(edge)
+    row = grid.cells[axis] - 1 if end else 0
+    if not isinstance(support.place, MovingPoints) or border.points is None:
+        return np.flatnonzero(np.take(active, row, axis=1 - axis))
+    found = []
+    tolerance = NEAR if domain.model.moves else ON_LINE
+    for points in (support.place, border.points):
+        near = points.edge(edge, tolerance)
+        if points is border.points and not domain.model.moves:
+            continue
+        index = grid.cell_indices(points.cells(domain).location.cell[near].astype(np.int64))
+        found.append(index[index[:, axis] == row, 1 - axis])
+    return np.unique(np.concatenate(found))
 
 
-def on_edge(domain: Domain, support: Support, amount: Callable[[Term], float]) -> Held:
-    """Values along an edge of the grid."""
-    assert isinstance(support.place, str)
+def on_edge(
+    domain: Domain, support: Support, edge: Edge, cells: Indices, amount: Callable[[Term], float]
+) -> Held:
+    """Values along an edge of the grid, where the body touches it in some cells along it."""
     indices, values = np.empty(0, dtype=np.int64), np.zeros(1)
-    places = domain.layout.fields
-    place, component = next(iter(places.values())), support.component
-    if isinstance(component, str):
-        place, component = places[component], 0
+    places, grid = domain.layout.fields, domain.model.grid
+    place, component, sign = next(iter(places.values())), 0, 1.0
+    if support.is_field:
+        place = places[str(support.component)]
+    else:
+        component, sign = support.along_edge(edge, grid)
     for term in support.terms:
-        edge = held_edge(
-            domain.model.grid, place, domain.active, support.place, component, term.values[0],
-            support.between,
-        )  # fmt: skip
-        indices, values = edge.indices, values + amount(term) * edge.values
+        held = held_edge(grid, place, edge, cells, component, term.values[0], f"{support}")
+        indices, values = held.indices, values + sign * amount(term) * held.values
     return Held(indices, values, support.line)
+
+
+def at_points(support: Support, amount: Callable[[Term], float]) -> Array:
+    """Values at the points of a part of the border."""
+    assert isinstance(support.place, MovingPoints)
+    x = support.place.x
+    parts = (amount(term) * evaluate(term.values[0], *x.T, f"{support}") for term in support.terms)
+    return sum(parts, np.zeros(len(x)))
 
 
 def at_point(domain: Domain, support: Support, amount: Callable[[Term], float]) -> PointHeld:
     """The displacement of a point."""
-    assert not isinstance(support.place, str)
+    assert isinstance(support.place, tuple)
     assert not isinstance(support.component, str)
     return held_point(
         domain.model.grid, domain.model.basis, domain.active, support.place, support.component,

@@ -1,51 +1,65 @@
-"""One support: a displacement component that is prescribed along an edge or at a point."""
+"""One support: a displacement component that is prescribed on the border or at a point."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from tawami.base import checks
+from tawami.base.arrays import Array, Mask
 from tawami.base.errors import InputError
-from tawami.grid.edges import Interval, Profile
-from tawami.grid.grid import Edge
+from tawami.grid.edges import Profile
+from tawami.grid.grid import Edge, Grid
 from tawami.scene.action import Action, Owner
+from tawami.scene.border import MovingPoints
 from tawami.scene.factor import Factor, InTime
 from tawami.scene.share import Moment
 
 #: Difference of two factors of a displacement that is round-off.
 ALIKE = 1e-9
-Place = Edge | tuple[float, float]
+#: A part of the border, which moves with the body; a point; or an edge of the grid, for the axis of
+#: symmetry and for bodies without a border.
+Place = MovingPoints | tuple[float, float] | Edge
+#: Components of the displacement along the border, by their names.
+LOCAL = ("normal", "tangent")
 
 
 class Support(Action):
-    """One displacement component that is prescribed along an edge or at a point.
+    """One displacement component, or field, that is prescribed on the border or at a point.
 
     :meth:`change` replaces its value, :meth:`release` takes it away.
 
     Attributes:
-        place: Name of the edge, or the point (x, y) [m], which moves with the body.
-        given: The same as the driver script gave it.
-        component: Number of the component of the displacement, or name of another field.
+        place: Where it acts.
+        given: The place as the driver script gave it, in words, or as a point.
+        component: Number of the component of the displacement, 'normal', 'tangent', or name of a field.
         unit: Unit of its values.
-        between: Part of the edge [m]; None for all of it.
-        crossing: Distance by which it has moved the body across its edge [m], where particles move.
+        whole: Edges of the grid that its part of the border covers as far as the body touches them, each
+            with the mask of its points there. On these it prescribes coefficients of the grid.
+        held: Tractions that held each other point in the last step [Pa], as multipliers.
+        missing: Displacement by which each of these lagged behind the prescribed one [m].
     """
 
-    __slots__ = ("between", "component", "crossing", "given", "place", "unit")
+    __slots__ = ("component", "given", "held", "missing", "place", "unit", "whole")
 
     def __init__(
         self,
         owner: Owner[Any],
         place: Place,
+        given: str | tuple[float, float],
         component: int | str,
         unit: str,
         value: Profile,
         factor: Factor,
-        between: Interval | None = None,
+        whole: Mapping[Edge, Mask] | None = None,
     ) -> None:
-        self.place = self.given = place
+        self.place, self.given = place, given
         self.component, self.unit = component, unit
-        self.between, self.crossing = between, 0.0
+        self.whole: Mapping[Edge, Mask] = {} if whole is None else whole
+        count = len(place) if isinstance(place, MovingPoints) else 0
+        self.held, self.missing = np.zeros(count), np.zeros(count)
         super().__init__(owner, value, factor)
 
     @property
@@ -53,8 +67,55 @@ class Support(Action):
         """Name of the component."""
         return self.component if isinstance(self.component, str) else "xyz"[self.component]
 
+    @property
+    def is_field(self) -> bool:
+        """Whether it prescribes a field other than the displacement."""
+        return isinstance(self.component, str) and self.component not in LOCAL
+
+    def along_edge(self, edge: Edge, grid: Grid) -> tuple[int, float]:
+        """Number and sign of its component of the displacement on an edge of the grid."""
+        axis, end = grid.edge(edge)
+        outward = 1.0 if end else -1.0
+        if self.component == "normal":
+            return axis, outward
+        if self.component == "tangent":  # counter-clockwise around the body
+            return 1 - axis, outward if axis == 0 else -outward
+        assert isinstance(self.component, int)
+        return self.component, 1.0
+
+    @property
+    def directions(self) -> Array:
+        """Unit vectors of its component of the displacement at its points, points x dim."""
+        assert isinstance(self.place, MovingPoints)
+        normal = self.place.normal
+        if self.component == "normal":
+            return normal
+        if self.component == "tangent":
+            return np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+        assert isinstance(self.component, int)
+        return np.tile(np.eye(normal.shape[1])[self.component], (len(normal), 1))
+
+    @property
+    def edges(self) -> list[Edge]:
+        """Edges of the grid on which it prescribes coefficients: those that its points still lie on."""
+        if isinstance(self.place, str):
+            return [self.place]
+        if not isinstance(self.place, MovingPoints):
+            return []
+        place = self.place
+        return [edge for edge, mask in self.whole.items() if place.edge(edge)[mask].all()]
+
+    @property
+    def weak(self) -> Mask:
+        """Mask of its points on the border that it holds by tractions on patches."""
+        assert isinstance(self.place, MovingPoints)
+        mask = np.ones(len(self.place), dtype=bool)
+        for edge in self.edges:
+            mask &= ~self.whole[edge]
+        return mask
+
     def _checked(self, value: Any) -> tuple[Profile, ...]:
-        check = checks.profile if isinstance(self.place, str) else checks.number
+        check = checks.number if isinstance(self.place, tuple) else checks.profile
         return (check(f"{self}: value", value),)
 
     def change(
@@ -117,8 +178,9 @@ class Support(Action):
         return any(abs(change) > ALIKE for change in missing.values())
 
     def __str__(self) -> str:
-        where = f"edge='{self.place}'" if isinstance(self.place, str) else f"point={self.place}"
-        return f"{'fix' if isinstance(self.place, str) else 'hold'}({where})"
+        if isinstance(self.place, tuple):
+            return f"hold(point={self.place})"
+        return f"fix({self.given})"
 
     @property
     def line(self) -> str:

@@ -1,4 +1,4 @@
-"""Supports of a scene: displacements prescribed along edges and at points, and walls."""
+"""Supports of a scene: displacements prescribed on the border and at points, and walls."""
 
 from __future__ import annotations
 
@@ -6,31 +6,30 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from tawami.base import checks
 from tawami.base.errors import CheckpointError, InputError, SupportError
-from tawami.base.identity import text
+from tawami.base.arrays import Array, Mask
 from tawami.base.text import listed, quoted
 from tawami.field.constraints import Held, PointHeld
 from tawami.field.reduction import Reduction
 from tawami.form.fields import Field
 from tawami.grid import edges
 from tawami.grid.basis import Basis
-from tawami.grid.edges import Interval, Profile
-from tawami.grid.grid import Edge, Grid
+from tawami.grid.edges import Profile
+from tawami.grid.grid import EDGES, Edge, Grid
 from tawami.scene import step_values
 from tawami.scene.action import Owner, Term, restored
 from tawami.scene.activity import Activity
+from tawami.scene.border import MovingPoints, Part, SceneBorder, label
 from tawami.scene.contact import ActiveSet
 from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor, InTime
-from tawami.scene.points import is_in_body
+from tawami.scene.held_border import HeldBorder, check_agreement
+from tawami.scene.points import is_in_body, reach
 from tawami.scene.share import Moment
-from tawami.scene.support import Place, Support
+from tawami.scene.support import LOCAL, Place, Support
 from tawami.scene.walls import Wall, checked_friction
-
-Array = npt.NDArray[np.float64]
 
 
 class Supports(Owner[Support]):
@@ -40,25 +39,31 @@ class Supports(Owner[Support]):
         grid: The grid.
         basis: Basis of the displacement.
         fields: The fields without a role.
+        border: The border of the body.
         activity: Time and activity of the scene.
 
     Attributes:
-        all: The supports along edges and at points.
+        all: The supports on the border and at points.
         walls: The walls.
         axis: In axisymmetry, u_x = 0 along the axis if it is an edge of the grid; else none.
         version: A number that changes with every change of a support or wall by the driver script.
     """
 
     def __init__(
-        self, grid: Grid, basis: Basis, fields: Mapping[str, Field], activity: Activity
+        self,
+        grid: Grid,
+        basis: Basis,
+        fields: Mapping[str, Field],
+        border: SceneBorder,
+        activity: Activity,
     ) -> None:
         super().__init__(activity)
-        self.grid, self.basis, self._fields = grid, basis, fields
+        self.grid, self.basis, self._fields, self._border = grid, basis, fields, border
         self.walls: list[Wall] = []
         self.axis: list[Support] = []
         if grid.on_axis:
             zero = Factor("the axis")
-            self.axis.append(Support(self, "left", 0, "x", 0.0, zero))
+            self.axis.append(Support(self, "left", "the axis", 0, "m", 0.0, zero))
 
     def remove(self, action: Support | Wall) -> None:
         """Remove a support or a wall."""
@@ -67,18 +72,35 @@ class Supports(Owner[Support]):
 
     def fix(
         self,
-        edge: Edge,
+        domain: Domain,
+        where: Part,
         component: str,
         value: Profile,
         amplitude: InTime | None,
         velocity: InTime | None,
-        between: Interval | None,
     ) -> Support:
-        """Prescribe a component along an edge."""
-        edges.cells_between(self.grid, edge, between)
-        return self._add(
-            edge, f"fix(edge='{edge}')", component, value, amplitude, velocity, between
-        )
+        """Prescribe a component on a part of the border."""
+        given = label(where)
+        what = f"fix({given})"
+        axis = self._component(component, LOCAL)
+        place: Place = self._place(domain, what, where)
+        whole: dict[Edge, Mask] = {}
+        if isinstance(place, MovingPoints):
+            whole = self._border.whole_edges(place)
+        return self._add(place, given, what, axis, value, amplitude, velocity, whole)
+
+    def _place(self, domain: Domain, what: str, where: Part) -> MovingPoints | Edge:
+        """Points of a part of the border; of a body without a border, an edge of the grid."""
+        if self._border.points is not None or not checks.one_of(where, EDGES):
+            return self._border.part(what, where)
+        edge: Edge = where
+        distance = reach(domain, edge)
+        if distance > 0:
+            raise SupportError(
+                f"{what}: the particles of a body without a border end {distance:.3g} m away from that "
+                "edge of the grid: expected particles that reach it, or a body with a border"
+            )
+        return edge
 
     def hold(
         self,
@@ -92,43 +114,51 @@ class Supports(Owner[Support]):
         what = f"hold(point={checks.shown(point)})"
         edges.locate_point(self.grid, point, what)
         place = checks.point(what, point)
-        return self._add(place, what, component, value, amplitude, velocity, None)
+        axis = self._component(component)
+        if isinstance(axis, str):
+            raise InputError(
+                f"{what}: the field '{axis}' at a point: expected fix(where, '{axis}', value) on a "
+                "part of the border"
+            )
+        return self._add(place, place, what, axis, value, amplitude, velocity, {})
 
     def _add(
         self,
         place: Place,
-        where: str,
-        component: str,
+        given: str | tuple[float, float],
+        what: str,
+        axis: int | str,
         value: Profile,
         amplitude: InTime | None,
         velocity: InTime | None,
-        between: Interval | None,
+        whole: Mapping[Edge, Mask],
     ) -> Support:
-        self.activity.check_between_steps(where)
-        axis = self._component(component)
-        if isinstance(axis, str) and (velocity is not None or not isinstance(place, str)):
-            what = "a velocity" if velocity is not None else "a point"
+        self.activity.check_between_steps(what)
+        is_field = axis in self._fields
+        if is_field and velocity is not None:
             raise InputError(
-                f"{where}: the field '{axis}' with {what}: expected fix(edge, '{axis}', value), where "
-                "amplitude=... changes the value in time"
+                f"{what}: the field '{axis}' with a velocity: expected fix(where, '{axis}', value), "
+                "where amplitude=... changes the value in time"
             )
         if velocity is not None:
             if callable(value) or value != 0:
-                raise InputError(f"{where}: expected a value or a velocity, not both")
+                raise InputError(f"{what}: expected a value or a velocity, not both")
             value = 1.0
-        factor = Factor(where, amplitude, velocity, time=self.activity.time)
-        unit = self._fields[axis].unit if isinstance(axis, str) else "m"
-        support = Support(self, place, axis, unit, value, factor, between)
+        factor = Factor(what, amplitude, velocity, time=self.activity.time)
+        unit = self._fields[str(axis)].unit if is_field else "m"
+        support = Support(self, place, given, axis, unit, value, factor, whole)
         self.all.append(support)
         return support
 
-    def _component(self, component: str) -> int | str:
-        """Number of a component of the displacement, or name of a field."""
-        if self._fields and checks.one_of(component, self._fields):
+    def _component(self, component: str, more: Sequence[str] = ()) -> int | str:
+        """Number of a component of the displacement, or one of other names or fields."""
+        known = [*self.grid.space.axes, *more, *self._fields]
+        if checks.one_of(component, [*more, *self._fields]):
             return component
-        if self._fields and not checks.one_of(component, self.grid.space.axes):
-            known = quoted([*self.grid.space.axes, *self._fields])
-            raise InputError(f"component {checks.shown(component)}: expected one of {known}")
+        if not checks.one_of(component, known):
+            raise InputError(
+                f"component {checks.shown(component)}: expected one of {quoted(known)}"
+            )
         return self.grid.space.axis(component)
 
     def wall(self, edge: Edge, friction: float, separates: bool) -> Wall:
@@ -150,12 +180,17 @@ class Supports(Owner[Support]):
 
     def release(self, place: Edge | Sequence[float], component: str | None) -> None:
         """Take supports away."""
-        at = place if isinstance(place, str) else checks.point("release(...)", place)
-        axis = None if component is None else self._component(component)
-        gone = [s for s in self.all if at in (s.place, s.given) and axis in (None, s.component)]
-        walls = [w for w in self.walls if w.edge == at and axis is None]
+        at = label(place) if isinstance(place, str) else checks.point("release(...)", place)
+        axis = None if component is None else self._component(component, LOCAL)
+        gone = [
+            s
+            for s in self.all
+            if (at == s.given or (isinstance(s.place, tuple) and at == s.place))
+            and axis in (None, s.component)
+        ]
+        walls = [w for w in self.walls if label(w.edge) == at and axis is None]
         if not gone and not walls:
-            places = sorted({f"{s.place}" for s in self.all} | {w.edge for w in self.walls})
+            places = sorted({f"{s.given}" for s in self.all} | {label(w.edge) for w in self.walls})
             raise InputError(
                 f"release({checks.shown(place)}): no such support: expected one of "
                 f"{', '.join(places) or 'none'}"
@@ -183,8 +218,9 @@ class Supports(Owner[Support]):
         *,
         moving: bool,
         fields: step_values.Fields | None = None,
-    ) -> tuple[Reduction, ActiveSet]:
-        """Unknowns that the supports leave free, and the walls in their present states.
+    ) -> tuple[Reduction, ActiveSet, list[HeldBorder]]:
+        """Unknowns that the supports leave free, the walls in their present states, and the supports on
+        patches of the border.
 
         Args:
             domain: The particles where they are.
@@ -192,29 +228,33 @@ class Supports(Owner[Support]):
             start: Coefficients at the start of the step, which the amounts include.
             before: Displacement coefficients since the start of the scene where particles do not move,
                 0 where they do. Walls measure distances from it.
-            moving: Inertia or stress holds the body: rigid motions may be free, and edges that are
-                held at rest and that the body has left are skipped.
-
+            moving: Inertia or stress holds the body: rigid motions may be free.
             fields: Fields without a role and what is prescribed for them; they stay by default.
 
         Raises:
-            SupportError: The body has left an edge with a prescribed motion, or a point.
+            SupportError: The body has left a point, or supports contradict each other.
         """
         layout, held, points = domain.layout, list[Held](), list[PointHeld]()
+        border = list[HeldBorder]()
         for support in [*self.all, *self.axis]:
-            if isinstance(support.component, str):
-                if moving and step_values.is_left(domain, support):
-                    continue
-                held.append(step_values.of_field(domain, support, start, fields))
-            elif isinstance(support.place, str):
-                may_be_left = support in self.axis or (moving and not support.moves)
-                if not (may_be_left and step_values.is_left(domain, support)):
-                    held.append(step_values.on_edge(domain, support, amount))
-            else:
+            if isinstance(support.place, tuple):
                 points.append(step_values.at_point(domain, support, amount))
+                continue
+            for edge in support.edges:
+                cells = step_values.touched(domain, self._border, support, edge)
+                if not len(cells):
+                    continue
+                if support.is_field:
+                    of = step_values.of_field(domain, support, edge, cells, start, fields)
+                else:
+                    of = step_values.on_edge(domain, support, edge, cells, amount)
+                held.append(of)
+            if isinstance(support.place, MovingPoints) and support.weak.any():
+                border.append(self._on_patches(domain, support, amount, start, fields))
+        check_agreement(border)
         fixed = np.zeros(layout.size, dtype=bool)
-        for edge in held:
-            fixed[edge.indices] = True
+        for one in held:
+            fixed[one.indices] = True
         prescribed = []
         for wall in self.walls:
             by_others = fixed.copy()
@@ -223,7 +263,29 @@ class Supports(Owner[Support]):
             prescribed.append(wall.prescribed(by_others))
             held += wall.held(layout.active, prescribed[-1], start, before)
         contact = ActiveSet(self.walls, prescribed)
-        return Reduction(layout, held, points, start, moving=moving), contact
+        rows = [row for support in border for row in support.rows] if not moving else []
+        reduction = Reduction(layout, held, points, start, moving=moving, also=rows)
+        return reduction, contact, border
+
+    @staticmethod
+    def _on_patches(
+        domain: Domain,
+        support: Support,
+        amount: Callable[[Term], float],
+        start: Array,
+        fields: step_values.Fields | None,
+    ) -> HeldBorder:
+        """A support on points of the border, held by tractions on patches."""
+        if not support.is_field:
+            return HeldBorder(domain, support, step_values.at_points(support, amount), start)
+        assert isinstance(support.place, MovingPoints)
+        place = domain.layout.fields[str(support.component)]
+        values = support.place.cells(domain).values(place.basis)
+        now = values @ start[place.slice]
+        if fields is None:
+            return HeldBorder(domain, support, now, start)
+        missing = step_values.at_points(support, fields.amount) - values @ fields.old[place.slice]
+        return HeldBorder(domain, support, now + fields.share * missing, start)
 
     def check_reach(self, before: Domain, after: Domain) -> None:
         """Check that supports still hold something once particles were removed; a call for all ranks.
@@ -235,12 +297,12 @@ class Supports(Owner[Support]):
             SupportError: One would hold no particles.
         """
         for support in self.all:
-            if isinstance(support.place, str):
-                lost = step_values.is_left(after, support) and not step_values.is_left(
-                    before, support
-                )
-            else:
+            if isinstance(support.place, tuple):
                 lost = not is_in_body(after, support.place)
+            elif isinstance(support.place, str):
+                lost = reach(after, support.place) > max(reach(before, support.place), 0.0)
+            else:
+                lost = support.place.lost(after)
             if lost:
                 raise SupportError(
                     f"{support} {support.axis} would hold no particles after remove(...): expected "
@@ -254,53 +316,26 @@ class Supports(Owner[Support]):
 
     # -- where particles move ------------------------------------------------
 
-    def crossings(self, amount: Callable[[Term], float]) -> dict[int, float]:
-        """Distance by which each support will have moved the body across its edge [m], by its number.
-
-        The functions of the edge do not move and would soon hold no particles.
-
-        Raises:
-            InputError: More than a quarter of a cell.
-        """
-        crossings = {}
-        for number, support in enumerate(self.all):
-            if (
-                isinstance(support.place, str)
-                and self.grid.edge(support.place)[0] == support.component
-            ):
-                crossings[number] = support.crossing + step_values.total(support, amount)
-                profiled = any(callable(term.values[0]) for term in support.terms)
-                if abs(crossings[number]) > 0.25 * self.grid.h and not profiled:
-                    raise InputError(
-                        f"{support} would have moved the body {crossings[number]:.3g} m across its edge "
-                        "of the grid, whose functions stay there: expected at most a quarter of a cell, "
-                        f"{0.25 * self.grid.h:.3g} m. hold(point, ...) moves points of the body further"
-                    )
-        return crossings
-
-    def follow(self, u: Array, points: Sequence[PointHeld], crossings: Mapping[int, float]) -> None:
-        """Move the points with the body, and record how far it has crossed edges.
+    def follow(self, u: Array, points: Sequence[PointHeld]) -> None:
+        """Move the points with the body.
 
         Args:
             u: Increments of the displacement, functions x dim.
             points: The constraints of the step, in the order of the supports.
-            crossings: As :meth:`crossings` gave them for this step.
         """
         for support, point in zip(self.at_points, points, strict=True):
             x, y = point.place + point.weights @ u[point.indices // self.grid.space.dim]
             support.place = (float(x), float(y))
-        for number, crossing in crossings.items():
-            self.all[number].crossing = crossing
 
     @property
     def at_points(self) -> list[Support]:
         """The supports that hold a point."""
-        return [s for s in self.all if not isinstance(s.place, str)]
+        return [s for s in self.all if isinstance(s.place, tuple)]
 
     @property
     def supported_edges(self) -> set[str]:
         """Names of the edges of the grid that supports or walls act on."""
-        edges_held = {support.place for support in self.all if isinstance(support.place, str)}
+        edges_held = {edge for support in self.all for edge in support.edges}
         return edges_held | {wall.edge for wall in self.walls}
 
     # -- header, identity, checkpoints ---------------------------------------
@@ -314,14 +349,19 @@ class Supports(Owner[Support]):
 
     def identity(self) -> list[list[Any]]:
         """Facts that decide the results of a run, in the types of JSON."""
-        given = [[str(s.given), s.component, text(s.between), *s.identity()] for s in self.all]
+        given = [[str(s.given), s.component, *s.identity()] for s in self.all]
         return given + [["wall", w.edge, w.friction, w.separates] for w in self.walls]
 
     def state(self) -> dict[str, Any]:
         """Positions of points, the share of each support that the body carries, and contact states."""
         return {
             "supports": [
-                support.state() | {"place": support.place, "crossing": support.crossing}
+                support.state()
+                | {
+                    "place": support.place if isinstance(support.place, tuple) else (),
+                    "held": support.held,
+                    "missing": support.missing,
+                }
                 for support in self.all
             ],
             "walls": [wall.stored() for wall in self.walls],
@@ -340,10 +380,10 @@ class Supports(Owner[Support]):
             )
         self.all = restored("support", self.all, state["supports"])
         for support, values in zip(self.all, state["supports"], strict=True):
-            if not isinstance(support.place, str):
+            if isinstance(support.place, tuple):
                 x, y = values["place"]
                 support.place = (x, y)
-            support.crossing = values["crossing"]
+            support.held, support.missing = values["held"], values["missing"]
         for wall, values in zip(self.walls, state["walls"], strict=True):
             wall.restore(values)
         self.changed()

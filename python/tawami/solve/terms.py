@@ -43,6 +43,9 @@ class Term(Protocol):
     def improve(self) -> bool:
         """Improve the multipliers at a solution; whether another solve is needed."""
 
+    def accept(self) -> None:
+        """Keep what later steps need, once a step is stored."""
+
 
 class Terms:
     """All such forces in one step.
@@ -86,3 +89,8 @@ class Terms:
         self._passes += 1
         needed = [term.improve() for term in self._terms]
         return any(needed) and self._passes < PASSES
+
+    def accept(self) -> None:
+        """Keep what later steps need, once a step is stored."""
+        for term in self._terms:
+            term.accept()

@@ -1,0 +1,157 @@
+"""Supports off the lines of the grid: means over patches of the border are held by tractions.
+
+The tractions are multipliers of an augmented Lagrangian. They need no stress at the border, so that they
+serve for all laws, forms and strain measures, and each pass leaves about a hundredth of the error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse as sp
+
+from tawami.base.arrays import Array
+from tawami.border.patches import patches
+from tawami.border.tied import Tied
+from tawami.field.constraints import PointHeld
+from tawami.scene.border import MovingPoints
+from tawami.scene.domain import Domain
+from tawami.scene.support import Support
+
+#: Penalty of a patch, in shear moduli, or diagonal entries of the tangent, per cell.
+PENALTY = 200.0
+#: Change of the tractions by a pass, relative to the largest, below which no other is needed.
+SETTLED = 1e-4
+
+
+class HeldBorder:
+    """A support on points of the border, in one step (`tawami.solve.terms`).
+
+    Args:
+        domain: The particles at its start.
+        support: The support.
+        values: Prescribed values at its points at the end of the step, counted as `before`: all of
+            those at small strain, the increments where particles move.
+        before: Coefficients at the start, which the values include.
+    """
+
+    smooth = True
+
+    def __init__(self, domain: Domain, support: Support, values: Array, before: Array) -> None:
+        assert isinstance(support.place, MovingPoints)
+        self._support, self._domain = support, domain
+        self._weak = np.flatnonzero(support.weak)
+        place, names = support.place, domain.layout.fields
+        self._place = names[str(support.component)] if support.is_field else next(iter(names.values()))
+        directions = np.ones((len(place), 1)) if support.is_field else support.directions
+        self._directions = directions[self._weak]
+        functions = place.cells(domain).values(self._place.basis)[self._weak]
+        components = sp.identity(self._place.components)
+        #: Values at the points, of all coefficients of the field: points components x coefficients.
+        self._at_points = sp.kron(functions, components, format="csr")
+        self._groups = patches(place.now[self._weak], domain.model.grid.h)
+        self._weights = place.weight[self._weak]
+        self._before = self._at_points @ before[self._place.slice]
+        self._values = (values + support.missing)[self._weak][:, None]
+        self.prescribed = float(np.abs(self._values).max(initial=0.0))
+        held = self._groups.means(self._weights, support.held[self._weak])
+        self._held = held[:, None]
+        self._tied = self._with_penalty(self._shear_moduli())
+
+    def _shear_moduli(self) -> Array:
+        """Mean shear modulus of the particles in the cell of each point [Pa]."""
+        assert isinstance(self._support.place, MovingPoints)
+        cells = self._support.place.cells(self._domain).location.cell
+        return self._domain.shear_of_cells[cells[self._weak]]
+
+    def _with_penalty(self, stiffness: Array) -> Tied:
+        penalty = PENALTY / self._domain.model.grid.h * self._groups.means(self._weights, stiffness)
+        return Tied(self._groups, self._weights, self._directions[None], penalty)
+
+    def begin(self, diagonal: Callable[[], Array]) -> None:
+        """See `Term`. The penalty of a field has the size of its tangent."""
+        if self._support.is_field:
+            h, dim = self._domain.model.grid.h, self._domain.model.space.dim
+            assert isinstance(self._support.place, MovingPoints)
+            thickness = self._support.place.weight / self._support.place.length
+            near = abs(self._at_points) @ diagonal()[self._place.slice]
+            self._tied = self._with_penalty(near / thickness[self._weak] / h ** (dim - 2))
+
+    def _displacement(self, coefficients: Array) -> Array:
+        moved = self._before + self._at_points @ coefficients[self._place.slice]
+        return moved.reshape(len(self._weak), -1)
+
+    def forces(self, coefficients: Array) -> Array:
+        """See `Term`."""
+        u = self._displacement(coefficients)
+        self._tractions = self._tied.tractions(u, self._values, self._held)
+        self._on_points = self._tied.forces(u, self._values, self._held)
+        self._error = self._tied.error(u, self._values)
+        forces = np.zeros_like(coefficients)
+        forces[self._place.slice] = self._at_points.T @ self._on_points.ravel()
+        return forces
+
+    def stiffness(self) -> sp.csr_matrix:
+        """See `Term`."""
+        matrix = (self._at_points.T @ self._tied.stiffness() @ self._at_points).tocoo()
+        size, first = self._domain.layout.size, self._place.start
+        places = (matrix.row + first, matrix.col + first)
+        return sp.coo_matrix((matrix.data, places), shape=(size, size)).tocsr()
+
+    def improve(self) -> bool:
+        """See `Term`."""
+        change = np.abs(self._tractions - self._held).max(initial=0.0)
+        self._held = self._tractions
+        return bool(change > SETTLED * np.abs(self._held).max(initial=0.0))
+
+    def accept(self) -> None:
+        """Keep the tractions, and what is missing of the prescribed displacement, for later steps."""
+        support, number = self._support, self._groups.number
+        support.held[self._weak] = self._tractions[number, 0]
+        if self._domain.model.moves:
+            support.missing[self._weak] = -self._error[number, 0]
+
+    @property
+    def resultant(self) -> Array:
+        """Force on the body [N per metre depth]."""
+        return self._domain.model.space.resultant(self._on_points.sum(axis=0))
+
+    @property
+    def rows(self) -> list[PointHeld]:
+        """The means of the patches as multi-point constraints, to find rigid motions."""
+        if self._support.is_field:
+            return []
+        rows = []
+        for k in range(self._groups.count):
+            mine = np.flatnonzero(self._groups.number == k)
+            weights = (self._weights[mine, None] * self._directions[mine]).ravel()
+            dim = self._directions.shape[1]
+            along = self._at_points[(dim * mine[:, None] + np.arange(dim)).ravel()].T @ weights
+            indices = np.flatnonzero(along)
+            total = self._weights[mine].sum()
+            x = self._support.place.x[self._weak[mine[0]]]
+            rows.append(
+                PointHeld(indices, along[indices] / total, 0.0, f"{self._support}", (x[0], x[1]))
+            )
+        return rows
+
+
+def check_agreement(held: Sequence[HeldBorder]) -> None:
+    """Check that supports do not prescribe different values of one component of one place.
+
+    Raises:
+        SupportError: Two of them do.
+    """
+    for one, other in combinations(held, 2):
+        if one.component != other.component:
+            continue
+        distance, at = KDTree(one.x).query(other.x, distance_upper_bound=SAME * one.h)
+        both = np.flatnonzero(np.isfinite(distance))
+        change = np.abs(one.values[at[both]] - other.values[both])
+        size = max(one.prescribed, other.prescribed)
+        if change.max(initial=0.0) > ROUND_OFF * size:
+            raise SupportError(
+                f"{one.name} and {other.name} prescribe values of '{one.component}' that differ by "
+                f"{change.max():.3g} where they meet: expected supports that agree; change or release one"
+            )
