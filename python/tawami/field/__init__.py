@@ -6,7 +6,6 @@ from tawami.field.layout import Layout
 from tawami.field.points import PointAssembly
 from tawami.field.reduction import Reduction
 from tawami.field.reference import ReferenceAssembly
-from tawami.field.tractions import Tractions
 
 __all__ = [
     "Assembly",
@@ -15,5 +14,4 @@ __all__ = [
     "PointAssembly",
     "Reduction",
     "ReferenceAssembly",
-    "Tractions",
 ]

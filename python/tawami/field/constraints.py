@@ -62,7 +62,13 @@ class PointHeld:
 
 
 def held_edge(
-    grid: Grid, place: Place, edge: Edge, touched: Indices, component: int, value: Profile, where: str
+    grid: Grid,
+    place: Place,
+    edge: Edge,
+    touched: Indices,
+    component: int,
+    value: Profile,
+    where: str,
 ) -> Held:
     """Prescribe a component of a field on an edge of the grid.
 
@@ -88,10 +94,10 @@ def held_edge(
     cell, t = np.repeat(touched, POINTS), np.tile(points, len(touched))
     position = grid.axis_positions(along, cell, t)
     fixed = np.full_like(position, grid.upper[axis] if end else grid.origin[axis])
-    x, y = (fixed, position) if axis == 0 else (position, fixed)
+    x = np.stack([fixed, position] if axis == 0 else [position, fixed], axis=-1)
     values = values_1d(place.basis, grid.cells[along], cell, t)[:, used]
     weighted = sp.diags(np.tile(weights, len(touched))) @ values
-    prescribed = evaluate(value, x, y, where)
+    prescribed = evaluate(value, x, where)
     coefficients = spsolve((weighted.T @ values).tocsc(), weighted.T @ prescribed)
     return Held(indices, coefficients)
 

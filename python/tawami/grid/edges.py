@@ -23,14 +23,20 @@ Interval = tuple[float, float]
 Profile = float | Callable[[Array, Array], Any]
 
 
-def evaluate(profile: Profile, x: Array, y: Array, what: str) -> Array:
+def evaluate(profile: Profile, points: Array, what: str) -> Array:
     """Values of a number or a function at points.
+
+    Args:
+        profile: A number or a function of position.
+        points: Positions [m], points x dim.
+        what: The input, for messages.
 
     Raises:
         InputError: The function fails, returns another shape, or returns NaN or infinity.
     """
+    x, *others = points.T
     try:
-        value = profile(x, y) if callable(profile) else profile
+        value = profile(x, *others) if callable(profile) else profile
         values = np.broadcast_to(checks.real_values(value), x.shape)
     except Exception as error:
         raise InputError(
@@ -41,7 +47,8 @@ def evaluate(profile: Profile, x: Array, y: Array, what: str) -> Array:
     if len(bad):
         first = bad[0]
         raise InputError(
-            f"{what}: {values[first]} at ({x[first]:g}, {y[first]:g}): expected a finite number"
+            f"{what}: {values[first]} at ({', '.join(f'{c:g}' for c in points[first])}): expected a "
+            "finite number"
         )
     return values
 

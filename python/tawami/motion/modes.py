@@ -95,9 +95,11 @@ def _matrices(scene: Scene) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix
     mass = np.zeros(size)
     mass[:n] = np.repeat(domain.lumped_mass, now.model.space.dim)
     zero = np.zeros(size)
-    reduction, _ = now.supports.constraints(domain, lambda support: 0.0, zero, zero, moving=True)
+    amounts = now.supports.constraints(domain, lambda support: 0.0, zero, zero, moving=True)
+    reduction, _, supports = amounts
     selection = reduction.selection
-    tangent = (selection.T @ scene.tangent(zero) @ selection).tocsr()
+    stiffness = sum((support.stiffness() for support in supports), scene.tangent(zero))
+    tangent = (selection.T @ stiffness @ selection).tocsr()
     largest = np.abs(tangent.data).max(initial=0.0)
     if np.abs((tangent - tangent.T).data).max(initial=0.0) > ROUND_OFF * largest:
         raise InputError(

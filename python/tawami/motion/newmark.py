@@ -23,6 +23,7 @@ from tawami.scene import reactions
 from tawami.scene.action import Term
 from tawami.scene.configuration import Configuration
 from tawami.scene.contact import ActiveSet
+from tawami.scene.held_border import HeldBorder
 from tawami.scene.share import Moment
 from tawami.scene.step import Accepted, Problem
 from tawami.scene.step_values import Fields
@@ -110,7 +111,7 @@ class NewmarkStep:
 
     def _constraints(
         self, amount: Callable[[Term], float], fields: Fields | None = None
-    ) -> tuple[Reduction, ActiveSet]:
+    ) -> tuple[Reduction, ActiveSet, list[HeldBorder]]:
         now, zero = self._now, np.zeros(self._now.domain.layout.size)
         return now.supports.constraints(
             now.domain, amount, zero, now.before, moving=True, fields=fields
@@ -129,8 +130,8 @@ class NewmarkStep:
     def problem(self) -> Problem:
         """The problem in the present states of the walls."""
         now, dt = self._now, self._dt
-        crossings = now.supports.crossings(self._displacement) if now.model.moves else {}
-        reduction, contact = self._constraints(self._displacement, now.fields_at(self._finish))
+        fields = now.fields_at(self._finish)
+        reduction, contact, supports = self._constraints(self._displacement, fields)
         v, a = self._mapped
         if self._loads != self._clock.loads:  # a belongs to other loads
             a = self._first_acceleration(a)
@@ -142,8 +143,9 @@ class NewmarkStep:
         inertia = Inertia(self._masses, slope, dt * v.ravel(), back, impulse)
         self._start = Start(v, a, reduction, inertia)
         return Problem(
-            reduction, contact, self._external, inertia, self._guess(dt * v.ravel()), crossings
-        )
+            reduction, contact, self._external, inertia, self._guess(dt * v.ravel()), supports,
+            now.terms(self._finish, supports),
+        )  # fmt: skip
 
     @functools.cached_property
     def _internal(self) -> Array:

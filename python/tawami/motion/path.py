@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -125,9 +125,7 @@ class PathStep:
                 "scene has not been solved for"
             )
         path = controls.Path(factor, rate, self._control())
-        return Problem(
-            static.reduction, static.contact, static.external, crossings=static.crossings, path=path
-        )
+        return replace(static, path=path, load=np.nan)
 
     def _control(self) -> controls.Control:
         domain, following = self.configuration.domain, self.following

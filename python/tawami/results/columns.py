@@ -19,7 +19,7 @@ from tawami.motion.energy import Energies
 from tawami.motion.observer import Motion, Snapshot, Subject
 from tawami.scene.points import check_in_body
 from tawami.scene.quantities import body_arrays
-from tawami.scene.reactions import supported_edge
+from tawami.scene.reactions import check_supported
 from tawami.scene.scene import Scene
 
 #: Particles that a linear fit of displacements around a point uses at finite strain.
@@ -137,11 +137,11 @@ def _reaction(name: str, place: str, scene: Scene) -> Columns:
     at: str | tuple[float, float] = place
     if place.startswith("("):
         at = _point(name, place)
-        held = [s for s in scene.configuration.supports.all if not isinstance(s.place, str)]
-        if not any(np.allclose(at, known) for s in held for known in (s.place, s.given)):
+        held = scene.configuration.supports.at_points
+        if not any(np.allclose(at, known) for s in held for known in s.places):
             raise InputError(f"{name}: no point is held there: expected hold({at}, ...) before")
     else:
-        supported_edge(place, scene.configuration.supports.supported_edges)
+        check_supported(place, scene.configuration.supports)
 
     def of(now: Snapshot, _: float) -> list[float]:
         if now.solution is None:

@@ -26,7 +26,14 @@ from tawami.scene.model import Model
 STAYING, MOVING = 3, 5
 #: Part of a border, as a driver script names it: a name or names, a function f(x, y) on arrays that
 #: returns a mask, or a mask of the points `scene.border.x`.
-Part = str | int | list[str | int] | tuple[str | int, ...] | Callable[[Array, Array], Any] | npt.NDArray[Any]
+Part = (
+    str
+    | int
+    | list[str | int]
+    | tuple[str | int, ...]
+    | Callable[[Array, Array], Any]
+    | npt.NDArray[Any]
+)
 
 
 class MovingPoints:
@@ -105,7 +112,11 @@ class MovingPoints:
             tolerance: Distance that counts as none [cells].
         """
         axis, end = self._grid.edge(edge)
-        inside = self._grid.upper[axis] - self.x[:, axis] if end else self.x[:, axis] - self._grid.origin[axis]
+        inside = (
+            self._grid.upper[axis] - self.x[:, axis]
+            if end
+            else self.x[:, axis] - self._grid.origin[axis]
+        )
         return np.asarray(inside <= tolerance * self._grid.h)
 
     def lost(self, domain: Domain) -> bool:
@@ -273,8 +284,9 @@ class SceneBorder:
         assert self.points is not None
         for edge in EDGES:
             length, mask = (
-                float(points.length[points.edge(edge)].sum()) for points in (self.points, part)
-            ), part.edge(edge)
+                (float(points.length[points.edge(edge)].sum()) for points in (self.points, part)),
+                part.edge(edge),
+            )
             all_of_it, covered = length
             if covered > 0 and abs(covered - all_of_it) <= ON_LINE * self._grid.h:
                 found[edge] = mask

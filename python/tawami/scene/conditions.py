@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy.typing as npt
 
 from tawami.base import checks
 from tawami.base.errors import InputError
 from tawami.base.text import quoted
-from tawami.grid.edges import Interval, Profile
+from tawami.grid.edges import Profile
 from tawami.grid.grid import Edge
 from tawami.scene import selection
+from tawami.scene.border import Part, label
 from tawami.scene.configuration import Configuration
 from tawami.scene.factor import InTime
-from tawami.scene.load import Load
+from tawami.scene.load import Load, Pressure, Traction
 from tawami.scene.points import check_in_body
 from tawami.scene.selection import Where
 from tawami.scene.support import Support
@@ -37,32 +39,39 @@ class Conditions:
 
     def fix(
         self,
-        edge: Edge,
+        where: Part,
         component: str,
         value: Profile = 0.0,
         *,
         amplitude: InTime | None = None,
         velocity: InTime | None = None,
-        between: Interval | None = None,
     ) -> Support:
-        """Prescribe a displacement component, or another field of the form, along an edge of the grid.
+        """Prescribe a displacement component, or another field of the form, on a part of the border.
+
+        Where the border lies on an edge of the grid as far as the body touches it, the coefficients of
+        the grid there are prescribed, which is exact. Elsewhere means over patches of the border, about
+        as long as a cell, are held by tractions, so that the border may lie anywhere in the cells and
+        move. A call for all ranks.
 
         Args:
-            edge: 'left', 'right', 'bottom' or 'top'.
-            component: 'x' or 'y', or the name of a field without a role, as 'p_w'. The value is then
-                that of the field, in its unit.
+            where: The part: a name or names of the border (`scene.border.names`; 'left', 'right',
+                'bottom' and 'top' are also parts on the edges of the grid), a function f(x, y) on arrays
+                that returns a mask, or a mask of the points `scene.border.x`. The part moves with the
+                body.
+            component: 'x' or 'y', 'normal' (outward) or 'tangent' (counter-clockwise), or the name of a
+                field without a role, as 'p_w'. The value is then that of the field, in its unit.
             value: Displacement [m] from now on (at small strain from the start of the scene): a
-                number, or a function f(x, y) on arrays, which is projected in L2 on the functions of
-                the edge.
+                number, or a function f(x, y) on arrays.
             amplitude: Factor of the value, a number or a function of time [s].
             velocity: For `Dynamics`, in place of a value: a number [m/s], or a function of time [s].
-            between: Part of the edge, from one line of the grid to another [m].
 
         Raises:
-            InputError: An unknown edge or component, a part that is not one of whole cells, or an
-                amplitude or velocity that is not a finite number at the present time.
+            InputError: A body without a border, a part that it does not have, an unknown component, or
+                an amplitude or velocity that is not a finite number at the present time.
+            SupportError: The particles of a body without a border do not reach the edge of the grid.
         """
-        return self.configuration.supports.fix(edge, component, value, amplitude, velocity, between)
+        now = self.configuration
+        return now.supports.fix(now.domain, where, component, value, amplitude, velocity)
 
     def hold(
         self,
@@ -102,44 +111,39 @@ class Conditions:
         return self.configuration.supports.wall(edge, friction, separates)
 
     def flux(
-        self,
-        edge: Edge,
-        field: str,
-        value: Profile,
-        *,
-        amplitude: InTime | None = None,
-        between: Interval | None = None,
+        self, where: Part, field: str, value: Profile, *, amplitude: InTime | None = None
     ) -> Load:
-        """Let a field flow into the body through an edge of the grid.
+        """Let a field flow into the body through a part of its border.
 
-        The residual of the field's equation gets - int value r ds, r its test function. Write the
+        The residual of the field's equation gets - int value r dA, r its test function. Write the
         equation per second, with storage and outflow positive: the flux is then an inflow. If the form
         multiplies the equation by a factor, the flux is wrong by this factor.
 
         Args:
-            edge: 'left', 'right', 'bottom' or 'top'.
+            where: The part, as in `fix`.
             field: Name of a field of the form without a role, as 'p_w'.
             value: Flux in the unit in which the form writes the equation of the field (with a source s
                 in it as - s r, the unit of s times m): a number, or a function f(x, y) on arrays.
             amplitude: Factor of the value, a number or a function of time [s].
-            between: Part of the edge, from one line of the grid to another [m].
 
         Raises:
-            InputError: An unknown edge or field, or a part that is not one of whole cells.
+            InputError: A body without a border, a part that it does not have, or an unknown field.
         """
-        known = self.configuration.model.form.own_fields
+        now, given = self.configuration, label(where)
+        known = now.model.form.own_fields
         if not checks.one_of(field, known):
             raise InputError(
-                f"flux(edge='{edge}', {checks.shown(field)}, ...): expected a field of the form without "
+                f"flux({given}, {checks.shown(field)}, ...): expected a field of the form without "
                 f"a role: {quoted(known) or 'it has none'}"
             )
-        return self.configuration.loads.add_flux(edge, field, value, between, amplitude)
+        points = now.border.part(f"flux({given})", where)
+        return now.loads.add_flux(points, given, field, value, amplitude)
 
     def release(self, place: Edge | Sequence[float], component: str | None = None) -> None:
         """Remove supports that `fix`, `hold` or `wall` made, as their `release()` does.
 
         Args:
-            place: Name of the edge, or point (x, y) [m].
+            place: Name of the part of the border or of the edge, or point (x, y) [m].
             component: 'x' or 'y'; both, and a wall, by default.
 
         Raises:
@@ -148,34 +152,48 @@ class Conditions:
         self.configuration.supports.release(place, component)
 
     def traction(
-        self,
-        edge: Edge,
-        value: tuple[Profile, Profile],
-        *,
-        amplitude: InTime | None = None,
-        between: Interval | None = None,
+        self, where: Part, value: tuple[Profile, Profile], *, amplitude: InTime | None = None
     ) -> Load:
-        """Load an edge of the grid where the body touches it.
+        """Load a part of the border with a dead traction: its direction and resultant stay.
 
         Args:
-            edge: 'left', 'right', 'bottom' or 'top'.
-            value: Traction (t_x, t_y) [Pa]: numbers, or functions f(x, y) on arrays, taken at the
-                biquadratic nodes of the grid (exact up to parabolas).
+            where: The part, as in `fix`. It moves with the body.
+            value: Traction (t_x, t_y) [Pa] per area of the border when the load is made: numbers, or
+                functions f(x, y) on arrays of present positions.
             amplitude: Factor of the value, a number or a function of time [s].
-            between: Part of the edge, from one line of the grid to another [m].
 
         Raises:
-            InputError: An unknown edge or part of it, an amplitude that is not a finite number at the
-                present time, or a form without a term `dot(t, w) * ds`.
+            InputError: A body without a border, a part that it does not have, or an amplitude that is
+                not a finite number at the present time.
         """
-        model = self.configuration.model
-        model.grid.edge(edge)
-        if model.compiled.traction is None:
-            raise InputError(
-                f"traction(edge='{edge}'): form {model.form.name} has no edge term; add "
-                "- dot(t, w) * ds to its residual"
-            )
-        return self.configuration.loads.add_traction(edge, value, between, amplitude)
+        return self._on_border(Traction, where, value, amplitude)
+
+    def pressure(self, where: Part, value: Profile, *, amplitude: InTime | None = None) -> Load:
+        """Load a part of the border with a pressure against its outward normal.
+
+        At finite strain it follows the border, within a step too: the force is -p n dA on the present
+        border.
+
+        Args:
+            where: The part, as in `fix`. It moves with the body.
+            value: Pressure [Pa]: a number, or a function f(x, y) on arrays of present positions.
+            amplitude: Factor of the value, a number or a function of time [s].
+
+        Raises:
+            InputError: As `traction`.
+        """
+        return self._on_border(Pressure, where, value, amplitude)
+
+    def _on_border(
+        self,
+        kind: type[Traction | Pressure],
+        where: Part,
+        value: Any,
+        amplitude: InTime | None,
+    ) -> Load:
+        now, given = self.configuration, label(where)
+        points = now.border.part(f"{kind.call}({given})", where)
+        return now.loads.add_on_border(kind, points, given, value, amplitude)
 
     def load(
         self,
@@ -184,8 +202,8 @@ class Conditions:
         *,
         amplitude: InTime | None = None,
     ) -> Load:
-        """Load particles of the body, wherever they move: a traction on a surface that is not an edge
-        of the grid. Its direction is fixed. A call for all ranks.
+        """Load particles of the body, wherever they move. The direction of the force is fixed. A call
+        for all ranks.
 
         Args:
             particles: A mask of the particles of the body, or their numbers; a function f(x, y) on

@@ -6,10 +6,10 @@ A step either changes all of it or nothing.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,8 +24,10 @@ from tawami.base.timing import Stopwatch
 from tawami.particles import placement
 from tawami.scene import coverage, mean_stress, own_fields, quantities, strain_limit
 from tawami.scene.activity import Activity
+from tawami.scene.border import SceneBorder
 from tawami.scene.domain import Domain
 from tawami.scene.form_inputs import FormInputs
+from tawami.scene.held_border import HeldBorder
 from tawami.scene.loads import Loads
 from tawami.scene.model import Model
 from tawami.scene.reactions import Reactions
@@ -36,6 +38,7 @@ from tawami.scene.strain_limits import StrainLimits
 from tawami.scene.supports import Supports
 from tawami.solve.newton import Converged
 from tawami.solve.numerics import Numerics
+from tawami.solve.terms import Term, Terms
 
 Array = npt.NDArray[np.float64]
 #: Arrays of particles whose values are lengths, or lengths per time.
@@ -62,6 +65,18 @@ class Outcome:
     particles: Mapping[str, Array]
 
 
+class Moved(NamedTuple):
+    """Positions at the end of a step.
+
+    Attributes:
+        particles: Of this rank's particles [m], particles x dim.
+        border: Of the points of the border, with their areas.
+    """
+
+    particles: Array
+    border: list[tuple[Array, Array]]
+
+
 class Configuration:
     """Particles, supports and loads of one scene between two steps.
 
@@ -72,6 +87,7 @@ class Configuration:
 
     Attributes:
         domain: The particles where they are; another object after a step that moves them.
+        border: The border of the body.
         supports, loads: As the driver script made them.
         inputs: Parameters and data of the form.
         activity: Time and activity of the scene.
@@ -91,8 +107,9 @@ class Configuration:
         mine.add_strain(model.moves, model.grid.geometry)
         own_fields.carry(model.form, mine, model.space.dim)
         self._attach(mine, location)
-        self.activity = Activity()
-        self.supports = Supports(model.grid, model.basis, model.form.own_fields, self.activity)
+        self.activity, self.border = Activity(), SceneBorder(model, model.border)
+        own = model.form.own_fields
+        self.supports = Supports(model.grid, model.basis, own, self.border, self.activity)
         self.loads = Loads(model.grid, np.array(particles.volume), self.activity)
         self.total = np.zeros(self.domain.layout.size)
         self.inputs = FormInputs(model, self.activity.time)
@@ -139,6 +156,16 @@ class Configuration:
             return Moment(part, start, start)
         end = checks.number("until", until, low=start)
         return Moment(part, start, end if part == 1.0 else start + part * (end - start))
+
+    def terms(self, now: Moment, supports: Sequence[HeldBorder]) -> Terms | None:
+        """Forces on the border that depend on the solution of a step; None without any.
+
+        Args:
+            now: The end of the step.
+            supports: Supports on patches of the border.
+        """
+        found: list[Term] = [*self.loads.following(self.domain, now), *supports]
+        return Terms(found, self.model.grid.comm) if found else None
 
     def external(self, now: Moment | None = None) -> Array:
         """External forces on all coefficients [N per metre depth], under all loads by default."""
@@ -238,15 +265,15 @@ class Configuration:
         friction = problem.contact.friction if problem.contact.walls else None
         found = self.domain.newton.solve(
             problem.reduction, problem.external, problem.inertia, guess, friction, path,
-            self.old if self.model.form.own_fields else None,
+            self.old if self.model.form.own_fields else None, problem.terms,
         )  # fmt: skip
         if last is None:
             return found
         history, krylov = last.history + found.history[1:], last.krylov + found.krylov
         return replace(found, history=history, krylov=krylov)
 
-    def _moved(self, accepted: Accepted, time: float) -> Array | None:
-        """Positions at the end of the step [m]; None where particles do not move.
+    def _moved(self, accepted: Accepted, time: float) -> Moved | None:
+        """Positions at the end of the step; None where particles do not move.
 
         Raises:
             InputError: A particle would leave the grid, and must not.
@@ -257,19 +284,22 @@ class Configuration:
         moved = np.asarray(particles.x + self.domain.at_particles(accepted.u))
         stop = self.model.leaving == "stop"
         placement.check_staying(self.model.grid, particles, moved, time, stop=stop)
-        return moved
+        return Moved(moved, self.border.moved(self.domain, accepted.u))
 
-    def _store(self, accepted: Accepted, moved: Array | None, time: float) -> Outcome:
+    def _store(self, accepted: Accepted, moved: Moved | None, time: float) -> Outcome:
         """Store a step that the laws have committed, and move the particles."""
         self.begun = True
         coefficients = accepted.step.coefficients
+        if accepted.problem.terms is not None:
+            accepted.problem.terms.accept()
         if moved is None:
             coefficients = self.total = self.total + coefficients
             return self._outcome(accepted, coefficients)
-        problem, grid = accepted.problem, self.model.grid
-        self.supports.follow(accepted.u, problem.reduction.points, problem.crossings)
-        projects = self._travel.must_project(self.domain, moved)
-        self.domain.particles.move_to(moved)
+        grid = self.model.grid
+        self.supports.follow(accepted.u, accepted.problem.reduction.points)
+        projects = self._travel.must_project(self.domain, moved.particles)
+        self.domain.particles.move_to(moved.particles)
+        self.border.move(moved.border)
         outcome = self._outcome(accepted, coefficients)
         outside = placement.outside(grid, self.domain.particles.x)
         particles, gone = placement.removed(grid, self.domain.particles, outside)
@@ -317,6 +347,7 @@ class Configuration:
             "coverage_checked": self._coverage_checked,
             "supports": self.supports.state(),
             "loads": self.loads.state(),
+            "border": self.border.state(),
             "newton": self.domain.newton.state(),
         }
 
@@ -342,6 +373,7 @@ class Configuration:
         self.inputs.restore(state["inputs"])
         self.supports.restore(state["supports"])
         self.loads.restore(state["loads"])
+        self.border.restore(state["border"])
         self._attach(particles, location)
         self.domain.newton.record()
         self.domain.newton.restore(state["newton"])

@@ -139,7 +139,7 @@ class Domain:
         columns = np.column_stack([np.ones(len(self.particles)), self.constants["mu"]])
         sums = _rust.cell_sums(self.location, self.particles.volume, columns)
         volume, weighted = ranks.sum_of(self.model.grid.comm, sums).T
-        return np.divide(weighted, volume, out=np.zeros_like(volume), where=volume > 0)
+        return np.asarray(np.divide(weighted, volume, out=np.zeros_like(volume), where=volume > 0))
 
     @property
     def areas(self) -> Array:

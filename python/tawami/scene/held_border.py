@@ -6,12 +6,15 @@ serve for all laws, forms and strain measures, and each pass leaves about a hund
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import combinations
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial import KDTree
 
 from tawami.base.arrays import Array
+from tawami.base.errors import SupportError
 from tawami.border.patches import patches
 from tawami.border.tied import Tied
 from tawami.field.constraints import PointHeld
@@ -23,6 +26,8 @@ from tawami.scene.support import Support
 PENALTY = 200.0
 #: Change of the tractions by a pass, relative to the largest, below which no other is needed.
 SETTLED = 1e-4
+#: Distance of points that are the same [cells], and difference of values that is round-off.
+SAME, ROUND_OFF = 1e-6, 1e-9
 
 
 class HeldBorder:
@@ -43,7 +48,9 @@ class HeldBorder:
         self._support, self._domain = support, domain
         self._weak = np.flatnonzero(support.weak)
         place, names = support.place, domain.layout.fields
-        self._place = names[str(support.component)] if support.is_field else next(iter(names.values()))
+        self._place = (
+            names[str(support.component)] if support.is_field else next(iter(names.values()))
+        )
         directions = np.ones((len(place), 1)) if support.is_field else support.directions
         self._directions = directions[self._weak]
         functions = place.cells(domain).values(self._place.basis)[self._weak]
@@ -59,11 +66,27 @@ class HeldBorder:
         self._held = held[:, None]
         self._tied = self._with_penalty(self._shear_moduli())
 
+    @property
+    def x(self) -> Array:
+        """Positions of its points [m], points x dim."""
+        assert isinstance(self._support.place, MovingPoints)
+        return np.asarray(self._support.place.x[self._weak])
+
+    @property
+    def values(self) -> Array:
+        """Prescribed values at its points."""
+        return np.asarray(self._values[:, 0])
+
+    @property
+    def support(self) -> Support:
+        """The support."""
+        return self._support
+
     def _shear_moduli(self) -> Array:
         """Mean shear modulus of the particles in the cell of each point [Pa]."""
         assert isinstance(self._support.place, MovingPoints)
         cells = self._support.place.cells(self._domain).location.cell
-        return self._domain.shear_of_cells[cells[self._weak]]
+        return np.asarray(self._domain.shear_of_cells[cells[self._weak]])
 
     def _with_penalty(self, stiffness: Array) -> Tied:
         penalty = PENALTY / self._domain.model.grid.h * self._groups.means(self._weights, stiffness)
@@ -80,12 +103,12 @@ class HeldBorder:
 
     def _displacement(self, coefficients: Array) -> Array:
         moved = self._before + self._at_points @ coefficients[self._place.slice]
-        return moved.reshape(len(self._weak), -1)
+        return np.asarray(moved.reshape(len(self._weak), -1))
 
     def forces(self, coefficients: Array) -> Array:
         """See `Term`."""
         u = self._displacement(coefficients)
-        self._tractions = self._tied.tractions(u, self._values, self._held)
+        self._tractions = self._tied.multipliers(u, self._values, self._held)
         self._on_points = self._tied.forces(u, self._values, self._held)
         self._error = self._tied.error(u, self._values)
         forces = np.zeros_like(coefficients)
@@ -130,28 +153,34 @@ class HeldBorder:
             along = self._at_points[(dim * mine[:, None] + np.arange(dim)).ravel()].T @ weights
             indices = np.flatnonzero(along)
             total = self._weights[mine].sum()
-            x = self._support.place.x[self._weak[mine[0]]]
+            x = self.x[mine[0]]
             rows.append(
                 PointHeld(indices, along[indices] / total, 0.0, f"{self._support}", (x[0], x[1]))
             )
         return rows
 
 
-def check_agreement(held: Sequence[HeldBorder]) -> None:
+def check_agreement(held: Sequence[HeldBorder], h: float) -> None:
     """Check that supports do not prescribe different values of one component of one place.
+
+    Args:
+        held: The supports.
+        h: Side of a cell [m].
 
     Raises:
         SupportError: Two of them do.
     """
     for one, other in combinations(held, 2):
-        if one.component != other.component:
+        component = one.support.component
+        if component != other.support.component:
             continue
-        distance, at = KDTree(one.x).query(other.x, distance_upper_bound=SAME * one.h)
+        distance, at = KDTree(one.x).query(other.x, distance_upper_bound=SAME * h)
         both = np.flatnonzero(np.isfinite(distance))
         change = np.abs(one.values[at[both]] - other.values[both])
         size = max(one.prescribed, other.prescribed)
         if change.max(initial=0.0) > ROUND_OFF * size:
             raise SupportError(
-                f"{one.name} and {other.name} prescribe values of '{one.component}' that differ by "
-                f"{change.max():.3g} where they meet: expected supports that agree; change or release one"
+                f"{one.support} and {other.support} prescribe values of '{one.support.axis}' that "
+                f"differ by {change.max():.3g} {one.support.unit} where they meet: expected supports "
+                "that agree; change or release one"
             )

@@ -89,7 +89,7 @@ class OnBorder(Load):
 
     def at_points(self, term: Term) -> Array:
         """Components of its value at the points where they are, points x components."""
-        columns = [evaluate(v, *self.points.x.T, f"{self}") for v in term.values]
+        columns = [evaluate(v, self.points.x, f"{self}") for v in term.values]
         return np.column_stack(columns)
 
     def __str__(self) -> str:

@@ -66,7 +66,12 @@ class Loads(Owner[Load]):
         return weight
 
     def add_on_border(
-        self, kind: type[Traction | Pressure], points: MovingPoints, where: str, value: Any, amplitude: Any
+        self,
+        kind: type[Traction | Pressure],
+        points: MovingPoints,
+        where: str,
+        value: Any,
+        amplitude: Any,
     ) -> Load:
         """Load a part of the border with a traction or a pressure [Pa]."""
         load = kind(self, points, where, value, self._factor(f"{kind.call}({where})", amplitude))
@@ -144,9 +149,12 @@ class Loads(Owner[Load]):
         """Pressures that follow the border within a step."""
         return [
             FollowerPressure(
-                domain.layout, load.points.cells(domain), load.points.x, load.points.area,
+                domain.layout,
+                load.points.cells(domain),
+                load.points.x,
+                load.points.area,
                 factor * load.at_points(term)[:, 0],
-            )  # fmt: skip
+            )
             for load, term, factor in self._acting(now)
             if isinstance(load, Pressure) and self._follows(load, domain)
         ]

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
 from tawami.base import checks
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError
+from tawami.base.text import quoted
 from tawami.field.reduction import Reduction
 from tawami.grid import edges
 from tawami.grid.grid import EDGES, Edge
@@ -17,25 +18,26 @@ from tawami.scene.model import Model
 from tawami.scene.step import Accepted
 from tawami.scene.supports import Supports
 
-Array = npt.NDArray[np.float64]
 #: A point is one of a `hold` if it is this near to it [cells].
 SAME_POINT = 1e-8
 
 
-def supported_edge(place: str, supported: set[str]) -> Edge:
-    """The edge of that name, one of those with supports.
+def check_supported(place: str, supports: Supports) -> None:
+    """Check that a part of the border, or an edge of the grid, has a support.
 
     Raises:
-        InputError: No such edge, or none with supports.
+        InputError: It has none.
     """
-    if place not in EDGES:
-        raise InputError(f"reaction({checks.shown(place)}): expected one of {', '.join(EDGES)}")
-    if place not in supported:
+    _check_known(place, supports.supported_edges, supports.labels)
+
+
+def _check_known(place: str, edges_held: set[str], labels: Collection[str]) -> None:
+    known = sorted({*edges_held, *(name.strip("'") for name in labels)})
+    if place not in known:
         raise InputError(
-            f"reaction('{place}'): nothing supports that edge: expected one of "
-            f"{', '.join(sorted(supported)) or 'none'}, or fix('{place}', ...) or wall('{place}') before"
+            f"reaction('{place}'): nothing supports that part of the border: expected one of "
+            f"{quoted(known) or 'none'}, or fix('{place}', ...) or wall('{place}') before"
         )
-    return place
 
 
 def divided(reduction: Reduction, forces: Array) -> tuple[Array, Array]:
@@ -92,12 +94,16 @@ class Reactions:
     Attributes:
         on_edges: Of edges and walls, functions x dim [N per metre depth].
         at_points: Of points.
+        on_border: Resultants of supports on patches of the border [N per metre depth], by their parts.
         supported: Names of the edges with supports.
+        labels: Parts of the border with supports, in words.
     """
 
     on_edges: Array
     at_points: Sequence[AtPoint] = field(default_factory=list)
+    on_border: Sequence[tuple[str, Array]] = field(default_factory=list)
     supported: set[str] = field(default_factory=set)
+    labels: Collection[str] = field(default_factory=set)
 
     @classmethod
     def of(cls, accepted: Accepted, supports: Supports) -> Reactions:
@@ -111,23 +117,33 @@ class Reactions:
         held, multipliers = divided(reduction, accepted.forces.ravel())
         points = zip(reduction.points, supports.at_points, multipliers, strict=True)
         for point, support, force in points:
-            assert not isinstance(support.given, str)
-            assert not isinstance(support.place, str)
+            assert isinstance(support.given, tuple)
+            assert isinstance(support.place, tuple)
             assert not isinstance(support.component, str)
             places = (support.given, support.place, point.place)
             at_points.append(AtPoint(places, support.component, float(force)))
         on_edges = held.reshape(accepted.u.shape) + accepted.friction
-        return cls(on_edges, at_points, supports.supported_edges)
+        on_border = [
+            (str(held.support.given), held.resultant)
+            for held in accepted.problem.supports
+            if not held.support.is_field
+        ]
+        supported = supports.supported_edges
+        return cls(on_edges, at_points, on_border, supported, supports.labels)
 
     def at(self, model: Model, place: str | Sequence[float]) -> Array:
-        """Force (x, y) [N per metre depth] of an edge or a point; see `Solution.reaction`."""
+        """Force (x, y) [N per metre depth] of a support; see `Solution.reaction`."""
+        force, found = np.zeros(model.space.dim), False
         if isinstance(place, str):
-            edge = supported_edge(place, self.supported)
-            functions = edges.edge_functions(model.grid, model.basis, edge)
-            return np.asarray(self.on_edges[functions].sum(axis=0))
+            _check_known(place, self.supported, self.labels)
+            if checks.one_of(place, EDGES) and place in self.supported:
+                edge: Edge = checks.choice("reaction(...)", place, EDGES)
+                functions = edges.edge_functions(model.grid, model.basis, edge)
+                force = self.on_edges[functions].sum(axis=0)
+            parts = [part for given, part in self.on_border if given == repr(place)]
+            return np.asarray(sum(parts, force))
         place = checks.point("reaction(...)", place)
         near = SAME_POINT * model.grid.h
-        force, found = np.zeros(model.space.dim), False
         for one in self.at_points:
             if any(np.abs(np.subtract(place, known)).max() <= near for known in one.places):
                 force[one.component] += one.force

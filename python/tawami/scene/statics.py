@@ -45,13 +45,15 @@ class StaticStep:
             return term.at(self.now) - (term.share.applied if moves else 0.0)
 
         with now.stopwatch("set-up"):
-            crossings = now.supports.crossings(amount) if moves else {}
-            reduction, contact = now.supports.constraints(
+            reduction, contact, supports = now.supports.constraints(
                 now.domain, amount, now.before, now.before, moving=self.stressed,
                 fields=now.fields_at(self.now),
             )  # fmt: skip
             external = now.external(self.now)
-        return Problem(reduction, contact, external, crossings=crossings, load=self.now.part)
+            terms = now.terms(self.now, supports)
+        return Problem(
+            reduction, contact, external, supports=supports, terms=terms, load=self.now.part
+        )
 
     def accept(self, accepted: Accepted) -> StaticStep:
         """Prepare nothing."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -11,10 +11,12 @@ import numpy.typing as npt
 
 from tawami.field.reduction import Reduction
 from tawami.scene.contact import ActiveSet
+from tawami.scene.held_border import HeldBorder
 from tawami.scene.share import Moment
 from tawami.solve.inertia import Inertia
 from tawami.solve.newton import Converged
 from tawami.solve.path import Path
+from tawami.solve.terms import Terms
 
 Array = npt.NDArray[np.float64]
 
@@ -29,8 +31,8 @@ class Problem:
         external: External forces on all coefficients [N per metre depth].
         inertia: Of a dynamic step.
         guess: Increments of all fields to start from.
-        crossings: Distances by which supports will have moved the body across their edges [m], by the
-            number of the support.
+        supports: Supports on patches of the border.
+        terms: Forces on the border that depend on the solution.
         path: Path on which the load factor is an unknown; `external` is at its start.
         load: Share of the new loads; NaN in dynamics.
     """
@@ -40,7 +42,8 @@ class Problem:
     external: Array
     inertia: Inertia | None = None
     guess: Array | None = None
-    crossings: Mapping[int, float] = field(default_factory=dict)
+    supports: Sequence[HeldBorder] = ()
+    terms: Terms | None = None
     path: Path | None = None
     load: float = np.nan
 

@@ -36,7 +36,12 @@ class Fields:
 
 
 def of_field(
-    domain: Domain, support: Support, edge: Edge, cells: Indices, start: Array, fields: Fields | None
+    domain: Domain,
+    support: Support,
+    edge: Edge,
+    cells: Indices,
+    start: Array,
+    fields: Fields | None,
 ) -> Held:
     """Prescribed values of a field on an edge of the grid, counted as the coefficients at the start."""
     held = on_edge(domain, support, edge, cells, fields.amount if fields else lambda _: 0.0)
@@ -66,7 +71,7 @@ def touched(domain: Domain, border: SceneBorder, support: Support, edge: Edge) -
             continue
         index = grid.cell_indices(points.cells(domain).location.cell[near].astype(np.int64))
         found.append(index[index[:, axis] == row, 1 - axis])
-    return np.unique(np.concatenate(found))
+    return np.asarray(np.unique(np.concatenate(found)))
 
 
 def on_edge(
@@ -90,7 +95,7 @@ def at_points(support: Support, amount: Callable[[Term], float]) -> Array:
     """Values at the points of a part of the border."""
     assert isinstance(support.place, MovingPoints)
     x = support.place.x
-    parts = (amount(term) * evaluate(term.values[0], *x.T, f"{support}") for term in support.terms)
+    parts = (amount(term) * evaluate(term.values[0], x, f"{support}") for term in support.terms)
     return sum(parts, np.zeros(len(x)))
 
 

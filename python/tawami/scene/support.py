@@ -10,6 +10,7 @@ import numpy as np
 from tawami.base import checks
 from tawami.base.arrays import Array, Mask
 from tawami.base.errors import InputError
+from tawami.border.tied import NORMAL, TANGENT, directions
 from tawami.grid.edges import Profile
 from tawami.grid.grid import Edge, Grid
 from tawami.scene.action import Action, Owner
@@ -23,7 +24,7 @@ ALIKE = 1e-9
 #: symmetry and for bodies without a border.
 Place = MovingPoints | tuple[float, float] | Edge
 #: Components of the displacement along the border, by their names.
-LOCAL = ("normal", "tangent")
+LOCAL = (NORMAL, TANGENT)
 
 
 class Support(Action):
@@ -68,6 +69,11 @@ class Support(Action):
         return self.component if isinstance(self.component, str) else "xyz"[self.component]
 
     @property
+    def places(self) -> list[tuple[float, float]]:
+        """The point that it holds, where it is and as the driver script gave it."""
+        return [place for place in (self.place, self.given) if isinstance(place, tuple)]
+
+    @property
     def is_field(self) -> bool:
         """Whether it prescribes a field other than the displacement."""
         return isinstance(self.component, str) and self.component not in LOCAL
@@ -76,9 +82,9 @@ class Support(Action):
         """Number and sign of its component of the displacement on an edge of the grid."""
         axis, end = grid.edge(edge)
         outward = 1.0 if end else -1.0
-        if self.component == "normal":
+        if self.component == NORMAL:
             return axis, outward
-        if self.component == "tangent":  # counter-clockwise around the body
+        if self.component == TANGENT:  # counter-clockwise around the body
             return 1 - axis, outward if axis == 0 else -outward
         assert isinstance(self.component, int)
         return self.component, 1.0
@@ -87,13 +93,8 @@ class Support(Action):
     def directions(self) -> Array:
         """Unit vectors of its component of the displacement at its points, points x dim."""
         assert isinstance(self.place, MovingPoints)
-        normal = self.place.normal
-        if self.component == "normal":
-            return normal
-        if self.component == "tangent":
-            return np.stack([-normal[:, 1], normal[:, 0]], axis=1)
-        assert isinstance(self.component, int)
-        return np.tile(np.eye(normal.shape[1])[self.component], (len(normal), 1))
+        names = directions(self.place.space, [self.axis], self.place.normal)
+        return np.asarray(names[0])
 
     @property
     def edges(self) -> list[Edge]:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from tawami.base import checks
-from tawami.base.errors import CheckpointError, InputError, SupportError
 from tawami.base.arrays import Array, Mask
+from tawami.base.errors import CheckpointError, InputError, SupportError
 from tawami.base.text import listed, quoted
 from tawami.field.constraints import Held, PointHeld
 from tawami.field.reduction import Reduction
@@ -93,7 +93,7 @@ class Supports(Owner[Support]):
         """Points of a part of the border; of a body without a border, an edge of the grid."""
         if self._border.points is not None or not checks.one_of(where, EDGES):
             return self._border.part(what, where)
-        edge: Edge = where
+        edge: Edge = checks.choice(what, where, EDGES)
         distance = reach(domain, edge)
         if distance > 0:
             raise SupportError(
@@ -251,7 +251,7 @@ class Supports(Owner[Support]):
                 held.append(of)
             if isinstance(support.place, MovingPoints) and support.weak.any():
                 border.append(self._on_patches(domain, support, amount, start, fields))
-        check_agreement(border)
+        check_agreement(border, self.grid.h)
         fixed = np.zeros(layout.size, dtype=bool)
         for one in held:
             fixed[one.indices] = True
@@ -331,6 +331,11 @@ class Supports(Owner[Support]):
     def at_points(self) -> list[Support]:
         """The supports that hold a point."""
         return [s for s in self.all if isinstance(s.place, tuple)]
+
+    @property
+    def labels(self) -> set[str]:
+        """Parts of the border with supports, in words."""
+        return {str(s.given) for s in self.all if isinstance(s.place, MovingPoints)}
 
     @property
     def supported_edges(self) -> set[str]:
