@@ -8,8 +8,8 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,7 @@ from tawami.scene.form_inputs import FormInputs
 from tawami.scene.held_border import HeldBorder
 from tawami.scene.loads import Loads
 from tawami.scene.model import Model
+from tawami.scene.outcome import Moved, Outcome
 from tawami.scene.reactions import Reactions
 from tawami.scene.share import Moment
 from tawami.scene.step import Accepted, Problem, StepKind
@@ -41,40 +42,10 @@ from tawami.solve.numerics import Numerics
 from tawami.solve.terms import Term, Terms
 
 Array = npt.NDArray[np.float64]
-#: Arrays of particles whose values are lengths, or lengths per time.
+#: Arrays of particles of lengths, or lengths per time.
 LENGTHS = ("x", "displacement", "velocity", "acceleration")
 #: Solves of one step with other states of the walls, after which it has failed.
 PASSES = 40
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """A step that was stored.
-
-    Attributes:
-        accepted: The step.
-        coefficients: Of all fields: since the start where particles do not move, of the step where
-            they do.
-        reactions: Forces of supports and walls.
-        particles: Arrays of the whole body at the end of the step, in the order of the numbers.
-    """
-
-    accepted: Accepted
-    coefficients: Array
-    reactions: Reactions
-    particles: Mapping[str, Array]
-
-
-class Moved(NamedTuple):
-    """Positions at the end of a step.
-
-    Attributes:
-        particles: Of this rank's particles [m], particles x dim.
-        border: Of the points of the border, with their areas.
-    """
-
-    particles: Array
-    border: list[tuple[Array, Array]]
 
 
 class Configuration:
@@ -107,7 +78,8 @@ class Configuration:
         mine.add_strain(model.moves, model.grid.geometry)
         own_fields.carry(model.form, mine, model.space.dim)
         self._attach(mine, location)
-        self.activity, self.border = Activity(), SceneBorder(model, model.border)
+        self.border = SceneBorder(model, particles)
+        self.activity = Activity()
         own = model.form.own_fields
         self.supports = Supports(model.grid, model.basis, own, self.border, self.activity)
         self.loads = Loads(model.grid, np.array(particles.volume), self.activity)
