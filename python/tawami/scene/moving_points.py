@@ -90,7 +90,7 @@ class MovingPoints:
 
         Args:
             edge: Name of the edge.
-            tolerance: Distance that counts as none [cells].
+            tolerance: Distance that is ignored [cells].
         """
         axis, end = self._grid.edge(edge)
         inside = (
