@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import reduce
 
 import numpy as np
@@ -18,6 +17,7 @@ from tawami.body.border_squares import Signs, Squares, merged, triangulated
 from tawami.body.filling import PER_AXIS, Filling
 from tawami.body.outline import outline
 from tawami.body.points import ROUND_OFF, areas, in_boxes, in_triangles, joined
+from tawami.border.pieces import Border
 from tawami.grid.grid import EDGES, Edge, Grid
 
 #: Memory of a sample [bytes], and number of samples that the function is given at once.
@@ -135,8 +135,8 @@ def level_set(
     squares = Squares(np.argwhere(border)[:, ::-1] / samples, 1 / samples, at)
     area = np.count_nonzero(inside) / samples**2
     triangles, whole, pieces = triangulated(sign, squares, area, tolerance)
-    body = _filled(filling, inside, triangles, whole, samples)
-    return replace(body, border=outline(grid, pieces, name, bool(signs[0, 0] < 0)))
+    ending = outline(grid, pieces, name, bool(signs[0, 0] < 0))
+    return _filled(filling, inside, triangles, whole, samples, ending)
 
 
 def _grown(mask: Mask) -> Mask:
@@ -162,7 +162,12 @@ def _check_ends(signs: Signs, ends: Sequence[str]) -> None:
 
 
 def _filled(
-    filling: Filling, inside: Mask, triangles: Array, whole: Sequence[Squares], samples: int
+    filling: Filling,
+    inside: Mask,
+    triangles: Array,
+    whole: Sequence[Squares],
+    samples: int,
+    border: Border,
 ) -> Body:
     """Particles for squares between samples that are inside, and along the border.
 
@@ -172,6 +177,7 @@ def _filled(
         triangles: Triangles along the border, n x 3 x 2.
         whole: Smaller squares along the border.
         samples: Samples per cell and axis.
+        border: The border of the body.
     """
     grid, (nx, ny) = filling.grid, filling.grid.cells
     count = inside.reshape(ny, samples, nx, samples).sum(axis=(1, 3), dtype=np.int64)
@@ -188,7 +194,7 @@ def _filled(
         cell = _cells(grid, one)
         lower, upper = merged(one.corner[~full[cell]], one.size, cell[~full[cell]])
         parts.append(in_boxes(lower, upper, grid.cell_numbers(grid.cell_at((lower + upper) / 2))))
-    return filling.body(np.flatnonzero(full), joined(parts))
+    return filling.body(np.flatnonzero(full), joined(parts), border=border)
 
 
 def _cells(grid: Grid, squares: Squares) -> Indices:
