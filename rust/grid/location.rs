@@ -98,7 +98,10 @@ impl Grid {
 }
 
 impl Location {
-    fn new(grid: Grid, cell: Vec<u32>, xi: Vec<Point>) -> Self {
+    /// Location of points whose cells and positions in them are known; these may lie outside the cell, so
+    /// that its polynomials are continued.
+    #[must_use]
+    pub fn new(grid: Grid, cell: Vec<u32>, xi: Vec<Point>) -> Self {
         let mut count = vec![0u32; grid.num_cells()];
         for &c in &cell {
             count[c as usize] += 1;

@@ -9,7 +9,7 @@ use super::array::{Read1, Read2};
 use super::require;
 use super::threads::detached;
 use crate::error::Error;
-use crate::grid::{Active, Basis, Functions, Grid, Location, Rule, MAX_CELLS};
+use crate::grid::{products, Active, Basis, Functions, Grid, Location, Rule, MAX_CELLS};
 use crate::space::{count, index_of, Index, Point, DIM, FUNCTIONS_1D};
 
 /// Most points of a Gauss rule; the time to make one grows with their square.
@@ -30,6 +30,15 @@ impl PyGrid {
     fn locate(&self, py: Python, x: Read2<f64>) -> PyResult<PyLocation> {
         let x = points(&x)?;
         Ok(PyLocation(Arc::new(detached(py, || self.0.locate(&x))?)))
+    }
+
+    /// Points of known cells, at positions in them that may lie outside: points x 2.
+    fn place(&self, cell: Read1<u32>, xi: Read2<f64>) -> PyResult<PyLocation> {
+        let (cell, xi) = (cell.as_slice()?, points(&xi)?);
+        require(cell.len() == xi.len(), "cells and positions differ in number")?;
+        let inside = cell.iter().all(|&c| (c as usize) < self.0.num_cells());
+        require(inside, "a cell outside the grid")?;
+        Ok(PyLocation(Arc::new(Location::new(self.0, cell.to_vec(), xi))))
     }
 }
 
@@ -218,4 +227,40 @@ pub(super) fn extraction<'py>(
     let shape = [cells.len(), nodes.len(), width];
     let numbers = numbers.to_pyarray(py).reshape([cells.len(), width])?;
     Ok((numbers, values.to_pyarray(py).reshape(shape)?))
+}
+
+/// Functions of a basis at points: the numbers of those on the cell of each point (points x functions), their
+/// values, and their gradients [1/m] (points x functions x 2).
+#[pyfunction]
+#[allow(clippy::type_complexity)]
+pub(super) fn functions_at<'py>(
+    py: Python<'py>,
+    location: &PyLocation,
+    basis: &str,
+) -> PyResult<(Bound<'py, PyArray2<i64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>)> {
+    let location = &*location.0;
+    let functions = Functions { basis: basis.parse()?, cells: location.grid.cells };
+    let (n, width) = (location.len(), functions.per_cell());
+    let mut numbers = Vec::with_capacity(n * width);
+    let mut values = Vec::with_capacity(n * width);
+    let mut gradients = Vec::with_capacity(n * width * DIM);
+    for p in 0..n {
+        let cell = location.cell_of(p);
+        numbers.extend(functions.on_cell(cell).iter().map(|&f| f as i64));
+        let along = functions.at(cell, location.xi[p]);
+        values.extend_from_slice(&functions.values(cell, location.xi[p])[..width]);
+        let slopes: [_; DIM] = std::array::from_fn(|axis| {
+            let mut factors = along.each_ref().map(|local| &local.value);
+            factors[axis] = &along[axis].derivative;
+            products(factors, functions.basis.per_cell())
+        });
+        for f in 0..width {
+            gradients.extend(slopes.iter().map(|slope| slope[f] / location.grid.h));
+        }
+    }
+    Ok((
+        numbers.to_pyarray(py).reshape([n, width])?,
+        values.to_pyarray(py).reshape([n, width])?,
+        gradients.to_pyarray(py).reshape([n, width, DIM])?,
+    ))
 }

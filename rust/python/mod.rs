@@ -80,6 +80,7 @@ fn _rust(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(grid::basis_1d, m)?)?;
     m.add_function(wrap_pyfunction!(grid::basis_len, m)?)?;
     m.add_function(wrap_pyfunction!(grid::gauss, m)?)?;
+    m.add_function(wrap_pyfunction!(grid::functions_at, m)?)?;
     m.add_function(wrap_pyfunction!(grid::extraction, m)?)?;
     m.add_function(wrap_pyfunction!(transfer::densities, m)?)?;
     m.add_function(wrap_pyfunction!(transfer::nodal_sums, m)?)?;

@@ -1,0 +1,116 @@
+"""Border points in the cells of a grid: the functions of the grid there.
+
+A point on a line of the grid belongs to the cell on the side of the body. One in a cell without
+particles reads the polynomials of the nearest cell with particles: they still add up to 1 and are exact
+for linear fields, so that no force and no moment of a load is lost.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import scipy.sparse as sp
+
+from tawami import _rust
+from tawami.base.arrays import Array, Indices, Mask
+from tawami.base.errors import SupportError
+from tawami.base.space import lattice
+from tawami.grid.basis import Basis
+from tawami.grid.grid import Grid
+
+#: Distance by which a point is moved into the body to find its cell [cells].
+INWARD = 1e-6
+#: Cells along each axis in which a cell with particles is sought.
+REACH = 2
+
+
+class BorderInCells:
+    """Points of a border in the cells of a grid.
+
+    Args:
+        grid: The grid.
+        active: Whether each cell holds particles, on any rank, ny x nx.
+        x: Positions [m], points x dim.
+        normal: Outward unit normals, points x dim.
+        where: Name of the border, for messages.
+
+    Attributes:
+        grid: The grid.
+        location: Cells and positions in them.
+
+    Raises:
+        SupportError: No cell near a point holds particles.
+    """
+
+    def __init__(
+        self, grid: Grid, active: Mask, x: Array, normal: Array, where: str = "border"
+    ) -> None:
+        self.grid = grid
+        scaled = (x - np.array(grid.origin)) / grid.h
+        most = np.array(grid.cells) - 1
+        index = np.clip(np.floor(scaled - INWARD * normal), 0, most).astype(np.int64)
+        flat = active.ravel()
+        away = ~flat[grid.cell_numbers(index)]
+        if away.any():
+            index[away] = _nearest(grid, flat, scaled[away], where)
+        xi = np.ascontiguousarray(scaled - index)
+        cell = grid.cell_numbers(index).astype(np.uint32)
+        self.location = grid.rust.place(cell, xi)
+
+    def __len__(self) -> int:
+        return len(self.location)
+
+    @functools.lru_cache(maxsize=4)  # noqa: B019 (its few results live as long as it does)
+    def _tabulated(self, basis: Basis) -> tuple[Indices, Array, Array]:
+        return _rust.functions_at(self.location, basis)
+
+    def values(self, basis: Basis) -> sp.csr_matrix:
+        """The functions of a basis at the points, points x functions."""
+        numbers, values, _ = self._tabulated(basis)
+        return self._matrix(basis, numbers, values)
+
+    def slopes(self, basis: Basis) -> list[sp.csr_matrix]:
+        """Their derivatives along each axis [1/m], points x functions."""
+        numbers, _, gradients = self._tabulated(basis)
+        return [
+            self._matrix(basis, numbers, gradients[..., axis])
+            for axis in range(self.grid.space.dim)
+        ]
+
+    def _matrix(self, basis: Basis, numbers: Indices, values: Array) -> sp.csr_matrix:
+        count = int(np.prod([_rust.basis_len(basis, n) for n in self.grid.cells]))
+        start = np.arange(0, numbers.size + 1, numbers.shape[1])
+        entries = (np.ascontiguousarray(values).ravel(), numbers.ravel(), start)
+        return sp.csr_matrix(entries, shape=(len(numbers), count))
+
+
+def _nearest(grid: Grid, active: Mask, scaled: Array, where: str) -> Indices:
+    """The nearest active cell of each point, by its position along the axes.
+
+    Args:
+        grid: The grid.
+        active: Whether each cell holds particles, x fastest.
+        scaled: Positions [cells].
+        where: Name of the border, for messages.
+    """
+    most = np.array(grid.cells) - 1
+    dim = grid.space.dim
+    base = np.clip(np.floor(scaled), 0, most).astype(np.int64)
+    steps = lattice([np.arange(-REACH, REACH + 1)] * dim)
+    near = base[:, None] + steps
+    inside = ((near >= 0) & (near <= most)).all(axis=2)
+    held = inside & active[grid.cell_numbers(np.clip(near, 0, most))]
+    outside = np.maximum(np.maximum(near - scaled[:, None], scaled[:, None] - near - 1), 0.0)
+    distance = np.where(held, (outside**2).sum(axis=2), np.inf)
+    best = distance.argmin(axis=1)
+    lost = np.flatnonzero(~np.isfinite(distance.min(axis=1)))
+    if len(lost):
+        x = grid.in_metres(scaled[lost[0]])
+        place = ", ".join(f"{c:g}" for c in x)
+        raise SupportError(
+            f"{where}: {len(lost)} of {len(scaled)} points of the border in cells without particles are "
+            f"more than {REACH} cells from any particle, the first at ({place}) m: expected the border "
+            "of the body's particles"
+        )
+    return np.asarray(near[np.arange(len(near)), best])
