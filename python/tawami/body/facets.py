@@ -11,7 +11,7 @@ from tawami.base import text
 from tawami.base.arrays import Array, Indices
 from tawami.base.errors import GeometryWarning
 from tawami.base.warn import warn
-from tawami.body import clipping
+from tawami.body import clipping, elements
 from tawami.body.groups import PHYSICAL
 from tawami.border.pieces import Border
 from tawami.border.polyline import straight
@@ -50,7 +50,7 @@ def border(grid: Grid, read: Any, x: Array, blocks: Sequence[Indices]) -> Border
     groups = _line_groups(read) or _node_groups(read, sides)
     ends = grid.in_metres(scaled)
     whole = straight(ends[sides[:, 0]], ends[sides[:, 1]], _names(sides, groups))
-    return whole.outside(clipping.tolerance(scaled) * grid.h)
+    return whole.outside(2 * elements.DEEP * clipping.tolerance(scaled) * grid.h)
 
 
 def _sides(x: Array, block: Indices) -> Indices:
