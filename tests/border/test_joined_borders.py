@@ -98,6 +98,13 @@ def test_many_pieces():
     closed(body, 1e-5)
 
 
+def test_short_pieces_stay():
+    corners = [(0.3, 0.5), (2.1, 0.5), (2.1, 0.5 + 1e-7), (2.1, 1.4)]
+    border = tawami.polyline(corners)
+    assert border.outside().lengths == border.lengths
+    assert len(border.lengths) == 4
+
+
 def test_a_body_without_border():
     body = box((0.3, 0.5), (1.1, 1.0))
     x = np.array([[2.0, 2.0]])

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError
@@ -67,6 +66,8 @@ def _gaps(grid: Grid, ends: Array, starts: Array) -> Array:
     There are such where the border crosses a side of a square twice, which one of the two squares does
     not see.
     """
+    from scipy.optimize import linear_sum_assignment
+
     a, b = (x[~_on_edge(grid, x)] for x in (ends, starts))
     distance = np.linalg.norm(a[:, None] - b, axis=2)
     pairs = zip((a, b), linear_sum_assignment(distance), strict=True)

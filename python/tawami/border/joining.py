@@ -40,8 +40,9 @@ def free(curves: Curves, tolerance: float) -> tuple[Indices, Array, Array]:
     same = of[1:] == of[:-1]
     first, last = reached[:-1][same], low[1:][same]
     of = of[1:][same]
-    large = (last - first) * curves.length[of] > tolerance
-    return of[large], first[large], last[large]
+    kept = (last - first) * curves.length[of] > tolerance
+    kept |= (first == 0) & (last == 1)
+    return of[kept], first[kept], last[kept]
 
 
 def _near(curves: Curves, tolerance: float) -> tuple[Indices, Indices]:
