@@ -37,7 +37,8 @@ def test_gauss_points_on_slanted_pieces(count):
     assert abs(error) < 1e-9  # short parts have fewer points
     assert np.ptp(points.normal, axis=0) == pytest.approx(0, abs=1e-13)
     assert points.normal[0] @ (b - a) == pytest.approx(0, abs=1e-13)
-    assert np.cross(b - a, points.normal[0]) < 0  # on the right of the way
+    (dx, dy), (nx, ny) = b - a, points.normal[0]
+    assert dx * ny - dy * nx < 0  # on the right of the way
 
 
 @pytest.mark.parametrize("radius", [0.05, 0.17, 0.6, RADIUS])
@@ -190,7 +191,11 @@ def test_wrong_polylines(options, message):
     ):
         tawami.polyline(CORNERS[:2])
     with pytest.raises(tawami.InputError, match="its corners coincide"):
-        tawami.polyline([(1, 1)] * 3)
+        tawami.polyline([(1, 1)] * 3, closed=False)
+    with pytest.raises(tawami.InputError, match="its corners are on a line: expected an area"):
+        tawami.polyline([(1, 1), (2, 2), (3, 3)])
+    with pytest.raises(tawami.InputError, match="3 or more finite points"):
+        tawami.polyline([(1, 1), (2, np.inf), (3, 3)])
 
 
 def test_the_axis_is_no_border():

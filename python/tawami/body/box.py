@@ -80,7 +80,8 @@ def _of_full_cells(filling: Filling, cells: Array) -> Body:
 
 def _ends(grid: Grid, corners: Array) -> Array:
     """Lower and upper corner in cells, 2 x dim, on lines of the grid if they are near."""
-    ends = clipping.on_lines(grid, corners)
+    with np.errstate(over="ignore", invalid="ignore"):
+        ends = clipping.on_lines(grid, corners)
     for axis, name in enumerate(grid.space.axes):
         (low, high), (first, last) = corners[:, axis], ends[:, axis]
         if not low < high:
