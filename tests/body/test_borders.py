@@ -110,6 +110,21 @@ def test_a_circle_as_a_level_set(place):
     assert (points.normal * away).sum(axis=1).min() > 0.999
 
 
+def test_corners_of_a_level_set():
+    """They are rounded off in pieces; four chains and the corner of the first piece are left."""
+
+    def f(x, y):
+        a, b = turned((0, 0), 0.3, np.stack([x - 1.2, y - 1.4], axis=-1)).T
+        return np.maximum(abs(a), abs(b)) - 0.6
+
+    body = tawami.level_set(GRID, f)
+    points = check(body)
+    assert body.border.length.sum() == pytest.approx(4.8, rel=1e-4)
+    sides = np.bincount(points.chain, points.length)
+    assert sides[sides > 0.01] == pytest.approx(1.2, abs=0.02)
+    assert len(sides) in (4, 5)
+
+
 def test_level_sets_that_end_on_edges():
     """A slope, a strip, everything, and the outside of a circle around a corner, with the corner."""
     width, height = 3.4, 3.06

@@ -65,6 +65,28 @@ def chained(following: Indices) -> tuple[Indices, Indices]:
     return order, np.repeat(np.arange(len(chains)), [len(chain) for chain in chains])
 
 
+def without_short(
+    curves: Curves, tag: Indices, chain: Indices, least: float, tolerance: float
+) -> Indices:
+    """Numbers of chains, where short ones belong to the chain before if they follow it.
+
+    Args:
+        curves: The pieces in order.
+        tag: Number of the name of each; chains of different names stay apart.
+        chain: Number of the chain of each, in order.
+        least: Length below which a chain is short [m].
+        tolerance: Distance below which two positions are the same [m].
+    """
+    if not len(chain):
+        return chain
+    first = np.flatnonzero(np.diff(chain, prepend=-1))
+    before = np.maximum(first - 1, 0)
+    gap = np.linalg.norm(curves.start[first] - curves.end[before], axis=1)
+    follows = (first > 0) & (gap <= tolerance) & (tag[first] == tag[before])
+    short = np.add.reduceat(curves.length, first) < least
+    return np.asarray(np.cumsum(~(follows & short)) - 1)[chain]
+
+
 def _near(a: Array, b: Array, tolerance: float) -> tuple[Indices, Indices]:
     """Pairs of positions a and b (n x dim), with all pairs that are nearer than the tolerance.
 
