@@ -170,6 +170,7 @@ class FormInputs:
             values[name] = self._checked(name, factor.at(time), model)
         domain.assembly.attachment.change(values)
         domain.responses.refresh()
+        domain.assembly.refresh_border()
         if not self._is_checked:
             self._check_incompressible(domain)
             self._is_checked = True
