@@ -13,17 +13,16 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from petsc4py import PETSc
 
 from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array, Mask
-from tawami.base.petsc import Handles, aij
 from tawami.fem import dolfinx
 from tawami.fem.kernels import Kernel
 from tawami.fem.rules import Rule
 from tawami.field.attachment import Attachment
 from tawami.field.reduction import Reduction
+from tawami.field.sum import Sum
 from tawami.form.integral import Integral
 
 Side = tuple[tuple[int, int], tuple[int, int], tuple[str, str]]
@@ -61,9 +60,7 @@ class GhostPenalty:
         self._matrix: sp.csr_matrix | None = None
         #: Values of the constants and of the particle data in it.
         self._read = np.zeros(0)
-        #: The tangent whose sum with the penalty is in `_petsc`.
-        self._tangent: Any = None
-        self._petsc = Handles(self, attachment.grid.comm)
+        self._sum = Sum(self, attachment.grid.comm)
 
     def add_forces(self, forces: Array, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
         """Forces on all coefficients with those of the penalty.
@@ -82,21 +79,7 @@ class GhostPenalty:
         if penalty is None:
             return tangent
         with self._attachment.stopwatch("reduction"):
-            if self._tangent is tangent:
-                total = self._petsc["total"]
-                total.zeroEntries()
-                for part in (tangent, self._petsc["penalty"]):
-                    total.axpy(1.0, part, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-            else:
-                self._petsc.free("penalty", "total")
-                selection = reduction.selection
-                reduced = (selection.T @ penalty @ selection)[reduction.own]
-                comm = self._attachment.grid.comm
-                part = self._petsc["penalty"] = aij(comm, reduced, reduction.num_own)
-                total = self._petsc["total"] = tangent.copy()
-                total.axpy(1.0, part, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-                self._tangent = tangent
-        return total
+            return self._sum.of(tangent, penalty, reduction)
 
     def _on_all(self, data: Mapping[Rule, Array]) -> sp.csr_matrix | None:
         """G on all coefficients, the same on every rank; None without a penalty."""
@@ -111,7 +94,7 @@ class GhostPenalty:
         if ranks.any_of(self._attachment.grid.comm, changed)[0]:
             with self._attachment.stopwatch("set-up"):
                 self._matrix = self._assembled(integral, data["mean"])
-            self._read, self._tangent = read, None
+            self._read = read
         return self._matrix
 
     def _assembled(self, integral: Integral, data: Array) -> sp.csr_matrix:

@@ -174,6 +174,20 @@ class Reduction:
             return np.asarray(forces[self.unknowns])
         return np.asarray(np.bincount(columns, forces[rows], self.size), dtype=float)
 
+    def reduced(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
+        """This rank's rows of S^T A S, A on all coefficients.
+
+        Without point constraints its entries are in places that depend on those of A only, zeros too.
+        """
+        if self._places is None:
+            return (self._transposed @ matrix @ self.selection).tocsr()[self.own]
+        entries = matrix.tocoo()
+        row, column = self._number_of[entries.row], self._number_of[entries.col]
+        mine = (row >= self.own.start) & (row < self.own.stop) & (column >= 0)
+        shape = (self.num_own, self.size)
+        places = (row[mine] - self.own.start, column[mine])
+        return sp.coo_matrix((entries.data[mine], places), shape=shape).tocsr()
+
     def diagonal(self, masses: Array) -> Array | None:
         """The diagonal of S^T M S, M the diagonal matrix of masses of all coefficients.
 

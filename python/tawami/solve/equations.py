@@ -11,6 +11,7 @@ from tawami.field.reduction import Reduction
 from tawami.solve.inertia import Inertia
 from tawami.solve.iterate import Forces, Friction, Iterate
 from tawami.solve.path import Path
+from tawami.solve.terms import Terms
 
 #: Advice if a step does not converge.
 STATIC = (
@@ -31,6 +32,7 @@ class Equations:
         inertia: Inertia of a dynamic step.
         friction: Friction of the walls.
         path: Path on which the load factor is an unknown.
+        terms: Forces on the border that depend on the solution.
     """
 
     reduction: Reduction
@@ -38,6 +40,7 @@ class Equations:
     inertia: Inertia | None
     friction: Friction | None
     path: Path | None
+    terms: Terms | None = None
 
     def first(self, guess: Array | None) -> Iterate:
         """The first iterate, at increments of all fields or at zero."""
@@ -51,12 +54,14 @@ class Equations:
         external = self.external
         if self.path is not None:
             external = self.path.external(external, iterate.factor)
-        return iterate.forces(internal, external, self.friction)
+        border = None if self.terms is None else self.terms.forces(iterate.coefficients)
+        return iterate.forces(internal, external, self.friction, border)
 
     @property
     def at_rest(self) -> bool:
         """Whether it is a static step at a given load without friction, which may use a line search."""
-        return self.inertia is None and self.friction is None and self.path is None
+        smooth = self.friction is None and (self.terms is None or self.terms.smooth)
+        return self.inertia is None and smooth and self.path is None
 
     @property
     def advice(self) -> str:

@@ -22,6 +22,7 @@ class Forces:
     Attributes:
         internal: Of the stress, and the residual of the volume equation.
         external: Of the loads.
+        border: Of terms on the border that depend on the solution; None without any.
         inertia: Of a dynamic step.
         acceleration: Of each displacement coefficient at the end of a dynamic step [m/s2].
         reactions: Forces of supports and walls that would balance the others.
@@ -30,6 +31,7 @@ class Forces:
 
     internal: Array
     external: Array
+    border: Array | None
     inertia: Array | None
     acceleration: Array | None
     reactions: Array
@@ -81,15 +83,18 @@ class Iterate:
         """Take a share of the last change, in a static step at a given load."""
         self.coefficients = self._before + share * self._change
 
-    def forces(self, internal: Array, external: Array, friction: Friction | None) -> Forces:
+    def forces(
+        self, internal: Array, external: Array, friction: Friction | None, border: Array | None
+    ) -> Forces:
         """All forces at this iterate.
 
         Args:
             internal: Internal forces at :attr:`coefficients`.
             external: External forces.
             friction: Friction of the walls.
+            border: Forces on the border at :attr:`coefficients`.
         """
-        residual = internal - external
+        residual = internal - external if border is None else internal - external - border
         reactions, inertial, acceleration = residual, None, None
         if self._inertia is not None and self._deviation is not None:
             acceleration = self._inertia.acceleration(self._deviation)
@@ -101,4 +106,4 @@ class Iterate:
             n, space = self._layout.num_displacement, self._layout.grid.space
             residual = residual.copy()
             residual[:n] -= friction(space.vectors(reactions[:n])).ravel()
-        return Forces(internal, external, inertial, acceleration, reactions, residual)
+        return Forces(internal, external, border, inertial, acceleration, reactions, residual)

@@ -25,7 +25,7 @@ from tawami.base.arrays import Array
 from tawami.field.assembly import Assembly
 from tawami.field.reduction import Reduction
 from tawami.particles.responses import Responses
-from tawami.solve.inertia import Inertia
+from tawami.solve.equations import Equations
 from tawami.solve.iterate import Forces
 
 #: Measures of momentum and volume, and with fields without a role the largest of theirs; the second is
@@ -77,6 +77,16 @@ def forcing(history: History, tolerance: float) -> float:
     return min(max(0.1 * rate**2, min(0.1 * tolerance / now, 1e-3)), 1e-3)
 
 
+def diagonal_of(tangent: Any, reduction: Reduction) -> Array:
+    """Sizes of the diagonal of a reduced tangent, on all coefficients; a collective call."""
+    vector = tangent.getDiagonal()
+    diagonal = ranks.allgathered(reduction.layout.grid.comm, vector.array)
+    vector.destroy()
+    on_all = np.zeros(reduction.layout.size)
+    on_all[reduction.unknowns] = np.abs(diagonal)
+    return on_all
+
+
 class Measures:
     """Measures of the residuals of one step after another.
 
@@ -116,26 +126,21 @@ class Measures:
             forces = internal(np.zeros(self._layout.size))
             self._at_start = float(np.linalg.norm(forces[: self._layout.num_displacement]))
 
-    def of(
-        self, forces: Forces, coefficients: Array, reduction: Reduction, inertia: Inertia | None
-    ) -> Measured:
+    def of(self, forces: Forces, coefficients: Array, equations: Equations) -> Measured:
         """Measures of the residuals, the same on all ranks; a collective call.
 
         Args:
             forces: Forces at the increments.
             coefficients: The increments.
-            reduction: Unknowns of the step.
-            inertia: Inertia of a dynamic step.
+            equations: The equations of the step.
         """
-        n = self._layout.num_displacement
+        n, reduction = self._layout.num_displacement, equations.reduction
         free = reduction.restricted(forces.residual)
         of_u = reduction.of_displacement
         parts = [forces.internal, forces.external]
-        parts += [] if forces.inertia is None else [forces.inertia]
+        parts += [part for part in (forces.border, forces.inertia) if part is not None]
         scale = max(self._at_start, *(norm(part[:n]) for part in parts))
-        at_rest = not forces.external.any() and self._is_at_rest(
-            scale, coefficients[:n], reduction.offset[:n], inertia
-        )
+        at_rest = not forces.external.any() and self._is_at_rest(scale, coefficients[:n], equations)
         momentum = 0.0 if at_rest or scale == 0 else norm(free[of_u]) / scale
         volume = None
         if self._responses.form.kinematics.has_mean_stress:
@@ -156,11 +161,7 @@ class Measures:
     def observe(self, tangent: Any, reduction: Reduction) -> None:
         """Keep what the measures need of a tangent that is not scaled yet; a collective call."""
         if self._own:
-            vector = tangent.getDiagonal()
-            diagonal = ranks.allgathered(self._comm, vector.array)
-            vector.destroy()
-            self._diagonal = np.zeros(self._layout.size)
-            self._diagonal[reduction.unknowns] = np.abs(diagonal)
+            self._diagonal = diagonal_of(tangent, reduction)
 
     def _of_fields(
         self, free: Array, forces: Forces, coefficients: Array, reduction: Reduction
@@ -178,14 +179,18 @@ class Measures:
             measures[name] = residual / scale if scale > 0 else residual
         return measures
 
-    def _is_at_rest(self, scale: float, u: Array, offset: Array, inertia: Inertia | None) -> bool:
+    def _is_at_rest(self, scale: float, u: Array, equations: Equations) -> bool:
         """Whether forces without a load are round-off.
 
         This holds for the forces of a body that supports move rigidly, or that moves freely, and for
         those of the rest of a stress. It does not hold for a small load, nor for the forces of an
         iterate that went farther than supports and velocities take the body.
         """
-        distance = prescribed = float(np.abs(offset).max())
+        offset, inertia = equations.reduction.offset[: len(u)], equations.inertia
+        prescribed = float(np.abs(offset).max())
+        if equations.terms is not None:
+            prescribed = max(prescribed, equations.terms.prescribed)
+        distance = prescribed
         if inertia is not None:
             distance = max(prescribed, float(np.abs(inertia.coasting).max(initial=0.0)))
         grid = self._layout.grid

@@ -28,10 +28,11 @@ from tawami.solve.iterate import Forces, Friction, Iterate
 from tawami.solve.iterative import IterativeSolver
 from tawami.solve.line_search import LineSearch
 from tawami.solve.linear_solver import LinearSolver
-from tawami.solve.measures import History, Measured, Measures, forcing, worst
+from tawami.solve.measures import History, Measured, Measures, diagonal_of, forcing, worst
 from tawami.solve.numerics import Numerics
 from tawami.solve.path import Path
 from tawami.solve.scaling import Scaling
+from tawami.solve.terms import Terms
 
 #: Tolerance of linear solves along a path, whose first residual may be zero.
 ON_PATH = 1e-8
@@ -155,6 +156,7 @@ class Newton:
         friction: Friction | None = None,
         path: Path | None = None,
         values: Array | None = None,
+        terms: Terms | None = None,
     ) -> Converged:
         """Solve for the increments that balance the external forces.
 
@@ -167,6 +169,7 @@ class Newton:
             path: Path on which the load factor is an unknown.
             values: Values of the fields at the beginning, on all coefficients; zero by default. Those
                 of fields without a role tell how large round-off is.
+            terms: Forces on the border that depend on the solution.
 
         Raises:
             ConvergenceError: Newton did not reach the tolerance within `max_iterations`, or the
@@ -177,7 +180,9 @@ class Newton:
         clean_up(self._comm)
         self._stopwatch.start()
         self._measures.begin(self.internal if inertia is None else None, values)
-        equations = Equations(reduction, external, inertia, friction, path)
+        equations = Equations(reduction, external, inertia, friction, path, terms)
+        if terms is not None:
+            terms.begin(functools.partial(self._diagonal, reduction))
         iterate, history, krylov = equations.first(guess), History(), list[int]()
         add_mass = None if inertia is None else inertia.adder(reduction)
         search: LineSearch | None = None
@@ -196,7 +201,12 @@ class Newton:
             if not np.isfinite(worst(measured)):
                 self._fail(history, f"A number is infinite or undefined. {equations.advice}")
             met = path is None or path.control.is_met(iterate.u)
-            if worst(measured) < self.numerics.tolerance and met:
+            converged = worst(measured) < self.numerics.tolerance and met
+            if converged and terms is not None and terms.improve():
+                forces, measured = self._evaluate(iterate, equations)
+                history[-1] = measured
+                converged = worst(measured) < self.numerics.tolerance
+            if converged:
                 tally.steps += 1
                 return Converged(
                     iterate.coefficients, forces.acceleration, forces.reactions, history, krylov,
@@ -218,9 +228,7 @@ class Newton:
         internal = self.internal(iterate.coefficients)
         forces = equations.forces(iterate, internal)
         with self._stopwatch("measures"):
-            measured = self._measures.of(
-                forces, iterate.coefficients, equations.reduction, equations.inertia
-            )
+            measured = self._measures.of(forces, iterate.coefficients, equations)
         return forces, measured
 
     def _shortened(
@@ -258,6 +266,9 @@ class Newton:
         tangent = self._assembly.tangent(iterate.coefficients, data, reduction)
         if add_mass is not None:
             add_mass(tangent)
+        if equations.terms is not None:
+            with self._stopwatch("reduction"):
+                tangent = equations.terms.add_tangent(tangent, reduction)
         if self._stored is not None:
             self._restore(tangent, reduction)
         self._measures.observe(tangent, reduction)
@@ -302,6 +313,13 @@ class Newton:
         if layout.volumetric is not None:
             signs[layout.volumetric.slice] = -1.0
         return signs
+
+    def _diagonal(self, reduction: Reduction) -> Array:
+        """Diagonal of the tangent at the start of a step, on all coefficients."""
+        size = self._assembly.layout.size
+        self.internal(np.zeros(size))
+        tangent = self._assembly.tangent(np.zeros(size), self._responses.data, reduction)
+        return diagonal_of(tangent, reduction)
 
     def _on_all(self, reduction: Reduction, unknowns: Array) -> Array:
         """All coefficients from this rank's unknowns."""

@@ -1,0 +1,62 @@
+"""The sum of a reduced tangent and a sparse matrix that is the same on every rank."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from petsc4py import PETSc
+
+from tawami.base import ranks
+from tawami.base.petsc import Handles, aij
+from tawami.field.reduction import Reduction
+
+
+class Sum:
+    """Adds S^T A S to reduced tangents, A a matrix on all coefficients.
+
+    Args:
+        owner: The object whose life ends that of the PETSc matrices.
+        comm: Communicator.
+    """
+
+    def __init__(self, owner: Any, comm: Any) -> None:
+        self._comm, self._petsc = comm, Handles(owner, comm)
+        #: What is in `_petsc`: the sum for this tangent and this matrix, whose rows are reduced.
+        self._tangent: Any = None
+        self._matrix: sp.csr_matrix | None = None
+        self._rows: sp.csr_matrix | None = None
+
+    def of(self, tangent: Any, matrix: sp.csr_matrix, reduction: Reduction) -> Any:
+        """The sum: the same object as long as the tangent is the same and the matrix has its pattern.
+
+        Args:
+            tangent: A reduced tangent.
+            matrix: A, the same on every rank. If its values change it must be another object.
+            reduction: S.
+        """
+        known, same = self._petsc, self._tangent is tangent
+        if not same or self._matrix is not matrix:
+            rows = reduction.reduced(matrix)
+            differs = not (same and _same_places(self._rows, rows))
+            same = not ranks.any_of(self._comm, np.array([differs]))[0]
+            known.free("part")
+            known["part"], self._rows = aij(self._comm, rows, reduction.num_own), rows
+        if same:
+            known["total"].zeroEntries()
+            for part in (tangent, known["part"]):
+                known["total"].axpy(1.0, part, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        else:
+            known.free("total")
+            known["total"] = tangent.copy()
+            known["total"].axpy(1.0, known["part"], PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        self._tangent, self._matrix = tangent, matrix
+        return known["total"]
+
+
+def _same_places(a: sp.csr_matrix | None, b: sp.csr_matrix) -> bool:
+    """Whether two matrices have entries in the same places."""
+    if a is None or a.nnz != b.nnz:
+        return False
+    return np.array_equal(a.indptr, b.indptr) and np.array_equal(a.indices, b.indices)
