@@ -36,6 +36,8 @@ from tawami.body.disc import disc
 from tawami.body.level_set import level_set
 from tawami.body.mesh import mesh
 from tawami.body.polygon import polygon
+from tawami.border.pieces import Border
+from tawami.border.polyline import polyline
 from tawami.check.form_check import check_form
 from tawami.check.report import FormReport
 from tawami.form.form import Form
@@ -67,6 +69,7 @@ from tawami.study import Series, Study, recommend
 
 __all__ = [
     "Body",
+    "Border",
     "CheckpointError",
     "CheckpointWarning",
     "ConvergenceError",
@@ -124,6 +127,7 @@ __all__ = [
     "neo_hookean",
     "plot",
     "polygon",
+    "polyline",
     "ramp",
     "recommend",
     "run",

@@ -13,6 +13,7 @@ from tawami.base import checks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.space import PLANE, Counts, Position
+from tawami.border.pieces import Border
 
 #: Share of a cell by which two bodies may overlap in it.
 ROUNDING = 1e-3
@@ -23,7 +24,8 @@ class Body:
     """Positions and volumes of the particles of a body.
 
     `one + other` is a body with the particles of both, in this order, and with the groups of both;
-    groups of the same name become one. `sum([...])` joins several.
+    groups of the same name become one. `sum([...])` joins several. Parts of the border that both have
+    in common are inside of it. It has no border if one of them has none.
 
     Attributes:
         x: Positions [m], particles x 2.
@@ -33,6 +35,8 @@ class Body:
         names: Names of the materials, in the order of their numbers. Empty: they have no names.
         lattice: Origin [m], side of a cell [m] and numbers of cells of the grid that it was made for.
             None: unknown.
+        border: The border of the body, with the names of its parts. None: unknown, as for loose
+            particles; `polyline` makes one.
     """
 
     x: Array
@@ -40,6 +44,7 @@ class Body:
     material_of: npt.NDArray[np.uint32] | None = None
     names: tuple[str, ...] = ()
     lattice: tuple[Position, float, Counts] | None = field(default=None, repr=False)
+    border: Border | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         materials = f", materials {', '.join(self.names)}" if self.names else ""
@@ -81,7 +86,8 @@ class Body:
             _check_apart(one, others, *self.lattice)
         names, number = _groups(self, other)
         x, volume = (np.concatenate(arrays) for arrays in zip(one, others, strict=True))
-        return Body(x, volume, number, names, lattice)
+        border = self.border and other.border and self.border.joined(other.border)
+        return Body(x, volume, number, names, lattice, border)
 
     def __radd__(self, other: Literal[0]) -> Body:
         """Join bodies with `sum([...])`, which begins with 0."""

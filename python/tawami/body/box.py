@@ -7,13 +7,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tawami.base.arrays import Indices
+from tawami.base.arrays import Array
 from tawami.base.checks import point
 from tawami.base.errors import InputError
 from tawami.base.space import lattice, tensor_product
+from tawami.body import clipping
 from tawami.body.body import Body
 from tawami.body.filling import PER_AXIS, Filling
+from tawami.body.points import in_boxes
+from tawami.border.pieces import Border
+from tawami.border.polyline import straight
 from tawami.grid.grid import Grid
+
+#: Corners of a box, lower 0 and upper 1 along each axis, counter-clockwise.
+AROUND = ((0, 0), (1, 0), (1, 1), (0, 1))
 
 
 def box(
@@ -24,44 +31,78 @@ def box(
     per_axis: int = PER_AXIS,
     gauss: bool = False,
 ) -> Body:
-    """A rectangle filled with `per_axis` x `per_axis` particles in every cell of the grid.
+    """A rectangle filled with particles; its sides may cut cells of the grid.
 
-    The sides must lie on lines of the grid, so that every cell is full or empty.
+    A full cell gets `per_axis` x `per_axis` particles. The part of a cut cell gets 16 at the Gauss
+    points, which are exact up to degree 6. The area is exact, but a side within 1e-6 of a line of the
+    grid, in units of a cell or of the size of the box, whichever is larger, is moved onto this line.
+    The sides of its border are 'left', 'right', 'bottom' and 'top'.
 
     Args:
         grid: The grid.
         lower: Lower left corner [m].
         upper: Upper right corner [m].
-        per_axis: Particles per cell and axis.
-        gauss: Place the particles at the Gauss points with the Gauss weights. By default they are
-            evenly spaced and have equal volumes.
+        per_axis: Particles per full cell and axis.
+        gauss: Place the particles of full cells at the Gauss points with the Gauss weights. By default
+            they are evenly spaced and have equal volumes.
 
     Raises:
-        InputError: A side is not on a line of the grid or is outside the grid, or the box is empty.
+        InputError: A side is outside the grid, or the box is empty.
     """
     filling = Filling("box", grid, per_axis, gauss)
     lower, upper = point("lower", lower), point("upper", upper)
-    cells = [_cells(grid, axis, lower[axis], upper[axis]) for axis in range(grid.space.dim)]
-    filling.check_memory(math.prod(map(len, cells)))
-    along = [(cell[:, None] + filling.points).ravel() for cell in cells]
-    lengths = [np.tile(filling.weights * grid.h, len(cell)) for cell in cells]
-    volume = tensor_product(lengths)
-    return Body(grid.in_metres(lattice(along)), volume, lattice=grid.lattice)
+    cells = [grid.cells_between(axis, lower[axis], upper[axis]) for axis in range(grid.space.dim)]
+    on_lines = [found for found in cells if found is not None and found[0] < found[1]]
+    if len(on_lines) == len(cells):
+        return _of_full_cells(filling, np.array(on_lines))
+    ends = _ends(grid, np.array([lower, upper]))
+    # along each axis, the ends of the box and the lines of the grid between them
+    cuts = [np.unique([low, *np.arange(np.ceil(low), high), high]) for low, high in ends.T]
+    filling.check_memory(math.prod(len(cut) - 1 for cut in cuts))
+    low, high = lattice([cut[:-1] for cut in cuts]), lattice([cut[1:] for cut in cuts])
+    full = (high - low == 1).all(axis=1)
+    cell = grid.cell_numbers(grid.cell_at((low + high) / 2))
+    cut = in_boxes(low[~full], high[~full], cell[~full])
+    return filling.body(cell[full], cut, border=_border(grid, ends))
 
 
-def _cells(grid: Grid, axis: int, low: float, high: float) -> Indices:
-    """Cells of the box along an axis."""
-    name = grid.space.axes[axis]
-    found = grid.cells_between(axis, low, high)
-    if found is None:
-        raise InputError(
-            f"box: its {name} range [{low:g}, {high:g}] m must lie on lines of the grid (every "
-            f"{grid.h:g} m from {grid.origin[axis]:g} to {grid.upper[axis]:g}); change h or the box"
-        )
-    first, last = found
-    if last <= first:
-        raise InputError(
-            f"box: its {name} range [{low:g}, {high:g}] m holds no cell, so the body has no "
-            "particles: expected lower < upper"
-        )
-    return np.arange(first, last)
+def _of_full_cells(filling: Filling, cells: Array) -> Body:
+    """A box of full cells, given the first and the last line along each axis, dim x 2."""
+    grid = filling.grid
+    filling.check_memory(math.prod(cells[:, 1] - cells[:, 0]))
+    along = [(np.arange(*ends)[:, None] + filling.points).ravel() for ends in cells]
+    volume = tensor_product(
+        [np.tile(filling.weights * grid.h, last - first) for first, last in cells]
+    )
+    border = _border(grid, cells.T)
+    return Body(grid.in_metres(lattice(along)), volume, lattice=grid.lattice, border=border)
+
+
+def _ends(grid: Grid, corners: Array) -> Array:
+    """Lower and upper corner in cells, 2 x dim, on lines of the grid if they are near."""
+    for name, (low, high) in zip(grid.space.axes, corners.T, strict=True):
+        if not low < high:
+            raise InputError(
+                f"box: its {name} range [{low:g}, {high:g}] m is empty, so the body has no particles: "
+                "expected lower < upper"
+            )
+    ends = clipping.on_lines(grid, corners)
+    for axis, name in enumerate(grid.space.axes):
+        low, high = ends[:, axis]
+        here = f"box: its {name} range [{corners[0, axis]:g}, {corners[1, axis]:g}] m"
+        if low < 0 or high > grid.cells[axis]:
+            raise InputError(
+                f"{here} leaves the grid, {grid.extent}; enlarge the grid or move the box"
+            )
+        if low == high:
+            raise InputError(
+                f"{here} is round-off on cells of {grid.h:g} m, so the body has no particles: expected "
+                "a wider box"
+            )
+    return ends
+
+
+def _border(grid: Grid, ends: Array) -> Border:
+    """The border of a box, given its lower and upper corner in cells, 2 x dim."""
+    corner = grid.in_metres(np.array([[ends[i, 0], ends[j, 1]] for i, j in AROUND]))
+    return straight(corner, np.roll(corner, -1, axis=0), ("bottom", "right", "top", "left"))

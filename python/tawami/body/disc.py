@@ -14,12 +14,15 @@ from tawami.body import clipping
 from tawami.body.body import Body
 from tawami.body.filling import PER_AXIS, Filling
 from tawami.body.points import ROUND_OFF, Points, halves, in_triangles, joined
+from tawami.border.pieces import Border
 from tawami.grid.grid import Grid
 
 #: Least number of chords around a circle.
 CHORDS = 32
 #: Gauss points along an arc, and between an arc and its chord: moments are exact to round-off.
 ALONG, ACROSS = 8, 4
+#: Directions of the ends of quarters of a circle, counter-clockwise.
+COMPASS = ((1, 0), (0, 1), (-1, 0), (0, -1))
 #: Two ends of arcs that are nearer than this [rad] are the same.
 ONE_ANGLE = 1e-11
 
@@ -40,6 +43,8 @@ def disc(
     exactly over its part of the disc up to degree 6. Area and first moments are those of the circle to
     1e-12. Second moments are too if `gauss` is set and `per_axis` is at least 2. With evenly spaced
     particles they are too small by h^2 / (12 per_axis^2) times the area of the full cells.
+
+    Its border is 'outer', and 'inner' for a ring.
 
     Args:
         grid: The grid.
@@ -74,9 +79,10 @@ def disc(
     # The chords of the outer circle must not cross the inner one.
     chords = max(CHORDS, int(np.ceil(2 * np.pi / np.sqrt(1 - hole / r))))
     border, caps = _circle(grid, middle, r, chords)
+    arcs = _border(grid, middle, {"outer": r, "inner": hole})
     if hole == 0.0:
         full, triangles, cell = clipping.clipped(grid, shapely.Polygon(border))
-        return filling.body(full, joined([in_triangles(triangles, cell), caps]))
+        return filling.body(full, joined([in_triangles(triangles, cell), caps]), border=arcs)
     inner_border, removed = _circle(grid, middle, hole, chords)
     clipped = clipping.clipped(grid, shapely.Polygon(border, [inner_border]))
     full, triangles, cell = _refined(grid, *clipped, removed.cell)
@@ -86,7 +92,26 @@ def disc(
         return np.asarray(np.hypot(*(x - middle).T) >= hole)
 
     cut = joined([in_triangles(triangles, cell), caps, removed])
-    return filling.body(full, cut, allowed=outside_hole)
+    return filling.body(full, cut, border=arcs, allowed=outside_hole)
+
+
+def _border(grid: Grid, middle: Array, radii: dict[str, float]) -> Border:
+    """Quarters of circles by name, right of the axis of axisymmetry if that is in the middle.
+
+    The first circle has the body inside, the others are holes; those with a radius of 0 are left out.
+    """
+    half = grid.on_axis and middle[0] == 0
+    corner = np.array([(0, -1), (1, 0), (0, 1)] if half else [*COMPASS, COMPASS[0]])
+    start, end, curvature, tag = [], [], [], []
+    names = [name for name, radius in radii.items() if radius > 0]
+    for k, name in enumerate(names):
+        x = grid.in_metres(middle + radii[name] * (corner if k == 0 else corner[::-1]))
+        start.append(x[:-1])
+        end.append(x[1:])
+        curvature.append(np.full(len(x) - 1, (1 if k == 0 else -1) / (radii[name] * grid.h)))
+        tag.append(np.full(len(x) - 1, k))
+    first, last, bent = (np.concatenate(part) for part in (start, end, curvature))
+    return Border(first, last, bent, np.concatenate(tag), tuple(names))
 
 
 def _circle(grid: Grid, middle: Array, r: float, chords: int) -> tuple[Array, Points]:

@@ -20,6 +20,7 @@ from tawami.base.space import lattice, tensor_product
 from tawami.body.body import Body
 from tawami.body.moment_fitting import fewer
 from tawami.body.points import ROUND_OFF, Points, joined
+from tawami.border.pieces import Border
 from tawami.grid.grid import Grid
 
 #: Default number of particles per cell and axis. With 2 the sums over cells are less exact: the error
@@ -96,6 +97,7 @@ class Filling:
         *,
         material: Indices | None = None,
         names: tuple[str, ...] | None = None,
+        border: Border | None = None,
         allowed: Callable[[Array], Mask] | None = None,
     ) -> Body:
         """The particles of full and of cut cells.
@@ -105,6 +107,7 @@ class Filling:
             cut: Points that integrate over parts of cells.
             material: Number of the material of each full cell.
             names: Names of the materials; None for a body of one material.
+            border: The border of the body.
             allowed: Tells which positions (n x dim) are inside the shape; by default all are.
 
         Raises:
@@ -119,7 +122,7 @@ class Filling:
             self.grid.space.measure(self.grid.h) * parts.weight,
         )
         number = None if names is None else parts.material.astype(np.uint32)
-        return Body(x, volume, number, names or (), self.grid.lattice)
+        return Body(x, volume, number, names or (), self.grid.lattice, border)
 
     def _thinned(
         self, points: Points, full: int, allowed: Callable[[Array], Mask] | None

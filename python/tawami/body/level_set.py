@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import reduce
 
 import numpy as np
@@ -15,6 +16,7 @@ from tawami.base.space import lattice
 from tawami.body.body import Body
 from tawami.body.border_squares import Signs, Squares, merged, triangulated
 from tawami.body.filling import PER_AXIS, Filling
+from tawami.body.outline import outline
 from tawami.body.points import ROUND_OFF, areas, in_boxes, in_triangles, joined
 from tawami.grid.grid import EDGES, Edge, Grid
 
@@ -73,6 +75,7 @@ def level_set(
     f: Callable[[Array, Array], npt.ArrayLike],
     *,
     ends: Sequence[Edge] = (),
+    name: str = "border",
     tolerance: float = 1e-6,
     samples: int = 8,
     per_axis: int = PER_AXIS,
@@ -94,6 +97,7 @@ def level_set(
         f: A function on arrays of x and y [m].
         ends: Edges of the grid ('left', 'right', 'bottom', 'top') where the body may end, so that f
             may be negative there.
+        name: Name of the border. The parts on edges of the grid have the names of these.
         tolerance: Error of the area, relative to the area, estimated from the last division; 1e-13 at
             least.
         samples: Samples per cell and axis.
@@ -106,6 +110,10 @@ def level_set(
     """
     filling = Filling("level_set", grid, per_axis, gauss)
     tolerance = number("tolerance", tolerance, low=1e-13, high=0.1)
+    if not isinstance(name, str) or not name or name in EDGES:
+        raise InputError(
+            f"level_set: name = {shown(name)}: expected a name, and no edge of the grid"
+        )
     ended = names("ends", ends, EDGES)
     samples, sign = whole_number("samples", samples, low=2), Function(grid, f)
     nx, ny = (n * samples for n in grid.cells)
@@ -126,8 +134,9 @@ def level_set(
     at = np.stack([corner[border] for corner in corners], axis=-1)
     squares = Squares(np.argwhere(border)[:, ::-1] / samples, 1 / samples, at)
     area = np.count_nonzero(inside) / samples**2
-    triangles, whole = triangulated(sign, squares, area, tolerance)
-    return _filled(filling, inside, triangles, whole, samples)
+    triangles, whole, pieces = triangulated(sign, squares, area, tolerance)
+    body = _filled(filling, inside, triangles, whole, samples)
+    return replace(body, border=outline(grid, pieces, name, bool(signs[0, 0] < 0)))
 
 
 def _grown(mask: Mask) -> Mask:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +15,8 @@ from tawami.body import clipping
 from tawami.body.body import Body
 from tawami.body.filling import PER_AXIS, Filling
 from tawami.body.points import ROUND_OFF, in_triangles
+from tawami.border.pieces import Border
+from tawami.border.polyline import SideNames, oriented, side_names, straight, unclosed
 from tawami.grid.grid import Grid
 
 if TYPE_CHECKING:
@@ -26,6 +28,7 @@ def polygon(
     shape: npt.ArrayLike | shapely.Polygon | shapely.MultiPolygon,
     *,
     holes: Sequence[npt.ArrayLike] = (),
+    names: SideNames = None,
     per_axis: int = PER_AXIS,
     gauss: bool = False,
 ) -> Body:
@@ -38,11 +41,17 @@ def polygon(
     moved onto this line, if it is nearer than 1e-6 of the polygon's size or of a cell, whichever is
     larger. Sides may cross by as little as this. Parts may touch, and a hole may touch the border.
 
+    The sides of its border are '0', '1', ... in the order of the corners: side k goes from corner k to
+    the next one. The sides of the holes have the numbers after these. In geometries of shapely the
+    order is that of their coordinates.
+
     Args:
         grid: The grid.
         shape: Corners [m] in order, n x 2, in either orientation; or a Polygon or MultiPolygon of
             shapely with its holes, for example the result of a union or of `buffer`.
         holes: Corners [m] of each hole, if the polygon is given by its corners.
+        names: Names of sides: one for each side of the outer border, in order, or a mapping from numbers
+            of sides to names.
         per_axis: Particles per full cell and axis.
         gauss: Place the particles of full cells at the Gauss points with the Gauss weights.
 
@@ -50,10 +59,39 @@ def polygon(
         InputError: The polygon has fewer than three vertices or no area, its sides cross, a hole is not
             inside it, or a vertex is outside the grid.
     """
+    import shapely
+
     filling = Filling("polygon", grid, per_axis, gauss)
-    valid = _valid(grid, _geometry(grid, shape, holes))
+    geometry = _geometry(grid, shape, holes)
+    valid = _valid(grid, geometry)
+    border = _border(grid, geometry, names)
+    if valid is not geometry:  # sides touch, and are inside where they do
+        border = border.outside(clipping.tolerance(shapely.get_coordinates(geometry)) * grid.h)
     full, triangles, cell = clipping.clipped(grid, valid)
-    return filling.body(full, in_triangles(triangles, cell))
+    return filling.body(full, in_triangles(triangles, cell), border=border)
+
+
+def _border(grid: Grid, shape: Any, names: SideNames) -> Border:
+    """The sides of a polygon in cells."""
+    import shapely
+
+    rings = []
+    for part in shapely.get_parts(shape):
+        loops = [part.exterior, *part.interiors]
+        rings += [(unclosed(shapely.get_coordinates(loop)), k > 0) for k, loop in enumerate(loops)]
+    count = [len(x) for x, _ in rings]
+    given = names if isinstance(names, Mapping | str) or names is None else None
+    all_names = side_names("polygon", given, sum(count))
+    if given is not names:
+        all_names[: count[0]] = side_names("polygon", names, count[0])
+    first = np.cumsum(count) - count
+    start, end, name = list[Array](), list[Array](), list[str]()
+    for (x, hole), k, n in zip(rings, first, count, strict=True):
+        one, other, named = oriented(grid.in_metres(x), all_names[k : k + n], hole)
+        start.append(one)
+        end.append(other)
+        name.extend(named)
+    return straight(np.concatenate(start), np.concatenate(end), name, all_names)
 
 
 def _geometry(grid: Grid, shape: Any, holes: Sequence[npt.ArrayLike]) -> Any:
