@@ -38,6 +38,9 @@ class BorderTerms:
         carried: Numbers of the points by name, which replace those of the nearest particle. 'old u[0]'
             is the x component of the displacement since the start of the scene.
 
+    Attributes:
+        cells: The points in the cells of the grid.
+
     Raises:
         InputError: The border lacks a part that the form names, or a number that it reads.
         SupportError: The border is away from all particles.
@@ -54,7 +57,8 @@ class BorderTerms:
         self._read = attachment.compiled.border_data
         grid, terms = attachment.grid, attachment.compiled.border
         parts = [parts_of(points, term.on, self._form.name) for term in terms]
-        cells = BorderInCells(grid, attachment.active, points.x, points.normal).location
+        self.cells = BorderInCells(grid, attachment.active, points.x, points.normal)
+        cells = self.cells.location
         mine = np.isin(cells.cell, attachment.location.active)
         self._points, self._particles, self._carried = points, particles, carried
         self._nearest = _nearest(attachment.location, cells, mine)
@@ -104,7 +108,7 @@ class BorderTerms:
                 "points of the border"
             )
         else:
-            found[mine] = self._particles[name][self._nearest[mine]]
+            found[mine] = self._of_particles(name, mine)
         bad = np.flatnonzero(mine & ~np.isfinite(found))
         if len(bad) and not (name == "K" and self._form.kinematics.deviatoric):
             place = ", ".join(f"{c:g}" for c in points.x[bad[0]])
@@ -113,6 +117,16 @@ class BorderTerms:
                 "border: expected a finite number"
             )
         return found
+
+    def _of_particles(self, name: str, mine: Mask) -> Array:
+        """A number of the nearest particles; an old field at the points themselves, by its gradient."""
+        nearest, particles = self._nearest[mine], self._particles
+        values = np.array(particles[name][nearest])
+        if name.startswith("old ") and name.removeprefix("old ") in self._form.own_fields:
+            for axis, letter in enumerate(self.cells.grid.space.axes):
+                way = self._points.x[mine, axis] - particles[f"x[{axis}]"][nearest]
+                values += way * particles[f"{name},{letter}"][nearest]
+        return values
 
     def add_vector(self, vector: Array, coefficients: Array, *, absolute: bool) -> Array:
         """A vector on all coefficients plus that of this rank's points; a collective call.

@@ -73,6 +73,18 @@ class CompiledForm:
         with tally.compiling():
             return None if self.edges is None else self.edges()
 
+    @property
+    def may_hold(self) -> bool:
+        """Whether sums over the border may hold the body, as an elastic foundation does."""
+        first = range(next(iter(self.form.fields.values())).components)
+        points = [one.points[1] for term in self.border for one in term.tangent if one.points]
+        return any(
+            all(
+                any(component in first for component, _ in entries) for entries in (p.test, p.trial)
+            )
+            for p in points
+        )
+
     def columns(self, rule: Rule) -> int:
         """Number of columns of the particle data of a rule."""
         return sum(density.size for density in self.densities[rule])

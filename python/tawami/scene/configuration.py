@@ -24,6 +24,7 @@ from tawami.base.timing import Stopwatch
 from tawami.particles import placement
 from tawami.scene import coverage, mean_stress, own_fields, quantities, strain_limit
 from tawami.scene.activity import Activity
+from tawami.scene.border_sums import BorderSums
 from tawami.scene.domain import Domain
 from tawami.scene.form_inputs import FormInputs
 from tawami.scene.loads import Loads
@@ -90,12 +91,13 @@ class Configuration:
             mine.add_eps_v()
         mine.add_strain(model.moves, model.grid.geometry)
         own_fields.carry(model.form, mine, model.space.dim)
+        self.border_sums = BorderSums(model, lambda: self.total)
         self._attach(mine, location)
         self.activity = Activity()
         self.supports = Supports(model.grid, model.basis, model.form.own_fields, self.activity)
         self.loads = Loads(model.grid, np.array(particles.volume), self.activity)
         self.total = np.zeros(self.domain.layout.size)
-        self.inputs = FormInputs(model, self.activity.time)
+        self.inputs = FormInputs(model, self.activity.time, self.border_sums)
         self.inputs.begin(model, self.domain)
         self.left, self.removed = list[tuple[int, tuple[float, float], float]](), np.zeros(2)
         self.begun = self._coverage_checked = False
@@ -106,6 +108,7 @@ class Configuration:
         earlier: Domain | None = getattr(self, "domain", None)
         of = self.model, particles, location, self.numerics, self.stopwatch
         self.domain = Domain.attach(*of, earlier)
+        self.border_sums.attach(self.domain)
 
     @property
     def before(self) -> Array:

@@ -22,6 +22,7 @@ from tawami.base.space import Space
 from tawami.base.warn import warn
 from tawami.body import rings
 from tawami.body.body import Body
+from tawami.border.pieces import Border
 from tawami.form.compilation import CompiledForm, check_used, compile_form
 from tawami.form.form import Form
 from tawami.form.symbols import Assembly
@@ -63,6 +64,7 @@ class Model:
         names: Name of the group of each material; empty if the body has no names.
         leaving: 'stop' or 'remove', for particles that leave the grid.
         num_particles: Particles of the body, on all ranks.
+        border: The border of the body; None if it has none.
     """
 
     grid: Grid
@@ -79,6 +81,7 @@ class Model:
     names: tuple[str, ...]
     leaving: Leaving
     num_particles: int
+    border: Border | None
 
     @property
     def space(self) -> Space:
@@ -213,6 +216,7 @@ def build(
         grid, loaded, compiled, basis, values,
         used, in_time, in_space, Settings(options, fixed),
         laws, densities, _names(body, len(materials)), leaving, len(particles),
+        body.border,
     )  # fmt: skip
     return model, particles
 

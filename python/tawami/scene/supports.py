@@ -223,7 +223,8 @@ class Supports(Owner[Support]):
             prescribed.append(wall.prescribed(by_others))
             held += wall.held(layout.active, prescribed[-1], start, before)
         contact = ActiveSet(self.walls, prescribed)
-        return Reduction(layout, held, points, start, moving=moving), contact
+        held_by_form = moving or domain.model.compiled.may_hold
+        return Reduction(layout, held, points, start, moving=held_by_form), contact
 
     def check_reach(self, before: Domain, after: Domain) -> None:
         """Check that supports still hold something once particles were removed; a call for all ranks.
