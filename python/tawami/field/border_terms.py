@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from tawami import _rust
 from tawami.base import ranks
@@ -183,6 +182,8 @@ def _nearest(particles: Any, points: Any, mine: Mask) -> Indices:
         points: Location of the points.
         mine: Whether each point is in a cell of this rank.
     """
+    from scipy.spatial import cKDTree
+
     number = np.full(len(mine), -1)
 
     def apart(location: Any, chosen: Any) -> Array:
