@@ -74,7 +74,6 @@ class PointAssembly(Assembly):
             if slot.source in ("fields", "position"):
                 slots.append(slot.source)
                 continue
-            assert slot.source != "traction"  # compilation rejects it in integrals over cells
             slots.append((rules.index(slot.data), slot.source == "mean", slot.columns))
         kernel, constants = integral.kernel, self.attachment.constants(integral).tolist()
         point = None
