@@ -8,8 +8,8 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,7 @@ from tawami.scene.form_inputs import FormInputs
 from tawami.scene.held_border import HeldBorder
 from tawami.scene.loads import Loads
 from tawami.scene.model import Model
+from tawami.scene.outcome import Moved, Outcome
 from tawami.scene.reactions import Reactions
 from tawami.scene.share import Moment
 from tawami.scene.step import Accepted, Problem, StepKind
@@ -41,40 +42,10 @@ from tawami.solve.numerics import Numerics
 from tawami.solve.terms import Term, Terms
 
 Array = npt.NDArray[np.float64]
-#: Arrays of particles whose values are lengths, or lengths per time.
+#: Arrays of particles of lengths, or lengths per time.
 LENGTHS = ("x", "displacement", "velocity", "acceleration")
 #: Solves of one step with other states of the walls, after which it has failed.
 PASSES = 40
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """A step that was stored.
-
-    Attributes:
-        accepted: The step.
-        coefficients: Of all fields: since the start where particles do not move, of the step where
-            they do.
-        reactions: Forces of supports and walls.
-        particles: Arrays of the whole body at the end of the step, in the order of the numbers.
-    """
-
-    accepted: Accepted
-    coefficients: Array
-    reactions: Reactions
-    particles: Mapping[str, Array]
-
-
-class Moved(NamedTuple):
-    """Positions at the end of a step.
-
-    Attributes:
-        particles: Of this rank's particles [m], particles x dim.
-        border: Of the points of the border, with their areas.
-    """
-
-    particles: Array
-    border: list[tuple[Array, Array]]
 
 
 class Configuration:
@@ -107,7 +78,8 @@ class Configuration:
         mine.add_strain(model.moves, model.grid.geometry)
         own_fields.carry(model.form, mine, model.space.dim)
         self._attach(mine, location)
-        self.activity, self.border = Activity(), SceneBorder(model, model.border)
+        self.border = SceneBorder(model, particles)
+        self.activity = Activity()
         own = model.form.own_fields
         self.supports = Supports(model.grid, model.basis, own, self.border, self.activity)
         self.loads = Loads(model.grid, np.array(particles.volume), self.activity)
@@ -120,9 +92,8 @@ class Configuration:
         self._travel, self._limits = mean_stress.Travel(), StrainLimits(small=not model.moves)
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
-        earlier: Domain | None = getattr(self, "domain", None)
         of = self.model, particles, location, self.numerics, self.stopwatch
-        self.domain = Domain.attach(*of, earlier)
+        self.domain = Domain.attach(*of, getattr(self, "domain", None))
 
     @property
     def before(self) -> Array:
@@ -237,10 +208,10 @@ class Configuration:
 
     def _solve(self, kind: StepKind) -> Accepted:
         """A step in which no wall pulls, is passed through, or exceeds its friction."""
-        layout, supports = self.domain.layout, self.supports
+        layout = self.domain.layout
         n, step, space = layout.num_displacement, None, self.model.space
         active, before = layout.active[: n : space.dim], space.vectors(self.before[:n])
-        for wall in supports.walls:
+        for wall in self.supports.walls:
             wall.begin()
         for _ in range(PASSES):
             problem = kind.problem()
@@ -250,10 +221,9 @@ class Configuration:
                 a = step.acceleration
                 return Accepted(problem, step, u, None if a is None else space.vectors(a))
         assert step is not None
+        what = f"contact and friction of the walls did not settle in {PASSES} solves"
         raise ConvergenceError(
-            f"contact and friction of the walls did not settle in {PASSES} solves. Nothing was changed "
-            "in the particles. Use a smaller step",
-            step.history,
+            f"{what}. Nothing was changed in the particles. Use a smaller step", step.history
         )
 
     def _newton(self, problem: Problem, last: Converged | None) -> Converged:
@@ -282,21 +252,22 @@ class Configuration:
             return None
         particles = self.domain.particles
         moved = np.asarray(particles.x + self.domain.at_particles(accepted.u))
-        stop = self.model.leaving == "stop"
-        placement.check_staying(self.model.grid, particles, moved, time, stop=stop)
+        placement.check_staying(
+            self.model.grid, particles, moved, time, stop=self.model.leaving == "stop"
+        )
         return Moved(moved, self.border.moved(self.domain, accepted.u))
 
     def _store(self, accepted: Accepted, moved: Moved | None, time: float) -> Outcome:
         """Store a step that the laws have committed, and move the particles."""
         self.begun = True
-        coefficients = accepted.step.coefficients
-        if accepted.problem.terms is not None:
-            accepted.problem.terms.accept()
+        coefficients, terms = accepted.step.coefficients, accepted.problem.terms
+        if terms is not None:
+            terms.accept()
         if moved is None:
             coefficients = self.total = self.total + coefficients
             return self._outcome(accepted, coefficients)
-        grid = self.model.grid
-        self.supports.follow(accepted.u, accepted.problem.reduction.points)
+        grid, points = self.model.grid, accepted.problem.reduction.points
+        self.supports.follow(accepted.u, points)
         projects = self._travel.must_project(self.domain, moved.particles)
         self.domain.particles.move_to(moved.particles)
         self.border.move(moved.border)
