@@ -252,9 +252,14 @@ class Supports(Owner[Support]):
         return [s for s in self.all if isinstance(s.place, tuple)]
 
     @property
-    def labels(self) -> set[str]:
-        """Parts of the border with supports, in words."""
-        return {str(s.given) for s in self.all if isinstance(s.place, MovingPoints)}
+    def names(self) -> dict[str, set[Edge]]:
+        """Parts of the border with supports, each with the edges of the grid that it is held on."""
+        found = dict[str, set[Edge]]()
+        for support in self.all:
+            if isinstance(support.place, MovingPoints):
+                for name, edges_held in support.names.items():
+                    found.setdefault(name, set()).update(edges_held)
+        return found
 
     @property
     def supported_edges(self) -> set[str]:
