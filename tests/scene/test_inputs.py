@@ -238,24 +238,11 @@ def test_wrong_supports_and_loads_are_rejected():
         scene.solve()
 
 
-def test_a_traction_on_a_form_without_an_edge_term_is_rejected():
-    from ufl import grad
-
-    form = tawami.Form(
-        fields={"u": vector("w")},
-        residual=lambda w, sigma, sum_p: sum_p(sigma, grad(w)),
-    )
-    grid = grid_of()
-    scene = tawami.Scene(grid, body_of(grid), tawami.linear_elastic(**ELASTIC), form=form)
-    with pytest.raises(tawami.InputError, match=r"no edge term; add - dot\(t, w\) \* ds"):
-        scene.traction("right", (0.0, -1.0))
-
-
 def test_an_error_of_newton_holds_its_history_and_changes_nothing():
-    from ufl import div, dot, grad
+    from ufl import div, grad
 
-    def residual(u, w, sigma, mu, t, sum_p, ds):
-        return sum_p(sigma, grad(w)) + sum_p(3e5 * mu, div(u) ** 3 * div(w)) - dot(t, w) * ds
+    def residual(u, w, sigma, mu, sum_p):
+        return sum_p(sigma, grad(w)) + sum_p(3e5 * mu, div(u) ** 3 * div(w))
 
     form = tawami.Form(fields={"u": vector("w")}, residual=residual)
     grid = grid_of()

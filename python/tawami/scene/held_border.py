@@ -135,9 +135,15 @@ class HeldBorder:
             support.missing[self._weak] = -self._error[number, 0]
 
     @property
-    def resultant(self) -> Array:
-        """Force on the body [N per metre depth]."""
-        return self._domain.model.space.resultant(self._on_points.sum(axis=0))
+    def resultants(self) -> dict[str, Array]:
+        """Force on the body at each part of the border that the support covers [N per metre depth]."""
+        assert isinstance(self._support.place, MovingPoints)
+        made, resultant = self._support.place.made, self._domain.model.space.resultant
+        tags = made.tag[self._weak]
+        return {
+            made.names[tag]: resultant(self._on_points[tags == tag].sum(axis=0))
+            for tag in np.unique(tags)
+        }
 
     @property
     def rows(self) -> list[PointHeld]:

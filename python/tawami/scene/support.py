@@ -108,6 +108,14 @@ class Support(Action):
         return [edge for edge, mask in self.whole.items() if place.edge(edge)[mask].all()]
 
     @property
+    def names(self) -> dict[str, set[Edge]]:
+        """Parts of the border that it covers, each with the edges of the grid that it is held on."""
+        assert isinstance(self.place, MovingPoints)
+        made, held = self.place.made, self.edges
+        tags = {made.names[tag]: made.tag == tag for tag in np.unique(made.tag)}
+        return {name: {e for e in held if (self.whole[e] & of).any()} for name, of in tags.items()}
+
+    @property
     def weak(self) -> Mask:
         """Mask of its points on the border that it holds by tractions on patches."""
         if not isinstance(self.place, MovingPoints):
