@@ -175,12 +175,11 @@ def check_agreement(held: Sequence[HeldBorder], h: float) -> None:
     Raises:
         SupportError: Two of them do.
     """
-    from scipy.spatial import KDTree  # takes long to import
-
-    for one, other in combinations(held, 2):
-        component = one.support.component
-        if component != other.support.component:
-            continue
+    pairs = combinations(held, 2)
+    alike = [(a, b) for a, b in pairs if a.support.component == b.support.component]
+    if alike:
+        from scipy.spatial import KDTree  # takes long to import
+    for one, other in alike:
         distance, at = KDTree(one.x).query(other.x, distance_upper_bound=SAME * h)
         both = np.flatnonzero(np.isfinite(distance))
         change = np.abs(one.values[at[both]] - other.values[both])
