@@ -21,7 +21,7 @@ from tawami.scene.domain import Domain
 from tawami.scene.moving_points import MovingPoints
 from tawami.scene.support import Support
 
-#: Penalty of a patch, in shear moduli, or diagonal entries of the tangent, per cell.
+#: Penalty of a patch per cell, in shear moduli (besides K), or in diagonal entries of the tangent.
 PENALTY = 200.0
 #: Change of the tractions by a pass, relative to the largest, below which no other is needed.
 SETTLED = 1e-4
@@ -63,7 +63,8 @@ class HeldBorder:
         self.prescribed = float(np.abs(self._values).max(initial=0.0))
         held = self._groups.means(self._weights, support.held[self._weak])
         self._held = held[:, None]
-        self._tied = self._with_penalty(self._shear_moduli())
+        K, mu = (m[place.cells(domain).location.cell] for m in domain.moduli_of_cells)
+        self._tied = self._with_penalty((K + PENALTY * mu)[self._weak])
 
     @property
     def x(self) -> Array:
@@ -81,14 +82,9 @@ class HeldBorder:
         """The support."""
         return self._support
 
-    def _shear_moduli(self) -> Array:
-        """Mean shear modulus of the particles in the cell of each point [Pa]."""
-        assert isinstance(self._support.place, MovingPoints)
-        cells = self._support.place.cells(self._domain).location.cell
-        return np.asarray(self._domain.shear_of_cells[cells[self._weak]])
-
-    def _with_penalty(self, stiffness: Array) -> Tied:
-        penalty = PENALTY / self._domain.model.grid.h * self._groups.means(self._weights, stiffness)
+    def _with_penalty(self, penalty: Array) -> Tied:
+        """Ties with a penalty, given at each point [Pa]."""
+        penalty = self._groups.means(self._weights, penalty) / self._domain.model.grid.h
         return Tied(self._groups, self._weights, self._directions[None], penalty)
 
     def begin(self, diagonal: Callable[[], Array]) -> None:
@@ -98,7 +94,7 @@ class HeldBorder:
             assert isinstance(self._support.place, MovingPoints)
             thickness = self._support.place.weight / self._support.place.length
             near = abs(self._at_points) @ diagonal()[self._place.slice]
-            self._tied = self._with_penalty(near / thickness[self._weak] / h ** (dim - 2))
+            self._tied = self._with_penalty(PENALTY * near / thickness[self._weak] / h ** (dim - 2))
 
     def _displacement(self, coefficients: Array) -> Array:
         moved = self._before + self._at_points @ coefficients[self._place.slice]
