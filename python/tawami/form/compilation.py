@@ -5,8 +5,7 @@ Forms are written and compiled without a mesh, once per process and on disk.
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,8 +17,23 @@ from tawami.form.form import Form
 from tawami.form.integral import Integral, KernelBuilder
 from tawami.form.quantities import Density, LawQuantity, ParticleScalar
 from tawami.form.symbols import Assembly, Symbols
-from tawami.form.tangent import Linearisation
+from tawami.form.tangent import Linearisation, change_with_fields
 from tawami.form.terms import at_points, by_rule, terms_of
+
+
+@dataclass(frozen=True)
+class BorderTerm:
+    """The sums of a form over one part of the border.
+
+    Attributes:
+        on: Names of the parts of the border; None for all of it.
+        residual: The integrals of rank 1.
+        tangent: Their derivatives.
+    """
+
+    on: tuple[str, ...] | None
+    residual: tuple[Integral, ...]
+    tangent: tuple[Integral, ...]
 
 
 @dataclass(frozen=True)
@@ -30,29 +44,37 @@ class CompiledForm:
         form: The form.
         element: Element of all fields on the mesh: biquadratic displacement, bilinear others.
         residual: Integrals of the residual over cells, one for each quadrature rule.
-        edges: Compiles the integral over loaded edges, if there is one. It is called for the first load.
         tangent: Derivative of `residual`, one integral for each quadrature rule.
         couplings: The other part of the tangent: products of two integrals of rank 1, cell by cell.
         ghost: Integral of rank 2 over sides of partially filled cells, if there is one.
+        border: Sums over the border.
         densities: Particle data of each rule: each density with its first column.
+        border_data: Numbers of the points of the border, as columns.
         used: Parameters, data and constants (time, dt, b) that the residual reads with these options.
     """
 
     form: Form
     element: Any
     residual: tuple[Integral, ...]
-    edges: Callable[[], Integral] | None
     tangent: tuple[Integral, ...]
     couplings: tuple[tuple[Integral, Integral], ...]
     ghost: Integral | None
+    border: tuple[BorderTerm, ...]
     densities: Mapping[Rule, Mapping[Density, int]]
+    border_data: tuple[ParticleScalar, ...]
     used: frozenset[str]
 
-    @functools.cached_property
-    def traction(self) -> Integral | None:
-        """The integral over loaded edges, if the form has one; a collective call."""
-        with tally.compiling():
-            return None if self.edges is None else self.edges()
+    @property
+    def may_hold(self) -> bool:
+        """Whether sums over the border may hold the body, as an elastic foundation does."""
+        first = range(next(iter(self.form.fields.values())).components)
+        points = [one.points[1] for term in self.border for one in term.tangent if one.points]
+        return any(
+            all(
+                any(component in first for component, _ in entries) for entries in (p.test, p.trial)
+            )
+            for p in points
+        )
 
     def columns(self, rule: Rule) -> int:
         """Number of columns of the particle data of a rule."""
@@ -122,7 +144,7 @@ def _compile(comm: Any, symbols: Symbols) -> CompiledForm:
         linearisation = Linearisation(symbols, terms.cells)
         tangent, couplings = linearisation.tangent(), linearisation.couplings()
     builder = KernelBuilder(comm, symbols)
-    integral, edges, ghost = builder.integral, terms.edges, terms.ghost
+    integral, ghost = builder.integral, terms.ghost
 
     def integrals(form: Any) -> tuple[Integral, ...]:
         if symbols.assembly == "dolfinx":
@@ -135,15 +157,30 @@ def _compile(comm: Any, symbols: Symbols) -> CompiledForm:
         (left,), (right,) = map(integrals, pair)
         return left, right
 
+    of_border = KernelBuilder(comm, symbols)
+
+    def border_term(on: tuple[str, ...] | None, form: Any) -> BorderTerm:
+        """Points of the border take the place of particles in kernels of their own."""
+        with symbols.lines.errors(form):
+            parts = form, change_with_fields(symbols, form)
+        kernels = [
+            tuple(of_border.at_points(part, "particle") for _, part in at_points(one)[0])
+            for one in parts
+        ]
+        return BorderTerm(on, *kernels)
+
+    border = tuple(border_term(on, form) for on, form in terms.border.items())
+    numbers = [density.quantity for density in of_border.densities["particle"]]
     return CompiledForm(
         form=form,
         element=symbols.element,
         residual=integrals(terms.cells),
-        edges=None if edges is None else lambda: integral(edges, "exterior_facet"),
         tangent=integrals(tangent),
         ghost=None if ghost is None else integral(ghost, "interior_facet"),
+        border=border,
         couplings=tuple(map(of_pair, couplings)),
         densities=builder.densities,
+        border_data=tuple(n for n in numbers if isinstance(n, ParticleScalar)),
         used=_used(symbols, residual),
     )
 

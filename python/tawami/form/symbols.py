@@ -26,6 +26,8 @@ from tawami.form.sums import Sums
 
 #: Evaluation of a form: by kernels at the particles, or by integrals over cells in plain dolfinx.
 Assembly = Literal["points", "dolfinx"]
+#: Traction and measure of the terms with which forms took loads on edges of the grid before.
+OF_EDGES = ("t", "ds")
 #: What the terms of a residual are.
 TERMS = (
     "expressions of one shape in a sum, and a number in each term of sum_p, as dot(a, b) of vectors or "
@@ -79,8 +81,6 @@ class Symbols:
         self.test_function = ufl.TestFunction(functions)
         tests = self._split(self.test_function)
         self.tests = {field.test: tests[name] for name, field in form.fields.items()}
-        traction = ufl.FunctionSpace(domain, dolfinx.lagrange(2, PLANE.dim))
-        self.traction = ufl.Coefficient(traction, count=1)
         shapes = dict.fromkeys(("h", "time", "dt"), ()) | {"b": (space.dim,)}
         shapes |= dict.fromkeys(form.parameters, ())
         self.constants = {
@@ -98,19 +98,21 @@ class Symbols:
         """Function that makes the symbol of each name: particle data are read only if asked for."""
         form, data = self.form, self.data
         sums = Sums(
-            form, data, self.lines, self.measure, self.old, reference=self.assembly == "dolfinx"
-        )
+            form, data, self.lines, self.measure, self.border, self.old,
+            reference=self.assembly == "dolfinx",
+        )  # fmt: skip
         ready = {
             **self.fields, **self.tests, **self.constants, **options, **self.operators.names,
-            **sums.names, "t": self.traction, "x": SpatialCoordinate(self.domain),
+            **sums.names, "x": SpatialCoordinate(self.domain),
             "old": Old(form, self._split(self.old), data),
             "dx": self.measure("particle"), "dx_c": self.measure("centre"),
-            "ds": self._sides("exterior_facet"), "dG": self._sides("interior_facet"),
-            "jump_n": self._jump_n, "jump_nn": self._jump_nn,
+            "dG": self._sides,
+            "jump_n": self._jump_n, "jump_nn": self._jump_nn, "dot_n": self._dot_n,
         }  # fmt: skip
         names: dict[str, Callable[[], Any]] = {
             **{name: partial(data.law, HISTORY + name) for name in histories},
             **{name: partial(ready.get, name) for name in ready},
+            "n": self._normal,
             **{name: partial(data.scalar, named(name)) for name in ("K", "mu", "rho")},
             **{name: partial(data.law, name) for name in form.strain.quantities},
         }
@@ -128,6 +130,15 @@ class Symbols:
             return Measure(self.lines, "dx", self.domain, metadata)
         return Measure(self.lines, "dx", self.domain, metadata, self.operators.volume)
 
+    def border(self, on: tuple[str, ...] | None) -> Measure:
+        """Sums over the points of the border, or over those of the parts with some names."""
+        rule: Rule = "particle"
+        metadata: dict[str, Any] = {
+            "quadrature_degree": DEGREE[rule], "quadrature_rule": FAMILY[rule],
+            "place": "border", "on": on,
+        }  # fmt: skip
+        return Measure(self.lines, "dx", self.domain, metadata)
+
     def data_of(self, symbol: Any, component: int, axes: tuple[int, ...]) -> Density | None:
         """Particle data that a symbol which is no placeholder stands for: an old field.
 
@@ -143,21 +154,39 @@ class Symbols:
                 "a second derivative of an old field: expected old fields and their gradients"
             )
         names = [
-            f"{name}[{k}]" if field.components > 1 else name
+            (f"{name}[{k}]" if field.components > 1 else name, field.own)
             for name, field in self.form.fields.items()
             for k in range(field.components)
         ]
-        text = "old " + "".join((names[component], *(f",{self.space.axes[i]}" for i in axes)))
-        return density("particle", named(text, varies=True), self.space)
+        name, own = names[component]
+        if axes and not own:
+            raise FormError(
+                f"a derivative of the old displacement ({name}): expected old.u alone, or gradients of "
+                "the increment u"
+            )
+        text = "old " + "".join((name, *(f",{self.space.axes[i]}" for i in axes)))
+        return density("particle", named(text, varies=True, border=not own), self.space)
 
-    def _sides(self, kind: str) -> Measure:
+    @property
+    def _sides(self) -> Measure:
         metadata = {"quadrature_degree": 4}
-        return Measure(self.lines, kind, self.domain, metadata, self.operators.volume)
+        return Measure(self.lines, "interior_facet", self.domain, metadata, self.operators.volume)
 
     def _split(self, function: Any) -> dict[str, Any]:
         names = list(self.form.fields)
         parts = [function] if len(names) == 1 else ufl.split(function)
         return dict(zip(names, parts, strict=True))
+
+    # -- the border ----------------------------------------------------------
+
+    def _normal(self) -> Any:
+        """Outward normal of the border, with the components of a field."""
+        axes = range(self.space.dim)
+        return ufl.as_vector([self.data.scalar(named(f"n[{k}]", border=True)) for k in axes])
+
+    def _dot_n(self, f: Any) -> Any:
+        """A n of a tensor, or g . n of a vector, n the normal of the border."""
+        return self.operators.along(f, self._normal())
 
     # -- jumps ---------------------------------------------------------------
 
@@ -186,6 +215,12 @@ class Symbols:
                 "function written in Python"
             ) from None
         unknown = [name for name in wanted if name not in self.names]
+        if {*unknown} & {*OF_EDGES}:
+            raise FormError(
+                f"{self.lines.text(self.lines.first)}: residual asks for {quoted(unknown)}: tractions "
+                "act without a term of the form: remove - dot(t, w) * ds; state other terms of the "
+                "border as sum_b(...)"
+            )
         if unknown:
             hint = meant(unknown[0], self.names)
             raise FormError(
@@ -233,7 +268,7 @@ class Symbols:
         if not isinstance(residual, ufl.Form):
             raise FormError(
                 f"form {self.form.name}: residual returned {type(residual).__name__}: expected a UFL "
-                "form (sums of sum_p(...) and of expressions * dx or * ds)"
+                "form (sums of sum_p(...) and of expressions * dx)"
             )
         check_symbols(self, residual)
         for unknown, field in self.form.fields.items():
@@ -250,13 +285,18 @@ class Symbols:
 
 
 class Old:
-    """The fields at the start of the step, as `old.p_w`, and at finite strain `old.J` = det F."""
+    """The fields at the start of the step, as `old.p_w`, and at finite strain `old.J` = det F.
+
+    In sums over the border also the displacement since the start of the scene.
+    """
 
     def __init__(self, form: Form, fields: Mapping[str, Any], data: ParticleData) -> None:
         self._form, self._fields, self._data = form, fields, data
 
     def __getattr__(self, name: str) -> Any:
         known = [*self._form.own_fields]
+        if name == next(iter(self._form.fields)):
+            return self._fields[name]
         if name == "J" and self._form.strain.finite:
             return self._data.scalar(named("old J", varies=True))
         if name not in known:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,8 +20,8 @@ from tawami.base.errors import FormError
 from tawami.fem.rules import Rule
 from tawami.form.arity import check_arity, is_multilinear
 from tawami.form.lines import line_of
-from tawami.form.particle_data import PLACEHOLDERS
 from tawami.form.points import Integrand
+from tawami.form.sums import check_of_particles
 from tawami.form.symbols import Symbols
 
 
@@ -30,12 +31,12 @@ class Terms:
 
     Attributes:
         cells: Sums over particles and integrals over cells.
-        edges: Integrals over loaded edges, linear in the traction.
+        border: Sums over the border by the names of its parts; None is all of it.
         ghost: Matrix of the integrals over sides of partially filled cells, which are linear.
     """
 
     cells: Any
-    edges: Any | None
+    border: Mapping[tuple[str, ...] | None, Any]
     ghost: Any | None
 
 
@@ -48,21 +49,13 @@ def terms_of(symbols: Symbols, residual: Any) -> Terms:
     name = symbols.form.name
     for part in residual.integrals():
         _check(symbols, part)
-    kinds = ("cell", "exterior_facet", "interior_facet")
-    cells, edges, sides = (_of_type(residual, kind) for kind in kinds)
-    for part in [] if edges is None else edges.integrals():
-        _check_edge(symbols, part)
-    parts = [part for part in (cells, edges, sides) if part is not None]
-    if cells is None or len(residual.integrals()) > sum(len(part.integrals()) for part in parts):
+    inside, border = _without_border(residual)
+    cells, sides = (_of_type(inside, kind) for kind in ("cell", "interior_facet"))
+    if cells is None:
         raise FormError(
-            f"form {name}: expected integrals over particles or cells, over edges (ds) and over sides "
-            "of partially filled cells (dG) only"
+            f"form {name}: expected sums over particles or integrals over cells: it has none"
         )
-    if symbols.traction in cells.coefficients():
-        raise FormError(
-            f"form {name}: the traction t in a term with dx: expected it in terms with ds only"
-        )
-    return Terms(cells, edges, None if sides is None else _matrix(symbols, sides))
+    return Terms(cells, border, None if sides is None else _matrix(symbols, sides))
 
 
 def _check(symbols: Symbols, part: Any) -> None:
@@ -78,7 +71,9 @@ def _check(symbols: Symbols, part: Any) -> None:
         with symbols.lines.errors(ufl.Form([part])):
             expanded = expand_derivatives(ufl.Form([part]))
             if not expanded.empty():
-                Integrand(expanded, symbols)
+                integrand = Integrand(expanded, symbols)
+                for density in integrand.data if part.metadata()["place"] != "border" else ():
+                    check_of_particles(density.quantity)
         return
     coefficients = extract_coefficients(part.integrand())
     if symbols.old in coefficients:
@@ -96,31 +91,6 @@ def _check(symbols: Symbols, part: Any) -> None:
         raise FormError(
             f"{where}: the position x outside a sum over particles: expected x in sum_p(...) only"
         )
-
-
-def _check_edge(symbols: Symbols, part: Any) -> None:
-    """Check one integral over edges."""
-    term = ufl.Form([part])
-    if _is_linear_in(term, symbols.traction):
-        return
-    tested = [n for n, f in symbols.form.own_fields.items() if _has_test(symbols, term, f.test)]
-    flux = f"scene.flux(edge, '{tested[0]}', value)" if tested else "scene.traction(...)"
-    raise FormError(
-        f"{symbols.lines.text(line_of(part))}: expected edge terms that are linear in the traction t "
-        f"and contain nothing else but test functions, as - dot(t, w) * ds; give other loads "
-        f"through {flux}"
-    )
-
-
-def _has_test(symbols: Symbols, term: Any, test: str) -> bool:
-    """Whether a term contains the test function of this name."""
-    parts = list[Any]()
-    for field in symbols.form.fields.values():
-        chosen, found = field.test == test, symbols.tests[field.test]
-        split = [found[k] for k in range(field.components)] if found.ufl_shape else [found]
-        parts += split if chosen else [ufl.as_ufl(0.0)] * len(split)
-    alone = ufl.replace(term, {symbols.test_function: ufl.as_vector(parts)})
-    return not expand_derivatives(alone).empty()
 
 
 def by_rule(form: Any) -> list[Any]:
@@ -153,21 +123,20 @@ def at_points(form: Any) -> tuple[list[tuple[Rule, Any]], Any]:
     return [(rule, ufl.Form(parts)) for rule, parts in sums.items()], ufl.Form(rest)
 
 
+def _without_border(form: Any) -> tuple[Any, dict[tuple[str, ...] | None, Any]]:
+    """A form without its sums over the border, and these by the names of their parts."""
+    rest, border = [], dict[tuple[str, ...] | None, list[Any]]()
+    for part in form.integrals():
+        if part.metadata().get("place") == "border":
+            border.setdefault(part.metadata()["on"], []).append(part)
+        else:
+            rest.append(part)
+    return ufl.Form(rest), {on: ufl.Form(parts) for on, parts in border.items()}
+
+
 def _of_type(form: Any, kind: str) -> Any | None:
     integrals = form.integrals_by_type(kind)
     return ufl.Form(integrals) if integrals else None
-
-
-def _is_linear_in(form: Any, coefficient: Any) -> bool:
-    """Whether every term of a form contains this coefficient once, and no other."""
-    if set(form.coefficients()) != {coefficient}:
-        return False
-    zero = ufl.zero(coefficient.ufl_shape)
-    expand = ufl.algorithms.expand_derivatives
-    at_zero = expand(ufl.replace(form, {coefficient: zero}))
-    direction = ufl.Coefficient(coefficient.ufl_function_space(), count=PLACEHOLDERS - 2)
-    slope = expand(ufl.derivative(form, coefficient, direction))
-    return at_zero.empty() and coefficient not in slope.coefficients()
 
 
 def _matrix(symbols: Symbols, sides: Any) -> Any:
@@ -175,8 +144,7 @@ def _matrix(symbols: Symbols, sides: Any) -> Any:
     used = set(sides.coefficients())
     others = {data for symbol in used if (data := symbols.data.of(symbol)) is not None}
     matrix = ufl.replace(sides, {symbols.increments: symbols.trial})
-    linear = len(matrix.arguments()) == 2 and symbols.traction not in used
-    linear = linear and is_multilinear(matrix)
+    linear = len(matrix.arguments()) == 2 and is_multilinear(matrix)
     if not linear or any(density.rule != "mean" for density in others):
         raise FormError(
             f"form {symbols.form.name}: expected terms with dG that are linear in the fields and "

@@ -76,6 +76,17 @@ class SceneBorder:
         """Names of its parts."""
         return () if self._given is None else self._given.names
 
+    @property
+    def x(self) -> Array:
+        """Present positions of its points [m], points x dim; none for a body without a border."""
+        return np.zeros((0, self._grid.space.dim)) if self.points is None else self.points.x
+
+    def __repr__(self) -> str:
+        if self.points is None:
+            return "SceneBorder(none)"
+        length = self.points.length.sum()
+        return f"SceneBorder({len(self.points)} points, {length:.6g} m: {', '.join(self.names)})"
+
     def part(self, what: str, where: Part) -> MovingPoints:
         """Points of a part of the border, which are exact for this part at its present place.
 

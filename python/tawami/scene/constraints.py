@@ -75,7 +75,8 @@ def constraints(
         held += wall.held(layout.active, prescribed[-1], start, before)
     contact = ActiveSet(supports.walls, prescribed)
     rows = [row for one in border for row in one.rows] if not moving else []
-    reduction = Reduction(layout, held, points, start, moving=moving, also=rows)
+    may_move = moving or domain.model.compiled.may_hold
+    reduction = Reduction(layout, held, points, start, moving=may_move, also=rows)
     return reduction, contact, border
 
 

@@ -151,13 +151,17 @@ def _remove(now: Configuration, mask: Mask) -> Removed:
 def _replace(now: Configuration, after: Domain) -> None:
     """Let a scene continue with other particles or laws; a call for all ranks."""
     before, zero, first = now.domain, np.zeros(after.layout.size), now.moment(0.0)
-    for domain in (before, after):
-        now.inputs.repeat(domain, now.moment(), now.loads.acceleration(now.moment()))
-    internal = after.newton.internal(zero)
-    forces = internal - before.newton.internal(zero) + now.loads.at_start(before, first)
+    gravity = now.loads.acceleration(now.moment())
+    now.inputs.repeat(before, now.moment(), gravity)
+    forces = now.loads.at_start(before, first) - before.newton.internal(zero)
     if after.particles is not before.particles:
-        now.supports.keep(now.border.keep(before, after))
-    forces -= now.loads.at_start(after, first)
+        kept = now.border.keep(before, after)
+        now.supports.keep(kept)
+        now.border_sums.keep(kept)
+    now.border_sums.attach(after)
+    now.inputs.repeat(after, now.moment(), gravity)
+    internal = after.newton.internal(zero)
+    forces += internal - now.loads.at_start(after, first)
     forces[after.layout.num_displacement :] = 0.0
     forces[~after.layout.active] = 0.0
     now.model, now.domain = after.model, after
