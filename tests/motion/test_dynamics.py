@@ -288,7 +288,7 @@ def test_wrong_input_is_rejected(random_scene):
     other = falling_on_the_floor()
     other.fix("bottom", "y", 1e-3)
     with pytest.raises(
-        tawami.InputError, match=r"fix\(edge='bottom'\) prescribes a displacement that"
+        tawami.InputError, match=r"fix\('bottom'\) prescribes a displacement that"
     ):
         tawami.Dynamics(other).step(0.01)
     for velocity, words in (

@@ -207,7 +207,7 @@ def test_wrong_input_is_rejected():
         tawami.ramp(scene, 2.0)
     scene.fix("right", "x", velocity=1.0)
     with pytest.raises(
-        tawami.InputError, match=r"fix\(edge='right'\) has a velocity, which static"
+        tawami.InputError, match=r"fix\('right'\) has a velocity, which static"
     ):
         tawami.ramp(scene)
 

@@ -205,7 +205,7 @@ print(*[name for name in others if name in sys.modules])
         (lambda s: tawami.settle(s), "expected a scene with a form of finite strain"),
         (
             lambda s: s.solve().reaction("top"),
-            r"reaction\('top'\): nothing supports that edge: expected one of bottom, or fix\('top'",
+            r"reaction\('top'\): nothing supports that part of the border: expected one of 'bottom', or fix\('top'",
         ),
     ],
 )

@@ -219,7 +219,7 @@ def test_wrong_supports_and_loads_are_rejected():
         (lambda: scene.traction("up", (0, 0)), "edge 'up'"),
         (
             lambda: scene.traction("right", 5.0),
-            r"traction\(edge='right'\) = 5.0: expected two comp",
+            r"traction\('right'\) = 5.0: expected two comp",
         ),
         (lambda: scene.traction("right", (0, 1, 2)), "expected two comp"),
     ]:
@@ -227,13 +227,13 @@ def test_wrong_supports_and_loads_are_rejected():
             call()
     scene.fix("left", "x", lambda x, y: np.nan * x)
     with pytest.raises(
-        tawami.InputError, match=r"fix\(edge='left'\): nan at .*: expected a finite"
+        tawami.InputError, match=r"fix\('left'\): nan at .*: expected a finite"
     ):
         scene.solve()
     scene = tawami.Scene(grid, body_of(grid), tawami.linear_elastic(**ELASTIC))
     scene.fix("left", "x", lambda x, y: x.sum(axis=3))
     with pytest.raises(
-        tawami.InputError, match=r"fix\(edge='left'\): expected a number or a function"
+        tawami.InputError, match=r"fix\('left'\): expected a number or a function"
     ):
         scene.solve()
 
