@@ -33,7 +33,8 @@ class CompiledForm:
         edges: Compiles the integral over loaded edges, if there is one. It is called for the first load.
         tangent: Derivative of `residual`, one integral for each quadrature rule.
         couplings: The other part of the tangent: products of two integrals of rank 1, cell by cell.
-        ghost: Integral of rank 2 over sides of partially filled cells, if there is one.
+        sides: Compiles the integral of rank 2 over sides of partially filled cells, if there is one. It
+            is called for the first body with such cells.
         densities: Particle data of each rule: each density with its first column.
         used: Parameters, data and constants (time, dt, b) that the residual reads with these options.
     """
@@ -44,7 +45,7 @@ class CompiledForm:
     edges: Callable[[], Integral] | None
     tangent: tuple[Integral, ...]
     couplings: tuple[tuple[Integral, Integral], ...]
-    ghost: Integral | None
+    sides: Callable[[], Integral] | None
     densities: Mapping[Rule, Mapping[Density, int]]
     used: frozenset[str]
 
@@ -53,6 +54,17 @@ class CompiledForm:
         """The integral over loaded edges, if the form has one; a collective call."""
         with tally.compiling():
             return None if self.edges is None else self.edges()
+
+    @property
+    def penalises(self) -> bool:
+        """Whether the form has a ghost penalty."""
+        return self.sides is not None
+
+    @functools.cached_property
+    def ghost(self) -> Integral | None:
+        """The ghost penalty, if the form has one; a collective call."""
+        with tally.compiling():
+            return None if self.sides is None else self.sides()
 
     def columns(self, rule: Rule) -> int:
         """Number of columns of the particle data of a rule."""
@@ -141,7 +153,7 @@ def _compile(comm: Any, symbols: Symbols) -> CompiledForm:
         residual=integrals(terms.cells),
         edges=None if edges is None else lambda: integral(edges, "exterior_facet"),
         tangent=integrals(tangent),
-        ghost=None if ghost is None else integral(ghost, "interior_facet"),
+        sides=None if ghost is None else builder.prepared(ghost, "interior_facet"),
         couplings=tuple(map(of_pair, couplings)),
         densities=builder.densities,
         used=_used(symbols, residual),
