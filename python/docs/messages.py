@@ -16,7 +16,7 @@ PACKAGE = ROOT / "python" / "tawami"
 #: Headings of the list, and the rooms whose messages they hold.
 SUBJECTS: dict[str, tuple[str, ...]] = {
     "Inputs, installation and ranks": ("base", "fem"),
-    "Grid and body": ("grid", "body"),
+    "Grid and body": ("grid", "border", "body"),
     "Forms": ("form", "check"),
     "Particles and laws": ("particles", "rust"),
     "Supports and fields": ("field",),

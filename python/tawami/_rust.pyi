@@ -182,6 +182,7 @@ class Assembler:
         coefficients: _Floats,
         pattern: Pattern,
         values: _Floats,
+        add: bool = False,
     ) -> None: ...
 
 @final

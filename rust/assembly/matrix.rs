@@ -11,8 +11,8 @@ use super::point::Row;
 use super::selection::{self, Entry, Selection};
 use super::{colours, with_rows, Shared};
 
-/// The reduced matrix in its pattern: `P^T K P`. False if the pattern does not belong to these cells and this
-/// selection; `values` are then meaningless.
+/// The reduced matrix in its pattern: `P^T K P`; with `add`, it is added to the values. False if the pattern
+/// does not contain these cells or belongs to another selection; `values` are then meaningless.
 ///
 /// # Safety
 /// As [`vector`](super::vector), with kernels of the ranks that [`Bilinear`] says. `values` is as long as the
@@ -23,9 +23,10 @@ pub unsafe fn matrix(
     selection: &Selection,
     pattern: &Pattern,
     values: &mut [f64],
+    add: bool,
 ) -> bool {
     // SAFETY: the caller's.
-    unsafe { with_rows!(state.cells, matrix_of(state, form, selection, pattern, values)) }
+    unsafe { with_rows!(state.cells, matrix_of(state, form, selection, pattern, values, add)) }
 }
 
 /// Memory of one thread: the matrix of the cell and its unknowns.
@@ -59,14 +60,20 @@ unsafe fn matrix_of<const P: usize>(
     selection: &Selection,
     pattern: &Pattern,
     values: &mut [f64],
+    add: bool,
 ) -> bool {
-    values.par_chunks_mut(1 << 16).for_each(|part| part.fill(0.0));
-    let (Some(start), Some(columns)) = (pattern.start.as_slice(), pattern.columns.as_slice())
-    else {
+    let (Some(start), Some(columns), Some(reaching)) = (
+        pattern.start.as_slice(),
+        pattern.columns.as_slice(),
+        pattern.reaching(&state.location.active),
+    ) else {
         return false;
     };
+    if !add {
+        values.par_chunks_mut(1 << 16).for_each(|part| part.fill(0.0));
+    }
     let shared = Shared::new(values);
-    let add = |a: usize, scatter: &mut Scatter<P>| {
+    let add_cell = |a: usize, scatter: &mut Scatter<P>| {
         let Scatter { work, entries, runs, places, of_cell } = scatter;
         let local = state.cells.local(state.location, a);
         selection.of_cell(&local, entries);
@@ -103,12 +110,12 @@ unsafe fn matrix_of<const P: usize>(
     for rows in colours(state.location) {
         let fits = rows.into_par_iter().all(|row| {
             let mut scatter = Scatter::new(state.cells);
-            row.filter(|&a| !pattern.reaching[a]).all(|a| add(a, &mut scatter))
+            row.filter(|&a| !reaching[a]).all(|a| add_cell(a, &mut scatter))
         });
         if !fits {
             return false;
         }
     }
     let mut scatter = Scatter::new(state.cells);
-    (0..pattern.reaching.len()).filter(|&a| pattern.reaching[a]).all(|a| add(a, &mut scatter))
+    (0..reaching.len()).filter(|&a| reaching[a]).all(|a| add_cell(a, &mut scatter))
 }

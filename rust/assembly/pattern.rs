@@ -1,5 +1,6 @@
 //! Pattern of the reduced matrix.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use ndarray::Array1;
@@ -17,8 +18,22 @@ pub struct Pattern {
     pub start: Array1<i32>,
     /// Columns of the rows, ascending.
     pub columns: Array1<i32>,
-    /// Whether the unknowns of each active cell reach beyond its functions (point constraints).
-    pub(super) reaching: Vec<bool>,
+    /// The active cells of the pattern.
+    active: Vec<u32>,
+    /// Whether the unknowns of each of them reach beyond its functions (point constraints).
+    reaching: Vec<bool>,
+}
+
+impl Pattern {
+    /// Whether the unknowns of some cells, ascending, reach beyond their functions; `None` if one of them
+    /// is not a cell of the pattern.
+    pub(super) fn reaching(&self, cells: &[u32]) -> Option<Cow<'_, [bool]>> {
+        if cells == self.active {
+            return Some(Cow::Borrowed(&self.reaching));
+        }
+        let of_cell = |cell| Some(self.reaching[self.active.binary_search(cell).ok()?]);
+        cells.iter().map(of_cell).collect::<Option<Vec<_>>>().map(Cow::Owned)
+    }
 }
 
 /// The functions of a field, and its place among the coefficients.
@@ -129,7 +144,8 @@ pub fn pattern(cells: &Cells, location: &Location, selection: &Selection) -> Opt
         end += length;
         start.push(i32::try_from(end).ok()?);
     }
-    Some(Pattern { start: start.into(), columns: columns.concat().into(), reaching })
+    let (start, columns) = (start.into(), columns.concat().into());
+    Some(Pattern { start, columns, active: location.active.clone(), reaching })
 }
 
 /// Sort the columns of a row, each once.

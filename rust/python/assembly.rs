@@ -310,13 +310,14 @@ impl PyAssembler {
                 "the reduced matrix has more than 2147483647 entries: expected a coarser grid",
             ));
         };
-        let Location { grid, active, .. } = &*self.location;
-        Ok(PyPattern { grid: *grid, active: active.clone(), selection, pattern })
+        Ok(PyPattern { grid: self.location.grid, selection, pattern })
     }
 
     /// Fill the values of the reduced matrix in its pattern. `couplings` are kernels of rank 1; the products
-    /// of the first and the second, of the third and the fourth, ... are added.
+    /// of the first and the second, of the third and the fourth, ... are added. With `add`, all of it is added to
+    /// the values; the pattern may then be that of more cells.
     #[allow(clippy::too_many_arguments)]
+    #[pyo3(signature = (kernels, couplings, data, volume, coefficients, pattern, values, add = false))]
     fn matrix(
         &self,
         py: Python,
@@ -327,9 +328,10 @@ impl PyAssembler {
         coefficients: Read1<f64>,
         pattern: &PyPattern,
         mut values: Write1<f64>,
+        add: bool,
     ) -> PyResult<()> {
         let values = values.as_slice_mut()?;
-        let mine = pattern.grid == self.location.grid && pattern.active == self.location.active;
+        let mine = pattern.grid == self.location.grid;
         require(mine && values.len() == pattern.pattern.columns.len(), "another pattern")?;
         let mut sides = couplings.each(self, 1, &data)?.into_iter();
         let mut pairs = Vec::new();
@@ -342,9 +344,9 @@ impl PyAssembler {
         let form = Bilinear { kernels: kernels.with(self, 2, &data)?, couplings: pairs };
         let state = self.state(&volume, &coefficients)?;
         // SAFETY: kernels as in `PyKernels::new`, of the ranks asked for; `assembly::pattern` made the
-        // pattern for this location, and the lengths were checked.
+        // pattern, whose cells are compared with those of this location, and the lengths were checked.
         let fits = detached(py, || unsafe {
-            assembly::matrix(&state, &form, &pattern.selection, &pattern.pattern, values)
+            assembly::matrix(&state, &form, &pattern.selection, &pattern.pattern, values, add)
         });
         require(fits, "not the pattern of this matrix")
     }
@@ -354,8 +356,6 @@ impl PyAssembler {
 #[pyclass(name = "Pattern", frozen, module = "tawami._rust")]
 pub(super) struct PyPattern {
     grid: Grid,
-    /// The active cells.
-    active: Vec<u32>,
     selection: Selection,
     pattern: Pattern,
 }

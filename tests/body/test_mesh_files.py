@@ -144,6 +144,15 @@ def test_groups_without_names_and_negative_numbers(gmsh):
     assert volumes(gmsh([[7], [-7, 5], [-3]], groups=["7", "sand"])) == {"7": 2.0, "sand": 1.0}
 
 
+def test_physical_groups_of_curves(gmsh):
+    """A curve and a surface may share a name; the groups of the body are those of the surfaces."""
+    body = gmsh([[2], [2], [3]], lines=[[9], [-9]])
+    assert body.names == ("clay", "sand")
+    named = body.border.lengths["clay"]
+    assert named in (1.0, 2.0)  # the file of version 2 has one line
+    assert body.border.lengths == {"clay": named, "border": 8.0 - named}
+
+
 def test_elements_without_a_group(gmsh):
     """Gmsh writes them with Mesh.SaveAll."""
     assert volumes(gmsh([[], [], []], lines=[[], [9]])) == {"": 3.0}
@@ -201,6 +210,17 @@ def test_abaqus_with_one_set_of_two_types(tmp_path):
     more += "*Element, type=CPE3, elset=other\n7, 30, 80, 70\n*Solid section, elset=all\n1.\n"
     path.write_text(abaqus("CPE4", QUADS[:2], more))
     assert volumes(tawami.mesh(GRID, path)) == {"all": 2.5, "other": 0.5}
+
+
+def test_node_sets_of_abaqus(tmp_path):
+    """A side is in the smallest set that has both of its nodes."""
+    path = tmp_path / "body.inp"
+    more = "*Nset, nset=base, generate\n10, 40, 10\n*NSET, NSET=Wall\n10, 50\n"
+    path.write_text(abaqus("CPE4", QUADS, more))
+    lengths = tawami.mesh(GRID, path).border.lengths
+    assert lengths == {"base": 3.0, "border": 4.0, "Wall": 1.0}
+    path.write_text(abaqus("CPE4", QUADS, more + "*Nset, nset=all\nbase, wall, 60, 70, 80\n"))
+    assert tawami.mesh(GRID, path).border.lengths == {"base": 3.0, "all": 4.0, "Wall": 1.0}
 
 
 @pytest.mark.parametrize(
@@ -278,6 +298,20 @@ def test_kratos(tmp_path, elements, name):
             tawami.mesh(GRID, path)
         body = tawami.mesh(GRID, path, groups=["clay", "sand"])
         assert volumes(body) == {"clay": 2.0, "sand": 1.0}
+
+
+def test_conditions_of_kratos(tmp_path):
+    path = tmp_path / "body.mdpa"
+    part = "Begin SubModelPart {0}\nBegin SubModelPartConditions\n{1}\nEnd SubModelPartConditions\n"
+    part += "End SubModelPart\n"
+    more = "Begin Conditions LineLoadCondition2D3N\n7 0 6 7 8\nEnd Conditions\n"
+    path.write_text(kratos(QUADS, more + part.format("load", 1) + part.format("base", 7)))
+    body = tawami.mesh(GRID, path)
+    assert body.names == ("0", "1")
+    assert body.border.lengths == {"load": 1.0, "base": 1.0, "border": 6.0}
+    path.write_text(kratos(QUADS, more.replace("6 7 8", "6 77")))
+    with pytest.raises(tawami.InputError, match="line 7 has node 77, which is not in the file"):
+        tawami.mesh(GRID, path)
 
 
 @pytest.mark.parametrize(

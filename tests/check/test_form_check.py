@@ -8,7 +8,7 @@ import edited
 import numpy as np
 import pytest
 from scenes import FINITE, FORMS
-from ufl import div, dot, grad, inner
+from ufl import cofac, div, dot, grad, inner
 
 import tawami
 from tawami.base import dimensions
@@ -368,3 +368,27 @@ def test_the_plastic_law_yields_in_the_check():
     )
     change = abs(elastic.tangent(c[0]) - plastic.tangent(c[0])).max()
     assert change > 0.1 * abs(elastic.tangent(c[0])).max()
+
+
+def test_a_form_with_sums_over_the_border():
+    """The parts of the border have names that the bodies of the check do not have."""
+
+    def residual(u, T, w, r, sigma, grad, I, sum_p, sum_b, dot_n, old, p, k, c):  # noqa: E741
+        pressure = p * dot(dot_n(cofac(I + grad(u))), w)
+        R = sum_p(sigma, grad(w)) + sum_b(pressure, on=["crest", "top"])
+        R += sum_b(k * dot(old.u + u, w), on="base")
+        R += sum_p(dot(grad(old.T + T), grad(r)))
+        return R + sum_b(c * (old.T + T) * r, on=["a", "b", "c"])
+
+    own = {**ALONE, "T": scalar("r", unit="K")}
+    numbers = {name: {"default": 1.0, "unit": unit} for name, unit in (("p", "Pa"), ("c", "1/m"))}
+    foundation = {"k": "stiffness of the foundation [Pa/m]"}
+    report = tawami.check_form(tawami.Form(own, residual, parameters=numbers, data=foundation))
+    assert report.usable, str(report)
+    found = {line.subject for line in report.lines if line.verdict != "pass"}
+    loads = {"patch test, loaded", "locking"}
+    assert found - loads == {"symmetry", "dolfinx", "field T"}, str(report)
+    wrong = tawami.Form(own, residual, parameters=numbers, data={"k": "stiffness [Pa]"})
+    ((verdict, words),) = declared.check_units(wrong, {})
+    assert verdict == "cost"
+    assert 'on="base"' in words

@@ -212,29 +212,35 @@ def test_the_solutions_after_a_change_of_supports_agree():
 
 def test_arrays_that_do_not_fit_raise_an_error(random_scene):
     scene = random_scene(form="u")
-    field, c = scene.configuration.domain.assembly, np.zeros(scene.num_coefficients)
+    assembly, c = scene.configuration.domain.assembly, np.zeros(scene.num_coefficients)
     scene.residual(c)
+    field = assembly._kernels
     (kernels, none), volume = field._of_tangent, scene.particles.volume
     data = list(scene.configuration.domain.responses.data.values())
     with pytest.raises(RuntimeError, match="kernels of another rank"):
-        field._assembler.vector(kernels, data, volume, c)
-    owner, address, rank, width, *rest = field._kernel(field.attachment.compiled.tangent[0])
-    pattern = field._assembler.pattern(as_arrays(identity(len(c), format="csr"), np.arange(len(c))))
+        field.assembler.vector(kernels, data, volume, c)
+    owner, address, rank, width, *rest = field._kernel(assembly.attachment.compiled.tangent[0])
+    pattern = field.assembler.pattern(as_arrays(identity(len(c), format="csr"), np.arange(len(c))))
     wrong = (owner, address, rank, width + 1, *rest)
     with pytest.raises(RuntimeError, match="a kernel of other coefficients"):
-        _rust.Kernels(field._assembler, 2, [wrong])
+        _rust.Kernels(field.assembler, 2, [wrong])
     with pytest.raises(RuntimeError, match="a kernel of another rank"):
-        _rust.Kernels(field._assembler, 1, [(owner, address, rank, width, *rest)])
+        _rust.Kernels(field.assembler, 1, [(owner, address, rank, width, *rest)])
     values = np.zeros(len(pattern.columns))
     with pytest.raises(RuntimeError, match="kernels of other data"):
-        field._assembler.matrix(kernels, none, [], volume, c, pattern, values)
+        field.assembler.matrix(kernels, none, [], volume, c, pattern, values)
     short = [array[1:] for array in data]
     with pytest.raises(RuntimeError, match="data of other particles"):
-        field._assembler.matrix(kernels, none, short, volume, c, pattern, values)
+        field.assembler.matrix(kernels, none, short, volume, c, pattern, values)
     with pytest.raises(RuntimeError, match="another pattern"):
-        field._assembler.matrix(kernels, none, data, volume, c, pattern, np.zeros(3))
+        field.assembler.matrix(kernels, none, data, volume, c, pattern, np.zeros(3))
+    more = random_scene(count=1, form="u").configuration.domain
+    foreign = as_arrays(identity(len(c), format="csr"), np.arange(len(c)))
+    fewer = more.assembly._kernels.assembler.pattern(foreign)
+    with pytest.raises(RuntimeError, match="not the pattern of this matrix"):
+        field.assembler.matrix(kernels, none, data, volume, c, fewer, np.zeros(len(fewer.columns)))
     with pytest.raises(RuntimeError, match="not a selection of these coefficients"):
-        field._assembler.pattern(as_arrays(identity(3, format="csr"), np.arange(3)))
+        field.assembler.pattern(as_arrays(identity(3, format="csr"), np.arange(3)))
 
 
 def test_an_unknown_assembly_is_rejected(random_scene):

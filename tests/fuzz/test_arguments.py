@@ -227,12 +227,14 @@ TABLE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             {"grid": grid_of(), "lower": (-1.0, 0.5), "upper": (0.0, 1.0), "per_axis": 2,
             "gauss": False}),
     "polygon": (tawami.polygon, {"grid": grid_of(), "shape": [(-1, 0.5), (0, 0.5), (0, 1.2)],
-                                 "holes": [], "per_axis": 2, "gauss": True}),
+                                 "holes": [], "names": ["a", "b", "c"], "per_axis": 2, "gauss": True}),
+    "polyline": (tawami.polyline, {"corners": [(-1, 0.5), (0, 0.5), (0, 1.2)],
+                                   "names": ["a", "b", "c"], "closed": True}),
     "disc": (tawami.disc, {"grid": grid_of(), "centre": (0.0, 1.2), "radius": 0.6, "inner": 0.2,
                            "per_axis": 2, "gauss": True}),
     "level_set": (tawami.level_set, {
         "grid": grid_of(), "f": lambda x, y: np.hypot(x, y - 1.2) - 0.6, "ends": (),
-        "tolerance": 1e-3, "samples": 4, "per_axis": 2, "gauss": True}),
+        "tolerance": 1e-3, "samples": 4, "name": "skin", "per_axis": 2, "gauss": True}),
     "mesh": (tawami.mesh, {
         "grid": grid_of(), "source": meshio.Mesh([(-1, 0.5), (0, 0.5), (0, 1.2)],
                                                  [("triangle", [[0, 1, 2]])]),

@@ -125,6 +125,28 @@ def nonlinear() -> dict[str, np.ndarray]:
     return found
 
 
+def border() -> dict[str, np.ndarray]:
+    """Sums over a border that crosses the cells of several ranks: a foundation and a pressure."""
+    from ufl import cofac, dot
+
+    def residual(u, w, sigma, K, grad, I, old, n, dot_n, sum_p, sum_b, k):  # noqa: E741
+        R = sum_p(sigma, grad(w)) + sum_b(k * K * dot(old.u + u, w), on=["0", "2"])
+        return R + sum_b(0.1 * dot(dot_n(cofac(I + grad(u))), w)) - sum_b(w[0], on="1")
+
+    data = {"k": "stiffness of the foundation over K [1/m]"}
+    grid, random = grid_of((6, 5)), np.random.default_rng(0)
+    corners = [(-0.9, 0.6), (1.63, 0.7), (1.5, 2.8), (-0.8, 2.4)]
+    body = tawami.polygon(grid, corners, per_axis=3)
+    form = Form({"u": vector("w")}, residual, data=data)
+    law = tawami.linear_elastic(E=2.0, nu=0.3)
+    scene = tawami.Scene(grid, body, law, form=form, tolerance=1e-11)
+    scene.data("k", lambda x, y: 1 + y)
+    c = random.standard_normal(scene.num_coefficients)
+    found = {"border residual": scene.residual(c), "border tangent": scene.tangent(c).toarray()}
+    found["border first"], found["border second"] = scene.solve().u, scene.solve().u
+    return found
+
+
 def singular() -> dict[str, np.ndarray]:
     """The error of a singular tangent names cells."""
     grid = grid_of((6, 5))
@@ -340,7 +362,7 @@ def output(folder: Path) -> dict[str, np.ndarray]:
 def results(folder: Path) -> dict[str, Any]:
     """Results of all scenes; files are written to the folder."""
     found = beams() | random_clouds() | fields() | nonlinear() | singular() | motion() | initial()
-    found |= construction()
+    found |= construction() | border()
     return found | errors() | inverted() | few_cells() | output(folder)
 
 

@@ -147,12 +147,16 @@ def test_wrong_bodies_are_rejected(arguments, message):
 
 def test_wrong_boxes_are_rejected():
     grid = grid_of()
-    with pytest.raises(tawami.InputError, match="must lie on lines of the grid"):
-        tawami.box(grid, (-1.0, 0.5), (0.3, 2.0), per_axis=2)
-    with pytest.raises(tawami.InputError, match="must lie on lines of the grid"):
+    with pytest.raises(tawami.InputError, match=r"its x range \[-1, 2\] m leaves the grid"):
         tawami.box(grid, (-1.0, 0.5), (2.0, 2.0), per_axis=2)
-    with pytest.raises(tawami.InputError, match="so the body has no particles"):
+    with pytest.raises(
+        tawami.InputError, match=r"\[0, 0\] m is empty, so the body has no particles"
+    ):
         tawami.box(grid, (0.0, 0.5), (0.0, 2.0), per_axis=2)
+    with pytest.raises(tawami.InputError, match="expected lower < upper"):
+        tawami.box(grid, (0.3, 0.5), (0.1, 2.0), per_axis=2)
+    with pytest.raises(tawami.InputError, match=r"is round-off on cells of 0.5 m"):
+        tawami.box(grid, (0.0, 0.5), (1e-8, 2.0), per_axis=2)
     with pytest.raises(tawami.InputError, match="per_axis = 0"):
         tawami.box(grid, (-1.0, 0.5), (0.0, 2.0), per_axis=0)
 

@@ -21,7 +21,7 @@ RULES = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM", "INCLUDE
 
 
 def read(file: Path) -> Any:
-    """A mesh of meshio; its cell sets are the element sets.
+    """A mesh of meshio; its cell sets are the element sets, its point sets the node sets.
 
     Raises:
         InputError: The file has elements, keywords or lines that are not read.
@@ -76,7 +76,9 @@ class _File(Numbered):
         elif keyword == "ELEMENT":
             self._add_elements(options, rows)
         elif keyword == "ELSET":
-            self._add_set(options, rows)
+            self._add_set(self.sets, options.get("ELSET", ""), options, rows)
+        elif keyword == "NSET":
+            self._add_set(self.node_sets, options.get("NSET", ""), options, rows)
 
     def _add_elements(self, options: dict[str, str], rows: list[list[str]]) -> None:
         kind = options.get("TYPE", "")
@@ -97,15 +99,17 @@ class _File(Numbered):
                 )
             self.add_element(PLANE[count], number, nodes)
             if "ELSET" in options:
-                self._set(options["ELSET"]).append(number)
+                self._set(self.sets, options["ELSET"]).append(number)
 
-    def _set(self, name: str) -> list[int]:
-        """The elements of a set; upper and lower case are the same."""
-        same = (known for known in self.sets if known.upper() == name.upper())
-        return self.sets.setdefault(next(same, name), [])
+    def _set(self, sets: dict[str, list[int]], name: str) -> list[int]:
+        """The members of a set; upper and lower case are the same."""
+        same = (known for known in sets if known.upper() == name.upper())
+        return sets.setdefault(next(same, name), [])
 
-    def _add_set(self, options: dict[str, str], rows: list[list[str]]) -> None:
-        members = self._set(options.get("ELSET", ""))
+    def _add_set(
+        self, sets: dict[str, list[int]], name: str, options: dict[str, str], rows: list[list[str]]
+    ) -> None:
+        members = self._set(sets, name)
         for row in rows:
             if "GENERATE" in options:
                 first, last, *step = self.numbers(row, int)
@@ -115,4 +119,4 @@ class _File(Numbered):
                 if word.lstrip("-").isdigit():
                     members.append(int(word))
                 else:
-                    members.extend(self._set(word.strip('"')))
+                    members.extend(self._set(sets, word.strip('"')))

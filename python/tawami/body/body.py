@@ -86,6 +86,8 @@ class Body:
             _check_apart(one, others, *self.lattice)
         names, number = _groups(self, other)
         x, volume = (np.concatenate(arrays) for arrays in zip(one, others, strict=True))
+        for part in (self, other):
+            checks.instance("Body + Body: border", part.border, Border | None, "a tawami.Border")
         border = self.border and other.border and self.border.joined(other.border)
         return Body(x, volume, number, names, lattice, border)
 

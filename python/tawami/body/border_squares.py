@@ -61,8 +61,9 @@ class Squares:
 
 def triangulated(
     sign: Sign, squares: Squares, inside: float, tolerance: float
-) -> tuple[Array, list[Squares]]:
-    """Triangles (n x 3 x 2) and squares that fill the body in squares along its border.
+) -> tuple[Array, list[Squares], Array]:
+    """Triangles (n x 3 x 2) and squares that fill the body in squares along its border, and the straight
+    pieces of the border (n x 2 x 2, with the body on the left).
 
     Args:
         sign: Sign of the function.
@@ -73,18 +74,18 @@ def triangulated(
     Raises:
         InputError: The tolerance is not reached.
     """
-    done, whole = list[Array](), list[Squares]()
-    triangles, of_square = _pieces(sign, squares)
+    done, whole, border = list[Array](), list[Squares](), [np.empty((0, 2, 2))]
+    triangles, of_square, *_ = _pieces(sign, squares)
     most = MANY + 4 * len(squares.corner)
     for level in range(DEEPEST):
         count = len(squares.corner)
         if count > most:
             break
         if not count:
-            return np.concatenate([triangles, *done]), whole
+            return np.concatenate([triangles, *done]), whole, np.concatenate(border)
         before = np.bincount(of_square, areas(triangles), minlength=count)
         parts = _quarters(sign, squares)
-        triangles, of_part = _pieces(sign, parts)
+        triangles, of_part, pieces, of_piece = _pieces(sign, parts)
         found = areas(triangles)
         change = np.abs(np.bincount(of_part // 4, found, minlength=count) - before)
         # A change is not a bound of the error: all levels together may leave a tenth of the tolerance.
@@ -95,6 +96,7 @@ def triangulated(
         pending = again[of_part]
         full = (parts.sign < 0).all(axis=1)
         whole.append(parts[full & ~again])
+        border.append(pieces[~again[of_piece]])
         done.append(triangles[~pending & ~full[of_part]])
         inside += found[~pending].sum()
         squares, triangles = parts[again], triangles[pending]
@@ -142,8 +144,9 @@ def _quarters(sign: Sign, squares: Squares) -> Squares:
     return Squares(corner.reshape(-1, 2), half, signs[:, of_quarter].reshape(-1, 4))
 
 
-def _pieces(sign: Sign, squares: Squares) -> tuple[Array, Indices]:
-    """Triangles that fill the body in squares, and the square of each.
+def _pieces(sign: Sign, squares: Squares) -> tuple[Array, Indices, Array, Indices]:
+    """Triangles that fill the body in squares, the square of each, pieces of the border (n x 2 x 2, with
+    the body on the left), and the square of each.
 
     A square is two triangles. The border crosses a triangle from side to side through a point in
     between. This point is chosen so that the two straight pieces enclose the area of the parabola
@@ -158,6 +161,7 @@ def _pieces(sign: Sign, squares: Squares) -> tuple[Array, Indices]:
     number = np.repeat(np.arange(len(squares.corner)), 2)
     count = (signs < 0).sum(axis=1)
     found, of = [corners[count == 3]], [number[count == 3]]
+    border, of_border = list[Array](), list[Indices]()
     for alone, least in ((-1, 1), (1, 2)):  # one corner is inside, or one corner is outside
         mine = np.flatnonzero(count == least)
         first = (signs[mine] == alone).argmax(axis=1)
@@ -173,9 +177,12 @@ def _pieces(sign: Sign, squares: Squares) -> tuple[Array, Indices]:
         fans = ((a, p, m), (a, m, q)) if alone < 0 else ((m, b, c), (m, c, q), (m, p, b))
         found += [np.stack(fan, axis=1) for fan in fans]
         of += [number[mine]] * len(fans)
+        pieces = ((p, m), (m, q)) if alone < 0 else ((q, m), (m, p))
+        border += [np.stack(ends, axis=1) for ends in pieces]
+        of_border += [number[mine]] * 2
     triangles, squares_of = np.concatenate(found), np.concatenate(of)
     large = areas(triangles) > 0
-    return triangles[large], squares_of[large]
+    return triangles[large], squares_of[large], np.concatenate(border), np.concatenate(of_border)
 
 
 def _crossing(sign: Sign, a: Array, b: Array, at_a: Any) -> Array:

@@ -80,24 +80,24 @@ def _of_full_cells(filling: Filling, cells: Array) -> Body:
 
 def _ends(grid: Grid, corners: Array) -> Array:
     """Lower and upper corner in cells, 2 x dim, on lines of the grid if they are near."""
-    for name, (low, high) in zip(grid.space.axes, corners.T, strict=True):
+    with np.errstate(over="ignore", invalid="ignore"):
+        ends = clipping.on_lines(grid, corners)
+    for axis, name in enumerate(grid.space.axes):
+        (low, high), (first, last) = corners[:, axis], ends[:, axis]
         if not low < high:
             raise InputError(
                 f"box: its {name} range [{low:g}, {high:g}] m is empty, so the body has no particles: "
                 "expected lower < upper"
             )
-    ends = clipping.on_lines(grid, corners)
-    for axis, name in enumerate(grid.space.axes):
-        low, high = ends[:, axis]
-        here = f"box: its {name} range [{corners[0, axis]:g}, {corners[1, axis]:g}] m"
-        if low < 0 or high > grid.cells[axis]:
+        if first < 0 or last > grid.cells[axis]:
             raise InputError(
-                f"{here} leaves the grid, {grid.extent}; enlarge the grid or move the box"
+                f"box: its {name} range [{low:g}, {high:g}] m leaves the grid, {grid.extent}; enlarge "
+                "the grid or move the box"
             )
-        if low == high:
+        if first == last:
             raise InputError(
-                f"{here} is round-off on cells of {grid.h:g} m, so the body has no particles: expected "
-                "a wider box"
+                f"box: its {name} range [{low:g}, {high:g}] m is round-off on cells of {grid.h:g} m, so "
+                "the body has no particles: expected a wider box"
             )
     return ends
 

@@ -97,7 +97,7 @@ class Filling:
         *,
         material: Indices | None = None,
         names: tuple[str, ...] | None = None,
-        border: Border | None = None,
+        border: Border | None,
         allowed: Callable[[Array], Mask] | None = None,
     ) -> Body:
         """The particles of full and of cut cells.

@@ -17,8 +17,10 @@ import numpy as np
 from tawami.base.errors import InputError
 from tawami.body.groups import PHYSICAL
 
-#: Numbers of the physical groups of each surface.
-OfSurface = dict[int, list[int]]
+#: Numbers of the physical groups of each curve and surface, by dimension and number.
+OfEntity = dict[tuple[int, int], list[int]]
+#: Elements of each physical group in each block, by dimension and number of the group.
+Groups = dict[tuple[int, int], list[Any]]
 
 
 def is_gmsh(path: Path) -> bool:
@@ -28,7 +30,7 @@ def is_gmsh(path: Path) -> bool:
 
 
 def read(path: Path, by_meshio: Callable[[Path, str], Any]) -> Any:
-    """A mesh of meshio; its cell sets include the physical groups of surfaces.
+    """A mesh of meshio; its cell sets include the physical groups of surfaces and curves.
 
     Args:
         path: The file.
@@ -52,12 +54,18 @@ def read(path: Path, by_meshio: Callable[[Path, str], Any]) -> Any:
             rest.write_bytes(data[: section.start()] + data[section.end() :])
             mesh = by_meshio(rest, "gmsh")
         groups = _groups_of_entities(mesh, _entities(data, section.group(1)))
-    named = {abs(number): name for number, name in _names(data)}
-    mesh.field_data = {named.get(n, str(n)): np.array([n, 2]) for n in sorted(groups)}
-    mesh.cell_sets = {named.get(n, str(n)): groups[n] for n in sorted(groups)}
+    named = _names(data)
+    surfaces = sorted(number for dim, number in groups if dim == 2)
+    mesh.field_data = {named.get((2, n), str(n)): np.array([n, 2]) for n in surfaces}
+    mesh.cell_sets = {}
+    for dim, number in sorted(groups):  # a curve and a surface may have one name
+        members = groups[dim, number]
+        same = mesh.cell_sets.setdefault(named.get((dim, number), str(number)), members)
+        if same is not members:
+            same[:] = [np.union1d(a, b) for a, b in zip(same, members, strict=True)]
     first = [np.zeros(len(block.data), dtype=np.int64) for block in mesh.cells]
-    for number in sorted(groups, reverse=True):
-        for values, members in zip(first, groups[number], strict=True):
+    for number in reversed(surfaces):
+        for values, members in zip(first, groups[2, number], strict=True):
             values[members] = number
     mesh.cell_data[PHYSICAL] = first
     return mesh
@@ -67,21 +75,20 @@ def _section(data: bytes, name: bytes) -> re.Match[bytes] | None:
     return re.search(rb"\$" + name + rb"\s*?\n(.*?)\$End" + name + rb"\s*?\n", data, re.DOTALL)
 
 
-def _names(data: bytes) -> list[tuple[int, str]]:
-    """Numbers and names of the physical groups of surfaces."""
+def _names(data: bytes) -> dict[tuple[int, int], str]:
+    """Names of the physical groups of curves and surfaces, by dimension and number."""
     section = _section(data, b"PhysicalNames")
-    lines = (
-        re.findall(rb'^\s*2\s+(-?\d+)\s+"(.*)"', section.group(1), re.MULTILINE) if section else []
-    )
-    return [(int(number), name.decode(errors="replace")) for number, name in lines]
+    pattern = rb'^\s*([12])\s+(-?\d+)\s+"(.*)"'
+    lines = re.findall(pattern, section.group(1), re.MULTILINE) if section else []
+    return {(int(d), abs(int(number))): name.decode(errors="replace") for d, number, name in lines}
 
 
-def _entities(data: bytes, section: bytes) -> OfSurface:
-    """Physical groups of the surfaces of a file of version 4."""
+def _entities(data: bytes, section: bytes) -> OfEntity:
+    """Physical groups of the curves and surfaces of a file of version 4."""
     head = re.search(rb"\$MeshFormat\s+(\S+)\s+(\d)\s+(\d)", data)
     version, binary, size = head.groups() if head else (b"4.1", b"0", b"8")
     take = _binary(section, int(size)) if binary == b"1" else _text(section)
-    found = OfSurface()
+    found = OfEntity()
     for dim, count in enumerate(take("size", 4)):
         for _ in range(count):
             (tag,) = take("int", 1)
@@ -89,8 +96,8 @@ def _entities(data: bytes, section: bytes) -> OfSurface:
             numbers = take("int", take("size", 1)[0])
             if dim > 0:
                 take("int", take("size", 1)[0])  # what bounds it
-            if dim == 2:
-                found[tag] = [abs(number) for number in numbers]
+            if dim in (1, 2):
+                found[dim, tag] = [abs(number) for number in numbers]
     return found
 
 
@@ -116,26 +123,26 @@ def _binary(section: bytes, size: int) -> Callable[[str, int], list[int]]:
     return take
 
 
-def _groups_of_entities(mesh: Any, of_surface: OfSurface) -> dict[int, list[Any]]:
+def _groups_of_entities(mesh: Any, of_entity: OfEntity) -> Groups:
     """Elements of each physical group, in each block of a file of version 4."""
     tags = mesh.cell_data.get("gmsh:geometrical", [])
-    found = dict[int, list[Any]]()
-    for number in {number for numbers in of_surface.values() for number in numbers}:
-        surfaces = [tag for tag, numbers in of_surface.items() if number in numbers]
-        found[number] = [
-            np.flatnonzero(np.isin(values, surfaces) & (block.dim == 2))
+    found = Groups()
+    for dim, number in {(d, number) for (d, _), numbers in of_entity.items() for number in numbers}:
+        entities = [t for (d, t), numbers in of_entity.items() if d == dim and number in numbers]
+        found[dim, number] = [
+            np.flatnonzero(np.isin(values, entities) & (block.dim == dim))
             for block, values in zip(mesh.cells, tags, strict=True)
         ]
     return found
 
 
-def _groups_of_elements(mesh: Any) -> dict[int, list[Any]]:
+def _groups_of_elements(mesh: Any) -> Groups:
     """The same for version 2, which repeats an element for each of its groups: one of them stays."""
     _join_blocks(mesh)
     values = mesh.cell_data.get(PHYSICAL, [])
-    found = dict[int, list[Any]]()
+    found = Groups()
     for k, (block, numbers) in enumerate(zip(mesh.cells, values, strict=bool(values))):
-        if block.dim != 2:
+        if block.dim not in (1, 2):
             continue
         nodes, numbers = np.sort(block.data, axis=1), np.abs(numbers)
         _, first, of = np.unique(nodes, axis=0, return_index=True, return_inverse=True)
@@ -145,7 +152,8 @@ def _groups_of_elements(mesh: Any) -> dict[int, list[Any]]:
         kept = np.sort(first)
         place = np.asarray(np.searchsorted(kept, first))[np.ravel(of)]
         for number in set(numbers.tolist()) - {0}:
-            members = found.setdefault(number, [np.empty(0, dtype=np.int64) for _ in mesh.cells])
+            none = [np.empty(0, dtype=np.int64) for _ in mesh.cells]
+            members = found.setdefault((block.dim, number), none)
             members[k] = np.unique(place[numbers == number])
         block.data = block.data[kept]
         for data in mesh.cell_data.values():

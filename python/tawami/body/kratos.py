@@ -15,7 +15,8 @@ from tawami.body.numbered import PLANE, Numbered
 def read(file: Path) -> Any:
     """A mesh of meshio; its cell sets are the submodel parts, or else the numbers of the properties.
 
-    A submodel part has the elements of the parts inside it.
+    A submodel part has the elements and conditions of the parts inside it. Conditions with two or three
+    nodes are lines of the border.
 
     Raises:
         InputError: The file has elements or lines that are not read.
@@ -59,9 +60,17 @@ class _File(Numbered):
             self.add_node(words)
         elif block == "Elements":
             self._add_element("".join(name), words)
-        elif block == "SubModelPartElements":
+        elif block == "Conditions":
+            self._add_condition("".join(name), words)
+        elif block in ("SubModelPartElements", "SubModelPartConditions"):
+            sets = self.sets if block == "SubModelPartElements" else self.line_sets
             for part in (part[1] for part in self.open if part[0] == "SubModelPart" and part[1:]):
-                self.sets.setdefault(part, []).extend(self.numbers(words, int))
+                sets.setdefault(part, []).extend(self.numbers(words, int))
+
+    def _add_condition(self, name: str, words: list[str]) -> None:
+        number, _, *nodes = self.numbers(words, int)
+        if len(nodes) == 2 or (len(nodes) == 3 and "2D" in name):
+            self.lines[number] = nodes[:2]
 
     def _add_element(self, name: str, words: list[str]) -> None:
         number, properties, *nodes = self.numbers(words, int)

@@ -15,7 +15,9 @@ from tawami.base.space import lattice
 from tawami.body.body import Body
 from tawami.body.border_squares import Signs, Squares, merged, triangulated
 from tawami.body.filling import PER_AXIS, Filling
+from tawami.body.outline import outline
 from tawami.body.points import ROUND_OFF, areas, in_boxes, in_triangles, joined
+from tawami.border.pieces import Border
 from tawami.grid.grid import EDGES, Edge, Grid
 
 #: Memory of a sample [bytes], and number of samples that the function is given at once.
@@ -73,6 +75,7 @@ def level_set(
     f: Callable[[Array, Array], npt.ArrayLike],
     *,
     ends: Sequence[Edge] = (),
+    name: str = "border",
     tolerance: float = 1e-6,
     samples: int = 8,
     per_axis: int = PER_AXIS,
@@ -94,6 +97,7 @@ def level_set(
         f: A function on arrays of x and y [m].
         ends: Edges of the grid ('left', 'right', 'bottom', 'top') where the body may end, so that f
             may be negative there.
+        name: Name of the border. The parts on edges of the grid have the names of these.
         tolerance: Error of the area, relative to the area, estimated from the last division; 1e-13 at
             least.
         samples: Samples per cell and axis.
@@ -106,6 +110,10 @@ def level_set(
     """
     filling = Filling("level_set", grid, per_axis, gauss)
     tolerance = number("tolerance", tolerance, low=1e-13, high=0.1)
+    if not isinstance(name, str) or not name or name in EDGES:
+        raise InputError(
+            f"level_set: name = {shown(name)}: expected a name, and no edge of the grid"
+        )
     ended = names("ends", ends, EDGES)
     samples, sign = whole_number("samples", samples, low=2), Function(grid, f)
     nx, ny = (n * samples for n in grid.cells)
@@ -126,8 +134,9 @@ def level_set(
     at = np.stack([corner[border] for corner in corners], axis=-1)
     squares = Squares(np.argwhere(border)[:, ::-1] / samples, 1 / samples, at)
     area = np.count_nonzero(inside) / samples**2
-    triangles, whole = triangulated(sign, squares, area, tolerance)
-    return _filled(filling, inside, triangles, whole, samples)
+    triangles, whole, pieces = triangulated(sign, squares, area, tolerance)
+    ending = outline(grid, pieces, name, bool(signs[0, 0] < 0))
+    return _filled(filling, inside, triangles, whole, samples, ending)
 
 
 def _grown(mask: Mask) -> Mask:
@@ -153,7 +162,12 @@ def _check_ends(signs: Signs, ends: Sequence[str]) -> None:
 
 
 def _filled(
-    filling: Filling, inside: Mask, triangles: Array, whole: Sequence[Squares], samples: int
+    filling: Filling,
+    inside: Mask,
+    triangles: Array,
+    whole: Sequence[Squares],
+    samples: int,
+    border: Border,
 ) -> Body:
     """Particles for squares between samples that are inside, and along the border.
 
@@ -163,6 +177,7 @@ def _filled(
         triangles: Triangles along the border, n x 3 x 2.
         whole: Smaller squares along the border.
         samples: Samples per cell and axis.
+        border: The border of the body.
     """
     grid, (nx, ny) = filling.grid, filling.grid.cells
     count = inside.reshape(ny, samples, nx, samples).sum(axis=(1, 3), dtype=np.int64)
@@ -179,7 +194,7 @@ def _filled(
         cell = _cells(grid, one)
         lower, upper = merged(one.corner[~full[cell]], one.size, cell[~full[cell]])
         parts.append(in_boxes(lower, upper, grid.cell_numbers(grid.cell_at((lower + upper) / 2))))
-    return filling.body(np.flatnonzero(full), joined(parts))
+    return filling.body(np.flatnonzero(full), joined(parts), border=border)
 
 
 def _cells(grid: Grid, squares: Squares) -> Indices:

@@ -11,7 +11,7 @@ import numpy as np
 from tawami.base.arrays import Array, Indices
 from tawami.base.errors import GeometryWarning, InputError
 from tawami.base.warn import warn
-from tawami.body import clipping, elements, mesh_files
+from tawami.body import clipping, elements, facets, mesh_files
 from tawami.body.body import Body
 from tawami.body.filling import PER_AXIS, Filling
 from tawami.body.groups import materials
@@ -47,6 +47,10 @@ def mesh(
     is plane if z varies by less, and gaps and overlaps of four times this width are accepted. Sides may
     have hanging nodes, or two surfaces their own nodes along a common side.
 
+    The sides of the border have the names of the groups of lines in the mesh: physical groups of curves
+    in Gmsh, cell sets of lines, submodel parts with conditions in Kratos; in Abaqus, node sets that hold
+    both ends of a side. Sides in no group are named 'border'.
+
     Args:
         grid: The grid.
         source: A mesh of meshio, or a file: .msh of Gmsh, .inp of Abaqus, .mdpa of Kratos, .vtu, .vtk
@@ -68,7 +72,8 @@ def mesh(
             overlap; the tags or groups do not exist; or an element is in several groups or in none.
 
     Warns:
-        GeometryWarning: Quadratic elements have curved sides, or meshio has a warning.
+        GeometryWarning: Quadratic elements have curved sides, sides of the border are in several groups,
+            or meshio has a warning.
     """
     filling = Filling("mesh", grid, per_axis, gauss)
     read = mesh_files.read(source)
@@ -86,7 +91,8 @@ def mesh(
     elements.check_apart(grid, parts)
     _warn_of_curved_sides(nodes, x, elements.DEEP * parts.tolerance * grid.h)
     full, of_full, cut = elements.by_cells(grid, parts, max(len(names), 1))
-    return filling.body(full, cut, material=of_full, names=names)
+    border = facets.border(grid, read, x, corners)
+    return filling.body(full, cut, material=of_full, names=names, border=border)
 
 
 def _plane(grid: Grid, read: Any, used: Indices) -> Array:

@@ -22,6 +22,9 @@ class Numbered:
         nodes: Position (x, y, z) [m] of each node.
         elements: Nodes of each element, by type of meshio and number.
         sets: Numbers of the elements of each set.
+        lines: Nodes of each line of the border, by number.
+        line_sets: Numbers of the lines of each set.
+        node_sets: Numbers of the nodes of each set.
         line: Number of the line that is read.
 
     Args:
@@ -33,6 +36,9 @@ class Numbered:
         self.nodes: dict[int, list[float]] = {}
         self.elements: dict[str, dict[int, list[int]]] = {}
         self.sets: dict[str, list[int]] = {}
+        self.lines: dict[int, list[int]] = {}
+        self.line_sets: dict[str, list[int]] = {}
+        self.node_sets: dict[str, list[int]] = {}
         self.line = 0
 
     def fail(self, what: str) -> NoReturn:
@@ -79,7 +85,7 @@ class Numbered:
             self.fail(f"element {number} is listed twice: expected each number once")
 
     def mesh(self) -> Any:
-        """The mesh, with the sets as cell sets.
+        """The mesh, with the sets of elements and lines as cell sets, and those of nodes as point sets.
 
         Raises:
             InputError: An element has a node that the file does not have.
@@ -87,21 +93,33 @@ class Numbered:
         import meshio
 
         place = {number: k for k, number in enumerate(self.nodes)}
-        for elements in self.elements.values():
-            for number, nodes in elements.items():
-                missing = [node for node in nodes if node not in place]
+        blocks = [*self.elements.items(), *([("line", self.lines)] if self.lines else [])]
+        for kind, elements in blocks:
+            for number, of in elements.items():
+                missing = [node for node in of if node not in place]
                 if missing:
+                    what = "line" if kind == "line" else "element"
                     raise InputError(
-                        f"mesh: '{self.file}': element {number} has node {missing[0]}, which is not in "
-                        "the file: expected all nodes of the elements"
+                        f"mesh: '{self.file}': {what} {number} has node {missing[0]}, which is not in "
+                        "the file: expected all nodes of the elements and lines"
                     )
         cells = [
-            (kind, np.array([[place[node] for node in nodes] for nodes in elements.values()]))
-            for kind, elements in self.elements.items()
+            (kind, np.array([[place[node] for node in of] for of in elements.values()]))
+            for kind, elements in blocks
         ]
-        order = [{number: k for k, number in enumerate(e)} for e in self.elements.values()]
         sets = {
-            name: [np.array([at[n] for n in numbers if n in at], dtype=np.int64) for at in order]
-            for name, numbers in self.sets.items()
+            name: [
+                _places((self.line_sets if kind == "line" else self.sets).get(name, ()), elements)
+                for kind, elements in blocks
+            ]
+            for name in (*self.sets, *(name for name in self.line_sets if name not in self.sets))
         }
-        return meshio.Mesh(np.array([*self.nodes.values()]).reshape(-1, 3), cells, cell_sets=sets)
+        points = {name: _places(numbers, place) for name, numbers in self.node_sets.items()}
+        x = np.array([*self.nodes.values()]).reshape(-1, 3)
+        return meshio.Mesh(x, cells, cell_sets=sets, point_sets=points)
+
+
+def _places(numbers: Iterable[int], known: Iterable[int]) -> Any:
+    """Places among the known numbers of those that are known."""
+    place = {number: k for k, number in enumerate(known)}
+    return np.array([place[n] for n in numbers if n in place], dtype=np.int64)

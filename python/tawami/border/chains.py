@@ -5,13 +5,12 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from tawami.base.arrays import Array, Indices
-from tawami.border.curves import Curves
+from tawami.border.curves import Curves, spread
 
-#: Pieces that may start where another one ends: more than one where parts of a body touch.
-NEAREST = 4
+#: Factors that make one number of the indices of a square; squares may share a number.
+KEY = np.array([1, 1_000_003, 998_244_353])
 #: Angle from which on two pieces form a corner [rad].
 CORNER = np.radians(20)
 
@@ -29,18 +28,10 @@ def followers(curves: Curves, tolerance: float, tag: Indices | None = None) -> I
     following = np.full(n, -1)
     if not n:
         return following
-    near = list(range(1, min(NEAREST, n) + 1))
-    distance, other = cKDTree(curves.start).query(
-        curves.end, k=near, distance_upper_bound=tolerance
-    )
-    each, found = np.arange(n), other < n
-    of, other, distance = (
-        np.broadcast_to(each[:, None], found.shape)[found],
-        other[found],
-        distance[found],
-    )
+    of, other = _near(curves.end, curves.start, tolerance)
+    distance = np.linalg.norm(curves.end[of] - curves.start[other], axis=1)
     turn = _turn(curves, of, other)
-    some = of != other
+    some = (of != other) & (distance <= tolerance)
     if tag is not None:
         some &= (tag[of] == tag[other]) & (turn < CORNER)
     cost = (distance / tolerance + 1e-2 * turn)[some]
@@ -72,6 +63,45 @@ def chained(following: Indices) -> tuple[Indices, Indices]:
     chains.sort(key=min)
     order = np.array(list(itertools.chain(*chains)), dtype=np.int64)
     return order, np.repeat(np.arange(len(chains)), [len(chain) for chain in chains])
+
+
+def without_short(
+    curves: Curves, tag: Indices, chain: Indices, least: float, tolerance: float
+) -> Indices:
+    """Numbers of chains, where short ones belong to the chain before if they follow it.
+
+    Args:
+        curves: The pieces in order.
+        tag: Number of the name of each; chains of different names stay apart.
+        chain: Number of the chain of each, in order.
+        least: Length below which a chain is short [m].
+        tolerance: Distance below which two positions are the same [m].
+    """
+    if not len(chain):
+        return chain
+    first = np.flatnonzero(np.diff(chain, prepend=-1))
+    before = np.maximum(first - 1, 0)
+    gap = np.linalg.norm(curves.start[first] - curves.end[before], axis=1)
+    follows = (first > 0) & (gap <= tolerance) & (tag[first] == tag[before])
+    short = np.add.reduceat(curves.length, first) < least
+    return np.asarray(np.cumsum(~(follows & short)) - 1)[chain]
+
+
+def _near(a: Array, b: Array, tolerance: float) -> tuple[Indices, Indices]:
+    """Pairs of positions a and b (n x dim), with all pairs that are nearer than the tolerance.
+
+    Positions that near are in one square of at least one lattice, shifted by half a square or not.
+    """
+    size, pairs = 4 * tolerance, list[tuple[Indices, Indices]]()
+    for shift in itertools.product((0.0, 0.5), repeat=a.shape[1]):
+        keys = (np.floor(x / size + shift).astype(np.int64) @ KEY[: a.shape[1]] for x in (a, b))
+        key, known = keys
+        order = np.argsort(known, kind="stable")
+        first, last = (np.searchsorted(known[order], key, side) for side in ("left", "right"))
+        of, step = spread(last - first)
+        pairs.append((of, order[first[of] + step]))
+    of, other = (np.concatenate(part) for part in zip(*pairs, strict=True))
+    return of, other
 
 
 def _turn(curves: Curves, of: Indices, other: Indices) -> Array:

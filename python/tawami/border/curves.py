@@ -80,8 +80,8 @@ class Curves:
             first = np.ceil(np.clip(np.minimum(a, b) - bulge / h, 0, count)).astype(np.int64)
             last = np.floor(np.clip(np.maximum(a, b) + bulge / h, 0, count)).astype(np.int64)
             number = np.maximum(last - first + 1, 0)
-            of = np.repeat(np.arange(len(a)), number)
-            line = first[of] + np.arange(len(of)) - np.repeat(np.cumsum(number) - number, number)
+            of, step = spread(number)
+            line = first[of] + step
             for s in self._meeting(of, axis, origin[axis] + h * line):
                 inside = (s > 0) & (s < 1)
                 found.append((of[inside], s[inside], np.full(inside.sum(), axis), line[inside]))
@@ -125,6 +125,12 @@ def turned(vector: Array, angle: Array) -> Array:
     c, s = np.cos(angle), np.sin(angle)
     x, y = vector[:, 0], vector[:, 1]
     return np.stack([c * x - s * y, s * x + c * y], axis=1)
+
+
+def spread(count: Indices) -> tuple[Indices, Indices]:
+    """The numbers 0 to count - 1 for each count: which count each belongs to, and the number."""
+    of = np.repeat(np.arange(len(count)), count)
+    return of, np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
 
 
 def _divided(a: Array, b: Array) -> Array:

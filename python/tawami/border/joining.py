@@ -40,8 +40,9 @@ def free(curves: Curves, tolerance: float) -> tuple[Indices, Array, Array]:
     same = of[1:] == of[:-1]
     first, last = reached[:-1][same], low[1:][same]
     of = of[1:][same]
-    large = (last - first) * curves.length[of] > tolerance
-    return of[large], first[large], last[large]
+    kept = (last - first) * curves.length[of] > tolerance
+    kept |= (first == 0) & (last == 1)
+    return of[kept], first[kept], last[kept]
 
 
 def _near(curves: Curves, tolerance: float) -> tuple[Indices, Indices]:
@@ -63,7 +64,8 @@ def _common(curves: Curves, of: Indices, other: Indices, tolerance: float) -> tu
     """Shares of the pieces `of` between which pieces `other` lie on them; both 0 if they do not."""
     a, b = (_share(curves, of, x) for x in (curves.end[other], curves.start[other]))
     low, high = np.clip(a, 0, 1), np.clip(b, 0, 1)
-    on = (high - low) * curves.length[of] > tolerance
+    # of pieces shorter than the tolerance, half must be common
+    on = high - low > np.minimum(tolerance / curves.length[of], 0.5)
     # where the part begins and ends, the other piece is at the same place
     for share in (low, high):
         on &= _distance(curves, of, other, share, a, b) <= tolerance

@@ -55,7 +55,8 @@ class Border(Curves):
         parts shorter than h/16 have at most two points, and those shorter than h/128 have one.
         Pieces on the axis of an axisymmetric grid have none.
 
-        Consecutive pieces of one name that form no corner (less than 20 degrees) are one chain.
+        Consecutive pieces of one name that form no corner (less than 20 degrees) are one chain. Chains
+        shorter than h/16, as at corners of level sets, belong to the one before.
 
         Args:
             grid: The grid.
@@ -66,9 +67,11 @@ class Border(Curves):
             size = ON_LINE * grid.h
             on_axis = (np.abs(parts.start[:, 0]) < size) & (np.abs(parts.end[:, 0]) < size)
             parts = parts[~(on_axis & (parts.curvature == 0))]
-        following = chains.followers(parts, ON_LINE * grid.h, parts.tag)
+        same = ON_LINE * grid.h
+        following = chains.followers(parts, same, parts.tag)
         order, chain = chains.chained(following)
         parts = parts[order]
+        chain = chains.without_short(parts, parts.tag, chain, rule.TWO * grid.h, same)
         of, s, share = rule.gauss(parts, count, grid.h)
         length = parts.length
         before = np.cumsum(length) - length

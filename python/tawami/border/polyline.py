@@ -12,7 +12,10 @@ from tawami.base.arrays import Array
 from tawami.base.checks import array, shown, switch
 from tawami.base.errors import InputError
 from tawami.border.pieces import Border
+from tawami.grid.grid import LARGEST
 
+#: An area this small, relative to the square of the size, is round-off.
+ROUND_OFF = 1e-14
 #: Names of the sides of a shape: one for all, one for each, or some by the number of the side.
 SideNames = str | Sequence[str] | Mapping[int, str] | None
 
@@ -32,7 +35,7 @@ def polyline(corners: npt.ArrayLike, *, names: SideNames = None, closed: bool = 
     """
     x = array("corners", corners, 2)
     least = 3 if switch("closed", closed) else 2
-    if len(x) < least or x.shape[1] != 2 or not np.isfinite(x).all():
+    if len(x) < least or x.shape[1] != 2 or not (np.abs(x) < LARGEST).all():
         raise InputError(
             f"polyline: corners of shape {x.shape}: expected {least} or more finite points (x, y)"
         )
@@ -40,6 +43,8 @@ def polyline(corners: npt.ArrayLike, *, names: SideNames = None, closed: bool = 
         named = side_names("polyline", names, len(x) - 1)
         return _checked(straight(x[:-1], x[1:], named))
     x = unclosed(x)
+    if abs(_area(x)) <= ROUND_OFF * np.ptp(x, axis=0).max() ** 2:
+        raise InputError("polyline: its corners are on a line: expected an area, or closed=False")
     named = side_names("polyline", names, len(x))
     return _checked(straight(*oriented(x, named), named))
 
@@ -55,9 +60,7 @@ def oriented(
         hole: Whether the body is outside.
     """
     after = np.roll(x, -1, axis=0)
-    middle = x.mean(axis=0)
-    area = float(np.sum(np.cross(x - middle, after - middle)))
-    if (area < 0) != hole:
+    if (_area(x) < 0) != hole:
         order = np.arange(len(x))[::-1]
         return after[order], x[order], [names[k] for k in order]
     return x, after, names
@@ -80,6 +83,12 @@ def straight(
     number = {name: k for k, name in enumerate(known)}
     tag = np.array([number[name] for name in of], dtype=np.int64)
     return Border(start[some], end[some], np.zeros(len(some)), tag, known)
+
+
+def _area(x: Array) -> float:
+    """Area inside corners [m], n x 2, positive if these are counter-clockwise."""
+    a, b = (x - x.mean(axis=0)).T
+    return float(a @ np.roll(b, -1) - b @ np.roll(a, -1)) / 2
 
 
 def unclosed(x: Array) -> Array:

@@ -1,8 +1,9 @@
-"""The mechanical part of a form: its fields without a role stay at zero."""
+"""The mechanical part of a form: fields without a role stay at zero, and nothing acts on the border."""
 
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable
 from typing import Any
 
 from tawami.form.form import Form
@@ -12,13 +13,13 @@ REST = "field_at_rest"
 
 
 def mechanical(form: Form) -> Form:
-    """A form without its fields that no law receives; the form itself if it has none.
+    """A form without its fields that no law receives and without its sums over the border.
 
-    Their values, increments and equations are multiplied by a constant that is zero, so that a term with
-    them compiles, and does nothing.
+    These fields, their equations and these sums are multiplied by a constant that is zero, so that such
+    a term compiles, and does nothing. A form without them is returned as it is.
     """
     own = form.own_fields
-    if not own:
+    if not own and "sum_b" not in inspect.signature(form.residual).parameters:
         return form
     left_out = {*own, *(field.test for field in own.values())}
     wanted = list(inspect.signature(form.residual).parameters)
@@ -30,6 +31,8 @@ def mechanical(form: Form) -> Form:
         names |= dict.fromkeys(own, zero)
         names |= {field.test: zero * w[0] for field in own.values()}
         names["old"] = _Old(names["old"], dict.fromkeys(own, zero)) if "old" in wanted else None
+        if "sum_b" in wanted:
+            names["sum_b"] = _scaled(names["sum_b"], zero)
         return form.residual(**{name: names[name] for name in wanted})
 
     keyword = inspect.Parameter.KEYWORD_ONLY
@@ -48,6 +51,11 @@ def mechanical(form: Form) -> Form:
         static_options=form.static_options,
         name=form.name,
     )
+
+
+def _scaled(sum_b: Callable[..., Any], factor: Any) -> Callable[..., Any]:
+    """A sum over the border times a factor."""
+    return lambda f, on=None: sum_b(factor * f, on=on)
 
 
 class _Old:

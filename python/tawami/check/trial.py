@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ from tawami import _rust
 from tawami.base.arrays import Array
 from tawami.base.dimensions import dimension, size
 from tawami.body.body import Body
+from tawami.border.pieces import Border
+from tawami.border.polyline import polyline
 from tawami.check.units import unit_of, unreadable
 from tawami.form.compilation import CompiledForm, compile_form
 from tawami.form.form import Form
@@ -32,6 +35,8 @@ K, H = 5.0, 0.5
 SCALES = {"m": H, "s": 1.0, "kg": K * H}
 #: Lengths of a step [s] for forms that read dt, and one in which rates vanish.
 STEPS, LONG = (1e-3, 1.0, 1e3), 1e9
+#: Sides of the body, as sums over the border name them.
+SIDES = ("right", "top", "left", "bottom")
 #: Density for forms that read it [kg/m3].
 DENSITY = 2.0
 #: Plastic laws, and elastic laws, some of them with history variables that never change.
@@ -126,6 +131,8 @@ def made(
         varied: Whether data differ between particles.
         options: Other arguments of `Scene`.
     """
+    if compiled(form, given).border:
+        body = replace(body, border=border_of(form, given, grid, body))
     if "rho" in inspect.signature(form.residual).parameters:
         options["density"] = DENSITY
     scene = Scene(grid, body, material, form=form, **options, **values(form, given))
@@ -134,6 +141,25 @@ def made(
         vary = random.uniform(0.8, 1.2, len(body.x)) if varied else 1.0
         scene.data(name, natural(form, name) * vary)
     return scene
+
+
+def border_of(form: Form, given: Settings, grid: Grid, body: Body) -> Border:
+    """The rectangle around a body, or the whole grid for loose particles.
+
+    Its sides are 'bottom', 'right', 'top' and 'left'. Other names in sums over the border take the
+    places of sides that no sum names, and then of parts of the base.
+    """
+    lower, upper = np.array(grid.origin), np.array(grid.upper)
+    if body.border is not None:
+        ends = np.concatenate([body.border.start, body.border.end])
+        lower, upper = ends.min(axis=0), ends.max(axis=0)
+    asked = {name for term in compiled(form, given).border for name in term.on or ()}
+    names, others = [*SIDES], sorted(asked - {*SIDES})
+    for free in [name for name in names if name not in asked][: len(others)]:
+        names[names.index(free)] = others.pop()
+    base = np.linspace(lower, upper, len(others) + 2)[:-1, 0]
+    corners = [(upper[0], lower[1]), tuple(upper), (lower[0], upper[1])]
+    return polyline([*corners, *((x, lower[1]) for x in base)], names=[*names, *others])
 
 
 def solve(scene: Scene, *, dt: float) -> Any:

@@ -27,7 +27,7 @@ UNITS: Mapping[str, str] = {
     **dict.fromkeys(("sigma", "s", "sigma_m", "P", "P_s", "tau_m"), "Pa"),
 }  # fmt: skip
 #: Unit of the measure of an integral, per metre of depth.
-MEASURES = {"cell": "m2", "exterior_facet": "m", "interior_facet": "m"}
+MEASURES = {"border": "m", "cell": "m2", "exterior_facet": "m", "interior_facet": "m"}
 FACTOR, SAMPLES = 2.0, 3
 #: Exponents that differ by less are the same.
 SAME = 1e-6
@@ -68,7 +68,7 @@ def contradictions(
     parts = [
         (line_of(part), kind, expanded.integrand())
         for part in symbols.residual().integrals()
-        for kind in [part.integral_type()]
+        for kind in [_kind(part)]
         for expanded in expand_derivatives(ufl.Form([part])).integrals()
     ]
     terms = _Terms(symbols)
@@ -96,6 +96,12 @@ def contradictions(
                     f"{field.test}), but {text_of(expected[0])} {other}",
                     read,
                 )
+
+
+def _kind(part: Any) -> str:
+    """Kind of an integral, as `MEASURES` has it."""
+    border = part.metadata().get("place") == "border"
+    return "border" if border else str(part.integral_type())
 
 
 def _times(a: Dimension, b: Dimension, power: float = 1.0) -> dict[str, float]:

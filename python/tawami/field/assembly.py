@@ -14,12 +14,18 @@ import scipy.sparse as sp
 
 from tawami.base import ranks
 from tawami.base.arrays import Array
+from tawami.base.errors import InputError
 from tawami.base.petsc import rows_of
+from tawami.base.text import quoted
+from tawami.border.points import BorderPoints
 from tawami.fem.rules import Rule
 from tawami.field.attachment import Attachment
+from tawami.field.border_terms import BorderTerms
 from tawami.field.ghost import GhostPenalty
 from tawami.field.layout import Layout
 from tawami.field.reduction import Reduction
+
+NOTHING: Mapping[str, Array] = {}
 
 
 class Assembly(ABC):
@@ -39,6 +45,7 @@ class Assembly(ABC):
         self.attachment = attachment
         self._compiled, self._stopwatch = attachment.compiled, attachment.stopwatch
         self._ghost = GhostPenalty(attachment)
+        self._border: BorderTerms | None = None
 
     @property
     def layout(self) -> Layout:
@@ -73,6 +80,55 @@ class Assembly(ABC):
         The next call overwrites it. It is the same object as long as the unknowns are the same.
         """
 
+    def set_border(
+        self,
+        points: BorderPoints | None,
+        particles: Mapping[str, Array],
+        carried: Mapping[str, Array] = NOTHING,
+    ) -> None:
+        """Give the sums of the form over the border, `sum_b`, their points; a collective call.
+
+        Without such sums it does nothing.
+
+        Args:
+            points: Points of the border, the same on every rank; None if the body has none.
+            particles: Numbers of this rank's particles by name: those of the nearest particle of the
+                cell are the numbers of a point.
+            carried: Numbers of the points by name, which replace these.
+
+        Raises:
+            InputError: The body has no border, or it lacks a part that the form names.
+        """
+        if not self._compiled.border:
+            return
+        if points is None:
+            raise self._no_border()
+        self._border = BorderTerms(self.attachment, points, particles, carried)
+
+    @property
+    def border(self) -> BorderTerms:
+        """The sums over the border.
+
+        Raises:
+            InputError: The body has no border.
+        """
+        if self._border is None:
+            raise self._no_border()
+        return self._border
+
+    def refresh_border(self) -> None:
+        """Read the numbers of the points of the border again: they may have changed."""
+        if self._border is not None:
+            self._border.refresh()
+
+    def _no_border(self) -> InputError:
+        names = sorted({name for term in self._compiled.border for name in term.on or ()})
+        parts = f" with the parts {quoted(names)}" if names else ""
+        return InputError(
+            f"form {self._compiled.form.name} has sums over the border, sum_b(...), and the body has no "
+            f"border: expected a body with a border{parts}, as tawami.box(...) gives it"
+        )
+
     def follow(self, earlier: Assembly) -> None:  # noqa: B027 (by default there is nothing to use)
         """Use what an earlier assembly made for its matrix, if the cells and unknowns are the same.
 
@@ -88,6 +144,7 @@ class Assembly(ABC):
         """
         everything, comm = Reduction.of_all(self.layout), self.layout.grid.comm
         apart = type(self)(self.attachment)
+        apart._border = self._border
         mine = rows_of(apart.tangent(coefficients, data, everything)).tocoo()
         rows, columns, values = (
             ranks.allgathered(comm, part)

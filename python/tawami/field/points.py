@@ -8,8 +8,7 @@ round-off (`tests/field/test_assemblies.py`).
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,13 +16,12 @@ import numpy as np
 from tawami import _rust
 from tawami.base.arrays import Array
 from tawami.base.errors import FormError
-from tawami.fem import dolfinx
 from tawami.fem.rules import Rule
 from tawami.field.assembly import Assembly
 from tawami.field.attachment import Attachment
+from tawami.field.kernels import KernelsAtPoints
 from tawami.field.matrix import ReducedMatrix
 from tawami.field.reduction import Reduction
-from tawami.form.integral import Integral
 
 
 class PointAssembly(Assembly):
@@ -47,62 +45,16 @@ class PointAssembly(Assembly):
                 "basis='bilinear' for some of them"
             )
         self._matrix = ReducedMatrix(attachment.grid.comm)
-        #: Kernels, which hold the values of the constants, with the version of these.
-        self._residual: tuple[int, _rust.Kernels] | None = None
-        self._tangent: tuple[int, _rust.Kernels, _rust.Kernels] | None = None
+        compiled = attachment.compiled
+        self._kernels = KernelsAtPoints(
+            attachment, attachment.location, attachment.volume,
+            compiled.residual, compiled.tangent, compiled.couplings,
+        )  # fmt: skip
 
     def follow(self, earlier: Assembly) -> None:
         """See `Assembly.follow`."""
         if isinstance(earlier, PointAssembly):
             self._matrix = earlier._matrix
-
-    @functools.cached_property
-    def _assembler(self) -> _rust.Assembler:
-        to_grid = self.layout.grid.rectangle.to_grid_axes
-        nodes, vertices = (
-            np.rint(degree * to_grid(dolfinx.reference_nodes(degree))).astype(int).tolist()
-            for degree in (2, 1)
-        )
-        fields = [(f.basis, f.components, f.degree) for f in self.layout.fields.values()]
-        return _rust.Assembler(self.attachment.location, fields, nodes, vertices)
-
-    def _kernel(self, integral: Integral) -> tuple[Any, ...]:
-        """An integral as `_rust.Kernels` reads it."""
-        rules = list(self._compiled.densities)
-        slots: list[tuple[Any, ...] | str] = []
-        for slot in integral.slots:
-            if slot.source in ("fields", "position"):
-                slots.append(slot.source)
-                continue
-            assert slot.source != "traction"  # compilation rejects it in integrals over cells
-            slots.append((rules.index(slot.data), slot.source == "mean", slot.columns))
-        kernel, constants = integral.kernel, self.attachment.constants(integral).tolist()
-        point = None
-        if integral.points is not None:
-            place, entries = integral.points
-            point = (place, entries.fields, entries.test, entries.trial)
-        reads_position = integral.reads_position
-        code = kernel.module, kernel.address
-        return *code, integral.rank, integral.width, slots, constants, reads_position, point
-
-    def _kernels(self, rank: int, integrals: Sequence[Integral]) -> _rust.Kernels:
-        return _rust.Kernels(self._assembler, rank, list(map(self._kernel, integrals)))
-
-    @property
-    def _of_residual(self) -> _rust.Kernels:
-        if self._residual is None or self._residual[0] != self.attachment.version:
-            kernels = self._kernels(1, self._compiled.residual)
-            self._residual = self.attachment.version, kernels
-        return self._residual[1]
-
-    @property
-    def _of_tangent(self) -> tuple[_rust.Kernels, _rust.Kernels]:
-        """Kernels of rank 2, and the pairs of kernels of rank 1 whose products are added."""
-        if self._tangent is None or self._tangent[0] != self.attachment.version:
-            pairs = [integral for pair in self._compiled.couplings for integral in pair]
-            kernels = self._kernels(2, self._compiled.tangent), self._kernels(1, pairs)
-            self._tangent = self.attachment.version, *kernels
-        return self._tangent[1:]
 
     def residual(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
         """See `Assembly.residual`."""
@@ -115,10 +67,10 @@ class PointAssembly(Assembly):
 
     def _vector(self, coefficients: Array, data: Mapping[Rule, Array], *, absolute: bool) -> Array:
         with self._stopwatch("residual"):
-            arrays, volume = list(data.values()), self.attachment.volume
-            of_cells = self._assembler.vector(
-                self._of_residual, arrays, volume, coefficients, absolute
-            )
+            arrays = list(data.values())
+            of_cells = self._kernels.vector(arrays, coefficients, absolute=absolute)
+            if self._compiled.border:
+                of_cells = self.border.add_vector(of_cells, coefficients, absolute=absolute)
             return self.attachment.summed(of_cells)
 
     def tangent(self, coefficients: Array, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
@@ -126,13 +78,13 @@ class PointAssembly(Assembly):
         matrix = self._matrix
         with self._stopwatch("pattern"):
             self.reduction = None
-            matrix.fit(self._assembler, self.attachment, reduction)
+            matrix.fit(self._kernels.assembler, self.attachment, reduction)
             self.reduction = reduction
         with self._stopwatch("tangent"):
-            arrays, volume = list(data.values()), self.attachment.volume
-            self._assembler.matrix(
-                *self._of_tangent, arrays, volume, coefficients, matrix.pattern, matrix.values
-            )
+            arrays, place = list(data.values()), (matrix.pattern, matrix.values)
+            self._kernels.write_matrix(arrays, coefficients, *place)
+            if self._compiled.border:
+                self.border.add_matrix(coefficients, *place)
             matrix.written()
         with self._stopwatch("reduction"):
             tangent = matrix.summed()

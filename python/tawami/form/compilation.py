@@ -18,8 +18,23 @@ from tawami.form.form import Form
 from tawami.form.integral import Integral, KernelBuilder
 from tawami.form.quantities import Density, LawQuantity, ParticleScalar
 from tawami.form.symbols import Assembly, Symbols
-from tawami.form.tangent import Linearisation
+from tawami.form.tangent import Linearisation, change_with_fields
 from tawami.form.terms import at_points, by_rule, terms_of
+
+
+@dataclass(frozen=True)
+class BorderTerm:
+    """The sums of a form over one part of the border.
+
+    Attributes:
+        on: Names of the parts of the border; None for all of it.
+        residual: The integrals of rank 1.
+        tangent: Their derivatives.
+    """
+
+    on: tuple[str, ...] | None
+    residual: tuple[Integral, ...]
+    tangent: tuple[Integral, ...]
 
 
 @dataclass(frozen=True)
@@ -35,7 +50,9 @@ class CompiledForm:
         couplings: The other part of the tangent: products of two integrals of rank 1, cell by cell.
         sides: Compiles the integral of rank 2 over sides of partially filled cells, if there is one. It
             is called for the first body with such cells.
+        border: Sums over the border.
         densities: Particle data of each rule: each density with its first column.
+        border_data: Numbers of the points of the border, as columns.
         used: Parameters, data and constants (time, dt, b) that the residual reads with these options.
     """
 
@@ -46,7 +63,9 @@ class CompiledForm:
     tangent: tuple[Integral, ...]
     couplings: tuple[tuple[Integral, Integral], ...]
     sides: Callable[[], Integral] | None
+    border: tuple[BorderTerm, ...]
     densities: Mapping[Rule, Mapping[Density, int]]
+    border_data: tuple[ParticleScalar, ...]
     used: frozenset[str]
 
     @functools.cached_property
@@ -65,6 +84,18 @@ class CompiledForm:
         """The ghost penalty, if the form has one; a collective call."""
         with tally.compiling():
             return None if self.sides is None else self.sides()
+
+    @property
+    def may_hold(self) -> bool:
+        """Whether sums over the border may hold the body, as an elastic foundation does."""
+        first = range(next(iter(self.form.fields.values())).components)
+        points = [one.points[1] for term in self.border for one in term.tangent if one.points]
+        return any(
+            all(
+                any(component in first for component, _ in entries) for entries in (p.test, p.trial)
+            )
+            for p in points
+        )
 
     def columns(self, rule: Rule) -> int:
         """Number of columns of the particle data of a rule."""
@@ -147,6 +178,20 @@ def _compile(comm: Any, symbols: Symbols) -> CompiledForm:
         (left,), (right,) = map(integrals, pair)
         return left, right
 
+    of_border = KernelBuilder(comm, symbols)
+
+    def border_term(on: tuple[str, ...] | None, form: Any) -> BorderTerm:
+        """Points of the border take the place of particles in kernels of their own."""
+        with symbols.lines.errors(form):
+            parts = form, change_with_fields(symbols, form)
+        kernels = [
+            tuple(of_border.at_points(part, "particle") for _, part in at_points(one)[0])
+            for one in parts
+        ]
+        return BorderTerm(on, *kernels)
+
+    border = tuple(border_term(on, form) for on, form in terms.border.items())
+    numbers = [density.quantity for density in of_border.densities["particle"]]
     return CompiledForm(
         form=form,
         element=symbols.element,
@@ -154,8 +199,10 @@ def _compile(comm: Any, symbols: Symbols) -> CompiledForm:
         edges=None if edges is None else lambda: integral(edges, "exterior_facet"),
         tangent=integrals(tangent),
         sides=None if ghost is None else builder.prepared(ghost, "interior_facet"),
+        border=border,
         couplings=tuple(map(of_pair, couplings)),
         densities=builder.densities,
+        border_data=tuple(n for n in numbers if isinstance(n, ParticleScalar)),
         used=_used(symbols, residual),
     )
 

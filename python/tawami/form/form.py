@@ -46,8 +46,8 @@ RESERVED = frozenset(
     (
         *STRAIN_MEASURES["small"].quantities, *STRAIN_MEASURES["finite"].quantities,
         "K", "mu", "rho", "x", "time", "dt", "b", "t", "h", "old", "dx", "dx_c", "ds", "dG",
-        "grad", "div", "eps", "I", "dim", "sum_p", "sum_c", "sum_v", "cell_mean", "facet_mean",
-        "jump_n", "jump_nn",
+        "grad", "div", "eps", "I", "dim", "sum_p", "sum_c", "sum_v", "sum_b", "cell_mean",
+        "facet_mean", "jump_n", "jump_nn", "n", "dot_n",
     )
 )  # fmt: skip
 #: Arrays of the particles that no field and no data may be called after.

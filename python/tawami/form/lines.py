@@ -113,5 +113,5 @@ def line_of(integral: Any) -> int | None:
 
 def without_line(integral: Any) -> Any:
     """An integral as FFCx compiles it."""
-    metadata = {k: v for k, v in integral.metadata().items() if k not in ("line", "place")}
+    metadata = {k: v for k, v in integral.metadata().items() if k not in ("line", "place", "on")}
     return integral.reconstruct(metadata=metadata)

@@ -153,6 +153,23 @@ class Operators:
         rows = range(self.dim)
         return ufl.as_matrix([[places.get((i, j), ufl.as_ufl(0.0)) for j in rows] for i in rows])
 
+    def along(self, f: Any, n: Any) -> Any:
+        """A n of a tensor, with the components of a field, or g . n of a vector.
+
+        Args:
+            f: The tensor A or the vector g.
+            n: A vector in the plane.
+
+        Raises:
+            FormError: f is neither.
+        """
+        f, axes = ufl.as_ufl(f), range(self.space.dim)
+        if len(f.ufl_shape) not in (1, 2) or {*f.ufl_shape} - {self.space.dim, self.dim}:
+            self._unexpected("dot_n", f, "a vector or a tensor")
+        if len(f.ufl_shape) == 1:
+            return sum(f[j] * n[j] for j in axes)
+        return ufl.as_vector([sum(f[i, j] * n[j] for j in axes) for i in axes])
+
     def volume_change(self, u: Any, du: Any, *, finite: bool) -> Any:
         """Change of div u, or of ln det (I + grad u), with du."""
         if finite:

@@ -32,16 +32,18 @@ class ParticleScalar:
         text: Its name or the expression; two with the same text are the same.
         evaluate: Gives its values from arrays by name, with one entry per particle.
         varies: Whether it may change between the steps of particles that do not move.
+        border: Whether points of the border have it, and particles do not: the normal.
     """
 
     text: str
     evaluate: Callable[[Mapping[str, Any]], Any] = field(compare=False)
     varies: bool = field(default=False, compare=False)
+    border: bool = field(default=False, compare=False)
 
 
-def named(name: str, *, varies: bool = False) -> ParticleScalar:
-    """The number of each particle with this name."""
-    return ParticleScalar(name, lambda values: values[name], varies)
+def named(name: str, *, varies: bool = False, border: bool = False) -> ParticleScalar:
+    """The number of each particle, or of each point of the border, with this name."""
+    return ParticleScalar(name, lambda values: values[name], varies, border)
 
 
 @dataclass(frozen=True)

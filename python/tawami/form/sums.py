@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from ufl.algorithms.analysis import (
 from ufl.classes import SpatialCoordinate, Zero
 from ufl.utils.stacks import StackDict
 
+from tawami.base.checks import shown
 from tawami.base.errors import FormError, InexactSumWarning
 from tawami.fem import dolfinx
 from tawami.fem.rules import Rule
@@ -26,7 +27,7 @@ from tawami.form.form import Form
 from tawami.form.lines import Lines
 from tawami.form.operators import ADVICE
 from tawami.form.particle_data import PLACEHOLDERS, ParticleData
-from tawami.form.quantities import ONE, LawQuantity, ParticleScalar, Quantity
+from tawami.form.quantities import HISTORY, ONE, LawQuantity, ParticleScalar, Quantity
 
 #: Degree along x and along y up to which the densities of `sum_p` integrate exactly.
 EXACT_DEGREE = 4
@@ -42,6 +43,7 @@ class Sums:
         data: Its particle data.
         lines: The source of its residual.
         measure: Gives the measure of a rule.
+        border: Gives the measure of the border, or of its parts with some names.
         old: The fields at the start of the step.
         reference: Whether sums over particles are integrals of densities over cells.
     """
@@ -52,18 +54,21 @@ class Sums:
         data: ParticleData,
         lines: Lines,
         measure: Callable[..., Any],
+        border: Callable[[tuple[str, ...] | None], Any],
         old: Any,
         *,
         reference: bool,
     ) -> None:
         self._form, self._data, self._lines = form, data, lines
-        self._measure, self._old, self._reference = measure, old, reference
+        self._measure, self._border = measure, border
+        self._old, self._reference = old, reference
 
     @property
     def names(self) -> dict[str, Callable[..., Any]]:
         """The functions by the names under which a residual asks for them."""
         return {
             "sum_p": self.sum_p,
+            "sum_b": self.sum_b,
             "sum_c": lambda *given: self._of_density("sum_c", given),
             "sum_v": lambda *given: self._of_density("sum_v", given),
             "cell_mean": self.cell_mean,
@@ -81,7 +86,40 @@ class Sums:
             data = self._data.of(symbol)
             if data is not None and isinstance(data.quantity, LawQuantity):
                 self._check_place("particle", data.quantity, "sum_p")
-        return self._integral("sum_p", f)
+        return self._integral("sum_p", f, self._measure("particle", place=True))
+
+    def sum_b(self, f: Any, on: str | Sequence[str] | None = None) -> Any:
+        """sum_b dA_b f(x_b) over the points of the border, dA_b = 2 pi r dl_b in axisymmetry.
+
+        Args:
+            f: A number: an expression of fields at the point, data and the normal.
+            on: Name or names of parts of the border; by default all of it.
+        """
+        if self._reference:
+            raise FormError(
+                "sum_b with assembly='dolfinx', which has no border: expected assembly='points'"
+            )
+        names = (on,) if isinstance(on, str) else on
+        listed = isinstance(names, tuple | list) and all(isinstance(n, str) for n in names)
+        if names is not None and not (listed and names):
+            raise FormError(
+                f"sum_b(..., on={shown(on)}): expected the name of a part of the border or a list of "
+                'names, as on="top"'
+            )
+        f = ufl.as_ufl(f)
+        for symbol in extract_coefficients(f):
+            data = self._data.of(symbol)
+            if data is not None and isinstance(data.quantity, LawQuantity):
+                name = data.quantity.name.removeprefix(HISTORY)
+                raise FormError(
+                    f"sum_b of '{name}': laws are evaluated at particles, and the border has no stress "
+                    "and no history: expected an elastic stress of the fields, as "
+                    "2 * mu * dev(eps(u)) + K * eps_v * I"
+                )
+            if data is not None and data.rule != "particle":
+                raise FormError("sum_b of cell_mean(...): expected K, mu or data alone")
+        chosen = None if names is None else tuple(sorted({*names}))
+        return self._integral("sum_b", f, self._border(chosen))
 
     def cell_mean(self, quantity: Any, caller: str = "cell_mean") -> Any:
         """Volume-weighted mean of a quantity over the particles of each cell."""
@@ -122,9 +160,10 @@ class Sums:
         if weight and isinstance(weight[0], Zero):
             return ufl.Form([])
         D = self._data.shaped(rule, quantity)
-        return self._integral(caller, _product(caller, D, f), place=not self._reference)
+        measure = self._measure(rule, place=not self._reference)
+        return self._integral(caller, _product(caller, D, f), measure)
 
-    def _integral(self, caller: str, f: Any, *, place: bool = True) -> Any:
+    def _integral(self, caller: str, f: Any, measure: Any) -> Any:
         if isinstance(f, Zero):
             return ufl.Form([])
         if f.ufl_shape != ():
@@ -132,7 +171,7 @@ class Sums:
                 f"{caller} of an expression of shape {f.ufl_shape}: expected a number, as of "
                 "inner(sigma, grad(w))"
             )
-        return f * self._measure(RULES[caller], place=place)
+        return f * measure
 
     # -- quantities ----------------------------------------------------------
 
@@ -144,6 +183,7 @@ class Sums:
                 raise self._not_a_quantity(D, caller)
             if isinstance(data.quantity, LawQuantity):
                 return self._law_quantity(D, symbol, data.quantity, caller)
+            check_of_particles(data.quantity)
         if extract_arguments(D) or has_type(D, SpatialCoordinate):
             raise self._not_a_quantity(D, caller)
         if extract_constants(D):
@@ -252,6 +292,23 @@ class Sums:
                 InexactSumWarning,
                 stacklevel=2,
             )
+
+
+def check_of_particles(scalar: Quantity) -> None:
+    """Check that particles have a quantity.
+
+    Raises:
+        FormError: Only points of the border have it.
+    """
+    if isinstance(scalar, LawQuantity) or not scalar.border:
+        return
+    if scalar.text.startswith("old "):
+        name = scalar.text.removeprefix("old ").split("[")[0]
+        raise FormError(
+            f"old.{name}: only fields without a role have an old value at the particles; the old state "
+            f"of the displacement is in the stress: expected old.{name} in sum_b(...) only"
+        )
+    raise FormError("the normal n at particles: expected n and dot_n(...) in sum_b(...) only")
 
 
 def _product(caller: str, D: Any, f: Any) -> Any:

@@ -98,19 +98,21 @@ class Symbols:
         """Function that makes the symbol of each name: particle data are read only if asked for."""
         form, data = self.form, self.data
         sums = Sums(
-            form, data, self.lines, self.measure, self.old, reference=self.assembly == "dolfinx"
-        )
+            form, data, self.lines, self.measure, self.border, self.old,
+            reference=self.assembly == "dolfinx",
+        )  # fmt: skip
         ready = {
             **self.fields, **self.tests, **self.constants, **options, **self.operators.names,
             **sums.names, "t": self.traction, "x": SpatialCoordinate(self.domain),
             "old": Old(form, self._split(self.old), data),
             "dx": self.measure("particle"), "dx_c": self.measure("centre"),
             "ds": self._sides("exterior_facet"), "dG": self._sides("interior_facet"),
-            "jump_n": self._jump_n, "jump_nn": self._jump_nn,
+            "jump_n": self._jump_n, "jump_nn": self._jump_nn, "dot_n": self._dot_n,
         }  # fmt: skip
         names: dict[str, Callable[[], Any]] = {
             **{name: partial(data.law, HISTORY + name) for name in histories},
             **{name: partial(ready.get, name) for name in ready},
+            "n": self._normal,
             **{name: partial(data.scalar, named(name)) for name in ("K", "mu", "rho")},
             **{name: partial(data.law, name) for name in form.strain.quantities},
         }
@@ -128,6 +130,15 @@ class Symbols:
             return Measure(self.lines, "dx", self.domain, metadata)
         return Measure(self.lines, "dx", self.domain, metadata, self.operators.volume)
 
+    def border(self, on: tuple[str, ...] | None) -> Measure:
+        """Sums over the points of the border, or over those of the parts with some names."""
+        rule: Rule = "particle"
+        metadata: dict[str, Any] = {
+            "quadrature_degree": DEGREE[rule], "quadrature_rule": FAMILY[rule],
+            "place": "border", "on": on,
+        }  # fmt: skip
+        return Measure(self.lines, "dx", self.domain, metadata)
+
     def data_of(self, symbol: Any, component: int, axes: tuple[int, ...]) -> Density | None:
         """Particle data that a symbol which is no placeholder stands for: an old field.
 
@@ -143,12 +154,18 @@ class Symbols:
                 "a second derivative of an old field: expected old fields and their gradients"
             )
         names = [
-            f"{name}[{k}]" if field.components > 1 else name
+            (f"{name}[{k}]" if field.components > 1 else name, field.own)
             for name, field in self.form.fields.items()
             for k in range(field.components)
         ]
-        text = "old " + "".join((names[component], *(f",{self.space.axes[i]}" for i in axes)))
-        return density("particle", named(text, varies=True), self.space)
+        name, own = names[component]
+        if axes and not own:
+            raise FormError(
+                f"a derivative of the old displacement ({name}): expected old.u alone, or gradients of "
+                "the increment u"
+            )
+        text = "old " + "".join((name, *(f",{self.space.axes[i]}" for i in axes)))
+        return density("particle", named(text, varies=True, border=not own), self.space)
 
     def _sides(self, kind: str) -> Measure:
         metadata = {"quadrature_degree": 4}
@@ -158,6 +175,17 @@ class Symbols:
         names = list(self.form.fields)
         parts = [function] if len(names) == 1 else ufl.split(function)
         return dict(zip(names, parts, strict=True))
+
+    # -- the border ----------------------------------------------------------
+
+    def _normal(self) -> Any:
+        """Outward normal of the border, with the components of a field."""
+        axes = range(self.space.dim)
+        return ufl.as_vector([self.data.scalar(named(f"n[{k}]", border=True)) for k in axes])
+
+    def _dot_n(self, f: Any) -> Any:
+        """A n of a tensor, or g . n of a vector, n the normal of the border."""
+        return self.operators.along(f, self._normal())
 
     # -- jumps ---------------------------------------------------------------
 
@@ -250,13 +278,18 @@ class Symbols:
 
 
 class Old:
-    """The fields at the start of the step, as `old.p_w`, and at finite strain `old.J` = det F."""
+    """The fields at the start of the step, as `old.p_w`, and at finite strain `old.J` = det F.
+
+    In sums over the border also the displacement since the start of the scene.
+    """
 
     def __init__(self, form: Form, fields: Mapping[str, Any], data: ParticleData) -> None:
         self._form, self._fields, self._data = form, fields, data
 
     def __getattr__(self, name: str) -> Any:
         known = [*self._form.own_fields]
+        if name == next(iter(self._form.fields)):
+            return self._fields[name]
         if name == "J" and self._form.strain.finite:
             return self._data.scalar(named("old J", varies=True))
         if name not in known:

@@ -27,9 +27,7 @@ class Linearisation:
 
     def tangent(self) -> Any:
         """The derivative with respect to the fields, without :meth:`couplings`."""
-        tangent = ufl.algorithms.expand_derivatives(
-            ufl.derivative(self._residual, self._symbols.increments, self._symbols.trial)
-        )
+        tangent = change_with_fields(self._symbols, self._residual)
         for density, symbol in self._law_densities():
             tangent += _with(self._residual, symbol, self._direction(density))
         return tangent
@@ -102,6 +100,12 @@ class Linearisation:
         """Change of div u (ln det f) with du."""
         u = next(iter(self._symbols.fields.values()))
         return self._symbols.operators.volume_change(u, du, finite=self._form.strain.finite)
+
+
+def change_with_fields(symbols: Symbols, form: Any) -> Any:
+    """The derivative of a form with respect to the fields, particle data unchanged."""
+    derivative = ufl.derivative(form, symbols.increments, symbols.trial)
+    return ufl.algorithms.expand_derivatives(derivative)
 
 
 def _with(form: Any, symbol: Any, value: Any) -> Any:

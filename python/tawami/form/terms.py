@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +22,7 @@ from tawami.form.arity import check_arity, is_multilinear
 from tawami.form.lines import line_of
 from tawami.form.particle_data import PLACEHOLDERS
 from tawami.form.points import Integrand
+from tawami.form.sums import check_of_particles
 from tawami.form.symbols import Symbols
 
 
@@ -30,11 +32,13 @@ class Terms:
 
     Attributes:
         cells: Sums over particles and integrals over cells.
+        border: Sums over the border by the names of its parts; None is all of it.
         edges: Integrals over loaded edges, linear in the traction.
         ghost: Matrix of the integrals over sides of partially filled cells, which are linear.
     """
 
     cells: Any
+    border: Mapping[tuple[str, ...] | None, Any]
     edges: Any | None
     ghost: Any | None
 
@@ -49,11 +53,12 @@ def terms_of(symbols: Symbols, residual: Any) -> Terms:
     for part in residual.integrals():
         _check(symbols, part)
     kinds = ("cell", "exterior_facet", "interior_facet")
-    cells, edges, sides = (_of_type(residual, kind) for kind in kinds)
+    inside, border = _without_border(residual)
+    cells, edges, sides = (_of_type(inside, kind) for kind in kinds)
     for part in [] if edges is None else edges.integrals():
         _check_edge(symbols, part)
     parts = [part for part in (cells, edges, sides) if part is not None]
-    if cells is None or len(residual.integrals()) > sum(len(part.integrals()) for part in parts):
+    if cells is None or len(inside.integrals()) > sum(len(part.integrals()) for part in parts):
         raise FormError(
             f"form {name}: expected integrals over particles or cells, over edges (ds) and over sides "
             "of partially filled cells (dG) only"
@@ -62,7 +67,7 @@ def terms_of(symbols: Symbols, residual: Any) -> Terms:
         raise FormError(
             f"form {name}: the traction t in a term with dx: expected it in terms with ds only"
         )
-    return Terms(cells, edges, None if sides is None else _matrix(symbols, sides))
+    return Terms(cells, border, edges, None if sides is None else _matrix(symbols, sides))
 
 
 def _check(symbols: Symbols, part: Any) -> None:
@@ -78,7 +83,9 @@ def _check(symbols: Symbols, part: Any) -> None:
         with symbols.lines.errors(ufl.Form([part])):
             expanded = expand_derivatives(ufl.Form([part]))
             if not expanded.empty():
-                Integrand(expanded, symbols)
+                integrand = Integrand(expanded, symbols)
+                for density in integrand.data if part.metadata()["place"] != "border" else ():
+                    check_of_particles(density.quantity)
         return
     coefficients = extract_coefficients(part.integrand())
     if symbols.old in coefficients:
@@ -151,6 +158,17 @@ def at_points(form: Any) -> tuple[list[tuple[Rule, Any]], Any]:
         else:
             sums.setdefault(place, []).extend(expanded.integrals())
     return [(rule, ufl.Form(parts)) for rule, parts in sums.items()], ufl.Form(rest)
+
+
+def _without_border(form: Any) -> tuple[Any, dict[tuple[str, ...] | None, Any]]:
+    """A form without its sums over the border, and these by the names of their parts."""
+    rest, border = [], dict[tuple[str, ...] | None, list[Any]]()
+    for part in form.integrals():
+        if part.metadata().get("place") == "border":
+            border.setdefault(part.metadata()["on"], []).append(part)
+        else:
+            rest.append(part)
+    return ufl.Form(rest), {on: ufl.Form(parts) for on, parts in border.items()}
 
 
 def _of_type(form: Any, kind: str) -> Any | None:

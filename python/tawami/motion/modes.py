@@ -16,6 +16,7 @@ from tawami.base import checks
 from tawami.base.arrays import Array
 from tawami.base.errors import ConvergenceError, InputError
 from tawami.particles import placement
+from tawami.scene.constraints import constraints
 from tawami.scene.scene import Scene
 
 #: Asymmetry of the tangent that counts as round-off, relative to its largest entry.
@@ -95,7 +96,7 @@ def _matrices(scene: Scene) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix
     mass = np.zeros(size)
     mass[:n] = np.repeat(domain.lumped_mass, now.model.space.dim)
     zero = np.zeros(size)
-    amounts = now.supports.constraints(domain, lambda support: 0.0, zero, zero, moving=True)
+    amounts = constraints(now.supports, domain, lambda support: 0.0, zero, zero, moving=True)
     reduction, _, supports = amounts
     selection = reduction.selection
     stiffness = sum((support.stiffness() for support in supports), scene.tangent(zero))

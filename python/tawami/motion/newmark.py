@@ -22,6 +22,7 @@ from tawami.motion.rotation import Rotation
 from tawami.scene import reactions
 from tawami.scene.action import Term
 from tawami.scene.configuration import Configuration
+from tawami.scene.constraints import constraints
 from tawami.scene.contact import ActiveSet
 from tawami.scene.held_border import HeldBorder
 from tawami.scene.share import Moment
@@ -113,8 +114,8 @@ class NewmarkStep:
         self, amount: Callable[[Term], float], fields: Fields | None = None
     ) -> tuple[Reduction, ActiveSet, list[HeldBorder]]:
         now, zero = self._now, np.zeros(self._now.domain.layout.size)
-        return now.supports.constraints(
-            now.domain, amount, zero, now.before, moving=True, fields=fields
+        return constraints(
+            now.supports, now.domain, amount, zero, now.before, moving=True, fields=fields
         )
 
     def _prescribed(self, rate: Callable[[Term], float]) -> Array:
@@ -144,7 +145,7 @@ class NewmarkStep:
         self._start = Start(v, a, reduction, inertia)
         return Problem(
             reduction, contact, self._external, inertia, self._guess(dt * v.ravel()), supports,
-            now.terms(self._finish, supports),
+            now.terms(self._finish, supports), now.supports.supported_edges,
         )  # fmt: skip
 
     @functools.cached_property

@@ -39,6 +39,7 @@ class Responses:
 
     Attributes:
         form: The form.
+        values: Numbers of the particles by name.
         constants: K and mu of each particle [Pa].
         data: Particle data of each rule, particles x columns; :meth:`evaluate` writes them.
         stiffest: Largest modulus of the body [Pa]; a bulk modulus counts up to `LOCKED` mu.
@@ -58,7 +59,7 @@ class Responses:
         comm: Any,
         stopwatch: Stopwatch,
     ) -> None:
-        self.form, self.stage, self._values = compiled.form, stage, values
+        self.form, self.stage, self.values = compiled.form, stage, values
         self.constants = {name: values[name] for name in ("K", "mu")}
         self.particles, self.location = particles, location
         self._comm, self._stopwatch = comm, stopwatch
@@ -92,7 +93,7 @@ class Responses:
         assert isinstance(quantity, LawQuantity)
         factor = None
         if quantity.factor is not None:
-            factor = np.asarray(quantity.factor.evaluate(self._values), dtype=float)
+            factor = np.asarray(quantity.factor.evaluate(self.values), dtype=float)
         return quantity.name, density.part, column, factor
 
     def refresh(self) -> None:
@@ -110,7 +111,7 @@ class Responses:
 
     def _constant(self, scalar: ParticleScalar) -> Array:
         with np.errstate(all="ignore"):
-            values = np.asarray(scalar.evaluate(self._values), dtype=float)
+            values = np.asarray(scalar.evaluate(self.values), dtype=float)
         incompressible = scalar.text == "K" and self.form.kinematics.deviatoric
         bad = np.flatnonzero(~np.isfinite(values) & (not incompressible))
         if len(bad):

@@ -1,29 +1,31 @@
-"""The border of the body in a scene: points that move with the body, and the parts that actions own."""
+"""The border of the body in a scene, and the parts of it that loads and supports own."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from tawami import _rust
 from tawami.base import checks
 from tawami.base.arrays import Array, Indices, Mask
-from tawami.base.errors import CheckpointError, InputError, SupportError
-from tawami.base.space import Space
+from tawami.base.errors import CheckpointError, InputError
 from tawami.base.text import meant, quoted
 from tawami.border.pieces import Border
 from tawami.border.points import BorderPoints
-from tawami.field.border import BorderInCells
 from tawami.grid.grid import EDGES, ON_LINE, Edge, Grid
 from tawami.scene.domain import Domain
 from tawami.scene.model import Model
+from tawami.scene.moving_points import MovingPoints
 
 #: Gauss points on a piece of the border between two lines of the grid: where particles stay, three are
 #: exact; points that move to other places in their cells need five (noise of a pressure .5 and .14 %).
 STAYING, MOVING = 3, 5
+#: Sum of n dA of a closed border relative to its length, and differences of areas and centroids, that
+#: are ignored.
+CLOSED, FITS = 1e-6, 0.02
 #: Part of a border, as a driver script names it: a name or names, a function f(x, y) on arrays that
 #: returns a mask, or a mask of the points `scene.border.x`.
 Part = (
@@ -36,150 +38,29 @@ Part = (
 )
 
 
-class MovingPoints:
-    """Points of a border that move with the body.
-
-    Args:
-        points: The points at the start.
-        grid: The grid.
-        what: Name of the part, for messages.
-
-    Attributes:
-        what: As given.
-        x: Positions [m], points x dim.
-        area: Outward normals times lengths in the plane of the grid [m], points x dim.
-        reference: Weights when they were made [m2 per metre depth], which dead loads refer to.
-        made: The points when they were made.
-    """
-
-    def __init__(self, points: BorderPoints, grid: Grid, what: str = "border") -> None:
-        self.made, self._grid, self.what = points, grid, what
-        self.x = np.array(points.x)
-        self.area = points.length[:, None] * points.normal
-        self.reference = self.weight
-        self._located: tuple[Domain, BorderInCells] | None = None
-
-    def __len__(self) -> int:
-        return len(self.x)
-
-    @property
-    def space(self) -> Space:
-        """The space of the grid."""
-        return self._grid.space
-
-    @property
-    def length(self) -> Array:
-        """Length of the border that each point integrates over [m], in the plane."""
-        return np.asarray(np.linalg.norm(self.area, axis=1))
-
-    @property
-    def weight(self) -> Array:
-        """Area that each point integrates over [m2 per metre depth], in axisymmetry [m2]."""
-        return np.asarray(self.length * self.space.thickness(self.x))
-
-    @property
-    def normal(self) -> Array:
-        """Outward unit normals, points x dim."""
-        return np.asarray(self.area / self.length[:, None])
-
-    @property
-    def now(self) -> BorderPoints:
-        """The points as they are, with distances along the stretched chains."""
-        length, made = self.length, self.made
-        order = np.lexsort((made.along, made.chain))
-        along, chain = np.empty(len(self)), made.chain[order]
-        ends = np.cumsum(length[order])
-        first = np.searchsorted(chain, chain)
-        along[order] = ends - length[order] / 2 - (ends - length[order])[first]
-        return replace(made, x=self.x, length=length, normal=self.normal, along=along)
-
-    def cells(self, domain: Domain) -> BorderInCells:
-        """The points in the cells of a domain.
-
-        Raises:
-            SupportError: A point has no particles near it.
-        """
-        if self._located is None or self._located[0] is not domain:
-            made = BorderInCells(self._grid, domain.active, self.x, self.normal, self.what)
-            self._located = domain, made
-        return self._located[1]
-
-    def edge(self, edge: Edge, tolerance: float = ON_LINE) -> Mask:
-        """Mask of the points on an edge of the grid, or beyond it.
-
-        Args:
-            edge: Name of the edge.
-            tolerance: Distance that counts as none [cells].
-        """
-        axis, end = self._grid.edge(edge)
-        inside = (
-            self._grid.upper[axis] - self.x[:, axis]
-            if end
-            else self.x[:, axis] - self._grid.origin[axis]
-        )
-        return np.asarray(inside <= tolerance * self._grid.h)
-
-    def lost(self, domain: Domain) -> bool:
-        """Whether a point has no particles near it."""
-        try:
-            self.cells(domain)
-        except SupportError:
-            return True
-        return False
-
-    def moved(self, domain: Domain, u: Array) -> tuple[Array, Array]:
-        """Positions and areas after a step (Nanson: n dA = cof(F) n0 dA0).
-
-        Args:
-            domain: The particles at its start.
-            u: Increments of the displacement, functions x dim.
-        """
-        cells, basis = self.cells(domain), domain.layout.basis
-        gradient = np.stack([slope @ u for slope in cells.slopes(basis)], axis=2)
-        f = gradient + np.eye(self.space.dim)
-        cofactor = np.linalg.det(f)[:, None, None] * np.linalg.inv(f).transpose(0, 2, 1)
-        area = np.einsum("nij,nj->ni", cofactor, self.area)
-        return self.x + cells.values(basis) @ u, area
-
-    def state(self) -> dict[str, Any]:
-        """Positions and areas, for a checkpoint."""
-        return {"x": self.x, "area": self.area, "reference": self.reference}
-
-    def restore(self, state: Mapping[str, Any]) -> None:
-        """The reverse of :meth:`state`.
-
-        Raises:
-            CheckpointError: It has another number of points.
-        """
-        if np.shape(state["x"]) != self.x.shape:
-            raise CheckpointError(
-                f"{self.what} had {len(state['x'])} border points when the run was stored and has "
-                f"{len(self)} now: expected the same parts of the border"
-            )
-        self.x, self.area, self.reference = state["x"], state["area"], state["reference"]
-        self._located = None
-
-
 class SceneBorder:
     """The border of the body of a scene.
 
     Args:
-        model: Grid, form and laws of the scene.
-        border: The border; None for a body without one.
+        model: Grid, form and laws of the scene; its border is None for a body without one.
+        particles: The particles of the whole body.
 
     Attributes:
         points: All points; None for a body without a border.
         parts: Points that actions own.
     """
 
-    def __init__(self, model: Model, border: Border | None) -> None:
-        self._grid, self._given = model.grid, border
+    def __init__(self, model: Model, particles: _rust.Particles) -> None:
+        self._grid, self._given = model.grid, model.border
         self._count = MOVING if model.moves else STAYING
         self.points: MovingPoints | None = None
         self._ends: MovingPoints | None = None
         self._has_moved = False
         self.parts: list[MovingPoints] = []
+        border = model.border
         if border is not None:
+            area = particles.volume / model.space.thickness(particles.x)
+            check_fits(self._grid, border.points(self._grid, STAYING), particles.x, area)
             self.points = MovingPoints(border.points(self._grid, self._count), self._grid)
             if model.moves:
                 self._ends = MovingPoints(_ends(border.at_lines(self._grid)), self._grid)
@@ -194,6 +75,17 @@ class SceneBorder:
     def names(self) -> tuple[str, ...]:
         """Names of its parts."""
         return () if self._given is None else self._given.names
+
+    @property
+    def x(self) -> Array:
+        """Present positions of its points [m], points x dim; none for a body without a border."""
+        return np.zeros((0, self._grid.space.dim)) if self.points is None else self.points.x
+
+    def __repr__(self) -> str:
+        if self.points is None:
+            return "SceneBorder(none)"
+        length = self.points.length.sum()
+        return f"SceneBorder({len(self.points)} points, {length:.6g} m: {', '.join(self.names)})"
 
     def part(self, what: str, where: Part) -> MovingPoints:
         """Points of a part of the border, which are exact for this part at its present place.
@@ -292,6 +184,20 @@ class SceneBorder:
                 found[edge] = mask
         return found
 
+    def keep(self, before: Domain, after: Domain) -> dict[MovingPoints, Mask]:
+        """Drop points where particles were removed.
+
+        Returns:
+            For each of the parts the mask of the points that remain.
+        """
+        kept = {points: points.remains(before, after) for points in self.all if len(points)}
+        if self._ends is not None:
+            both = np.logical_and(*np.split(kept[self._ends], 2))
+            kept[self._ends] = np.tile(both, 2)
+        for points, mask in kept.items():
+            points.keep(mask)
+        return kept
+
     def moved(self, domain: Domain, u: Array) -> list[tuple[Array, Array]]:
         """Positions and areas of all points after a step, for :meth:`move`."""
         return [points.moved(domain, u) for points in self.all]
@@ -321,6 +227,34 @@ class SceneBorder:
         for points, stored in zip(self.all, state["points"], strict=True):
             points.restore(stored)
         self._has_moved = state["moved"]
+
+
+def check_fits(grid: Grid, points: BorderPoints, x: Array, area: Array) -> None:
+    """Check that a closed border encloses the particles: area and centroid by the divergence theorem.
+
+    Args:
+        grid: The grid.
+        points: Points of the border.
+        x: Positions of all particles [m], particles x dim.
+        area: Their areas in the plane [m2].
+
+    Raises:
+        InputError: It does not.
+    """
+    flux = points.length[:, None] * points.normal
+    axis = 1 if grid.space.hoop else 0  # the axis of rotation closes the border
+    if np.abs(flux.sum(axis=0)[axis:]).max() > CLOSED * points.length.sum():
+        return
+    enclosed = (points.x * flux).sum() / grid.space.dim
+    centroid = (points.x**2 * flux).sum(axis=0) / 2 / enclosed
+    total = area.sum()
+    away = float(np.linalg.norm(centroid - area @ x / total))
+    if abs(enclosed - total) > FITS * total or away > FITS * max(grid.h, np.sqrt(total)):
+        raise InputError(
+            f"the border of the body encloses {enclosed:.6g} m2 and its particles have {total:.6g} m2, "
+            f"with centroids {away:.2g} m apart: expected a border that fits the particles; "
+            "Body(x, volume, border=tawami.polyline(corners)) gives another one, border=None none"
+        )
 
 
 def label(where: Part) -> str:

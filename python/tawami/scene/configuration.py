@@ -8,15 +8,15 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks, ranks, signals
-from tawami.base.errors import CheckpointError, ConvergenceError
+from tawami.base.errors import CheckpointError
 from tawami.base.meaning import fingerprint
 from tawami.base.process import check_process
 from tawami.base.program import leave_together
@@ -25,56 +25,26 @@ from tawami.particles import placement
 from tawami.scene import coverage, mean_stress, own_fields, quantities, strain_limit
 from tawami.scene.activity import Activity
 from tawami.scene.border import SceneBorder
+from tawami.scene.border_sums import BorderSums
 from tawami.scene.domain import Domain
 from tawami.scene.form_inputs import FormInputs
 from tawami.scene.held_border import HeldBorder
 from tawami.scene.loads import Loads
 from tawami.scene.model import Model
+from tawami.scene.outcome import Moved, Outcome
 from tawami.scene.reactions import Reactions
 from tawami.scene.share import Moment
-from tawami.scene.step import Accepted, Problem, StepKind
+from tawami.scene.solving import solved
+from tawami.scene.step import Accepted, StepKind
 from tawami.scene.step_values import Fields
 from tawami.scene.strain_limits import StrainLimits
 from tawami.scene.supports import Supports
-from tawami.solve.newton import Converged
 from tawami.solve.numerics import Numerics
 from tawami.solve.terms import Term, Terms
 
 Array = npt.NDArray[np.float64]
-#: Arrays of particles whose values are lengths, or lengths per time.
+#: Arrays of particles of lengths, or lengths per time.
 LENGTHS = ("x", "displacement", "velocity", "acceleration")
-#: Solves of one step with other states of the walls, after which it has failed.
-PASSES = 40
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """A step that was stored.
-
-    Attributes:
-        accepted: The step.
-        coefficients: Of all fields: since the start where particles do not move, of the step where
-            they do.
-        reactions: Forces of supports and walls.
-        particles: Arrays of the whole body at the end of the step, in the order of the numbers.
-    """
-
-    accepted: Accepted
-    coefficients: Array
-    reactions: Reactions
-    particles: Mapping[str, Array]
-
-
-class Moved(NamedTuple):
-    """Positions at the end of a step.
-
-    Attributes:
-        particles: Of this rank's particles [m], particles x dim.
-        border: Of the points of the border, with their areas.
-    """
-
-    particles: Array
-    border: list[tuple[Array, Array]]
 
 
 class Configuration:
@@ -106,13 +76,15 @@ class Configuration:
             mine.add_eps_v()
         mine.add_strain(model.moves, model.grid.geometry)
         own_fields.carry(model.form, mine, model.space.dim)
+        self.border = SceneBorder(model, particles)
+        self.border_sums = BorderSums(model, self.border, lambda: self.total)
         self._attach(mine, location)
-        self.activity, self.border = Activity(), SceneBorder(model, model.border)
+        self.activity = Activity()
         own = model.form.own_fields
         self.supports = Supports(model.grid, model.basis, own, self.border, self.activity)
         self.loads = Loads(model.grid, np.array(particles.volume), self.activity)
         self.total = np.zeros(self.domain.layout.size)
-        self.inputs = FormInputs(model, self.activity.time)
+        self.inputs = FormInputs(model, self.activity.time, self.border_sums)
         self.inputs.begin(model, self.domain)
         self.left, self.removed = list[tuple[int, tuple[float, float], float]](), np.zeros(2)
         self.begun = self._coverage_checked = False
@@ -120,9 +92,9 @@ class Configuration:
         self._travel, self._limits = mean_stress.Travel(), StrainLimits(small=not model.moves)
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
-        earlier: Domain | None = getattr(self, "domain", None)
         of = self.model, particles, location, self.numerics, self.stopwatch
-        self.domain = Domain.attach(*of, earlier)
+        self.domain = Domain.attach(*of, getattr(self, "domain", None))
+        self.border_sums.attach(self.domain)
 
     @property
     def before(self) -> Array:
@@ -212,7 +184,8 @@ class Configuration:
         try:
             with leave_together():  # laws and other functions of the driver script are called here
                 self.prepare(kind.moment)
-                accepted = self._solve(kind)
+                old = self.old if self.model.form.own_fields else None
+                accepted = solved(self.domain, self.supports, kind, self.before, old)
             if not self.model.moves:
                 strain_limit.check_digits(self.domain, accepted.step, self.numerics.tolerance)
             moved = self._moved(accepted, kind.end)
@@ -235,43 +208,6 @@ class Configuration:
                     wall.state = state
             raise
 
-    def _solve(self, kind: StepKind) -> Accepted:
-        """A step in which no wall pulls, is passed through, or exceeds its friction."""
-        layout, supports = self.domain.layout, self.supports
-        n, step, space = layout.num_displacement, None, self.model.space
-        active, before = layout.active[: n : space.dim], space.vectors(self.before[:n])
-        for wall in supports.walls:
-            wall.begin()
-        for _ in range(PASSES):
-            problem = kind.problem()
-            step = self._newton(problem, step)
-            forces, u = (space.vectors(part[:n]) for part in (step.forces, step.coefficients))
-            if not problem.contact.adapt(forces, u, before, active):
-                a = step.acceleration
-                return Accepted(problem, step, u, None if a is None else space.vectors(a))
-        assert step is not None
-        raise ConvergenceError(
-            f"contact and friction of the walls did not settle in {PASSES} solves. Nothing was changed "
-            "in the particles. Use a smaller step",
-            step.history,
-        )
-
-    def _newton(self, problem: Problem, last: Converged | None) -> Converged:
-        """Solve a problem, from the solution for the last states of the walls if there is one."""
-        guess, path = problem.guess, problem.path
-        if last is not None:
-            guess = last.coefficients
-            path = None if path is None else replace(path, guess=last.factor)
-        friction = problem.contact.friction if problem.contact.walls else None
-        found = self.domain.newton.solve(
-            problem.reduction, problem.external, problem.inertia, guess, friction, path,
-            self.old if self.model.form.own_fields else None, problem.terms,
-        )  # fmt: skip
-        if last is None:
-            return found
-        history, krylov = last.history + found.history[1:], last.krylov + found.krylov
-        return replace(found, history=history, krylov=krylov)
-
     def _moved(self, accepted: Accepted, time: float) -> Moved | None:
         """Positions at the end of the step; None where particles do not move.
 
@@ -282,21 +218,22 @@ class Configuration:
             return None
         particles = self.domain.particles
         moved = np.asarray(particles.x + self.domain.at_particles(accepted.u))
-        stop = self.model.leaving == "stop"
-        placement.check_staying(self.model.grid, particles, moved, time, stop=stop)
+        placement.check_staying(
+            self.model.grid, particles, moved, time, stop=self.model.leaving == "stop"
+        )
         return Moved(moved, self.border.moved(self.domain, accepted.u))
 
     def _store(self, accepted: Accepted, moved: Moved | None, time: float) -> Outcome:
         """Store a step that the laws have committed, and move the particles."""
         self.begun = True
-        coefficients = accepted.step.coefficients
-        if accepted.problem.terms is not None:
-            accepted.problem.terms.accept()
+        coefficients, terms = accepted.step.coefficients, accepted.problem.terms
+        if terms is not None:
+            terms.accept()
         if moved is None:
             coefficients = self.total = self.total + coefficients
             return self._outcome(accepted, coefficients)
-        grid = self.model.grid
-        self.supports.follow(accepted.u, accepted.problem.reduction.points)
+        grid, points = self.model.grid, accepted.problem.reduction.points
+        self.supports.follow(accepted.u, points)
         projects = self._travel.must_project(self.domain, moved.particles)
         self.domain.particles.move_to(moved.particles)
         self.border.move(moved.border)

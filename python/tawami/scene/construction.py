@@ -126,6 +126,7 @@ def _remove(now: Configuration, mask: Mask) -> Removed:
     location = placement.located(model.grid, kept.x, moving=model.moves)
     after = Domain.attach(model, kept, location, now.numerics, now.stopwatch)
     now.supports.check_reach(before, after)
+    now.loads.check_reach(before, after)
     sums = ranks.sum_of(
         comm,
         np.array(
@@ -149,13 +150,18 @@ def _remove(now: Configuration, mask: Mask) -> Removed:
 
 def _replace(now: Configuration, after: Domain) -> None:
     """Let a scene continue with other particles or laws; a call for all ranks."""
-    before, zero = now.domain, np.zeros(after.layout.size)
-    for domain in (before, after):
-        now.inputs.repeat(domain, now.moment(), now.loads.acceleration(now.moment()))
+    before, zero, first = now.domain, np.zeros(after.layout.size), now.moment(0.0)
+    gravity = now.loads.acceleration(now.moment())
+    now.inputs.repeat(before, now.moment(), gravity)
+    forces = now.loads.at_start(before, first) - before.newton.internal(zero)
+    if after.particles is not before.particles:
+        kept = now.border.keep(before, after)
+        now.supports.keep(kept)
+        now.border_sums.keep(kept)
+    now.border_sums.attach(after)
+    now.inputs.repeat(after, now.moment(), gravity)
     internal = after.newton.internal(zero)
-    forces = internal - before.newton.internal(zero)
-    first = now.moment(0.0)
-    forces -= now.loads.external(after, first) - now.loads.external(before, first)
+    forces += internal - now.loads.at_start(after, first)
     forces[after.layout.num_displacement :] = 0.0
     forces[~after.layout.active] = 0.0
     now.model, now.domain = after.model, after

@@ -10,6 +10,7 @@ from tawami.base import ranks
 from tawami.base.text import labelled, size
 from tawami.form.kinematics import STRAIN_MEASURES
 from tawami.scene.configuration import Configuration
+from tawami.scene.constraints import num_free
 
 
 def header(now: Configuration, motion: str = "") -> str:
@@ -60,7 +61,7 @@ def _unknowns(now: Configuration) -> str:
     layout = now.domain.layout
     numbers = {name: int(layout.active[place.slice].sum()) for name, place in layout.fields.items()}
     fields = ", ".join(f"{n} of {name}" for name, n in numbers.items())
-    free = now.supports.num_free(now.domain)
+    free = num_free(now.supports, now.domain)
     return f"{free}: {fields}, minus {sum(numbers.values()) - free} prescribed by supports"
 
 

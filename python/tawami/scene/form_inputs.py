@@ -13,6 +13,7 @@ from tawami.base.errors import CheckpointError, InputError
 from tawami.base.sealed import Settings
 from tawami.base.text import meant, quoted
 from tawami.scene import sources
+from tawami.scene.border_sums import BorderSums
 from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor
 from tawami.scene.model import Model
@@ -26,10 +27,12 @@ class FormInputs:
     Args:
         model: Grid, form and laws.
         time: Time of the scene [s].
+        border: Numbers of the points of the border.
     """
 
-    def __init__(self, model: Model, time: float) -> None:
+    def __init__(self, model: Model, time: float, border: BorderSums) -> None:
         self._form, self._is_checked = model.form, False
+        self._border = border
         #: Time of the last step [s], its length [s], and its part of a phase, 0 at the end of one.
         self._latest, self._dt, self._part = time, 0.0, 0.0
         self._values: dict[str, Any] = dict(model.values)
@@ -83,6 +86,7 @@ class FormInputs:
         unit = self._form.data_unit(name)
         with ranks.raise_together(domain.model.grid.comm):
             found = sources.values(domain, name, source, "value", unit, f"data '{name}'")
+            self._border.set(name, source, f"data '{name}'")
         domain.particles.carry(name, 1)
         domain.particles.carried(name)[:, 0] = found[:, 0]
 
@@ -123,6 +127,7 @@ class FormInputs:
             found = sources.values(domain, name, source, "value", "", f"parameter '{name}'")[:, 0]
             for value in (found.min(), found.max()) if len(found) else ():
                 self._checked(name, float(value), domain.model)
+            self._border.set(name, source, f"parameter '{name}'")
         domain.particles.carried(name)[:, 0] = found
 
     def _checked(self, name: str, value: Any, model: Model) -> float:
@@ -170,6 +175,7 @@ class FormInputs:
             values[name] = self._checked(name, factor.at(time), model)
         domain.assembly.attachment.change(values)
         domain.responses.refresh()
+        domain.assembly.refresh_border()
         if not self._is_checked:
             self._check_incompressible(domain)
             self._is_checked = True
@@ -178,7 +184,10 @@ class FormInputs:
         """Values of the parameters, for a checkpoint."""
         changing = {name: factor.identity() for name, factor in self._in_time.items()}
         passed = [self._latest, self._dt, self._part]
-        return {"values": dict(self._values), "in time": changing, "passed": passed}
+        return {
+            "values": dict(self._values), "in time": changing, "passed": passed,
+            "border": self._border.state(),
+        }  # fmt: skip
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`state`.
@@ -195,4 +204,5 @@ class FormInputs:
                 )
         self._in_time = {name: self._in_time[name] for name in state["in time"]}
         self._values |= state["values"]
+        self._border.restore(state["border"])
         self._latest, self._dt, self._part = state["passed"]

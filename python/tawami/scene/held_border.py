@@ -11,15 +11,14 @@ from itertools import combinations
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.spatial import KDTree
 
 from tawami.base.arrays import Array
 from tawami.base.errors import SupportError
 from tawami.border.patches import patches
 from tawami.border.tied import Tied
 from tawami.field.constraints import PointHeld
-from tawami.scene.border import MovingPoints
 from tawami.scene.domain import Domain
+from tawami.scene.moving_points import MovingPoints
 from tawami.scene.support import Support
 
 #: Penalty of a patch, in shear moduli, or diagonal entries of the tangent, per cell.
@@ -170,6 +169,8 @@ def check_agreement(held: Sequence[HeldBorder], h: float) -> None:
     Raises:
         SupportError: Two of them do.
     """
+    from scipy.spatial import KDTree  # takes long to import
+
     for one, other in combinations(held, 2):
         component = one.support.component
         if component != other.support.component:

@@ -14,9 +14,9 @@ from tawami.base.errors import InputError
 from tawami.grid.edges import evaluate
 from tawami.grid.grid import Grid
 from tawami.scene.action import Action, Owner, Term, Value
-from tawami.scene.border import MovingPoints
 from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor
+from tawami.scene.moving_points import MovingPoints
 
 Numbers = npt.NDArray[np.integer[Any]]
 

@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 
 from tawami.base.arrays import Array, Indices
+from tawami.base.errors import SupportError
 from tawami.base.text import listed
 from tawami.field.follower import FollowerPressure
 from tawami.grid.grid import Grid
 from tawami.scene.action import Owner, Term, restored
 from tawami.scene.activity import Activity
-from tawami.scene.border import MovingPoints
 from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor
-from tawami.scene.load import Flux, Forces, Load, Pressure, Traction, Weight
+from tawami.scene.load import Flux, Forces, Load, OnBorder, Pressure, Traction, Weight
+from tawami.scene.moving_points import MovingPoints
 from tawami.scene.share import Moment
 
 
@@ -163,6 +164,28 @@ class Loads(Owner[Load]):
     def _follows(load: Load, domain: Domain) -> bool:
         """Whether a load depends on the displacement in a step."""
         return isinstance(load, Pressure) and domain.model.moves
+
+    def check_reach(self, before: Domain, after: Domain) -> None:
+        """Check that loads on the border still load something once particles were removed.
+
+        Raises:
+            SupportError: One would not.
+        """
+        for load in self.all:
+            if load.released or not isinstance(load, OnBorder):
+                continue
+            if not load.points.remains(before, after).any():
+                raise SupportError(
+                    f"{load} would load no particles after remove(...): expected loads on particles "
+                    "that remain; release() it before. Nothing was changed"
+                )
+
+    def at_start(self, domain: Domain, now: Moment) -> Array:
+        """All external forces, with those of pressures that follow the border."""
+        total = self.external(domain, now)
+        for term in self.following(domain, now):
+            total += term.forces(np.zeros_like(total))
+        return total
 
     def keep_balance(self, forces: Array) -> None:
         """Add forces on all coefficients that fade from now on [N per metre depth]."""

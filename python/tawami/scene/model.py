@@ -64,7 +64,7 @@ class Model:
         names: Name of the group of each material; empty if the body has no names.
         leaving: 'stop' or 'remove', for particles that leave the grid.
         num_particles: Particles of the body, on all ranks.
-        border: Border of the body at the start; None for loose particles.
+        border: The border of the body; None if it has none.
     """
 
     grid: Grid
@@ -81,7 +81,7 @@ class Model:
     names: tuple[str, ...]
     leaving: Leaving
     num_particles: int
-    border: Border | None = None
+    border: Border | None
 
     @property
     def space(self) -> Space:

@@ -31,7 +31,7 @@ def check_supported(place: str, supports: Supports) -> None:
     _check_known(place, supports.supported_edges, supports.labels)
 
 
-def _check_known(place: str, edges_held: set[str], labels: Collection[str]) -> None:
+def _check_known(place: str, edges_held: Collection[str], labels: Collection[str]) -> None:
     known = sorted({*edges_held, *(name.strip("'") for name in labels)})
     if place not in known:
         raise InputError(
@@ -101,9 +101,9 @@ class Reactions:
 
     on_edges: Array
     at_points: Sequence[AtPoint] = field(default_factory=list)
-    on_border: Sequence[tuple[str, Array]] = field(default_factory=list)
-    supported: set[str] = field(default_factory=set)
-    labels: Collection[str] = field(default_factory=set)
+    on_border: Sequence[tuple[str, Array]] = ()
+    supported: Collection[str] = ()
+    labels: Collection[str] = ()
 
     @classmethod
     def of(cls, accepted: Accepted, supports: Supports) -> Reactions:
@@ -128,8 +128,8 @@ class Reactions:
             for held in accepted.problem.supports
             if not held.support.is_field
         ]
-        supported = supports.supported_edges
-        return cls(on_edges, at_points, on_border, supported, supports.labels)
+        held_edges = accepted.problem.held_edges
+        return cls(on_edges, at_points, on_border, held_edges, supports.labels)
 
     def at(self, model: Model, place: str | Sequence[float]) -> Array:
         """Force (x, y) [N per metre depth] of a support; see `Solution.reaction`."""

@@ -26,6 +26,7 @@ from tawami.grid.grid import Grid
 from tawami.particles import assignment
 from tawami.scene import description, initial
 from tawami.scene.absent import Elsewhere
+from tawami.scene.border import SceneBorder
 from tawami.scene.conditions import Conditions
 from tawami.scene.configuration import Configuration
 from tawami.scene.construction import Construction
@@ -160,6 +161,11 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         `remove` and `change_material`.
         """
         return self.configuration.domain.particles
+
+    @property
+    def border(self) -> SceneBorder:
+        """The border of the body: its `names`, and its points with their positions `x` [m]."""
+        return self.configuration.border
 
     @property
     def left(self) -> list[tuple[int, tuple[float, float], float]]:

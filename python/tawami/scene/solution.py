@@ -19,7 +19,8 @@ from tawami.form.kinematics import KINEMATICS
 from tawami.grid import edges
 from tawami.scene import presentation, quantities
 from tawami.scene.absent import Elsewhere
-from tawami.scene.configuration import Configuration, Outcome
+from tawami.scene.configuration import Configuration
+from tawami.scene.outcome import Outcome
 from tawami.scene.points import ROUND_OFF, outside
 from tawami.scene.quantities import Arrays, Given, Quantity
 

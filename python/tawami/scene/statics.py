@@ -8,6 +8,7 @@ import numpy as np
 
 from tawami.scene.action import Term
 from tawami.scene.configuration import Configuration
+from tawami.scene.constraints import constraints
 from tawami.scene.share import Moment
 from tawami.scene.step import Accepted, Problem
 
@@ -45,15 +46,16 @@ class StaticStep:
             return term.at(self.now) - (term.share.applied if moves else 0.0)
 
         with now.stopwatch("set-up"):
-            reduction, contact, supports = now.supports.constraints(
-                now.domain, amount, now.before, now.before, moving=self.stressed,
+            reduction, contact, supports = constraints(
+                now.supports, now.domain, amount, now.before, now.before, moving=self.stressed,
                 fields=now.fields_at(self.now),
             )  # fmt: skip
             external = now.external(self.now)
             terms = now.terms(self.now, supports)
         return Problem(
-            reduction, contact, external, supports=supports, terms=terms, load=self.now.part
-        )
+            reduction, contact, external, supports=supports, terms=terms,
+            held_edges=now.supports.supported_edges, load=self.now.part,
+        )  # fmt: skip
 
     def accept(self, accepted: Accepted) -> StaticStep:
         """Prepare nothing."""

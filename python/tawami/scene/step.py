@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -33,6 +33,7 @@ class Problem:
         guess: Increments of all fields to start from.
         supports: Supports on patches of the border.
         terms: Forces on the border that depend on the solution.
+        held_edges: Names of the edges of the grid that supports or walls hold.
         path: Path on which the load factor is an unknown; `external` is at its start.
         load: Share of the new loads; NaN in dynamics.
     """
@@ -44,6 +45,7 @@ class Problem:
     guess: Array | None = None
     supports: Sequence[HeldBorder] = ()
     terms: Terms | None = None
+    held_edges: Collection[str] = ()
     path: Path | None = None
     load: float = np.nan
 

@@ -12,8 +12,9 @@ from tawami.field.constraints import Held, PointHeld, held_edge, held_point
 from tawami.grid.edges import evaluate
 from tawami.grid.grid import ON_LINE, Edge
 from tawami.scene.action import Term
-from tawami.scene.border import MovingPoints, SceneBorder
+from tawami.scene.border import SceneBorder
 from tawami.scene.domain import Domain
+from tawami.scene.moving_points import MovingPoints
 from tawami.scene.support import Support
 
 #: Distance of a moving border from an edge of the grid below which it has come to it [cells].

@@ -14,8 +14,8 @@ from tawami.border.tied import NORMAL, TANGENT, directions
 from tawami.grid.edges import Profile
 from tawami.grid.grid import Edge, Grid
 from tawami.scene.action import Action, Owner
-from tawami.scene.border import MovingPoints
 from tawami.scene.factor import Factor, InTime
+from tawami.scene.moving_points import MovingPoints
 from tawami.scene.share import Moment
 
 #: Difference of two factors of a displacement that is round-off.
@@ -92,7 +92,8 @@ class Support(Action):
     @property
     def directions(self) -> Array:
         """Unit vectors of its component of the displacement at its points, points x dim."""
-        assert isinstance(self.place, MovingPoints)
+        if not isinstance(self.place, MovingPoints) or self.is_field:
+            return np.zeros((0, 0))
         names = directions(self.place.space, [self.axis], self.place.normal)
         return np.asarray(names[0])
 
@@ -109,11 +110,17 @@ class Support(Action):
     @property
     def weak(self) -> Mask:
         """Mask of its points on the border that it holds by tractions on patches."""
-        assert isinstance(self.place, MovingPoints)
+        if not isinstance(self.place, MovingPoints):
+            return np.zeros(0, dtype=bool)
         mask = np.ones(len(self.place), dtype=bool)
         for edge in self.edges:
             mask &= ~self.whole[edge]
         return mask
+
+    def keep(self, kept: Mask) -> None:
+        """Keep some of its points of the border; those of removed particles are lost."""
+        self.held, self.missing = self.held[kept], self.missing[kept]
+        self.whole = {edge: mask[kept] for edge, mask in self.whole.items() if mask[kept].any()}
 
     def _checked(self, value: Any) -> tuple[Profile, ...]:
         check = checks.number if isinstance(self.place, tuple) else checks.profile

@@ -2,30 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
-
-import numpy as np
 
 from tawami.base import checks
 from tawami.base.arrays import Array, Mask
 from tawami.base.errors import CheckpointError, InputError, SupportError
 from tawami.base.text import listed, quoted
-from tawami.field.constraints import Held, PointHeld
-from tawami.field.reduction import Reduction
+from tawami.field.constraints import PointHeld
 from tawami.form.fields import Field
 from tawami.grid import edges
 from tawami.grid.basis import Basis
 from tawami.grid.edges import Profile
 from tawami.grid.grid import EDGES, Edge, Grid
-from tawami.scene import step_values
-from tawami.scene.action import Owner, Term, restored
+from tawami.scene.action import Owner, restored
 from tawami.scene.activity import Activity
-from tawami.scene.border import MovingPoints, Part, SceneBorder, label
-from tawami.scene.contact import ActiveSet
+from tawami.scene.border import Part, SceneBorder, label
 from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor, InTime
-from tawami.scene.held_border import HeldBorder, check_agreement
+from tawami.scene.moving_points import MovingPoints
 from tawami.scene.points import is_in_body, reach
 from tawami.scene.share import Moment
 from tawami.scene.support import LOCAL, Place, Support
@@ -43,6 +38,7 @@ class Supports(Owner[Support]):
         activity: Time and activity of the scene.
 
     Attributes:
+        border: The border of the body.
         all: The supports on the border and at points.
         walls: The walls.
         axis: In axisymmetry, u_x = 0 along the axis if it is an edge of the grid; else none.
@@ -58,7 +54,7 @@ class Supports(Owner[Support]):
         activity: Activity,
     ) -> None:
         super().__init__(activity)
-        self.grid, self.basis, self._fields, self._border = grid, basis, fields, border
+        self.grid, self.basis, self._fields, self.border = grid, basis, fields, border
         self.walls: list[Wall] = []
         self.axis: list[Support] = []
         if grid.on_axis:
@@ -86,13 +82,13 @@ class Supports(Owner[Support]):
         place: Place = self._place(domain, what, where)
         whole: dict[Edge, Mask] = {}
         if isinstance(place, MovingPoints):
-            whole = self._border.whole_edges(place)
+            whole = self.border.whole_edges(place)
         return self._add(place, given, what, axis, value, amplitude, velocity, whole)
 
     def _place(self, domain: Domain, what: str, where: Part) -> MovingPoints | Edge:
         """Points of a part of the border; of a body without a border, an edge of the grid."""
-        if self._border.points is not None or not checks.one_of(where, EDGES):
-            return self._border.part(what, where)
+        if self.border.points is not None or not checks.one_of(where, EDGES):
+            return self.border.part(what, where)
         edge: Edge = checks.choice(what, where, EDGES)
         distance = reach(domain, edge)
         if distance > 0:
@@ -209,84 +205,6 @@ class Supports(Owner[Support]):
 
     # -- prescribed values in a step -----------------------------------------
 
-    def constraints(
-        self,
-        domain: Domain,
-        amount: Callable[[Term], float],
-        start: Array,
-        before: Array,
-        *,
-        moving: bool,
-        fields: step_values.Fields | None = None,
-    ) -> tuple[Reduction, ActiveSet, list[HeldBorder]]:
-        """Unknowns that the supports leave free, the walls in their present states, and the supports on
-        patches of the border.
-
-        Args:
-            domain: The particles where they are.
-            amount: Factor of each value of a support.
-            start: Coefficients at the start of the step, which the amounts include.
-            before: Displacement coefficients since the start of the scene where particles do not move,
-                0 where they do. Walls measure distances from it.
-            moving: Inertia or stress holds the body: rigid motions may be free.
-            fields: Fields without a role and what is prescribed for them; they stay by default.
-
-        Raises:
-            SupportError: The body has left a point, or supports contradict each other.
-        """
-        layout, held, points = domain.layout, list[Held](), list[PointHeld]()
-        border = list[HeldBorder]()
-        for support in [*self.all, *self.axis]:
-            if isinstance(support.place, tuple):
-                points.append(step_values.at_point(domain, support, amount))
-                continue
-            for edge in support.edges:
-                cells = step_values.touched(domain, self._border, support, edge)
-                if not len(cells):
-                    continue
-                if support.is_field:
-                    of = step_values.of_field(domain, support, edge, cells, start, fields)
-                else:
-                    of = step_values.on_edge(domain, support, edge, cells, amount)
-                held.append(of)
-            if isinstance(support.place, MovingPoints) and support.weak.any():
-                border.append(self._on_patches(domain, support, amount, start, fields))
-        check_agreement(border, self.grid.h)
-        fixed = np.zeros(layout.size, dtype=bool)
-        for one in held:
-            fixed[one.indices] = True
-        prescribed = []
-        for wall in self.walls:
-            by_others = fixed.copy()
-            for other in self.walls:
-                by_others[other.stopped if other is not wall else []] = True
-            prescribed.append(wall.prescribed(by_others))
-            held += wall.held(layout.active, prescribed[-1], start, before)
-        contact = ActiveSet(self.walls, prescribed)
-        rows = [row for support in border for row in support.rows] if not moving else []
-        reduction = Reduction(layout, held, points, start, moving=moving, also=rows)
-        return reduction, contact, border
-
-    @staticmethod
-    def _on_patches(
-        domain: Domain,
-        support: Support,
-        amount: Callable[[Term], float],
-        start: Array,
-        fields: step_values.Fields | None,
-    ) -> HeldBorder:
-        """A support on points of the border, held by tractions on patches."""
-        if not support.is_field:
-            return HeldBorder(domain, support, step_values.at_points(support, amount), start)
-        assert isinstance(support.place, MovingPoints)
-        place = domain.layout.fields[str(support.component)]
-        values = support.place.cells(domain).values(place.basis)
-        now = values @ start[place.slice]
-        if fields is None:
-            return HeldBorder(domain, support, now, start)
-        missing = step_values.at_points(support, fields.amount) - values @ fields.old[place.slice]
-        return HeldBorder(domain, support, now + fields.share * missing, start)
-
     def check_reach(self, before: Domain, after: Domain) -> None:
         """Check that supports still hold something once particles were removed; a call for all ranks.
 
@@ -302,17 +220,18 @@ class Supports(Owner[Support]):
             elif isinstance(support.place, str):
                 lost = reach(after, support.place) > max(reach(before, support.place), 0.0)
             else:
-                lost = support.place.lost(after)
+                lost = not support.place.remains(before, after).any()
             if lost:
                 raise SupportError(
                     f"{support} {support.axis} would hold no particles after remove(...): expected "
                     "supports on particles that remain; release() it before. Nothing was changed"
                 )
 
-    def num_free(self, domain: Domain) -> int:
-        """Number of unknowns that the supports leave."""
-        zero = np.zeros(domain.layout.size)
-        return self.constraints(domain, lambda _: 0.0, zero, zero, moving=True)[0].size
+    def keep(self, kept: Mapping[MovingPoints, Mask]) -> None:
+        """Keep the points of the border that remain after particles were removed."""
+        for support in self.all:
+            if isinstance(support.place, MovingPoints):
+                support.keep(kept[support.place])
 
     # -- where particles move ------------------------------------------------
 

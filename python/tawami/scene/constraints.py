@@ -1,0 +1,106 @@
+"""Constraints of the supports of a scene in one step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tawami.base.arrays import Array
+from tawami.field.constraints import Held, PointHeld
+from tawami.field.reduction import Reduction
+from tawami.scene import step_values
+from tawami.scene.action import Term
+from tawami.scene.contact import ActiveSet
+from tawami.scene.domain import Domain
+from tawami.scene.held_border import HeldBorder, check_agreement
+from tawami.scene.moving_points import MovingPoints
+from tawami.scene.support import Support
+from tawami.scene.supports import Supports
+
+
+def constraints(
+    supports: Supports,
+    domain: Domain,
+    amount: Callable[[Term], float],
+    start: Array,
+    before: Array,
+    *,
+    moving: bool,
+    fields: step_values.Fields | None = None,
+) -> tuple[Reduction, ActiveSet, list[HeldBorder]]:
+    """Unknowns that the supports leave free, the walls in their present states, and the supports on
+    patches of the border.
+
+    Args:
+        supports: The supports of a scene.
+        domain: The particles where they are.
+        amount: Factor of each value of a support.
+        start: Coefficients at the start of the step, which the amounts include.
+        before: Displacement coefficients since the start of the scene where particles do not move,
+            0 where they do. Walls measure distances from it.
+        moving: Inertia or stress holds the body: rigid motions may be free.
+        fields: Fields without a role and what is prescribed for them; they stay by default.
+
+    Raises:
+        SupportError: The body has left a point, or supports contradict each other.
+    """
+    layout, held, points = domain.layout, list[Held](), list[PointHeld]()
+    border = list[HeldBorder]()
+    for support in [*supports.all, *supports.axis]:
+        if isinstance(support.place, tuple):
+            points.append(step_values.at_point(domain, support, amount))
+            continue
+        for edge in support.edges:
+            cells = step_values.touched(domain, supports.border, support, edge)
+            if not len(cells):
+                continue
+            if support.is_field:
+                of = step_values.of_field(domain, support, edge, cells, start, fields)
+            else:
+                of = step_values.on_edge(domain, support, edge, cells, amount)
+            held.append(of)
+        if isinstance(support.place, MovingPoints) and support.weak.any():
+            border.append(_on_patches(domain, support, amount, start, fields))
+    check_agreement(border, supports.grid.h)
+    fixed = np.zeros(layout.size, dtype=bool)
+    for one in held:
+        fixed[one.indices] = True
+    prescribed = []
+    for wall in supports.walls:
+        by_others = fixed.copy()
+        for other in supports.walls:
+            by_others[other.stopped if other is not wall else []] = True
+        prescribed.append(wall.prescribed(by_others))
+        held += wall.held(layout.active, prescribed[-1], start, before)
+    contact = ActiveSet(supports.walls, prescribed)
+    rows = [row for one in border for row in one.rows] if not moving else []
+    may_move = moving or domain.model.compiled.may_hold
+    reduction = Reduction(layout, held, points, start, moving=may_move, also=rows)
+    return reduction, contact, border
+
+
+def _on_patches(
+    domain: Domain,
+    support: Support,
+    amount: Callable[[Term], float],
+    start: Array,
+    fields: step_values.Fields | None,
+) -> HeldBorder:
+    """A support on points of the border, held by tractions on patches."""
+    if not support.is_field:
+        return HeldBorder(domain, support, step_values.at_points(support, amount), start)
+    assert isinstance(support.place, MovingPoints)
+    place = domain.layout.fields[str(support.component)]
+    values = support.place.cells(domain).values(place.basis)
+    now = values @ start[place.slice]
+    if fields is None:
+        return HeldBorder(domain, support, now, start)
+    missing = step_values.at_points(support, fields.amount) - values @ fields.old[place.slice]
+    return HeldBorder(domain, support, now + fields.share * missing, start)
+
+
+def num_free(supports: Supports, domain: Domain) -> int:
+    """Number of unknowns that the supports leave."""
+    zero = np.zeros(domain.layout.size)
+    return constraints(supports, domain, lambda _: 0.0, zero, zero, moving=True)[0].size

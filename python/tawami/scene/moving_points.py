@@ -1,0 +1,142 @@
+"""Points of a border that move with the body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from tawami.base.arrays import Array, Mask
+from tawami.base.errors import CheckpointError
+from tawami.base.space import Space
+from tawami.border.points import BorderPoints
+from tawami.field.border import BorderInCells
+from tawami.grid.grid import ON_LINE, Edge, Grid
+from tawami.scene.domain import Domain
+
+
+class MovingPoints:
+    """Points of a border that move with the body.
+
+    Args:
+        points: The points at the start.
+        grid: The grid.
+        what: Name of the part, for messages.
+
+    Attributes:
+        what: As given.
+        x: Positions [m], points x dim.
+        area: Outward normals times lengths in the plane of the grid [m], points x dim.
+        reference: Weights when they were made [m2 per metre depth], which dead loads refer to.
+        made: The points when they were made.
+    """
+
+    def __init__(self, points: BorderPoints, grid: Grid, what: str = "border") -> None:
+        self.made, self._grid, self.what = points, grid, what
+        self.x = np.array(points.x)
+        self.area = points.length[:, None] * points.normal
+        self.reference = self.weight
+        self._located: tuple[Domain, BorderInCells] | None = None
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+    @property
+    def space(self) -> Space:
+        """The space of the grid."""
+        return self._grid.space
+
+    @property
+    def length(self) -> Array:
+        """Length of the border that each point integrates over [m], in the plane."""
+        return np.asarray(np.linalg.norm(self.area, axis=1))
+
+    @property
+    def weight(self) -> Array:
+        """Area that each point integrates over [m2 per metre depth], in axisymmetry [m2]."""
+        return np.asarray(self.length * self.space.thickness(self.x))
+
+    @property
+    def normal(self) -> Array:
+        """Outward unit normals, points x dim."""
+        return np.asarray(self.area / self.length[:, None])
+
+    @property
+    def now(self) -> BorderPoints:
+        """The points as they are, with distances along the stretched chains."""
+        length, made = self.length, self.made
+        order = np.lexsort((made.along, made.chain))
+        along, chain = np.empty(len(self)), made.chain[order]
+        ends = np.cumsum(length[order])
+        first = np.searchsorted(chain, chain)
+        along[order] = ends - length[order] / 2 - (ends - length[order])[first]
+        return replace(made, x=self.x, length=length, normal=self.normal, along=along)
+
+    def cells(self, domain: Domain) -> BorderInCells:
+        """The points in the cells of a domain.
+
+        Raises:
+            SupportError: A point has no particles near it.
+        """
+        if self._located is None or self._located[0] is not domain:
+            made = BorderInCells(self._grid, domain.active, self.x, self.normal, self.what)
+            self._located = domain, made
+        return self._located[1]
+
+    def edge(self, edge: Edge, tolerance: float = ON_LINE) -> Mask:
+        """Mask of the points on an edge of the grid, or beyond it.
+
+        Args:
+            edge: Name of the edge.
+            tolerance: Distance that is ignored [cells].
+        """
+        axis, end = self._grid.edge(edge)
+        inside = (
+            self._grid.upper[axis] - self.x[:, axis]
+            if end
+            else self.x[:, axis] - self._grid.origin[axis]
+        )
+        return np.asarray(inside <= tolerance * self._grid.h)
+
+    def remains(self, before: Domain, after: Domain) -> Mask:
+        """Mask of the points whose cells still hold particles after some were removed."""
+        return np.asarray(after.active.ravel()[self.cells(before).location.cell])
+
+    def keep(self, kept: Mask) -> None:
+        """Keep some of the points."""
+        self.x, self.area, self.reference = self.x[kept], self.area[kept], self.reference[kept]
+        self.made, self._located = self.made[kept], None
+
+    def moved(self, domain: Domain, u: Array) -> tuple[Array, Array]:
+        """Positions and areas after a step (Nanson: n dA = cof(F) n0 dA0).
+
+        Args:
+            domain: The particles at its start.
+            u: Increments of the displacement, functions x dim.
+        """
+        cells, basis = self.cells(domain), domain.layout.basis
+        gradient = np.stack([slope @ u for slope in cells.slopes(basis)], axis=2)
+        f = gradient + np.eye(self.space.dim)
+        cofactor = np.linalg.det(f)[:, None, None] * np.linalg.inv(f).transpose(0, 2, 1)
+        area = np.einsum("nij,nj->ni", cofactor, self.area)
+        return self.x + cells.values(basis) @ u, area
+
+    def state(self) -> dict[str, Any]:
+        """Positions and areas, for a checkpoint."""
+        return {"x": self.x, "area": self.area, "reference": self.reference}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """The reverse of :meth:`state`.
+
+        Raises:
+            CheckpointError: It has another number of points.
+        """
+        if np.shape(state["x"]) != self.x.shape:
+            raise CheckpointError(
+                f"{self.what} had {len(state['x'])} border points when the run was stored and has "
+                f"{len(self)} now: expected the same parts of the border"
+            )
+        self.x, self.area, self.reference = state["x"], state["area"], state["reference"]
+        self._located = None

@@ -1,0 +1,41 @@
+"""The outcome of a step: positions at its end, and all that a solution shows of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from tawami.base.arrays import Array
+from tawami.scene.reactions import Reactions
+from tawami.scene.step import Accepted
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A step that was stored.
+
+    Attributes:
+        accepted: The step.
+        coefficients: Of all fields: since the start where particles do not move, of the step where
+            they do.
+        reactions: Forces of supports and walls.
+        particles: Arrays of the whole body at the end of the step, in the order of the numbers.
+    """
+
+    accepted: Accepted
+    coefficients: Array
+    reactions: Reactions
+    particles: Mapping[str, Array]
+
+
+class Moved(NamedTuple):
+    """Positions at the end of a step.
+
+    Attributes:
+        particles: Of this rank's particles [m], particles x dim.
+        border: Of the points of the border, with their areas.
+    """
+
+    particles: Array
+    border: list[tuple[Array, Array]]
