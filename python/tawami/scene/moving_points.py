@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tawami import _rust
 from tawami.base.arrays import Array, Mask
 from tawami.base.errors import CheckpointError
 from tawami.base.space import Space
@@ -123,12 +124,13 @@ class MovingPoints:
             domain: The particles at its start.
             u: Increments of the displacement, functions x dim.
         """
-        cells, basis = self.cells(domain), domain.layout.basis
-        gradient = np.stack([slope @ u for slope in cells.slopes(basis)], axis=2)
-        f = gradient + np.eye(self.space.dim)
+        location, basis = self.cells(domain).location, domain.layout.basis
+        flat, space = np.ascontiguousarray(u).ravel(), self.space
+        gradient = space.in_space(space.gradients(_rust.gradients(location, basis, flat)))
+        f = gradient + np.eye(space.dim)
         cofactor = np.linalg.det(f)[:, None, None] * np.linalg.inv(f).transpose(0, 2, 1)
         area = np.einsum("nij,nj->ni", cofactor, self.area)
-        return self.x + cells.values(basis) @ u, area
+        return self.x + _rust.interpolate(location, basis, space.dim, flat), area
 
     def state(self) -> dict[str, Any]:
         """Positions and areas, for a checkpoint."""
