@@ -153,9 +153,7 @@ def test_supports_on_removed_particles_and_wrong_selections_raise_an_error():
         match=r"hold\(point=\(0.5, 1.9\)\) y would hold no particles.*release\(\) it before",
     ):
         scene.remove(lambda x, y: y > 1.25)
-    with pytest.raises(
-        tawami.SupportError, match=r"fix\('bottom'\) y would hold no particles"
-    ):
+    with pytest.raises(tawami.SupportError, match=r"fix\('bottom'\) y would hold no particles"):
         scene.remove(lambda x, y: y < 0.5)
     for where, words in (
         (lambda x, y: y > 9, r"remove\(...\): where: no particle was chosen"),

@@ -226,15 +226,11 @@ def test_wrong_supports_and_loads_are_rejected():
         with pytest.raises(tawami.InputError, match=message):
             call()
     scene.fix("left", "x", lambda x, y: np.nan * x)
-    with pytest.raises(
-        tawami.InputError, match=r"fix\('left'\): nan at .*: expected a finite"
-    ):
+    with pytest.raises(tawami.InputError, match=r"fix\('left'\): nan at .*: expected a finite"):
         scene.solve()
     scene = tawami.Scene(grid, body_of(grid), tawami.linear_elastic(**ELASTIC))
     scene.fix("left", "x", lambda x, y: x.sum(axis=3))
-    with pytest.raises(
-        tawami.InputError, match=r"fix\('left'\): expected a number or a function"
-    ):
+    with pytest.raises(tawami.InputError, match=r"fix\('left'\): expected a number or a function"):
         scene.solve()
 
 

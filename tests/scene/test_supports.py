@@ -135,7 +135,9 @@ def test_contradicting_supports_are_rejected():
     scene.fix("left", "x")
     scene.fix("left", "y")
     scene.hold((-1.0, 1.0), "y", 1e-3)
-    with pytest.raises(SupportError, match=r"hold\(point=\(-1, 1\)\): fix\('left'\) y already give"):
+    with pytest.raises(
+        SupportError, match=r"hold\(point=\(-1, 1\)\): fix\('left'\) y already give"
+    ):
         scene.solve()
 
 
