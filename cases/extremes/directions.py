@@ -23,9 +23,13 @@ N, H = 6, 0.25  # cells along a side of the grid, their size [m]
 FORMS: dict[str, dict[str, Any]] = {
     "u": {"form": "u"},
     "u_bbar": {"form": "u_bbar"},
-    "u_epsv": {"form": "u_epsv"},
-    "u_epsv, residual_based": {"form": "u_epsv", "stabilisation": "residual_based"},
-    "u_epsv, projection": {"form": "u_epsv", "stabilisation": "projection"},
+    "u_epsv": {"form": "u_epsv", "ghost_penalty": "off"},
+    "u_epsv, residual_based": {
+        "form": "u_epsv",
+        "ghost_penalty": "off",
+        "stabilisation": "residual_based",
+    },
+    "u_epsv, projection": {"form": "u_epsv", "ghost_penalty": "off", "stabilisation": "projection"},
     "u_epsv, ghost": {"form": "u_epsv", "ghost_penalty": "on"},
     "u_p": {"form": "u_p"},
     "u_epsv_finite": {"form": "u_epsv_finite"},

@@ -22,10 +22,14 @@ WIDTHS = (1e-2, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12)
 FORMS: dict[str, dict[str, Any]] = {
     "u": {"form": "u"},
     "u_bbar": {"form": "u_bbar"},
-    "u_epsv": {"form": "u_epsv"},
-    "u_epsv, alpha = 0": {"form": "u_epsv", "alpha": 0.0},
-    "u_epsv, projection": {"form": "u_epsv", "stabilisation": "projection"},
-    "u_epsv, residual_based": {"form": "u_epsv", "stabilisation": "residual_based"},
+    "u_epsv": {"form": "u_epsv", "ghost_penalty": "off"},
+    "u_epsv, alpha = 0": {"form": "u_epsv", "ghost_penalty": "off", "alpha": 0.0},
+    "u_epsv, projection": {"form": "u_epsv", "ghost_penalty": "off", "stabilisation": "projection"},
+    "u_epsv, residual_based": {
+        "form": "u_epsv",
+        "ghost_penalty": "off",
+        "stabilisation": "residual_based",
+    },
     "u_epsv, ghost": {"form": "u_epsv", "ghost_penalty": "on"},
     "u_p": {"form": "u_p"},
 }

@@ -74,7 +74,7 @@ def test_one_particle_in_each_cell_keeps_its_stress():
 def two_materials():
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=H, cells=(16, 8))
     body = tawami.box(grid, (0.25, 0.25), (0.75, 0.75), per_axis=3)
-    body = replace(body, x=body.x + (0.03, 0.05), border=None)
+    body = replace(body, x=body.x + np.array([0.03, 0.05]), border=None)
     right = body.x[:, 0] > 0.57  # inside a cell
     return tawami.Scene(
         grid, body, [SOFT, STIFF], material_of=right.astype(np.uint32), form="u_epsv_finite",

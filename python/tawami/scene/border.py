@@ -18,7 +18,7 @@ from tawami.border.points import BorderPoints
 from tawami.grid.grid import EDGES, ON_LINE, Edge, Grid
 from tawami.scene.domain import Domain
 from tawami.scene.model import Model
-from tawami.scene.moving_points import MovingPoints
+from tawami.scene.moving_points import MovingPoints, moved
 
 #: Gauss points on a piece of the border between two lines of the grid: where particles stay, three are
 #: exact; points that move to other places in their cells need five (noise of a pressure .5 and .14 %).
@@ -200,7 +200,7 @@ class SceneBorder:
 
     def moved(self, domain: Domain, u: Array) -> list[tuple[Array, Array]]:
         """Positions and areas of all points after a step, for :meth:`move`."""
-        return [points.moved(domain, u) for points in self.all]
+        return moved(self.all, domain, u)
 
     def move(self, moved: list[tuple[Array, Array]]) -> None:
         """Move all points."""
