@@ -11,8 +11,9 @@ residual_based  the same with the whole momentum residual grad p + div s, p = K 
                 to the alpha for which it is coercive (biquadratic 0.144, splines 0.23, bilinear 26)
 projection      Dohrmann and Bochev 2004: the part of eps_v that varies within a cell; needs no h^2
 
-`ghost_penalty` ties partly filled cells to their neighbours: jumps of the second normal derivative of
-u, whose first is continuous for splines, and of the first of eps_v, on the sides that they share.
+`ghost_penalty` ties partially filled cells to their neighbours: jumps of the second normal derivative of
+u, whose first is continuous for splines, and of the first of eps_v, on the sides that they share. Bodies
+on the lines of the grid have no such cells.
 """
 
 from ufl import dot, inner
@@ -32,7 +33,7 @@ parameters = {
 }
 options = {
     "stabilisation": ("laplacian", "residual_based", "projection"),
-    "ghost_penalty": ("off", "on"),
+    "ghost_penalty": ("on", "off"),
 }
 whole_cells = ("residual_based",)
 

@@ -56,7 +56,7 @@ def solve(residual) -> tawami.Solution:  # type: ignore[no-untyped-def]
     for edge in ("left", "right", "bottom"):
         scene.fix(edge, "x")
     scene.fix("bottom", "y")
-    scene.traction("top", (0.0, -LOAD), between=(-0.25, 0.25))
+    scene.traction(lambda x, y: (y == 1) & (abs(x) < 0.25), (0.0, -LOAD))
     return scene.solve()
 
 

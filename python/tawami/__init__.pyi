@@ -56,7 +56,7 @@ from tawami.particles.laws import (
     von_mises,
 )
 from tawami.particles.numpy_law import NumpyLaw
-from tawami.results.outputs import GridOutput, ParticleOutput
+from tawami.results.outputs import BorderOutput, GridOutput, ParticleOutput
 from tawami.results.plot import plot
 from tawami.results.results import Results
 from tawami.results.table import TableOutput
@@ -70,6 +70,7 @@ from tawami.study import Series, Study, recommend
 __all__ = [
     "Body",
     "Border",
+    "BorderOutput",
     "CheckpointError",
     "CheckpointWarning",
     "ConvergenceError",

@@ -10,11 +10,12 @@ from scipy.interpolate import BSpline
 
 import tawami
 from cases.showcase import cut_cells
-from tawami.field import ghost
+from tawami.field.cut_cells import partially_filled, sides
 from tawami.form import vector
 from tawami.form.form import Form
 
 GHOST = {"form": "u_epsv", "ghost_penalty": "on", "k": 0.5}
+WITHOUT = {"form": "u_epsv", "ghost_penalty": "off"}
 
 
 @pytest.fixture
@@ -33,7 +34,7 @@ def corner(random_scene):
 
 def penalty(corner, **options):
     """A scene with the ghost penalty, and the matrix of the penalty alone."""
-    with_it, without = corner(**GHOST, **options), corner(form="u_epsv", **options)
+    with_it, without = corner(**GHOST, **options), corner(**WITHOUT, **options)
     c = np.zeros(with_it.num_coefficients)
     return with_it, (with_it.tangent(c) - without.tangent(c)).toarray()
 
@@ -43,7 +44,7 @@ def penalty(corner, **options):
 def test_the_tangent_is_the_derivative_of_the_residual(corner, basis, path):
     scene, matrix = penalty(corner, basis=basis, assembly=path)
     c = np.random.default_rng(1).standard_normal(scene.num_coefficients)
-    other = corner(form="u_epsv", basis=basis, assembly=path)
+    other = corner(**WITHOUT, basis=basis, assembly=path)
     difference = scene.residual(c) - other.residual(c)
     assert np.abs(difference - matrix @ c).max() < 1e-12 * np.abs(difference).max()
     assert np.abs(matrix - matrix.T).max() < 1e-13 * np.abs(matrix).max()
@@ -76,7 +77,7 @@ def test_the_penalty_is_the_integral_of_the_jumps(corner):
     law = tawami.linear_elastic(E=2.0, nu=0.4)
     K, mu = law.bulk_modulus, law.shear_modulus
     expected = 0.0
-    for (i, j), (p, q), _ in ghost.sides(scene.configuration.domain.active):
+    for (i, j), (p, q), _ in scene.configuration.domain.assembly.attachment.sides:
         if p > i:
             bend = [second_derivative(nx, h, a, x) for x in (p * h - 1e-9, p * h + 1e-9)]
             along = spline(ny, h, b, j * h + points)
@@ -95,10 +96,10 @@ def test_the_penalty_is_the_integral_of_the_jumps(corner):
 def test_partly_filled_cells_are_beside_empty_ones():
     active = np.ones((4, 5), dtype=bool)
     active[3, 4] = False
-    partly = ghost.partially_filled(active)
+    partly = partially_filled(active)
     assert np.argwhere(partly).tolist() == [[2, 3], [2, 4], [3, 3]]  # not those at the grid's end
-    assert len(list(ghost.sides(active))) == 6
-    assert not list(ghost.sides(np.ones((3, 3), dtype=bool)))
+    assert len(list(sides(active))) == 6
+    assert not list(sides(np.ones((3, 3), dtype=bool)))
 
 
 @pytest.mark.parametrize(

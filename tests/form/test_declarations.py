@@ -188,4 +188,4 @@ def test_a_penalty_may_add_inner_products_to_plain_ones():
             sum_p(sigma, grad(w)) + facet_mean(mu) * (inner(bend, tested) + dot(bend, tested)) * dG
         )
 
-    assert compile_form(MPI.COMM_SELF, form_of(residual), {}).ghost is not None
+    assert compile_form(MPI.COMM_SELF, form_of(residual), {}).penalises

@@ -35,8 +35,8 @@ def test_a_block_above_the_lines_of_the_grid_settles_under_its_weight(gap):
 @pytest.mark.parametrize(("angle", "shift"), [(17.0, (0.1, 0.02)), (45.0, (0.07, 0.11))])
 @pytest.mark.parametrize("form", ["u", "u_epsv", "u_epsv_finite"])
 def test_a_uniform_strain_that_all_sides_prescribe_is_exact(angle, shift, form):
-    """Patch test."""
-    scene, _ = block(angle, shift, form=form)
+    """Patch test, with particles that integrate the functions of the grid exactly."""
+    scene, _ = block(angle, shift, gauss=True, form=form)
     gradient = 1e-3 * np.array([[1.0, -0.5], [2.0, 0.7]])
     sides = ["0", "1", "2", "3"]
     scene.fix(sides, "x", lambda x, y: gradient[0, 0] * x + gradient[0, 1] * y)

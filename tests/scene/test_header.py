@@ -84,7 +84,10 @@ def test_each_option_leaves_the_list_of_what_is_not_modelled(words, header):
 
 
 def test_the_header_shows_a_ghost_penalty_and_a_motion():
-    assert "ghost penalty (ghost_penalty='on')" in scene_of(form="u_epsv").header()
+    assert (
+        "ghost penalty (ghost_penalty='on')"
+        in scene_of(form="u_epsv", ghost_penalty="off").header()
+    )
     ghost = scene_of(form="u_epsv", ghost_penalty="on").header()
     assert "ghost_penalty 'on'" in line(ghost, "form")
     assert "k = 0.01" in line(ghost, "form")

@@ -13,6 +13,7 @@ from tawami.base import ranks
 from tawami.base.arrays import Array, Mask
 from tawami.base.timing import Stopwatch
 from tawami.fem.rules import Rule, rule_points
+from tawami.field.cut_cells import Side, full_cells, sides
 from tawami.field.layout import Layout
 from tawami.form.compilation import CompiledForm
 from tawami.form.integral import Integral
@@ -44,6 +45,7 @@ class Attachment:
         cells: This rank's active cells, as dolfinx numbers them.
         rows: Position of each of them in `location.active`.
         layout: Places of the coefficients.
+        sides: Sides of partially filled cells, if the form has a ghost penalty; the same on all ranks.
         points: Indices along the axes of the points of each rule; none for means over cells.
         values: Values of h, time, dt, b and the parameters of the form; :meth:`change` replaces them.
         version: A number that changes with them.
@@ -73,10 +75,15 @@ class Attachment:
         self.rows = np.searchsorted(location.active, number[self.cells]).astype(np.uint32)
         self.active = ranks.any_of(grid.comm, active)
         self.layout = Layout(grid, basis, compiled.form.fields, self.space, self.active)
+        self.sides: list[Side] = []
+        if compiled.penalises:
+            moves = compiled.form.strain.finite
+            full = None if moves else full_cells(grid, location, volume)
+            self.sides = list(sides(self.active, full))
         weak = [
             name
             for name, place in self.layout.fields.items()
-            if place.basis == "quadratic_spline" and (place.start > 0 or compiled.ghost is None)
+            if place.basis == "quadratic_spline" and (place.start > 0 or not self.sides)
         ]
         if weak:
             once = np.ones(len(volume))

@@ -1,14 +1,13 @@
 """Ghost penalty: the term of a form on the sides that partially filled cells share with others.
 
-A cell counts as partially filled if one of its eight neighbours in the grid holds no particles. The term
-is linear in the fields, so it is one matrix from one reset of the grid to the next. The kernel of FFCx
-for a side gives the entries of both cells at once (Burman 2010).
+The term is linear in the fields, so it is one matrix from one reset of the grid to the next. The kernel
+of FFCx for a side gives the entries of both cells at once (Burman 2010).
 """
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ import scipy.sparse as sp
 
 from tawami import _rust
 from tawami.base import ranks
-from tawami.base.arrays import Array, Mask
+from tawami.base.arrays import Array
 from tawami.fem import dolfinx
 from tawami.fem.kernels import Kernel
 from tawami.fem.rules import Rule
@@ -25,31 +24,9 @@ from tawami.field.reduction import Reduction
 from tawami.field.sum import Sum
 from tawami.form.integral import Integral
 
-Side = tuple[tuple[int, int], tuple[int, int], tuple[str, str]]
-
-
-def partially_filled(active: Mask) -> Mask:
-    """Cells with particles that have a neighbour without particles, ny x nx."""
-    ny, nx = active.shape
-    padded = np.pad(active, 1, constant_values=True)
-    shifts = [(i, j) for i in range(3) for j in range(3)]
-    filled = np.logical_and.reduce([padded[j : j + ny, i : i + nx] for i, j in shifts])
-    return np.asarray(active & ~filled)
-
-
-def sides(active: Mask) -> Iterator[Side]:
-    """Sides of partially filled cells: the cells (i, j) on both sides, and its name in each of them."""
-    partial = partially_filled(active)
-    for (di, dj), names in (((1, 0), ("right", "left")), ((0, 1), ("top", "bottom"))):
-        ny, nx = active.shape
-        here, there = (slice(0, ny - dj), slice(0, nx - di)), (slice(dj, None), slice(di, None))
-        both = active[here] & active[there] & (partial[here] | partial[there])
-        for j, i in np.argwhere(both):
-            yield (int(i), int(j)), (int(i) + di, int(j) + dj), names
-
 
 class GhostPenalty:
-    """The ghost penalty of a form; without such a term it adds nothing.
+    """The ghost penalty of a form; without such a term, or without cut cells, it adds nothing.
 
     Args:
         attachment: The form and the active cells.
@@ -83,9 +60,10 @@ class GhostPenalty:
 
     def _on_all(self, data: Mapping[Rule, Array]) -> sp.csr_matrix | None:
         """G on all coefficients, the same on every rank; None without a penalty."""
-        integral = self._attachment.compiled.ghost
-        if integral is None:
+        if not self._attachment.sides:
             return None
+        integral = self._attachment.compiled.ghost
+        assert integral is not None
         columns = list(integral.slots[0].columns) if integral.slots else []
         read = np.concatenate(
             [self._attachment.constants(integral), data["mean"][:, columns].ravel()]
@@ -106,7 +84,7 @@ class GhostPenalty:
         to_grid = grid.rectangle.to_grid_axes
         vertices = grid.h * np.pad(to_grid(dolfinx.reference_nodes(1)), ((0, 0), (0, 1)))
         rows, cols, entries = [], [], []
-        for here, there, names in sides(attached.active):
+        for here, there, names in attached.sides:
             shift = grid.h * np.array([*np.subtract(there, here), 0])
             x = np.concatenate([vertices, vertices + shift])
             if integral.reads_position:
@@ -122,8 +100,6 @@ class GhostPenalty:
             cols.append(np.tile(coefficients, len(coefficients)))
             entries.append((t.T @ element @ t).ravel())
         shape = (layout.size, layout.size)
-        if not rows:
-            return sp.csr_matrix(shape)
         index = (np.concatenate(rows), np.concatenate(cols))
         return sp.csr_matrix((np.concatenate(entries), index), shape=shape)
 

@@ -5,7 +5,8 @@ Forms are written and compiled without a mesh, once per process and on disk.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import functools
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,7 +47,8 @@ class CompiledForm:
         residual: Integrals of the residual over cells, one for each quadrature rule.
         tangent: Derivative of `residual`, one integral for each quadrature rule.
         couplings: The other part of the tangent: products of two integrals of rank 1, cell by cell.
-        ghost: Integral of rank 2 over sides of partially filled cells, if there is one.
+        sides: Compiles the integral of rank 2 over sides of partially filled cells, if there is one. It
+            is called for the first body with such cells.
         border: Sums over the border.
         densities: Particle data of each rule: each density with its first column.
         border_data: Numbers of the points of the border, as columns.
@@ -58,11 +60,22 @@ class CompiledForm:
     residual: tuple[Integral, ...]
     tangent: tuple[Integral, ...]
     couplings: tuple[tuple[Integral, Integral], ...]
-    ghost: Integral | None
+    sides: Callable[[], Integral] | None
     border: tuple[BorderTerm, ...]
     densities: Mapping[Rule, Mapping[Density, int]]
     border_data: tuple[ParticleScalar, ...]
     used: frozenset[str]
+
+    @property
+    def penalises(self) -> bool:
+        """Whether the form has a ghost penalty."""
+        return self.sides is not None
+
+    @functools.cached_property
+    def ghost(self) -> Integral | None:
+        """The ghost penalty, if the form has one; a collective call."""
+        with tally.compiling():
+            return None if self.sides is None else self.sides()
 
     @property
     def may_hold(self) -> bool:
@@ -176,7 +189,7 @@ def _compile(comm: Any, symbols: Symbols) -> CompiledForm:
         element=symbols.element,
         residual=integrals(terms.cells),
         tangent=integrals(tangent),
-        ghost=None if ghost is None else integral(ghost, "interior_facet"),
+        sides=None if ghost is None else builder.prepared(ghost, "interior_facet"),
         border=border,
         couplings=tuple(map(of_pair, couplings)),
         densities=builder.densities,

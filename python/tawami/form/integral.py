@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -92,6 +92,10 @@ class KernelBuilder:
             form: The form.
             kind: Domain of the integrals.
         """
+        return self.prepared(form, kind)()
+
+    def prepared(self, form: Any, kind: Kind) -> Callable[[], Integral]:
+        """A function that compiles a UFL form as `integral`; its data have their columns already."""
         symbols, packed = self._symbols, {}
         width = sum(field.num_dofs for field in symbols.form.fields.values())
         slots = {symbols.increments: Slot("fields", width)}
@@ -107,7 +111,7 @@ class KernelBuilder:
             slots[vector] = Slot(rule, num_points * len(columns), columns)
         form = ufl.Form([without_line(part) for part in ufl.replace(form, packed).integrals()])
         reads = any(has_type(part.integrand(), SpatialCoordinate) for part in form.integrals())
-        return replace(self._compiled(form, slots, kind), reads_position=reads)
+        return lambda: replace(self._compiled(form, slots, kind), reads_position=reads)
 
     def at_points(self, form: Any, place: Rule) -> Integral:
         """Compile sums over particles with the fields at points of one kind.

@@ -18,7 +18,7 @@ from tawami.border.points import BorderPoints
 from tawami.grid.grid import EDGES, ON_LINE, Edge, Grid
 from tawami.scene.domain import Domain
 from tawami.scene.model import Model
-from tawami.scene.moving_points import MovingPoints
+from tawami.scene.moving_points import MovingPoints, moved
 
 #: Gauss points on a piece of the border between two lines of the grid: where particles stay, three are
 #: exact; points that move to other places in their cells need five (noise of a pressure .5 and .14 %).
@@ -200,7 +200,7 @@ class SceneBorder:
 
     def moved(self, domain: Domain, u: Array) -> list[tuple[Array, Array]]:
         """Positions and areas of all points after a step, for :meth:`move`."""
-        return [points.moved(domain, u) for points in self.all]
+        return moved(self.all, domain, u)
 
     def move(self, moved: list[tuple[Array, Array]]) -> None:
         """Move all points."""
@@ -245,10 +245,14 @@ def check_fits(grid: Grid, points: BorderPoints, x: Array, area: Array) -> None:
     axis = 1 if grid.space.hoop else 0  # the axis of rotation closes the border
     if np.abs(flux.sum(axis=0)[axis:]).max() > CLOSED * points.length.sum():
         return
-    enclosed = (points.x * flux).sum() / grid.space.dim
-    centroid = (points.x**2 * flux).sum(axis=0) / 2 / enclosed
+    middle = points.x.mean(
+        axis=0
+    )  # positions relative to it: round-off far from the origin cancels
+    middle[:axis] = 0.0
+    enclosed = ((points.x - middle) * flux).sum() / grid.space.dim
+    centroid = ((points.x - middle) ** 2 * flux).sum(axis=0) / 2 / enclosed
     total = area.sum()
-    away = float(np.linalg.norm(centroid - area @ x / total))
+    away = float(np.linalg.norm(centroid - area @ (x - middle) / total))
     if abs(enclosed - total) > FITS * total or away > FITS * max(grid.h, np.sqrt(total)):
         raise InputError(
             f"the border of the body encloses {enclosed:.6g} m2 and its particles have {total:.6g} m2, "

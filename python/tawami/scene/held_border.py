@@ -123,6 +123,16 @@ class HeldBorder:
         self._held = self._tractions
         return bool(change > SETTLED * np.abs(self._held).max(initial=0.0))
 
+    @property
+    def unsettled(self) -> str:
+        """See `Term`."""
+        error, support = np.abs(self._error).max(), self._support
+        return (
+            f"{support}: its part of the border stays {error:.3g} {support.unit} away from the "
+            f"prescribed values of '{support.axis}': other supports hold it, or the body cannot deform "
+            "like this: expected supports that agree; change or release one"
+        )
+
     def accept(self) -> None:
         """Keep the tractions, and what is missing of the prescribed displacement, for later steps."""
         support, number = self._support, self._groups.number

@@ -21,6 +21,7 @@ from tawami.scene import presentation, quantities
 from tawami.scene.absent import Elsewhere
 from tawami.scene.configuration import Configuration
 from tawami.scene.outcome import Outcome
+from tawami.scene.outline import Outline
 from tawami.scene.points import ROUND_OFF, outside
 from tawami.scene.quantities import Arrays, Given, Quantity
 
@@ -83,6 +84,11 @@ class Solution(Elsewhere, Sealed, Unique):
         self._reactions = outcome.reactions
         self.on_edges = outcome.reactions.on_edges
         particles = outcome.particles
+        now = scene.configuration
+        #: The border of the body; None if it has none.
+        self.outline = None
+        if now.border.points is not None:
+            self.outline = Outline(now.border.points, now.domain, self.u)
         #: Arrays of the particles by name, for quantities.
         self.arrays = Arrays(self._array)
         self.number = particles["number"]
@@ -211,7 +217,7 @@ class Solution(Elsewhere, Sealed, Unique):
         deformed: float = 1.0,
         limits: tuple[float, float] | None = None,
     ) -> Axes:
-        """Draw the particles as squares, coloured by a quantity, with the border of the grid.
+        """Draw the particles as squares, coloured by a quantity, with the borders of body and grid.
 
         On several ranks each rank that calls it draws all particles in a figure of its own.
 
@@ -232,7 +238,7 @@ class Solution(Elsewhere, Sealed, Unique):
         """
         return presentation.plot(
             self.arrays, self._model.grid, quantity, axes, moved=self._model.moves, deformed=deformed,
-            limits=limits, more=quantities.of_scene(self.scene),
+            limits=limits, more=quantities.of_scene(self.scene), outline=self.outline,
         )  # fmt: skip
 
     def to_pandas(self, *names: Given) -> Any:

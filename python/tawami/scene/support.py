@@ -39,9 +39,10 @@ class Support(Action):
         unit: Unit of its values.
         held: Tractions that held each other point in the last step [Pa], as multipliers.
         missing: Displacement by which each of these lagged behind the prescribed one [m].
+        told: Whether a warning was issued that it holds nothing.
     """
 
-    __slots__ = ("_whole", "component", "given", "held", "missing", "place", "unit")
+    __slots__ = ("_whole", "component", "given", "held", "missing", "place", "told", "unit")
 
     def __init__(
         self,
@@ -55,7 +56,7 @@ class Support(Action):
         whole: Mapping[Edge, Mask] | None = None,
     ) -> None:
         self.place, self.given = place, given
-        self.component, self.unit = component, unit
+        self.component, self.unit, self.told = component, unit, False
         self._whole: Mapping[Edge, Mask] = {} if whole is None else whole
         count = len(place) if isinstance(place, MovingPoints) else 0
         self.held, self.missing = np.zeros(count), np.zeros(count)

@@ -266,6 +266,17 @@ class Supports(Owner[Support]):
         return found
 
     @property
+    def tractions(self) -> list[tuple[MovingPoints, Array]]:
+        """Points of each support of the displacement on patches, and the tractions that held them [Pa],
+        points x dim.
+        """
+        return [
+            (s.place, -s.held[:, None] * s.directions)
+            for s in self.all
+            if isinstance(s.place, MovingPoints) and not s.is_field
+        ]
+
+    @property
     def supported_edges(self) -> set[str]:
         """Names of the edges of the grid that supports or walls act on."""
         edges_held = {edge for support in self.all for edge in support.edges}

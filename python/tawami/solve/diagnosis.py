@@ -143,8 +143,9 @@ class Diagnosis:
         if lagrange:
             advice.append("use the basis 'quadratic_spline' with per_axis=2 or more")
         attachment = self._assembly.attachment
-        off = attachment.compiled.ghost is None and "ghost_penalty" in form.options
-        if off and not lagrange and not attachment.active.all():
+        off = not attachment.compiled.penalises and "ghost_penalty" in form.options
+        moves = form.strain.finite  # elsewhere full cells have no penalty
+        if off and moves and not lagrange and not attachment.active.all():
             advice.append("use ghost_penalty='on', which ties partial cells to their neighbours")
         return (
             "some functions of the grid get no stiffness from the particles. Support every part of the "
