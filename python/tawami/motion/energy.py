@@ -198,9 +198,10 @@ class Balance:
         mapped, imposed, end = (0.5 * float(mass @ (v**2).sum(axis=1)) for v in velocities)
         friction, u = accepted.friction, accepted.u
         work = accepted.problem.external[: u.size].reshape(u.shape) + accepted.forces_at_end
+        on_border = self._now.domain.assembly.border_work(accepted.step.coefficients)
         return Energies(
             kinetic=end,
-            external=float((work - friction).ravel() @ u.ravel()),
+            external=float((work - friction).ravel() @ u.ravel()) + on_border,
             friction=-float(friction.ravel() @ u.ravel()),
             transfer=self.energies.kinetic - mapped,
             impact=mapped - imposed,
