@@ -34,6 +34,7 @@ from tawami.scene.parameters import by_kind, check_names
 
 Array = npt.NDArray[np.float64]
 Leaving = Literal["stop", "remove"]
+Volumes = Literal["fitted", "own"]
 #: K/mu from which displacement-only forms lock: nu = 0.49. At 0.495 the mean stress of the cantilever
 #: has 4 times the error that it has at 0.3, at 0.49995 70 times (`python -m cases.extremes`).
 LOCKS = 50.0
@@ -41,7 +42,7 @@ LOCKS = 50.0
 #: Arguments of `Scene` that are not parameters of the form.
 KEYWORDS = (
     "material_of", "form", "basis", "tolerance", "max_iterations", "assembly", "factorise",
-    "linear_solver", "density", "leaving",
+    "linear_solver", "density", "leaving", "volumes",
 )  # fmt: skip
 
 
@@ -64,6 +65,7 @@ class Model:
         names: Name of the group of each material; empty if the body has no names.
         leaving: 'stop' or 'remove', for particles that leave the grid.
         num_particles: Particles of the body, on all ranks.
+        fits: Whether the form integrates with volumes that fit the border of the body.
         border: The border of the body; None if it has none.
     """
 
@@ -81,6 +83,7 @@ class Model:
     names: tuple[str, ...]
     leaving: Leaving
     num_particles: int
+    fits: bool
     border: Border | None
 
     @property
@@ -160,6 +163,7 @@ class Model:
                 "laws": [*self.texts, *laws],
                 "density": None if self.density is None else self.density.tolist(),
                 "leaving": self.leaving,
+                "volumes": "fitted" if self.fits else "own",
                 "number of particles": self.num_particles,
             }
         )
@@ -174,6 +178,7 @@ def build(
     basis: Basis,
     density: float | Sequence[float] | Mapping[str, float] | None,
     leaving: Leaving,
+    volumes: Volumes | None,
     assembly: Assembly,
     parameters: Mapping[str, Any],
 ) -> tuple[Model, _rust.Particles]:
@@ -216,9 +221,27 @@ def build(
         grid, loaded, compiled, basis, values,
         used, in_time, in_space, Settings(options, fixed),
         laws, densities, _names(body, len(materials)), leaving, len(particles),
-        body.border,
+        _fits(volumes, loaded, body, density), body.border,
     )  # fmt: skip
     return model, particles
+
+
+def _fits(volumes: Volumes | None, form: Form, body: Body, density: Any) -> bool:
+    """Whether volumes are fitted: by default in static scenes whose particles move.
+
+    Raises:
+        InputError: Another value, or a body without a border.
+    """
+    if volumes is None:
+        return body.border is not None and form.strain.finite and density is None
+    if checks.choice("volumes", volumes, ("fitted", "own")) == "own":
+        return False
+    if body.border is None:
+        raise InputError(
+            "volumes='fitted': the body has no border: expected volumes='own', or "
+            "Body(x, volume, border=tawami.polyline(corners))"
+        )
+    return True
 
 
 def _compiled(
