@@ -94,14 +94,6 @@ def build(n: int, size: float, shift: tuple[float, float], law: Any, gauss: bool
     return scene, body.x - (x, y), np.asarray(body.volume)
 
 
-def inner_radius(scene: tawami.Scene, shift: tuple[float, float]) -> float:
-    """Mean radius of the points of the inner border [m]."""
-    border = scene.border.points
-    chosen = border.made.tag == border.made.names.index("inner")
-    radius = np.linalg.norm(border.x[chosen] - np.array(shift) / (1 / scene.grid.h), axis=1)
-    return float(border.length[chosen] @ radius / border.length[chosen].sum())
-
-
 def errors(mean: Array, exact: Array | float, volume: Array, unit: float) -> tuple[float, float]:
     """The rms and the largest error of a stress [%]."""
     error = 100 * (mean - exact) / unit
@@ -117,11 +109,9 @@ def small(
     scene.pressure("inner", P)
     solution = scene.solve()
     radius = np.linalg.norm(x, axis=1)
-    # u r is uniform but for the compressibility: u = C (r (1 - 2 nu)/B^2 ... ) is fitted at r < 1.1 A
-    c = P * A**2 * (1 + NU) / (E * (B**2 - A**2))
-    u = np.sum(solution.displacement * x, axis=1) / radius
-    exact_u = c * ((1 - 2 * NU) * radius + B**2 / radius)
-    near = radius < A + 0.5 / n
+    u = np.sum(solution.displacement_of_particles * x, axis=1) / radius
+    exact_u = P * A**2 * (1 + NU) / (E * (B**2 - A**2)) * ((1 - 2 * NU) * radius + B**2 / radius)
+    near = radius < A + 0.5 / n  # in the first half cell the displacement is that of the border
     ratio = float(volume[near] @ (u / exact_u)[near] / volume[near].sum())
     mean = solution.stress[:, :3].mean(axis=1)
     exact = 2 / 3 * (1 + NU) * P * A**2 / (B**2 - A**2)
@@ -153,11 +143,13 @@ def large(
     law, form = tawami.neo_hookean(K=K, mu=MU), "u_epsv_finite"
     scene, x, volume = build(n, 2.75, shift, law, gauss, form=form, **options)
     scene.pressure("inner", P_MU * MU)
+    centre = np.array(shift) / n
+    inner = np.linalg.norm(scene.border.x - centre, axis=1) < (A + B) / 2
     solutions: list[tawami.Solution] = []
     tawami.ramp(scene, 1 / steps, each=solutions.append, stop="raise")
     R = np.linalg.norm(x, axis=1)
     mean = solutions[-1].stress[:, :3].mean(axis=1)
-    a = inner_radius(scene, shift)
+    a = float(np.linalg.norm(scene.border.x[inner] - centre, axis=1).mean())
     found = errors(mean, exact_mean(R), volume, P_MU * MU)
     return Ring(
         "large", n, "Gauss" if gauss else "even", options.get("volumes", "fitted"), shift[0],

@@ -103,6 +103,7 @@ class BorderInCells(PointsInCells):
         cell = grid.cell_numbers(index).astype(np.uint32)
         super().__init__(grid, grid.rust.place(cell, xi))
 
+
 def _nearest(grid: Grid, active: Mask, scaled: Array, where: str) -> Indices:
     """The nearest active cell of each point, by its position along the axes.
 
