@@ -4,7 +4,7 @@ The deviator is tested at the particle, the mean stress with tr(grad w f_c^-1) a
 `ghost_penalty` as in `u_epsv`.
 """
 
-from ufl import dot, inner, inv
+from ufl import inner, inv
 
 from tawami.form import vector
 
@@ -17,12 +17,12 @@ static_options = {"ghost_penalty": "on"}
 
 
 def residual(
-    u, w, P_s, tau_m, mu, t, h, grad, I, sum_p, sum_c, ds, dG, facet_mean, jump_nn, k,
+    u, w, P_s, tau_m, mu, h, grad, I, sum_p, sum_c, dG, facet_mean, jump_nn, k,
     ghost_penalty,
 ):  # fmt: skip
     """R_u(w) = sum_p V0_p { s_p f^-T : grad w + tau_m,p (f_c^-T : grad w)_c } - loads, c the centre."""
     f_c = I + grad(u)
-    R_u = sum_p(P_s, grad(w)) + sum_c(tau_m, inner(inv(f_c).T, grad(w))) - dot(t, w) * ds
+    R_u = sum_p(P_s, grad(w)) + sum_c(tau_m, inner(inv(f_c).T, grad(w)))
     if ghost_penalty == "on":
         R_u += k * facet_mean(mu) * h**3 * inner(jump_nn(u), jump_nn(w)) * dG
     return R_u

@@ -39,13 +39,13 @@ whole_cells = ("residual_based",)
 
 
 def residual(
-    u, eps_v, w, q, sigma, eps_p, K, mu, t, h, grad, div, eps, I, sum_p, cell_mean, dx_c, ds, dG,
+    u, eps_v, w, q, sigma, eps_p, K, mu, h, grad, div, eps, I, sum_p, cell_mean, dx_c, dG,
     facet_mean, jump_n, jump_nn, alpha, k, stabilisation, ghost_penalty,
 ):  # fmt: skip
-    """R_u = sum_p V_p sigma_p : grad w - int t . w ds
+    """R_u = sum_p V_p sigma_p : grad w
     R_q = sum_p V_p K_p q (div u - eps_v - eps_p) - S.
     """
-    R_u = sum_p(sigma, grad(w)) - dot(t, w) * ds
+    R_u = sum_p(sigma, grad(w))
     R_q = sum_p(K, q * (div(u) - eps_v)) - sum_p(K * eps_p, q)
     if ghost_penalty == "on":
         R_u += k * facet_mean(mu) * h**3 * inner(jump_nn(u), jump_nn(w)) * dG

@@ -33,16 +33,16 @@ parameters = {
 
 
 def residual(
-    u, eps_v, d, w, q, r, sigma, eps_p, K, mu, t, h, old, grad, div, sum_p, ds, H, G_c, l, alpha, k
+    u, eps_v, d, w, q, r, sigma, eps_p, K, mu, h, old, grad, div, sum_p, H, G_c, l, alpha, k
 ):  # fmt: skip
     """With D = old d + d:
 
-    R_u = sum_p V_p g(D) sigma_p : grad w - int t . w ds
+    R_u = sum_p V_p g(D) sigma_p : grad w
     R_q = that of u_epsv
     R_r = sum_p V_p { (G_c/l D - 2 (1 - D) H) r + G_c l grad D . grad r }.
     """
     D = old.d + d
-    R_u = sum_p(((1 - D) ** 2 + k) * inner(sigma, grad(w))) - dot(t, w) * ds
+    R_u = sum_p(((1 - D) ** 2 + k) * inner(sigma, grad(w)))
     R_q = sum_p(K * q * (div(u) - eps_v - eps_p))
     R_q -= sum_p(K**2 / mu * alpha * h**2 * dot(grad(q), grad(eps_v)))
     R_r = sum_p((G_c / l * D - 2 * (1 - D) * H) * r + G_c * l * dot(grad(D), grad(r)))

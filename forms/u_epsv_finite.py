@@ -23,14 +23,14 @@ static_options = {"ghost_penalty": "on"}
 
 
 def residual(
-    u, eps_v, w, q, P, ln_J, eps_p, K, mu, t, h, grad, sum_p, sum_v, ds, dG, facet_mean, jump_n,
+    u, eps_v, w, q, P, ln_J, eps_p, K, mu, h, grad, sum_p, sum_v, dG, facet_mean, jump_n,
     jump_nn, alpha, theta, k, ghost_penalty,
 ):  # fmt: skip
-    """R_u = sum_p V0_p (tau_p f^-T) : grad w - int t . w ds
+    """R_u = sum_p V0_p (tau_p f^-T) : grad w
     R_q = sum_p V0_p K_p { q (ln J_f - eps_p - (1 - theta) eps_v) - theta q_i eps_v,i (lumped)
                            - alpha h^2 (K_p/mu_p) grad q . grad eps_v }.
     """
-    R_u = sum_p(P, grad(w)) - dot(t, w) * ds
+    R_u = sum_p(P, grad(w))
     R_q = sum_p(K * ln_J, q) - sum_p(K * eps_p, q)
     R_q -= sum_p(K, (1 - theta) * q * eps_v) + sum_v(K, theta * q * eps_v)
     if ghost_penalty == "on":

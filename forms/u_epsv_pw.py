@@ -33,16 +33,16 @@ parameters = {
 
 
 def residual(
-    u, eps_v, p_w, w, q, r, sigma, eps_p, K, mu, t, b, h, dt, old, grad, div, sum_p, ds, kappa, alpha,
+    u, eps_v, p_w, w, q, r, sigma, eps_p, K, mu, b, h, dt, old, grad, div, sum_p, kappa, alpha,
     alpha_w, biot, storage, mu_w, rho_w,
 ):  # fmt: skip
-    """R_u = sum_p V_p { sigma_p : grad w - biot p div w } - int t . w ds,  p = old p_w + p_w
+    """R_u = sum_p V_p { sigma_p : grad w - biot p div w },  p = old p_w + p_w
     R_q = sum_p V_p K_p { q (div u - eps_v - eps_p) - alpha h^2 (K_p/mu_p) grad q . grad eps_v }
     R_r = sum_p V_p { r (biot div u + storage p_w)/dt + kappa/mu_w grad r . (grad p - rho_w b)
                       + alpha_w h^2/(K_p + 4 mu_p/3) grad r . grad p_w / dt }.
     """
     p = old.p_w + p_w
-    R_u = sum_p(inner(sigma, grad(w)) - biot * p * div(w)) - dot(t, w) * ds
+    R_u = sum_p(inner(sigma, grad(w)) - biot * p * div(w))
     R_q = sum_p(K * q * (div(u) - eps_v - eps_p))
     R_q -= sum_p(K**2 / mu * alpha * h**2 * dot(grad(q), grad(eps_v)))
     R_r = sum_p(r * (biot * div(u) + storage * p_w) / dt)

@@ -36,19 +36,19 @@ options = {"ghost_penalty": ("on", "off")}
 
 
 def residual(
-    u, eps_v, p_w, w, q, r, P, ln_J, eps_p, K, mu, t, b, h, dt, old, grad, I, sum_p, sum_v, ds, dG,
+    u, eps_v, p_w, w, q, r, P, ln_J, eps_p, K, mu, b, h, dt, old, grad, I, sum_p, sum_v, dG,
     facet_mean, jump_n, jump_nn, kappa, alpha, theta, alpha_w, mu_w, rho_w, m, leak, k, ghost_penalty,
 ):  # fmt: skip
     """With g = f^-T grad, gradients at the end of the step, p = old p_w + p_w, J = old J det f:
 
-    R_u = sum_p V0_p { (tau_p - J p I) : g w - rho_w (J - 1) b . w } - int t . w ds
+    R_u = sum_p V0_p { (tau_p - J p I) : g w - rho_w (J - 1) b . w }
     R_q = that of u_epsv_finite
     R_r = sum_p V0_p { r (J - old J)/dt + J^(1+m) kappa/mu_w g r . (g p - rho_w b) + leak J r p
                        + alpha_w h^2/(K_p + 4 mu_p/3) grad r . grad p_w / dt }.
     """
     p, J, F = old.p_w + p_w, old.J * exp(ln_J), inv(I + grad(u)).T
     g_r, g_p = dot(F, grad(r)), dot(F, grad(p))
-    R_u = sum_p(inner(P, grad(w)) - J * p * inner(F, grad(w))) - dot(t, w) * ds
+    R_u = sum_p(inner(P, grad(w)) - J * p * inner(F, grad(w)))
     R_u -= sum_p(rho_w * (J - 1) * dot(b, w))
     R_q = sum_p(K * q * (ln_J - eps_p - (1 - theta) * eps_v)) - sum_v(K, theta * q * eps_v)
     R_q -= sum_p(K**2 / mu * alpha * h**2 * dot(grad(q), grad(eps_v)))

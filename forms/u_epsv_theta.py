@@ -27,15 +27,15 @@ parameters = {"alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0, "unit": "
 
 
 def residual(
-    u, eps_v, theta, w, q, r, sigma, eps_p, K, mu, rho, t, h, dt, old, grad, div, sum_p, ds, expansion,
+    u, eps_v, theta, w, q, r, sigma, eps_p, K, mu, rho, h, dt, old, grad, div, sum_p, expansion,
     conductivity, capacity, alpha,
 ):  # fmt: skip
-    """R_u = sum_p V_p sigma_p : grad w - int t . w ds
+    """R_u = sum_p V_p sigma_p : grad w
     R_q = sum_p V_p K_p { q (div u - eps_v - eps_p - 3 a theta)
                           - alpha h^2 (K_p/mu_p) grad q . grad eps_v }
     R_r = sum_p V_p { rho c r theta/dt + k grad r . grad(old theta + theta) }.
     """
-    R_u = sum_p(inner(sigma, grad(w))) - dot(t, w) * ds
+    R_u = sum_p(inner(sigma, grad(w)))
     R_q = sum_p(K * q * (div(u) - eps_v - eps_p - 3 * expansion * theta))
     R_q -= sum_p(K**2 / mu * alpha * h**2 * dot(grad(q), grad(eps_v)))
     R_r = sum_p(rho * capacity * r * theta / dt)

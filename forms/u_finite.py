@@ -3,7 +3,7 @@
 `ghost_penalty` as in `u_epsv`.
 """
 
-from ufl import dot, inner
+from ufl import inner
 
 from tawami.form import vector
 
@@ -14,9 +14,9 @@ options = {"ghost_penalty": ("off", "on")}
 static_options = {"ghost_penalty": "on"}
 
 
-def residual(u, w, P, mu, t, h, grad, sum_p, ds, dG, facet_mean, jump_nn, k, ghost_penalty):
-    """R_u(w) = sum_p V0_p (tau_p f^-T) : grad w - int t . w ds, P = tau f^-T."""
-    R_u = sum_p(P, grad(w)) - dot(t, w) * ds
+def residual(u, w, P, mu, h, grad, sum_p, dG, facet_mean, jump_nn, k, ghost_penalty):
+    """R_u(w) = sum_p V0_p (tau_p f^-T) : grad w, P = tau f^-T."""
+    R_u = sum_p(P, grad(w))
     if ghost_penalty == "on":
         R_u += k * facet_mean(mu) * h**3 * inner(jump_nn(u), jump_nn(w)) * dG
     return R_u

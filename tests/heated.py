@@ -18,9 +18,9 @@ def heat(u, theta, w, r, K, sum_p, c, k, beta, source, a):
     )
 
 
-def residual(u, theta, eps_v, w, r, q, sigma, K, t, sum_p, ds, c, k, beta, source, a):
+def residual(u, theta, eps_v, w, r, q, sigma, K, sum_p, c, k, beta, source, a):
     volume = sum_p(K, q * (div(u) - eps_v))
-    momentum = sum_p(sigma, grad(w)) - dot(t, w) * ds
+    momentum = sum_p(sigma, grad(w))
     return momentum + volume + heat(u, theta, w, r, K, sum_p, c, k, beta, source, a)
 
 

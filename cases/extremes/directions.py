@@ -56,20 +56,21 @@ def solved(form: str, basis: Any, turns: int = 0, away: float = 0.0) -> list[Arr
     at_home = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=H, cells=(N, N))
     corners = np.array([(0, 0), (1, 0), (1, 1.0), (2 / 3, 1.0), (0.45, 0.52), (0, 0.5)]) * side
     body = tawami.polygon(at_home, corners, per_axis=3)
-    x = (body.x - side / 2) @ turn.T + side / 2 + origin
+
+    def there(at_home: Array) -> Array:
+        return (at_home - side / 2) @ turn.T + side / 2 + origin
+
+    x = there(body.x)
     laws = [tawami.linear_elastic(E=e, nu=nu) for e, nu in ((1e6, 0.3), (3e6, 0.45))]
+    moved = tawami.Body(x, body.volume, border=tawami.polyline(there(corners)))
     scene = tawami.Scene(
-        grid, tawami.Body(x, body.volume), laws, material_of=(body.x[:, 0] > side / 2).astype(int),
-        basis=basis, density=1e3, **FORMS[form],
+        grid, moved, laws, material_of=(body.x[:, 0] > side / 2).astype(int), basis=basis,
+        density=1e3, **FORMS[form],
     )  # fmt: skip
     for component in "xy":
         scene.fix(edge("bottom", turns), component)
-    # the part of the top that the body reaches
-    part = np.array([[2 / 3 * side, side], [side, side]])
-    along = 1 if edge("top", turns) in ("left", "right") else 0
-    ends = ((part - side / 2) @ turn.T + side / 2 + origin)[:, along]
     force = turn @ [2e3, -1e3]
-    scene.traction(edge("top", turns), (force[0], force[1]), between=(min(ends), max(ends)))
+    scene.traction(edge("top", turns), (force[0], force[1]))
     scene.gravity(turn @ [0.0, -10.0])
     scene.solve()
     s = np.array(scene.particles.stress)

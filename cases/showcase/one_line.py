@@ -30,16 +30,16 @@ PROGRAM = Program("cases.showcase.one_line", __doc__)
 H, LOAD = 1 / 16, 1e3  # [m], [Pa]
 
 
-def unstable(u, eps_v, w, q, sigma, K, t, sum_p, ds):  # type: ignore[no-untyped-def]
+def unstable(u, eps_v, w, q, sigma, K, sum_p):  # type: ignore[no-untyped-def]
     """The equations of the paper without stabilisation."""
-    R_u = sum_p(sigma, grad(w)) - dot(t, w) * ds
+    R_u = sum_p(sigma, grad(w))
     R_q = sum_p(K, q * (div(u) - eps_v))
     return R_u + R_q
 
 
-def stable(u, eps_v, w, q, sigma, K, mu, t, h, sum_p, ds):  # type: ignore[no-untyped-def]
+def stable(u, eps_v, w, q, sigma, K, mu, h, sum_p):  # type: ignore[no-untyped-def]
     """The same equations with one more term."""
-    R_u = sum_p(sigma, grad(w)) - dot(t, w) * ds
+    R_u = sum_p(sigma, grad(w))
     R_q = sum_p(K, q * (div(u) - eps_v))
     R_q -= sum_p(K**2 / mu, 0.01 * h**2 * dot(grad(q), grad(eps_v)))
     return R_u + R_q
@@ -56,7 +56,7 @@ def solve(residual) -> tawami.Solution:  # type: ignore[no-untyped-def]
     for edge in ("left", "right", "bottom"):
         scene.fix(edge, "x")
     scene.fix("bottom", "y")
-    scene.traction("top", (0.0, -LOAD), between=(-0.25, 0.25))
+    scene.traction(lambda x, y: (y == 1) & (abs(x) < 0.25), (0.0, -LOAD))
     return scene.solve()
 
 

@@ -1,6 +1,6 @@
 """The bearing capacity of a strip footing on weightless frictional soil, by loading to collapse.
 
-    traction q over b = 1 m
+    pressure q over b = 1 m
      |||||||||||||                         one half; width B = 2 b, plane strain
      o                               o     left and right edge smooth, bottom held
      o            soil               o     c = 1 Pa, mu = 500 c, nu = 0.3 to 0.4999
@@ -19,9 +19,8 @@ which is a low estimate. The loads measured here lie between Davis's and Prandtl
 below phi, and depend by a few percent on the steps.
 
 The load grows in adaptive steps until no equilibrium is found; the share reached is the result.
-The domain contains the mechanism. A spline that is 1 under the edge of the footing reaches past it, so
-that the excess over Prandtl's value is linear in h. Drucker-Prager's constants match those of
-Mohr-Coulomb in plane strain.
+The domain contains the mechanism. The pressure acts on the border of the ground over exactly x < b.
+Drucker-Prager's constants match those of Mohr-Coulomb in plane strain.
 
 python -m cases.verification.bearing_capacity
 """
@@ -123,7 +122,7 @@ def build(run: Run) -> tawami.Scene:
     scene = tawami.Scene(grid, ground, soil, form=run.form, tolerance=1e-5, **parameters)
     for edge, component in (("left", "x"), ("right", "x"), ("bottom", "x"), ("bottom", "y")):
         scene.fix(edge, component)
-    scene.traction("top", (0.0, -HIGHEST * prandtl(run.phi)), between=(0.0, 1.0))
+    scene.pressure(lambda x, y: (y == 0) & (x < 1), HIGHEST * prandtl(run.phi))
     return scene
 
 

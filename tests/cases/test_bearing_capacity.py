@@ -52,9 +52,9 @@ def test_the_limit_load_is_prandtls_for_other_soils(law, phi, psi, nu):
 
 
 @pytest.mark.slow
-def test_the_excess_is_linear_in_h():
+def test_the_excess_decreases_with_h():
     errors = [case.solve("mohr_coulomb", 20, 20.0, 0.49, n).error for n in (2, 4, 8)]
-    assert errors[1] == pytest.approx(errors[0] / 2, rel=0.2)
+    assert errors == sorted(errors, reverse=True)
     assert -0.2 < errors[2] < 1.4
 
 

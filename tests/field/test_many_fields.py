@@ -14,13 +14,9 @@ import tawami
 from tawami.form import Form, scalar, vector
 
 
-def with_cells(
-    u, theta, eps_v, w, r, q, sigma, K, t, sum_p, ds, c, k, beta, source, a, dx, cell_mean
-):
+def with_cells(u, theta, eps_v, w, r, q, sigma, K, sum_p, c, k, beta, source, a, dx, cell_mean):
     """Nonlinear terms over cells as well, which both assemblies integrate alike."""
-    linear = heated.residual(
-        u, theta, eps_v, w, r, q, sigma, K, t, sum_p, ds, c, k, beta, source, a
-    )
+    linear = heated.residual(u, theta, eps_v, w, r, q, sigma, K, sum_p, c, k, beta, source, a)
     power = cell_mean(K) * theta**2 * div(u)
     return linear + (power * r + theta * eps_v * q + theta * dot(u, w)) * dx
 

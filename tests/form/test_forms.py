@@ -26,9 +26,9 @@ fields = {"v": vector("w"), "theta": scalar("r", role="volumetric_strain")}
 parameters = {"beta": {"default": 0.2, "minimum": 0.0}}
 
 
-def residual(v, theta, w, r, s, sigma_m, K, mu, h, t, ds, sum_p, beta):
+def residual(v, theta, w, r, s, sigma_m, K, mu, h, sum_p, beta):
     """Eqs. (1) and (2): stress split into deviator and mean, stabilisation of two constants."""
-    momentum = sum_p(s, grad(w)) + sum_p(sigma_m, div(w)) - dot(t, w) * ds
+    momentum = sum_p(s, grad(w)) + sum_p(sigma_m, div(w))
     volume = sum_p(K, r * div(v)) - sum_p(K, r * theta)
     return momentum + volume - beta * h**2 * sum_p(K * K / mu, inner(grad(r), grad(theta)))
 
@@ -50,8 +50,8 @@ def test_a_form_in_a_file_works_like_a_shipped_one(random_scene, tmp_path):
             from ufl import dot, grad
             from tawami.form import vector
             fields = {"u": vector("w")}
-            def residual(w, sigma, t, sum_p, ds):
-                return sum_p(sigma, grad(w)) - dot(t, w) * ds
+            def residual(w, sigma, sum_p):
+                return sum_p(sigma, grad(w))
             """
         )
     )
@@ -134,8 +134,8 @@ def test_terms_under_two_rules_are_evaluated_under_their_own(random_scene):
 def test_newton_converges_quadratically_on_a_nonlinear_form():
     """A spring on div u that stiffens needs several iterations; the last ones are quadratic."""
 
-    def stiff(u, w, sigma, mu, sum_p, t, ds):
-        return sum_p(sigma, grad(w)) + sum_p(3e3 * mu, div(u) ** 3 * div(w)) - dot(t, w) * ds
+    def stiff(u, w, sigma, mu, sum_p):
+        return sum_p(sigma, grad(w)) + sum_p(3e3 * mu, div(u) ** 3 * div(w))
 
     form = Form({"u": vector("w")}, stiff)
     grid = grid_of()

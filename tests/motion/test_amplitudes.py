@@ -201,11 +201,11 @@ def test_functions_of_position_give_real_numbers(values):
     scene = beam(density=1.0)
     scene.fix("left", "y")
     side = scene.fix("left", "x", lambda x, y: values(x))
-    with pytest.raises(tawami.InputError, match=r"fix\(edge='left'\).*complex"):
+    with pytest.raises(tawami.InputError, match=r"fix\('left'\).*complex"):
         scene.solve()
     side.change(0.0)
     pull = scene.traction("right", (lambda x, y: values(x), 0.0))
-    with pytest.raises(tawami.InputError, match=r"traction\(edge='right'\).*complex"):
+    with pytest.raises(tawami.InputError, match=r"traction\('right'\).*complex"):
         scene.solve()
     pull.release()
     for function in (

@@ -84,7 +84,7 @@ def loaded(place, within):
     if place == "velocity":
         scene.hold((0.5, 1.0), "x", velocity=lambda t: within(0.0))
     if place == "profile":
-        scene.traction("top", (0.0, lambda x, y: within(1.0) + 0 * x), between=(0.0, 1.0))
+        scene.traction("top", (0.0, lambda x, y: within(1.0) + 0 * x))
     return scene, tawami.Dynamics(scene), load
 
 

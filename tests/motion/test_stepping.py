@@ -206,9 +206,7 @@ def test_wrong_input_is_rejected():
     with pytest.raises(tawami.InputError, match="size = 2.0: expected a finite number above 0"):
         tawami.ramp(scene, 2.0)
     scene.fix("right", "x", velocity=1.0)
-    with pytest.raises(
-        tawami.InputError, match=r"fix\(edge='right'\) has a velocity, which static"
-    ):
+    with pytest.raises(tawami.InputError, match=r"fix\('right'\) has a velocity, which static"):
         tawami.ramp(scene)
 
 

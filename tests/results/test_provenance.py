@@ -69,7 +69,7 @@ def test_a_script_is_described(tmp_path):
         ROOT / "forms/u_epsv.py"
     ).read_bytes()
     assert run["input"][0].startswith("grid          4 x 2 cells of 0.5 m")
-    assert "supports      fix(edge='left') x" in run["input"]
+    assert "supports      fix('left') x" in run["input"]
     assert run["versions"]["NumPy"] == np.__version__
     assert f"BLAS {run['blas']}" in run["environment"]
     assert abs(datetime.fromisoformat(run["started"]) - before).total_seconds() < 60

@@ -150,7 +150,7 @@ def test_contradicting_supports_are_named(where):
     scene = block()
     if where == "edge":
         scene.fix("left", "x", 1e-3)
-        words = r"fix\(edge='left'\) x and fix\(edge='left'\) x = 0.001 m prescribe .* by 0.001 m"
+        words = r"fix\('left'\) x and fix\('left'\) x = 0.001 m prescribe .* by 0.001 m"
     else:
         scene.hold((0.5, 1.0), "y")
         scene.hold((0.5, 1.0), "y", 1e-3)

@@ -30,7 +30,7 @@ def test_the_header_counts_particles_bytes_and_unknowns(assembly):
     assert "5.76 kB in total" in header
     assert line(header, "solver").endswith(f"assembly {assembly}, 1 rank")
     assert line(header, "supports") == (
-        "fix(edge='bottom') x, fix(edge='bottom') y, hold(point=(0.0, 1.7)) x = 0.01 m"
+        "fix('bottom') x, fix('bottom') y, hold(point=(0.0, 1.7)) x = 0.01 m"
     )
     data = scene.configuration.domain.responses.data["particle"]
     # sigma 3 and its derivatives 3 x (3 + 1), K, K^2/mu; and K and mu themselves

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -20,7 +22,7 @@ def block(law=SOFT, *, per_axis=3, shift=(0.03, 0.05), **options):
     """A block that does not follow the lines of the grid."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=H, cells=(16, 8))
     body = tawami.box(grid, (0.25, 0.25), (0.75, 0.75), per_axis=per_axis)
-    body.x[:] += shift
+    body = replace(body, x=body.x + shift, border=None)
     return tawami.Scene(grid, body, law, form="u_epsv_finite", density=1e3, **options)
 
 
@@ -72,7 +74,7 @@ def test_one_particle_in_each_cell_keeps_its_stress():
 def two_materials():
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=H, cells=(16, 8))
     body = tawami.box(grid, (0.25, 0.25), (0.75, 0.75), per_axis=3)
-    body.x[:] += (0.03, 0.05)
+    body = replace(body, x=body.x + np.array([0.03, 0.05]), border=None)
     right = body.x[:, 0] > 0.57  # inside a cell
     return tawami.Scene(
         grid, body, [SOFT, STIFF], material_of=right.astype(np.uint32), form="u_epsv_finite",

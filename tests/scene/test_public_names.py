@@ -76,9 +76,9 @@ def test_handles_say_what_they_are():
     assert repr(weight) == "Weight(gravity (0, -10) m/s2)"
     weight.release()
     assert repr(weight) == "Weight(gravity (0, -10) m/s2, released)"
-    assert repr(scene.fix("left", "x", 0.1)) == "Support(fix(edge='left'))"
+    assert repr(scene.fix("left", "x", 0.1)) == "Support(fix('left'))"
     assert repr(scene.wall("top", 0.3)) == "Wall(wall(edge='top') friction 0.3)"
-    assert repr(scene.traction("right", (1.0, 0.0))) == "Traction(traction(edge='right'))"
+    assert repr(scene.traction("right", (1.0, 0.0))) == "Traction(traction('right'))"
     assert repr(scene.load([1, 2], (1.0, 0.0))) == "Forces(force on 2 particles)"
 
 

@@ -7,6 +7,7 @@ import pytest
 from mpi4py import MPI
 
 import tawami
+from tawami.scene import constraints
 
 ELASTIC = tawami.linear_elastic(E=1e5, nu=0.3)
 PLASTIC = tawami.von_mises(ELASTIC, yield_stress=2e3)
@@ -60,7 +61,7 @@ def look(motion, handles, solution):
     for place in ("bottom", "right", (0.5, 0.4)):
         solution.reaction(place)
     solution.displacement((0.5, 0.4))
-    scene.configuration.supports.num_free(scene.configuration.domain)
+    constraints.num_free(scene.configuration.supports, scene.configuration.domain)
 
 
 def texts_of(value):

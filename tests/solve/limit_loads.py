@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 
 import tawami
+from tawami.base.arrays import Array, Mask
+
+
+def _left_half_of_top(x: Array, y: Array) -> Mask:
+    return np.asarray((y == 1) & (x < 0.5))
 
 
 def pulled(nu: float, up: float) -> tawami.Scene:
@@ -17,9 +23,14 @@ def pulled(nu: float, up: float) -> tawami.Scene:
     scene = tawami.Scene(grid, body, tawami.mohr_coulomb(elastic, phi=20.0, c=1.0))
     for component in ("x", "y"):
         scene.fix("bottom", component)
-    scene.fix("top", "x", between=(0.0, 0.5))
-    scene.fix("top", "y", up, between=(0.0, 0.5))
+    scene.fix(_left_half_of_top, "x")
+    scene.fix(_left_half_of_top, "y", up)
     return scene
+
+
+def footing(x: Array, y: Array) -> Mask:
+    """The first metre of the top."""
+    return np.asarray((y == 2) & (x < 1))
 
 
 def pressed(nu: float, psi: float, **options: Any) -> tawami.Scene:
@@ -33,5 +44,5 @@ def pressed(nu: float, psi: float, **options: Any) -> tawami.Scene:
     for edge in ("left", "right", "bottom"):
         scene.fix(edge, "x")
     scene.fix("bottom", "y")
-    scene.traction("top", (0.0, -16.0 if phi else -5.6), between=(0.0, 1.0))
+    scene.traction(footing, (0.0, -16.0 if phi else -5.6))
     return scene

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from limit_loads import pressed, pulled
+from limit_loads import footing, pressed, pulled
 from mpi4py import MPI
 
 import tawami
@@ -81,7 +81,7 @@ def test_a_ramp_and_a_path_where_the_load_is_too_large():
 
 def test_a_smaller_load():
     scene = pressed(0.49, 0.0)
-    scene.traction("top", (0.0, 5.6 - 3.0), between=(0.0, 1.0))
+    scene.traction(footing, (0.0, 5.6 - 3.0))
     scene.solve()
 
 

@@ -23,9 +23,9 @@ from tawami.fem.environment import peak_memory
 from tawami.form import scalar, vector
 
 
-def stiffening(u, eps_v, w, q, sigma, K, mu, t, h, sum_p, ds, alpha):  # type: ignore[no-untyped-def]
+def stiffening(u, eps_v, w, q, sigma, K, mu, h, sum_p, alpha):  # type: ignore[no-untyped-def]
     """The form of the paper with the additional stress 2 mu grad(u)^T grad(u): Newton iterates."""
-    R_u = sum_p(sigma, grad(w)) - dot(t, w) * ds
+    R_u = sum_p(sigma, grad(w))
     R_u += sum_p(2 * mu, inner(dot(grad(u).T, grad(u)), grad(w)))
     R_q = sum_p(K, q * (div(u) - eps_v))
     return R_u + R_q - sum_p(K**2 / mu, alpha * h**2 * dot(grad(q), grad(eps_v)))

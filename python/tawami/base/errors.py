@@ -62,6 +62,10 @@ class EnergyWarning(TawamiWarning):
     """A motion whose energy grew without work by loads or supports."""
 
 
+class SupportWarning(TawamiWarning):
+    """A support that holds nothing any more."""
+
+
 class GeometryWarning(TawamiWarning):
     """A body whose shape differs from the given one."""
 

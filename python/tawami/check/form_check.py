@@ -2,7 +2,7 @@
 
 `broken` makes a form unusable: it does not load, its Newton iteration cannot converge, a rotation
 strains it, or it does not find a uniform stress. `cost` is everything else that a user should know: an
-unsymmetric tangent (LU instead of LDL^T), no term for tractions, locking, springs, contradicting units.
+unsymmetric tangent (LU instead of LDL^T), locking, springs, contradicting units.
 
 Fields without a role are checked by themselves. The mechanical checks hold them at zero. A form that
 reads dt is checked at several dt, and its patch tests where rates vanish.

@@ -73,15 +73,8 @@ def displaced(form: Form, given: Settings) -> Found:
         yield uniform(error, f"error of the stress{text}, border displaced")
 
 
-def _has_edge_term(form: Form, given: Settings) -> bool:
-    return trial.compiled(form, given).edges is not None
-
-
 def compressed(form: Form, given: Settings) -> Found:
     """Patch test with a traction, and the part of it that rates carry."""
-    if not _has_edge_term(form, given):
-        yield "cost", "no term - dot(t, w) * ds: traction(...) will be rejected"
-        return
     cell = form.kinematics.volume_at_centre
     usual: Basis = "bilinear" if cell else "quadratic_spline"
     error = scenes.compressed(form, given, usual)
@@ -134,9 +127,6 @@ def axisymmetric_tangent(form: Form, given: Settings) -> Found:
 
 def locking(form: Form, given: Settings) -> Found:
     """A bent beam at nu near 0.5."""
-    if not _has_edge_term(form, given):
-        yield "not tried", "it needs a term - dot(t, w) * ds"
-        return
     if springs(form, given):
         yield "not tried", HELD
         return

@@ -69,7 +69,7 @@ def cloud(
     random = np.random.default_rng(0)
     grid = grid_of((4, 3), geometry=geometry)
     x = grid.h * np.array(grid.cells) * random.random((60, 2))
-    body = Body(x, random.uniform(0.01, 0.1, len(x)))
+    body = Body(x, random.uniform(0.005, 0.04, len(x)))
     elastic = [linear_elastic(E=2.0, nu=0.3), linear_elastic(E=7.0, nu=0.45)]
     chosen = law or trial.law_of(form, trial.ELASTIC)
     options |= {"material_of": random.integers(0, 2, len(x)), "varied": True}

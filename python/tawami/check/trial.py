@@ -132,7 +132,7 @@ def made(
         options: Other arguments of `Scene`.
     """
     if compiled(form, given).border:
-        body = replace(body, border=border_of(form, given, grid, body))
+        body = replace(body, border=border_of(form, given, body))
     if "rho" in inspect.signature(form.residual).parameters:
         options["density"] = DENSITY
     scene = Scene(grid, body, material, form=form, **options, **values(form, given))
@@ -143,13 +143,14 @@ def made(
     return scene
 
 
-def border_of(form: Form, given: Settings, grid: Grid, body: Body) -> Border:
-    """The rectangle around a body, or the whole grid for loose particles.
+def border_of(form: Form, given: Settings, body: Body) -> Border:
+    """The rectangle around a body, or the square with the area and centroid of loose particles.
 
     Its sides are 'bottom', 'right', 'top' and 'left'. Other names in sums over the border take the
     places of sides that no sum names, and then of parts of the base.
     """
-    lower, upper = np.array(grid.origin), np.array(grid.upper)
+    centre, half = body.volume @ body.x / body.volume.sum(), np.sqrt(body.volume.sum()) / 2
+    lower, upper = centre - half, centre + half
     if body.border is not None:
         ends = np.concatenate([body.border.start, body.border.end])
         lower, upper = ends.min(axis=0), ends.max(axis=0)

@@ -27,7 +27,7 @@ UNITS: Mapping[str, str] = {
     **dict.fromkeys(("sigma", "s", "sigma_m", "P", "P_s", "tau_m"), "Pa"),
 }  # fmt: skip
 #: Unit of the measure of an integral, per metre of depth.
-MEASURES = {"border": "m", "cell": "m2", "exterior_facet": "m", "interior_facet": "m"}
+MEASURES = {"border": "m", "cell": "m2", "interior_facet": "m"}
 FACTOR, SAMPLES = 2.0, 3
 #: Exponents that differ by less are the same.
 SAME = 1e-6
@@ -175,8 +175,6 @@ class _Terms:
         if isinstance(symbol, ufl.Constant):
             name = next(n for n, constant in symbols.constants.items() if constant == symbol)
             return [self._units[name]] * length
-        if symbol == symbols.traction:
-            return [PASCAL] * length
         data = symbols.data.of(symbol)
         if data is not None:
             return [self._of_quantity(data.quantity)] * length

@@ -29,7 +29,7 @@ class FollowerPressure:
     """
 
     #: It prescribes no displacement and has one tangent everywhere.
-    prescribed, smooth = 0.0, True
+    prescribed, smooth, unsettled = 0.0, True, ""
 
     def __init__(
         self, layout: Layout, cells: BorderInCells, x: Array, area: Array, pressure: Array

@@ -100,7 +100,6 @@ class KernelsAtPoints:
             if slot.source in ("fields", "position"):
                 slots.append(slot.source)
                 continue
-            assert slot.source != "traction"  # compilation rejects it in integrals over cells
             slots.append((rules.index(slot.data), slot.source == "mean", slot.columns))
         kernel, constants = integral.kernel, self._attachment.constants(integral).tolist()
         point = None

@@ -109,7 +109,7 @@ class ReferenceAssembly(Assembly):
             if slot.source == "fields":
                 packed[:, offset : offset + slot.width] = nodal[self._space.dofs[self._cells]]
             else:
-                rule = slot.data  # compilation rejects the traction in integrals over cells
+                rule = slot.data
                 _rust.densities(
                     attached.location, attached.volume, data[rule], attached.points[rule],
                     rule == "vertex", attached.rows, list(slot.columns), offset, packed,

@@ -45,7 +45,6 @@ class CompiledForm:
         form: The form.
         element: Element of all fields on the mesh: biquadratic displacement, bilinear others.
         residual: Integrals of the residual over cells, one for each quadrature rule.
-        edges: Compiles the integral over loaded edges, if there is one. It is called for the first load.
         tangent: Derivative of `residual`, one integral for each quadrature rule.
         couplings: The other part of the tangent: products of two integrals of rank 1, cell by cell.
         sides: Compiles the integral of rank 2 over sides of partially filled cells, if there is one. It
@@ -59,7 +58,6 @@ class CompiledForm:
     form: Form
     element: Any
     residual: tuple[Integral, ...]
-    edges: Callable[[], Integral] | None
     tangent: tuple[Integral, ...]
     couplings: tuple[tuple[Integral, Integral], ...]
     sides: Callable[[], Integral] | None
@@ -67,12 +65,6 @@ class CompiledForm:
     densities: Mapping[Rule, Mapping[Density, int]]
     border_data: tuple[ParticleScalar, ...]
     used: frozenset[str]
-
-    @functools.cached_property
-    def traction(self) -> Integral | None:
-        """The integral over loaded edges, if the form has one; a collective call."""
-        with tally.compiling():
-            return None if self.edges is None else self.edges()
 
     @property
     def penalises(self) -> bool:
@@ -165,7 +157,7 @@ def _compile(comm: Any, symbols: Symbols) -> CompiledForm:
         linearisation = Linearisation(symbols, terms.cells)
         tangent, couplings = linearisation.tangent(), linearisation.couplings()
     builder = KernelBuilder(comm, symbols)
-    integral, edges, ghost = builder.integral, terms.edges, terms.ghost
+    integral, ghost = builder.integral, terms.ghost
 
     def integrals(form: Any) -> tuple[Integral, ...]:
         if symbols.assembly == "dolfinx":
@@ -196,7 +188,6 @@ def _compile(comm: Any, symbols: Symbols) -> CompiledForm:
         form=form,
         element=symbols.element,
         residual=integrals(terms.cells),
-        edges=None if edges is None else lambda: integral(edges, "exterior_facet"),
         tangent=integrals(tangent),
         sides=None if ghost is None else builder.prepared(ghost, "interior_facet"),
         border=border,

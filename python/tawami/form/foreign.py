@@ -49,8 +49,8 @@ def check_symbols(symbols: Any, residual: Any) -> None:
             if line_of(part) is None and named:
                 where = symbols.lines.text(min(named.values()))
             raise FormError(
-                f"{where}: a measure of UFL: expected dx, dx_c or ds as arguments, residual(..., dx), "
-                "or sum_p(...) without a measure"
+                f"{where}: a measure of UFL: expected dx or dx_c as arguments, residual(..., dx), or "
+                "sum_p(...) without a measure"
             )
         _check_integrand(symbols, part.integrand(), where)
 
@@ -62,7 +62,7 @@ def _check_integrand(symbols: Any, integrand: Any, where: str) -> None:
             f"{where}: a Constant of UFL: expected a number, or one of 'parameters', as parameters = "
             '{"k": {"default": 1.0}}'
         )
-    own = {symbols.increments, symbols.old, symbols.traction}
+    own = {symbols.increments, symbols.old}
     for coefficient in extract_coefficients(integrand):
         if coefficient not in own and symbols.data.of(coefficient) is None:
             raise FormError(

@@ -45,7 +45,7 @@ LIMITS = ("default", "minimum", "maximum", "usual", "unit")
 RESERVED = frozenset(
     (
         *STRAIN_MEASURES["small"].quantities, *STRAIN_MEASURES["finite"].quantities,
-        "K", "mu", "rho", "x", "time", "dt", "b", "t", "h", "old", "dx", "dx_c", "ds", "dG",
+        "K", "mu", "rho", "x", "time", "dt", "b", "h", "old", "dx", "dx_c", "dG",
         "grad", "div", "eps", "I", "dim", "sum_p", "sum_c", "sum_v", "sum_b", "cell_mean",
         "facet_mean", "jump_n", "jump_nn", "n", "dot_n",
     )

@@ -26,13 +26,13 @@ class Slot:
     """One coefficient of a kernel, in packed order.
 
     Attributes:
-        source: 'fields' (the increments), 'traction', 'position' (x of a point), or the rule of particle
+        source: 'fields' (the increments), 'position' (x of a point), or the rule of particle
             densities.
         width: Entries per cell.
         columns: Columns of the particle data (densities only).
     """
 
-    source: Literal["fields", "traction", "position"] | Rule
+    source: Literal["fields", "position"] | Rule
     width: int
     columns: tuple[int, ...] = ()
 
@@ -40,7 +40,6 @@ class Slot:
     def data(self) -> Rule:
         """The rule of its particle data (densities only)."""
         assert self.source != "fields"
-        assert self.source != "traction"
         assert self.source != "position"
         return self.source
 
@@ -97,12 +96,14 @@ class KernelBuilder:
 
     def prepared(self, form: Any, kind: Kind) -> Callable[[], Integral]:
         """A function that compiles a UFL form as `integral`; its data have their columns already."""
-        symbols, slots, packed = self._symbols, self._field_slots(), {}
+        symbols, packed = self._symbols, {}
+        width = sum(field.num_dofs for field in symbols.form.fields.values())
+        slots = {symbols.increments: Slot("fields", width)}
         found = {symbol: symbols.data.of(symbol) for symbol in form.coefficients()}
         symbol_of = {data: symbol for symbol, data in found.items() if data is not None}
         for rule, first, columns in self._columns(symbol_of):
             space = symbols.data.function_space(rule, len(columns))
-            vector = ufl.Coefficient(space, count=2 + len(slots))
+            vector = ufl.Coefficient(space, count=3 + len(slots))
             for data, start in first.items():
                 components = [vector[start + k] for k in range(data.size)]
                 packed[symbol_of[data]] = ufl.as_vector(components)
@@ -167,11 +168,3 @@ class KernelBuilder:
             tuple(slots[order[i]] for i in kernel.coefficients),
             tuple(names[constant.count()] for constant in form.constants()),
         )
-
-    def _field_slots(self) -> dict[Any, Slot]:
-        """Slots of the increments and of the traction."""
-        displacement, *others = (f.num_dofs for f in self._symbols.form.fields.values())
-        return {
-            self._symbols.increments: Slot("fields", displacement + sum(others)),
-            self._symbols.traction: Slot("traction", displacement),
-        }

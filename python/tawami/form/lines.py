@@ -95,7 +95,7 @@ class Measure(ufl.Measure):  # type: ignore[misc]
         """Raise an error: the particles determine the domain."""
         what = ", ".join(map(str, given)) or "..."
         raise FormError(
-            f"a measure with a number, as dx({what}): expected dx, dx_c and ds without a number; the "
+            f"a measure with a number, as dx({what}): expected dx and dx_c without a number; the "
             "particles determine the domain"
         )
 

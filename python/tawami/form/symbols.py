@@ -26,6 +26,8 @@ from tawami.form.sums import Sums
 
 #: Evaluation of a form: by kernels at the particles, or by integrals over cells in plain dolfinx.
 Assembly = Literal["points", "dolfinx"]
+#: Traction and measure of the terms with which forms took loads on edges of the grid before.
+OF_EDGES = ("t", "ds")
 #: What the terms of a residual are.
 TERMS = (
     "expressions of one shape in a sum, and a number in each term of sum_p, as dot(a, b) of vectors or "
@@ -79,8 +81,6 @@ class Symbols:
         self.test_function = ufl.TestFunction(functions)
         tests = self._split(self.test_function)
         self.tests = {field.test: tests[name] for name, field in form.fields.items()}
-        traction = ufl.FunctionSpace(domain, dolfinx.lagrange(2, PLANE.dim))
-        self.traction = ufl.Coefficient(traction, count=1)
         shapes = dict.fromkeys(("h", "time", "dt"), ()) | {"b": (space.dim,)}
         shapes |= dict.fromkeys(form.parameters, ())
         self.constants = {
@@ -103,10 +103,10 @@ class Symbols:
         )  # fmt: skip
         ready = {
             **self.fields, **self.tests, **self.constants, **options, **self.operators.names,
-            **sums.names, "t": self.traction, "x": SpatialCoordinate(self.domain),
+            **sums.names, "x": SpatialCoordinate(self.domain),
             "old": Old(form, self._split(self.old), data),
             "dx": self.measure("particle"), "dx_c": self.measure("centre"),
-            "ds": self._sides("exterior_facet"), "dG": self._sides("interior_facet"),
+            "dG": self._sides,
             "jump_n": self._jump_n, "jump_nn": self._jump_nn, "dot_n": self._dot_n,
         }  # fmt: skip
         names: dict[str, Callable[[], Any]] = {
@@ -167,9 +167,10 @@ class Symbols:
         text = "old " + "".join((name, *(f",{self.space.axes[i]}" for i in axes)))
         return density("particle", named(text, varies=True, border=not own), self.space)
 
-    def _sides(self, kind: str) -> Measure:
+    @property
+    def _sides(self) -> Measure:
         metadata = {"quadrature_degree": 4}
-        return Measure(self.lines, kind, self.domain, metadata, self.operators.volume)
+        return Measure(self.lines, "interior_facet", self.domain, metadata, self.operators.volume)
 
     def _split(self, function: Any) -> dict[str, Any]:
         names = list(self.form.fields)
@@ -214,6 +215,12 @@ class Symbols:
                 "function written in Python"
             ) from None
         unknown = [name for name in wanted if name not in self.names]
+        if {*unknown} & {*OF_EDGES}:
+            raise FormError(
+                f"{self.lines.text(self.lines.first)}: residual asks for {quoted(unknown)}: tractions "
+                "act without a term of the form: remove - dot(t, w) * ds; state other terms of the "
+                "border as sum_b(...)"
+            )
         if unknown:
             hint = meant(unknown[0], self.names)
             raise FormError(
@@ -261,7 +268,7 @@ class Symbols:
         if not isinstance(residual, ufl.Form):
             raise FormError(
                 f"form {self.form.name}: residual returned {type(residual).__name__}: expected a UFL "
-                "form (sums of sum_p(...) and of expressions * dx or * ds)"
+                "form (sums of sum_p(...) and of expressions * dx)"
             )
         check_symbols(self, residual)
         for unknown, field in self.form.fields.items():

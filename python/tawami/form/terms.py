@@ -20,7 +20,6 @@ from tawami.base.errors import FormError
 from tawami.fem.rules import Rule
 from tawami.form.arity import check_arity, is_multilinear
 from tawami.form.lines import line_of
-from tawami.form.particle_data import PLACEHOLDERS
 from tawami.form.points import Integrand
 from tawami.form.sums import check_of_particles
 from tawami.form.symbols import Symbols
@@ -33,13 +32,11 @@ class Terms:
     Attributes:
         cells: Sums over particles and integrals over cells.
         border: Sums over the border by the names of its parts; None is all of it.
-        edges: Integrals over loaded edges, linear in the traction.
         ghost: Matrix of the integrals over sides of partially filled cells, which are linear.
     """
 
     cells: Any
     border: Mapping[tuple[str, ...] | None, Any]
-    edges: Any | None
     ghost: Any | None
 
 
@@ -52,22 +49,13 @@ def terms_of(symbols: Symbols, residual: Any) -> Terms:
     name = symbols.form.name
     for part in residual.integrals():
         _check(symbols, part)
-    kinds = ("cell", "exterior_facet", "interior_facet")
     inside, border = _without_border(residual)
-    cells, edges, sides = (_of_type(inside, kind) for kind in kinds)
-    for part in [] if edges is None else edges.integrals():
-        _check_edge(symbols, part)
-    parts = [part for part in (cells, edges, sides) if part is not None]
-    if cells is None or len(inside.integrals()) > sum(len(part.integrals()) for part in parts):
+    cells, sides = (_of_type(inside, kind) for kind in ("cell", "interior_facet"))
+    if cells is None:
         raise FormError(
-            f"form {name}: expected integrals over particles or cells, over edges (ds) and over sides "
-            "of partially filled cells (dG) only"
+            f"form {name}: expected sums over particles or integrals over cells: it has none"
         )
-    if symbols.traction in cells.coefficients():
-        raise FormError(
-            f"form {name}: the traction t in a term with dx: expected it in terms with ds only"
-        )
-    return Terms(cells, border, edges, None if sides is None else _matrix(symbols, sides))
+    return Terms(cells, border, None if sides is None else _matrix(symbols, sides))
 
 
 def _check(symbols: Symbols, part: Any) -> None:
@@ -103,31 +91,6 @@ def _check(symbols: Symbols, part: Any) -> None:
         raise FormError(
             f"{where}: the position x outside a sum over particles: expected x in sum_p(...) only"
         )
-
-
-def _check_edge(symbols: Symbols, part: Any) -> None:
-    """Check one integral over edges."""
-    term = ufl.Form([part])
-    if _is_linear_in(term, symbols.traction):
-        return
-    tested = [n for n, f in symbols.form.own_fields.items() if _has_test(symbols, term, f.test)]
-    flux = f"scene.flux(edge, '{tested[0]}', value)" if tested else "scene.traction(...)"
-    raise FormError(
-        f"{symbols.lines.text(line_of(part))}: expected edge terms that are linear in the traction t "
-        f"and contain nothing else but test functions, as - dot(t, w) * ds; give other loads "
-        f"through {flux}"
-    )
-
-
-def _has_test(symbols: Symbols, term: Any, test: str) -> bool:
-    """Whether a term contains the test function of this name."""
-    parts = list[Any]()
-    for field in symbols.form.fields.values():
-        chosen, found = field.test == test, symbols.tests[field.test]
-        split = [found[k] for k in range(field.components)] if found.ufl_shape else [found]
-        parts += split if chosen else [ufl.as_ufl(0.0)] * len(split)
-    alone = ufl.replace(term, {symbols.test_function: ufl.as_vector(parts)})
-    return not expand_derivatives(alone).empty()
 
 
 def by_rule(form: Any) -> list[Any]:
@@ -176,25 +139,12 @@ def _of_type(form: Any, kind: str) -> Any | None:
     return ufl.Form(integrals) if integrals else None
 
 
-def _is_linear_in(form: Any, coefficient: Any) -> bool:
-    """Whether every term of a form contains this coefficient once, and no other."""
-    if set(form.coefficients()) != {coefficient}:
-        return False
-    zero = ufl.zero(coefficient.ufl_shape)
-    expand = ufl.algorithms.expand_derivatives
-    at_zero = expand(ufl.replace(form, {coefficient: zero}))
-    direction = ufl.Coefficient(coefficient.ufl_function_space(), count=PLACEHOLDERS - 2)
-    slope = expand(ufl.derivative(form, coefficient, direction))
-    return at_zero.empty() and coefficient not in slope.coefficients()
-
-
 def _matrix(symbols: Symbols, sides: Any) -> Any:
     """The matrix of the terms on sides of cells."""
     used = set(sides.coefficients())
     others = {data for symbol in used if (data := symbols.data.of(symbol)) is not None}
     matrix = ufl.replace(sides, {symbols.increments: symbols.trial})
-    linear = len(matrix.arguments()) == 2 and symbols.traction not in used
-    linear = linear and is_multilinear(matrix)
+    linear = len(matrix.arguments()) == 2 and is_multilinear(matrix)
     if not linear or any(density.rule != "mean" for density in others):
         raise FormError(
             f"form {symbols.form.name}: expected terms with dG that are linear in the fields and "

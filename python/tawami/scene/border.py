@@ -245,10 +245,14 @@ def check_fits(grid: Grid, points: BorderPoints, x: Array, area: Array) -> None:
     axis = 1 if grid.space.hoop else 0  # the axis of rotation closes the border
     if np.abs(flux.sum(axis=0)[axis:]).max() > CLOSED * points.length.sum():
         return
-    enclosed = (points.x * flux).sum() / grid.space.dim
-    centroid = (points.x**2 * flux).sum(axis=0) / 2 / enclosed
+    middle = points.x.mean(
+        axis=0
+    )  # positions relative to it: round-off far from the origin cancels
+    middle[:axis] = 0.0
+    enclosed = ((points.x - middle) * flux).sum() / grid.space.dim
+    centroid = ((points.x - middle) ** 2 * flux).sum(axis=0) / 2 / enclosed
     total = area.sum()
-    away = float(np.linalg.norm(centroid - area @ x / total))
+    away = float(np.linalg.norm(centroid - area @ (x - middle) / total))
     if abs(enclosed - total) > FITS * total or away > FITS * max(grid.h, np.sqrt(total)):
         raise InputError(
             f"the border of the body encloses {enclosed:.6g} m2 and its particles have {total:.6g} m2, "

@@ -7,6 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from tawami.base.arrays import Array
+from tawami.base.errors import SupportError, SupportWarning
+from tawami.base.warn import warn
 from tawami.field.constraints import Held, PointHeld
 from tawami.field.reduction import Reduction
 from tawami.scene import step_values
@@ -54,6 +56,7 @@ def constraints(
         for edge in support.edges:
             cells = step_values.touched(domain, supports.border, support, edge)
             if not len(cells):
+                _check_left(support, support in supports.axis, moving=moving)
                 continue
             if support.is_field:
                 of = step_values.of_field(domain, support, edge, cells, start, fields)
@@ -78,6 +81,24 @@ def constraints(
     may_move = moving or domain.model.compiled.may_hold
     reduction = Reduction(layout, held, points, start, moving=may_move, also=rows)
     return reduction, contact, border
+
+
+def _check_left(support: Support, on_axis: bool, *, moving: bool) -> None:
+    """Report that loose particles have left the edge of the grid on which they were held.
+
+    Raises:
+        SupportError: In statics, or if the support moves.
+    """
+    if on_axis or support.told:
+        return
+    told = (
+        f"{support} {support.axis}: the particles have left that edge of the grid, so that it holds "
+        "nothing: expected support.release(), or a body with a border, which is held where it is"
+    )
+    if not moving or support.moves:
+        raise SupportError(told)
+    support.told = True
+    warn(told, SupportWarning)
 
 
 def _on_patches(

@@ -36,6 +36,8 @@ ASSEMBLIES: dict[str, type[PointAssembly | ReferenceAssembly]] = {
 }
 #: Share of a cell that a form which needs whole cells takes for a whole one.
 WHOLE = 0.5
+#: K/mu that an incompressible material counts with.
+INCOMPRESSIBLE = 1e4
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,12 +136,20 @@ class Domain:
         return mask
 
     @functools.cached_property
-    def shear_of_cells(self) -> Array:
-        """Mean shear modulus of the particles in each cell [Pa], 0 without any; a call for all ranks."""
-        columns = np.column_stack([np.ones(len(self.particles)), self.constants["mu"]])
+    def moduli_of_cells(self) -> tuple[Array, Array]:
+        """Mean K and mu of the particles in each cell [Pa], 0 without any; a call for all ranks.
+
+        An incompressible material counts with a K that is not infinite.
+        """
+        bulk, shear = self.constants["K"], self.constants["mu"]
+        bulk = np.where(np.isfinite(bulk), bulk, INCOMPRESSIBLE * shear)
+        columns = np.column_stack([np.ones(len(self.particles)), bulk, shear])
         sums = _rust.cell_sums(self.location, self.particles.volume, columns)
-        volume, weighted = ranks.sum_of(self.model.grid.comm, sums).T
-        return np.asarray(np.divide(weighted, volume, out=np.zeros_like(volume), where=volume > 0))
+        volume, *weighted = ranks.sum_of(self.model.grid.comm, sums).T
+        K, mu = (
+            np.divide(one, volume, out=np.zeros_like(volume), where=volume > 0) for one in weighted
+        )
+        return K, mu
 
     @property
     def areas(self) -> Array:

@@ -21,7 +21,7 @@ from tawami.scene.domain import Domain
 from tawami.scene.moving_points import MovingPoints
 from tawami.scene.support import Support
 
-#: Penalty of a patch, in shear moduli, or diagonal entries of the tangent, per cell.
+#: Penalty of a patch per cell, in shear moduli (besides K), or in diagonal entries of the tangent.
 PENALTY = 200.0
 #: Change of the tractions by a pass, relative to the largest, below which no other is needed.
 SETTLED = 1e-4
@@ -63,7 +63,8 @@ class HeldBorder:
         self.prescribed = float(np.abs(self._values).max(initial=0.0))
         held = self._groups.means(self._weights, support.held[self._weak])
         self._held = held[:, None]
-        self._tied = self._with_penalty(self._shear_moduli())
+        K, mu = (m[place.cells(domain).location.cell] for m in domain.moduli_of_cells)
+        self._tied = self._with_penalty((K + PENALTY * mu)[self._weak])
 
     @property
     def x(self) -> Array:
@@ -81,14 +82,9 @@ class HeldBorder:
         """The support."""
         return self._support
 
-    def _shear_moduli(self) -> Array:
-        """Mean shear modulus of the particles in the cell of each point [Pa]."""
-        assert isinstance(self._support.place, MovingPoints)
-        cells = self._support.place.cells(self._domain).location.cell
-        return np.asarray(self._domain.shear_of_cells[cells[self._weak]])
-
-    def _with_penalty(self, stiffness: Array) -> Tied:
-        penalty = PENALTY / self._domain.model.grid.h * self._groups.means(self._weights, stiffness)
+    def _with_penalty(self, penalty: Array) -> Tied:
+        """Ties with a penalty, given at each point [Pa]."""
+        penalty = self._groups.means(self._weights, penalty) / self._domain.model.grid.h
         return Tied(self._groups, self._weights, self._directions[None], penalty)
 
     def begin(self, diagonal: Callable[[], Array]) -> None:
@@ -98,7 +94,7 @@ class HeldBorder:
             assert isinstance(self._support.place, MovingPoints)
             thickness = self._support.place.weight / self._support.place.length
             near = abs(self._at_points) @ diagonal()[self._place.slice]
-            self._tied = self._with_penalty(near / thickness[self._weak] / h ** (dim - 2))
+            self._tied = self._with_penalty(PENALTY * near / thickness[self._weak] / h ** (dim - 2))
 
     def _displacement(self, coefficients: Array) -> Array:
         moved = self._before + self._at_points @ coefficients[self._place.slice]
@@ -127,6 +123,16 @@ class HeldBorder:
         self._held = self._tractions
         return bool(change > SETTLED * np.abs(self._held).max(initial=0.0))
 
+    @property
+    def unsettled(self) -> str:
+        """See `Term`."""
+        error, support = np.abs(self._error).max(), self._support
+        return (
+            f"{support}: its part of the border stays {error:.3g} {support.unit} away from the "
+            f"prescribed values of '{support.axis}': other supports hold it, or the body cannot deform "
+            "like this: expected supports that agree; change or release one"
+        )
+
     def accept(self) -> None:
         """Keep the tractions, and what is missing of the prescribed displacement, for later steps."""
         support, number = self._support, self._groups.number
@@ -135,9 +141,15 @@ class HeldBorder:
             support.missing[self._weak] = -self._error[number, 0]
 
     @property
-    def resultant(self) -> Array:
-        """Force on the body [N per metre depth]."""
-        return self._domain.model.space.resultant(self._on_points.sum(axis=0))
+    def resultants(self) -> dict[str, Array]:
+        """Force on the body at each part of the border that the support covers [N per metre depth]."""
+        assert isinstance(self._support.place, MovingPoints)
+        made, resultant = self._support.place.made, self._domain.model.space.resultant
+        tags = made.tag[self._weak]
+        return {
+            made.names[tag]: resultant(self._on_points[tags == tag].sum(axis=0))
+            for tag in np.unique(tags)
+        }
 
     @property
     def rows(self) -> list[PointHeld]:
@@ -169,12 +181,11 @@ def check_agreement(held: Sequence[HeldBorder], h: float) -> None:
     Raises:
         SupportError: Two of them do.
     """
-    from scipy.spatial import KDTree  # takes long to import
-
-    for one, other in combinations(held, 2):
-        component = one.support.component
-        if component != other.support.component:
-            continue
+    pairs = combinations(held, 2)
+    alike = [(a, b) for a, b in pairs if a.support.component == b.support.component]
+    if alike:
+        from scipy.spatial import KDTree  # takes long to import
+    for one, other in alike:
         distance, at = KDTree(one.x).query(other.x, distance_upper_bound=SAME * h)
         both = np.flatnonzero(np.isfinite(distance))
         change = np.abs(one.values[at[both]] - other.values[both])

@@ -30,11 +30,13 @@ class MovingPoints:
         x: Positions [m], points x dim.
         area: Outward normals times lengths in the plane of the grid [m], points x dim.
         reference: Weights when they were made [m2 per metre depth], which dead loads refer to.
-        made: The points when they were made.
+        first: The points when they were made.
+        number: Number among these of each point that is left.
     """
 
     def __init__(self, points: BorderPoints, grid: Grid, what: str = "border") -> None:
-        self.made, self._grid, self.what = points, grid, what
+        self.first, self._grid, self.what = points, grid, what
+        self.number = np.arange(len(points))
         self.x = np.array(points.x)
         self.area = points.length[:, None] * points.normal
         self.reference = self.weight
@@ -42,6 +44,11 @@ class MovingPoints:
 
     def __len__(self) -> int:
         return len(self.x)
+
+    @property
+    def made(self) -> BorderPoints:
+        """The points that are left as they were when they were made."""
+        return self.first[self.number]
 
     @property
     def space(self) -> Space:
@@ -107,7 +114,7 @@ class MovingPoints:
     def keep(self, kept: Mask) -> None:
         """Keep some of the points."""
         self.x, self.area, self.reference = self.x[kept], self.area[kept], self.reference[kept]
-        self.made, self._located = self.made[kept], None
+        self.number, self._located = self.number[kept], None
 
     def moved(self, domain: Domain, u: Array) -> tuple[Array, Array]:
         """Positions and areas after a step (Nanson: n dA = cof(F) n0 dA0).
@@ -125,18 +132,22 @@ class MovingPoints:
 
     def state(self) -> dict[str, Any]:
         """Positions and areas, for a checkpoint."""
-        return {"x": self.x, "area": self.area, "reference": self.reference}
+        return {
+            "x": self.x, "area": self.area, "reference": self.reference, "number": self.number
+        }  # fmt: skip
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`state`.
 
         Raises:
-            CheckpointError: It has another number of points.
+            CheckpointError: It was made with other points.
         """
-        if np.shape(state["x"]) != self.x.shape:
+        number = state["number"]
+        if np.max(number, initial=-1) >= len(self.first):
             raise CheckpointError(
-                f"{self.what} had {len(state['x'])} border points when the run was stored and has "
-                f"{len(self)} now: expected the same parts of the border"
+                f"{self.what} had more border points when the run was stored than {len(self.first)}, "
+                "which it is made of now: expected the same parts of the border"
             )
         self.x, self.area, self.reference = state["x"], state["area"], state["reference"]
+        self.number = number
         self._located = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -28,11 +28,11 @@ def check_supported(place: str, supports: Supports) -> None:
     Raises:
         InputError: It has none.
     """
-    _check_known(place, supports.supported_edges, supports.labels)
+    _check_known(place, supports.supported_edges, supports.names)
 
 
-def _check_known(place: str, edges_held: Collection[str], labels: Collection[str]) -> None:
-    known = sorted({*edges_held, *(name.strip("'") for name in labels)})
+def _check_known(place: str, edges_held: Collection[str], names: Collection[str]) -> None:
+    known = sorted({*edges_held, *names})
     if place not in known:
         raise InputError(
             f"reaction('{place}'): nothing supports that part of the border: expected one of "
@@ -94,16 +94,16 @@ class Reactions:
     Attributes:
         on_edges: Of edges and walls, functions x dim [N per metre depth].
         at_points: Of points.
-        on_border: Resultants of supports on patches of the border [N per metre depth], by their parts.
+        on_border: Of patches of the border [N per metre depth], by the names of its parts.
         supported: Names of the edges with supports.
-        labels: Parts of the border with supports, in words.
+        names: Parts of the border with supports, each with the edges of the grid that it is held on.
     """
 
     on_edges: Array
     at_points: Sequence[AtPoint] = field(default_factory=list)
     on_border: Sequence[tuple[str, Array]] = ()
     supported: Collection[str] = ()
-    labels: Collection[str] = ()
+    names: Mapping[str, Collection[Edge]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, accepted: Accepted, supports: Supports) -> Reactions:
@@ -124,23 +124,26 @@ class Reactions:
             at_points.append(AtPoint(places, support.component, float(force)))
         on_edges = held.reshape(accepted.u.shape) + accepted.friction
         on_border = [
-            (str(held.support.given), held.resultant)
+            part
             for held in accepted.problem.supports
             if not held.support.is_field
+            for part in held.resultants.items()
         ]
         held_edges = accepted.problem.held_edges
-        return cls(on_edges, at_points, on_border, held_edges, supports.labels)
+        return cls(on_edges, at_points, on_border, held_edges, supports.names)
 
     def at(self, model: Model, place: str | Sequence[float]) -> Array:
         """Force (x, y) [N per metre depth] of a support; see `Solution.reaction`."""
         force, found = np.zeros(model.space.dim), False
         if isinstance(place, str):
-            _check_known(place, self.supported, self.labels)
+            _check_known(place, self.supported, self.names)
+            on_edges = {*self.names.get(place, ())}
             if checks.one_of(place, EDGES) and place in self.supported:
-                edge: Edge = checks.choice("reaction(...)", place, EDGES)
+                on_edges.add(checks.choice("reaction(...)", place, EDGES))
+            for edge in sorted(on_edges):
                 functions = edges.edge_functions(model.grid, model.basis, edge)
-                force = self.on_edges[functions].sum(axis=0)
-            parts = [part for given, part in self.on_border if given == repr(place)]
+                force = force + self.on_edges[functions].sum(axis=0)
+            parts = [part for name, part in self.on_border if name == place]
             return np.asarray(sum(parts, force))
         place = checks.point("reaction(...)", place)
         near = SAME_POINT * model.grid.h

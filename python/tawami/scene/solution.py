@@ -293,12 +293,13 @@ class Solution(Elsewhere, Sealed, Unique):
         length.
 
         Args:
-            place: Name of an edge of the grid: the sum over the functions along it, so that forces at a
-                corner belong to both its edges. Or the point (x, y) of a `hold` [m], as it was given
-                or where it is now.
+            place: Name of a part of the border or of an edge of the grid. Along an edge of the grid it
+                is the sum over the functions of the edge, so that forces at a corner belong to both
+                edges, and parts of the border on one edge share its force. Or the point (x, y) of a
+                `hold` [m], as it was given or where it is now.
 
         Raises:
-            InputError: No such edge or nothing that supports it, or no point held there.
+            InputError: No such part or nothing that supports it, or no point held there.
         """
         return self._reactions.at(self._model, place)
 

@@ -37,13 +37,12 @@ class Support(Action):
         given: The place as the driver script gave it, in words, or as a point.
         component: Number of the component of the displacement, 'normal', 'tangent', or name of a field.
         unit: Unit of its values.
-        whole: Edges of the grid that its part of the border covers as far as the body touches them, each
-            with the mask of its points there. On these it prescribes coefficients of the grid.
         held: Tractions that held each other point in the last step [Pa], as multipliers.
         missing: Displacement by which each of these lagged behind the prescribed one [m].
+        told: Whether a warning was issued that it holds nothing.
     """
 
-    __slots__ = ("component", "given", "held", "missing", "place", "unit", "whole")
+    __slots__ = ("_whole", "component", "given", "held", "missing", "place", "told", "unit")
 
     def __init__(
         self,
@@ -57,8 +56,8 @@ class Support(Action):
         whole: Mapping[Edge, Mask] | None = None,
     ) -> None:
         self.place, self.given = place, given
-        self.component, self.unit = component, unit
-        self.whole: Mapping[Edge, Mask] = {} if whole is None else whole
+        self.component, self.unit, self.told = component, unit, False
+        self._whole: Mapping[Edge, Mask] = {} if whole is None else whole
         count = len(place) if isinstance(place, MovingPoints) else 0
         self.held, self.missing = np.zeros(count), np.zeros(count)
         super().__init__(owner, value, factor)
@@ -72,6 +71,17 @@ class Support(Action):
     def places(self) -> list[tuple[float, float]]:
         """The point that it holds, where it is and as the driver script gave it."""
         return [place for place in (self.place, self.given) if isinstance(place, tuple)]
+
+    @property
+    def whole(self) -> dict[Edge, Mask]:
+        """Edges of the grid that its part of the border covered as far as the body touched them, each
+        with the mask of its points there. On these it prescribes coefficients of the grid.
+        """
+        if not isinstance(self.place, MovingPoints):
+            return {}
+        number = self.place.number
+        left = {edge: mask[number] for edge, mask in self._whole.items()}
+        return {edge: mask for edge, mask in left.items() if mask.any()}
 
     @property
     def is_field(self) -> bool:
@@ -108,6 +118,15 @@ class Support(Action):
         return [edge for edge, mask in self.whole.items() if place.edge(edge)[mask].all()]
 
     @property
+    def names(self) -> dict[str, set[Edge]]:
+        """Parts of the border that it covers, each with the edges of the grid that it is held on."""
+        if not isinstance(self.place, MovingPoints):
+            return {}
+        made, held = self.place.made, self.edges
+        tags = {made.names[tag]: made.tag == tag for tag in np.unique(made.tag)}
+        return {name: {e for e in held if (self.whole[e] & of).any()} for name, of in tags.items()}
+
+    @property
     def weak(self) -> Mask:
         """Mask of its points on the border that it holds by tractions on patches."""
         if not isinstance(self.place, MovingPoints):
@@ -120,7 +139,6 @@ class Support(Action):
     def keep(self, kept: Mask) -> None:
         """Keep some of its points of the border; those of removed particles are lost."""
         self.held, self.missing = self.held[kept], self.missing[kept]
-        self.whole = {edge: mask[kept] for edge, mask in self.whole.items() if mask[kept].any()}
 
     def _checked(self, value: Any) -> tuple[Profile, ...]:
         check = checks.number if isinstance(self.place, tuple) else checks.profile

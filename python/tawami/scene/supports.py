@@ -87,7 +87,11 @@ class Supports(Owner[Support]):
 
     def _place(self, domain: Domain, what: str, where: Part) -> MovingPoints | Edge:
         """Points of a part of the border; of a body without a border, an edge of the grid."""
-        if self.border.points is not None or not checks.one_of(where, EDGES):
+        points = self.border.points
+        on_axis = self.grid.on_axis and checks.one_of(where, ("left",))
+        if on_axis and points is not None and not points.edge("left").any():
+            return "left"  # the border has no points on the axis
+        if points is not None or not checks.one_of(where, EDGES):
             return self.border.part(what, where)
         edge: Edge = checks.choice(what, where, EDGES)
         distance = reach(domain, edge)
@@ -252,9 +256,14 @@ class Supports(Owner[Support]):
         return [s for s in self.all if isinstance(s.place, tuple)]
 
     @property
-    def labels(self) -> set[str]:
-        """Parts of the border with supports, in words."""
-        return {str(s.given) for s in self.all if isinstance(s.place, MovingPoints)}
+    def names(self) -> dict[str, set[Edge]]:
+        """Parts of the border with supports, each with the edges of the grid that it is held on."""
+        found = dict[str, set[Edge]]()
+        for support in self.all:
+            if isinstance(support.place, MovingPoints):
+                for name, edges_held in support.names.items():
+                    found.setdefault(name, set()).update(edges_held)
+        return found
 
     @property
     def supported_edges(self) -> set[str]:

@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from tawami.base.arrays import Array
+from tawami.base.errors import SupportError
 from tawami.field.reduction import Reduction
 from tawami.field.sum import Sum
 
@@ -42,6 +43,10 @@ class Term(Protocol):
 
     def improve(self) -> bool:
         """Improve the multipliers at a solution; whether another solve is needed."""
+
+    @property
+    def unsettled(self) -> str:
+        """Message if the multipliers do not settle: what is wrong, and what to do."""
 
     def accept(self) -> None:
         """Keep what later steps need, once a step is stored."""
@@ -85,10 +90,16 @@ class Terms:
         return self._sum.of(tangent, sum(more, first), reduction)
 
     def improve(self) -> bool:
-        """Improve all multipliers; whether another solve is needed."""
+        """Improve all multipliers; whether another solve is needed.
+
+        Raises:
+            SupportError: They do not settle.
+        """
         self._passes += 1
-        needed = [term.improve() for term in self._terms]
-        return any(needed) and self._passes < PASSES
+        pending = [term for term in self._terms if term.improve()]
+        if pending and self._passes >= PASSES:
+            raise SupportError(pending[0].unsettled)
+        return bool(pending)
 
     def accept(self) -> None:
         """Keep what later steps need, once a step is stored."""
