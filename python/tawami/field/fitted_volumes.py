@@ -14,12 +14,15 @@ div (w e_r) = w,r + w/r.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 import scipy.sparse as sp
 
-from tawami.base import ranks
+from tawami.base import checks, ranks
 from tawami.base.arrays import Array
+from tawami.base.errors import InputError
+from tawami.border.pieces import Border
 from tawami.field.border import PointsInCells
 from tawami.grid.basis import Basis, greville
 
@@ -29,6 +32,32 @@ DAMPING = 0.01
 TOLERANCE, ITERATIONS = 1e-2, 30
 #: Largest correction of a volume.
 LARGEST = 0.5
+
+Volumes = Literal["fitted", "own"]
+
+
+def chosen(volumes: Volumes | None, border: Border | None, *, moves: bool, static: bool) -> bool:
+    """Whether volumes are fitted: by default in static scenes whose particles move.
+
+    Args:
+        volumes: As the user gave it.
+        border: The border of the body.
+        moves: Whether particles move.
+        static: Whether the scene has no density.
+
+    Raises:
+        InputError: Another value, or a body without a border.
+    """
+    if volumes is None:
+        return border is not None and moves and static
+    if checks.choice("volumes", volumes, ("fitted", "own")) == "own":
+        return False
+    if border is None:
+        raise InputError(
+            "volumes='fitted': the body has no border: expected volumes='own', or "
+            "Body(x, volume, border=tawami.polyline(corners))"
+        )
+    return True
 
 
 def corrections(

@@ -23,6 +23,7 @@ from tawami.base.warn import warn
 from tawami.body import rings
 from tawami.body.body import Body
 from tawami.border.pieces import Border
+from tawami.field import fitted_volumes
 from tawami.form.compilation import CompiledForm, check_used, compile_form
 from tawami.form.form import Form
 from tawami.form.symbols import Assembly
@@ -34,7 +35,6 @@ from tawami.scene.parameters import by_kind, check_names
 
 Array = npt.NDArray[np.float64]
 Leaving = Literal["stop", "remove"]
-Volumes = Literal["fitted", "own"]
 #: K/mu from which displacement-only forms lock: nu = 0.49. At 0.495 the mean stress of the cantilever
 #: has 4 times the error that it has at 0.3, at 0.49995 70 times (`python -m cases.extremes`).
 LOCKS = 50.0
@@ -178,7 +178,7 @@ def build(
     basis: Basis,
     density: float | Sequence[float] | Mapping[str, float] | None,
     leaving: Leaving,
-    volumes: Volumes | None,
+    volumes: fitted_volumes.Volumes | None,
     assembly: Assembly,
     parameters: Mapping[str, Any],
 ) -> tuple[Model, _rust.Particles]:
@@ -221,27 +221,10 @@ def build(
         grid, loaded, compiled, basis, values,
         used, in_time, in_space, Settings(options, fixed),
         laws, densities, _names(body, len(materials)), leaving, len(particles),
-        _fits(volumes, loaded, body, density), body.border,
+        fitted_volumes.chosen(volumes, body.border, moves=loaded.strain.finite, static=density is None),
+        body.border,
     )  # fmt: skip
     return model, particles
-
-
-def _fits(volumes: Volumes | None, form: Form, body: Body, density: Any) -> bool:
-    """Whether volumes are fitted: by default in static scenes whose particles move.
-
-    Raises:
-        InputError: Another value, or a body without a border.
-    """
-    if volumes is None:
-        return body.border is not None and form.strain.finite and density is None
-    if checks.choice("volumes", volumes, ("fitted", "own")) == "own":
-        return False
-    if body.border is None:
-        raise InputError(
-            "volumes='fitted': the body has no border: expected volumes='own', or "
-            "Body(x, volume, border=tawami.polyline(corners))"
-        )
-    return True
 
 
 def _compiled(
