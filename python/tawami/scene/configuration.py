@@ -22,7 +22,7 @@ from tawami.base.process import check_process
 from tawami.base.program import leave_together
 from tawami.base.timing import Stopwatch
 from tawami.particles import placement
-from tawami.scene import coverage, mean_stress, own_fields, quantities, strain_limit
+from tawami.scene import coverage, fitting, mean_stress, own_fields, quantities, strain_limit
 from tawami.scene.activity import Activity
 from tawami.scene.border import SceneBorder
 from tawami.scene.border_sums import BorderSums
@@ -95,6 +95,9 @@ class Configuration:
         of = self.model, particles, location, self.numerics, self.stopwatch
         self.domain = Domain.attach(*of, getattr(self, "domain", None))
         self.border_sums.attach(self.domain)
+        if self.model.fits:
+            with self.stopwatch("set-up"):
+                fitting.fit(self.domain, self.border)
 
     @property
     def before(self) -> Array:

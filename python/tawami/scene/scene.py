@@ -63,6 +63,9 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
             dictionary as for the materials); gravity needs it.
         leaving: Treatment of particles that leave the grid: 'stop' with an error before they do, or
             'remove' them; `left` lists them.
+        volumes: Volumes in the integrals of the form: 'own' of the particles, or 'fitted', so that the
+            divergence theorem holds for the functions of the grid; masses stay. By default 'fitted' for
+            bodies with a border in scenes of finite strain without a density.
         parameters: Parameters and options of the form: alpha, stabilisation, ... A parameter is a
             number, a function of time [s], or one number for each particle: a function f(x, y), an
             array, `tawami.table(...)` or `tawami.earlier(...)`.
@@ -104,6 +107,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         linear_solver: SolverName = "direct",
         density: float | Sequence[float] | Mapping[str, float] | None = None,
         leaving: Literal["stop", "remove"] = "stop",
+        volumes: Literal["fitted", "own"] | None = None,
         **parameters: Any,
     ) -> None:
         check_process()
@@ -117,6 +121,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
             basis,
             density,
             leaving,
+            volumes,
             assembly,
             parameters,
         )
