@@ -20,6 +20,8 @@ from tawami.grid import edges
 from tawami.scene import presentation, quantities
 from tawami.scene.absent import Elsewhere
 from tawami.scene.configuration import Configuration, Outcome
+from tawami.scene.obstacle import Obstacle
+from tawami.scene.obstacle_contact import ContactResult
 from tawami.scene.points import ROUND_OFF, outside
 from tawami.scene.quantities import Arrays, Given, Quantity
 
@@ -285,8 +287,19 @@ class Solution(Elsewhere, Sealed, Unique):
 
     # -- forces --------------------------------------------------------------
 
-    def reaction(self, place: str | Sequence[float]) -> Array:
-        """Force (x, y) [N per metre depth] that a support or wall exerts on the body.
+    def contact(self, obstacle: Obstacle | str) -> ContactResult:
+        """Contact with an obstacle: force and moment on it, pressure and friction at the border.
+
+        Args:
+            obstacle: As `scene.obstacle` returned it, or its name.
+
+        Raises:
+            InputError: The scene had no such obstacle in this step.
+        """
+        return self._reactions.contact(obstacle)
+
+    def reaction(self, place: str | Sequence[float] | Obstacle) -> Array:
+        """Force (x, y) [N per metre depth] that a support, wall or obstacle exerts on the body.
 
         In dynamics it is the force at the end of the step and the impulse at its beginning over its
         length.
@@ -294,7 +307,7 @@ class Solution(Elsewhere, Sealed, Unique):
         Args:
             place: Name of an edge of the grid: the sum over the functions along it, so that forces at a
                 corner belong to both its edges. Or the point (x, y) of a `hold` [m], as it was given
-                or where it is now.
+                or where it is now. Or an obstacle or its name.
 
         Raises:
             InputError: No such edge or nothing that supports it, or no point held there.

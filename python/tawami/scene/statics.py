@@ -45,15 +45,17 @@ class StaticStep:
             return term.at(self.now) - (term.share.applied if moves else 0.0)
 
         with now.stopwatch("set-up"):
+            obstacles = now.obstacles_in_step(self.now)
             reduction, contact, supports = now.supports.constraints(
                 now.domain, amount, now.before, now.before, moving=self.stressed,
-                fields=now.fields_at(self.now),
+                fields=now.fields_at(self.now), also=[row for o in obstacles for row in o.rows],
             )  # fmt: skip
             external = now.external(self.now)
-            terms = now.terms(self.now, supports)
+            terms = now.terms(self.now, supports, obstacles)
         return Problem(
-            reduction, contact, external, supports=supports, terms=terms, load=self.now.part
-        )
+            reduction, contact, external, supports=supports, obstacles=obstacles, terms=terms,
+            load=self.now.part,
+        )  # fmt: skip
 
     def accept(self, accepted: Accepted) -> StaticStep:
         """Prepare nothing."""
@@ -65,6 +67,6 @@ class StaticStep:
     def finish(self) -> None:
         """Record that the body is in equilibrium with this part."""
         self.configuration.activity.statics += 1
-        self.configuration.supports.apply(self.now)
+        self.configuration.apply(self.now)
         if self.now.part == 1.0:
             self.configuration.accept(self.now)

@@ -218,6 +218,7 @@ class Supports(Owner[Support]):
         *,
         moving: bool,
         fields: step_values.Fields | None = None,
+        also: Sequence[PointHeld] = (),
     ) -> tuple[Reduction, ActiveSet, list[HeldBorder]]:
         """Unknowns that the supports leave free, the walls in their present states, and the supports on
         patches of the border.
@@ -230,6 +231,7 @@ class Supports(Owner[Support]):
                 0 where they do. Walls measure distances from it.
             moving: Inertia or stress holds the body: rigid motions may be free.
             fields: Fields without a role and what is prescribed for them; they stay by default.
+            also: Constraints by contact that prevent rigid motions.
 
         Raises:
             SupportError: The body has left a point, or supports contradict each other.
@@ -264,6 +266,7 @@ class Supports(Owner[Support]):
             held += wall.held(layout.active, prescribed[-1], start, before)
         contact = ActiveSet(self.walls, prescribed)
         rows = [row for support in border for row in support.rows] if not moving else []
+        rows += also
         reduction = Reduction(layout, held, points, start, moving=moving, also=rows)
         return reduction, contact, border
 

@@ -186,6 +186,7 @@ class Newton:
         iterate, history, krylov = equations.first(guess), History(), list[int]()
         add_mass = None if inertia is None else inertia.adder(reduction)
         search: LineSearch | None = None
+        most = self.numerics.max_iterations
         while True:
             try:
                 forces, measured = self._evaluate(iterate, equations)
@@ -196,6 +197,8 @@ class Newton:
                     self._fail(history, f"Then {error}. {equations.advice}")
                 guess = search = None
                 iterate = equations.first(guess)
+                if terms is not None:
+                    terms.restart()
                 continue
             history.append(measured)
             if not np.isfinite(worst(measured)):
@@ -203,6 +206,7 @@ class Newton:
             met = path is None or path.control.is_met(iterate.u)
             converged = worst(measured) < self.numerics.tolerance and met
             if converged and terms is not None and terms.improve():
+                most = len(history) + self.numerics.max_iterations
                 forces, measured = self._evaluate(iterate, equations)
                 history[-1] = measured
                 converged = worst(measured) < self.numerics.tolerance
@@ -212,7 +216,7 @@ class Newton:
                     iterate.coefficients, forces.acceleration, forces.reactions, history, krylov,
                     self._solver.condition, self._solver.symmetric, iterate.factor,
                 )  # fmt: skip
-            if len(history) > self.numerics.max_iterations:
+            if len(history) > most:
                 advice = self._diagnosis.material()
                 self._fail(history, advice or equations.advice)
             with reported():
@@ -273,7 +277,7 @@ class Newton:
             self._restore(tangent, reduction)
         self._measures.observe(tangent, reduction)
         tolerance = ON_PATH
-        if equations.path is None:
+        if equations.path is None and not (equations.terms and equations.terms.bordering):
             tolerance = forcing(history, self.numerics.tolerance)
         singular: SingularError | None = None
         try:
@@ -293,16 +297,29 @@ class Newton:
         if solver.singular:
             solver.forget()
             self._diagnosis.report_singular(solver, equations, history, singular)
-        change = self._on_all(reduction, found)
-        if equations.path is None:
-            return change, 0.0
-        loads = reduction.restricted(equations.path.rate)[reduction.own]
-        rate = self._on_all(reduction, solver.again(loads, tolerance))
-        n = reduction.layout.num_displacement
-        of_factor = equations.path.control.change(iterate.u, change[:n], rate[:n])
-        if not np.isfinite(of_factor):
-            self._fail(history, "The loads do not move the control: choose another control")
-        return change + of_factor * rate, of_factor
+        change, of_factor = self._on_all(reduction, found), 0.0
+
+        def again(right: Array) -> Array:
+            own = reduction.restricted(right)[reduction.own]
+            return self._on_all(reduction, solver.again(own, tolerance))
+
+        elimination = None if equations.terms is None else equations.terms.elimination(again)
+        if elimination is not None:
+            change, own = elimination.solve(change, elimination.residual)
+        if equations.path is not None:
+            rate = again(equations.path.rate)
+            if elimination is not None:
+                rate, own_rate = elimination.solve(rate, np.zeros_like(own))
+            n = reduction.layout.num_displacement
+            of_factor = equations.path.control.change(iterate.u, change[:n], rate[:n])
+            if not np.isfinite(of_factor):
+                self._fail(history, "The loads do not move the control: choose another control")
+            change = change + of_factor * rate
+            if elimination is not None:
+                own = own + of_factor * own_rate
+        if elimination is not None:
+            elimination.add(own)
+        return change, of_factor
 
     @functools.cached_property
     def _signs(self) -> Array:

@@ -1,0 +1,354 @@
+"""Contact of the border with one obstacle in one step (`tawami.solve.terms`).
+
+Pressure and friction act on means over patches (`tawami.border.contact`) with a penalty of 200 mu/h, in
+passes with better multipliers until penetration and slip of sticking patches are below 1e-3 of those of
+the penalty alone: below 5e-6 h times the largest pressure over mu.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+
+from tawami.base.arrays import Array, Indices, Mask
+from tawami.base.errors import SupportError
+from tawami.border.contact import OPEN, Contact, ContactForces, Multipliers
+from tawami.border.patches import Patches, patches
+from tawami.border.rigid import Pose
+from tawami.field.constraints import PointHeld
+from tawami.scene.domain import Domain
+from tawami.scene.held_border import PENALTY
+from tawami.scene.obstacle_motion import ObstacleMotion
+from tawami.solve.bordered import Blocks
+
+if TYPE_CHECKING:
+    from tawami.scene.obstacle import Obstacle
+
+
+@dataclass(frozen=True)
+class ContactResult:
+    """Contact with one obstacle at the end of a step.
+
+    Attributes:
+        name: Name of the obstacle.
+        force: Force on the obstacle [N per metre depth].
+        moment: Moment on it about its centre [N m per metre depth], one for each rotation.
+        centre: Its centre [m].
+        x: Points of the border, points x dim [m], where contact was evaluated.
+        pressure: Pressure at these points [Pa], 0 where they are apart.
+        friction: Friction on the body at these points [Pa], along the normal of the obstacle turned by
+            a right angle counter-clockwise, points x (dim - 1).
+        penetration: Largest mean penetration of a patch [m].
+    """
+
+    name: str
+    force: Array
+    moment: Array
+    centre: Array
+    x: Array
+    pressure: Array
+    friction: Array
+    penetration: float
+
+
+#: Penetration, relative to that of the penalty alone, below which no other pass is needed; and the
+#: penetration that is round-off [cells].
+SETTLED, ROUND_OFF = 1e-3, 1e-9
+#: Distance of patches that are evaluated from the start of a step on [cells].
+REACH = 1.0
+#: Distance at which a patch touches at the start of a static step [cells].
+TOUCHING = 1e-6
+#: A motion is held by nothing if its stiffness is below this, relative to that of the penalty.
+UNHELD = 1e-12
+
+
+class ObstacleContact:
+    """Contact with one obstacle in one step.
+
+    Args:
+        domain: The particles at its start.
+        obstacle: The obstacle.
+        motion: Its motion in the step.
+        before: Displacement coefficients since the start where particles do not move, else 0.
+    """
+
+    smooth, implicit = False, True
+
+    def __init__(
+        self, domain: Domain, obstacle: Obstacle, motion: ObstacleMotion, before: Array
+    ) -> None:
+        self.obstacle, self.motion = obstacle, motion
+        self._h, self._size = domain.model.grid.h, domain.layout.size
+        place, dim = obstacle.place, domain.model.space.dim
+        self._n, self._dim = domain.layout.num_displacement, dim
+        cells = place.cells(domain)
+        functions = cells.values(domain.layout.basis)
+        #: Displacements of all points, from the coefficients of the displacement.
+        self._at_all = sp.kron(functions, sp.identity(dim), format="csr")
+        self._x = place.x + self._at_all_points(before)
+        self._start = motion.start.to_local(self._x)
+        self._groups = patches(place.now, self._h)
+        weight = place.weight
+        self._weights = np.maximum(weight, 1e-12 * weight.max())  # 0 on an axis of symmetry
+        shear = domain.shear_of_cells[cells.location.cell]
+        self._penalty = PENALTY / self._h * self._groups.means(self._weights, shear)
+        self._distance = obstacle.shape.evaluate(self._start).distance
+        self._pressure = self._groups.means(self._weights, obstacle.pressure)
+        self._traction = self._groups.means(self._weights, obstacle.traction)
+        self._chosen = np.zeros(self._groups.count, dtype=bool)
+        reach = REACH * self._h + np.abs(motion.unknown[:dim]).max(initial=0.0)
+        self._choose((self._distance < reach) | (self._pressure > 0)[self._groups.number])
+        self.at_start = self._forces_at_start()
+        if motion.times is None:
+            self._touch()
+
+    def _at_all_points(self, coefficients: Array) -> Array:
+        moved = self._at_all @ coefficients[: self._n]
+        return np.asarray(moved.reshape(-1, self._dim))
+
+    def _touch(self) -> None:
+        """Let patches that touch in statics push from the first evaluation on."""
+        gap = self._groups.means(self._weights, self._distance)
+        new = (np.abs(gap) < TOUCHING * self._h) & (self._pressure == 0)
+        self._pressure[new] = (self._penalty * (np.maximum(gap, 0.0) + ROUND_OFF * self._h))[new]
+
+    # -- the patches near the obstacle ---------------------------------------
+
+    def _choose(self, points: Mask) -> None:
+        """Evaluate the patches of further points from now on."""
+        number = self._groups.number
+        self._chosen[number[points]] = True
+        self._points: Indices = np.flatnonzero(self._chosen[number])
+        new_number = np.cumsum(self._chosen) - 1
+        near = Patches(new_number[number[self._points]], int(self._chosen.sum()))
+        rows = self._dim * self._points[:, None] + np.arange(self._dim)
+        self._at_points = self._at_all[rows.ravel()]
+        self._contact = Contact(
+            self.obstacle.shape, near, self._weights[self._points], self.obstacle.friction,
+            self._penalty[self._chosen], self._start[self._points],
+        )  # fmt: skip
+        together = (near.incidence.T @ near.incidence).astype(float)
+        of_points = sp.kron(together, np.ones((self._dim, self._dim)), format="csr")
+        touched = abs(self._at_points)
+        #: Where the stiffness may have entries.
+        self._places = (touched.T @ of_points @ touched).tocoo()
+
+    @property
+    def _held(self) -> Multipliers:
+        return Multipliers(self._pressure[self._chosen], self._traction[self._chosen])
+
+    def _reached(self, local: Array) -> Mask:
+        """Points of other patches that may have come to the obstacle since the start of the step."""
+        moved = np.linalg.norm(local - self._start, axis=1)
+        return np.asarray((self._distance <= moved) & ~self._chosen[self._groups.number])
+
+    # -- forces, see `Term` --------------------------------------------------
+
+    @property
+    def prescribed(self) -> float:
+        """The largest displacement that the obstacle prescribes in this step [m]."""
+        return float(np.abs(self.motion.change[: self._dim]).max(initial=0.0))
+
+    def begin(self, diagonal: Callable[[], Array]) -> None:
+        """See `Term`."""
+        self.restart()
+
+    def restart(self) -> None:
+        """See `Term`."""
+        self.motion.restart()
+        self._first = True
+
+    def forces(self, coefficients: Array) -> Array:
+        """See `Term`: in dynamics with the factors of both ends of the step."""
+        pose, x = self.motion.pose, self._x + self._at_all_points(coefficients)
+        reached = self._reached(pose.to_local(x))
+        if reached.any():
+            self._choose(reached)
+        self._sticking, self._first = self._first, False
+        self.now: ContactForces = self._contact.evaluate(
+            x[self._points], pose, self._held, sticking=self._sticking
+        )
+        self.at_end = self._on_all(self.now.forces)
+        factor = self.motion.factor
+        return np.asarray(factor * self.at_end - (factor - 1) * self.at_start[0])
+
+    def _on_all(self, forces: Array) -> Array:
+        """Forces on the points near the obstacle as forces on all coefficients."""
+        on_all = np.zeros(self._size)
+        on_all[: self._n] = self._at_points.T @ forces.ravel()
+        return on_all
+
+    def _forces_at_start(self) -> tuple[Array, Array]:
+        """Forces at the start of the step: on all coefficients, and on the obstacle."""
+        pose, x = self.motion.start, self._x[self._points]
+        now, held = self._contact.evaluate(x, pose, self._held), self._held
+        number = self._contact.patches.number
+        on_points = held.pressure[number, None] * now.surface.normal
+        on_points += np.einsum("jk,jka->ja", held.traction[number], now.tangent)
+        on_points *= self._contact.weights[:, None]
+        return self._on_all(on_points), -pose.resultant(x, on_points)
+
+    def stiffness(self) -> sp.csr_matrix:
+        """See `Term`. Its entries are in the same places as long as no patch comes near."""
+        matrix = self._at_points.T @ self.now.derivative @ self._at_points
+        matrix = (-self.motion.factor * matrix).tocoo()
+        places = self._places
+        data = np.concatenate([matrix.data, np.zeros(places.nnz)])
+        rows = np.concatenate([matrix.row, places.row])
+        columns = np.concatenate([matrix.col, places.col])
+        return sp.coo_matrix((data, (rows, columns)), shape=(self._size, self._size)).tocsr()
+
+    def improve(self) -> bool:
+        """See `Term`."""
+        now, penalty = self.now, self._contact.penalty
+        allowed = SETTLED * np.max(now.pressure / penalty, initial=0.0)
+        settled = now.violation <= max(allowed, ROUND_OFF * self._h)
+        if settled and not self._sticking:
+            return False
+        if not settled:
+            self._pressure[self._chosen] = now.pressure
+            self._traction[self._chosen] = now.traction
+        return True
+
+    def accept(self) -> None:
+        """Keep pressures, friction and pose for later steps."""
+        obstacle, of = self.obstacle, self._contact.patches.number
+        pressure, traction = self.pressures
+        obstacle.pressure, obstacle.traction = pressure, traction
+        obstacle.pose = self.motion.pose
+        obstacle.rates = self.motion.rates_at_end(self.at_start[1], self.now.resultant)
+        assert len(of) == len(self._points)
+
+    @property
+    def pressures(self) -> tuple[Array, Array]:
+        """Pressure and friction at all points [Pa]."""
+        number = self._contact.patches.number
+        pressure = np.zeros(len(self._x))
+        traction = np.zeros((len(self._x), self._dim - 1))
+        pressure[self._points] = self.now.pressure[number]
+        traction[self._points] = self.now.traction[number]
+        return pressure, traction
+
+    def result(self) -> ContactResult:
+        """The contact at the last forces."""
+        now, dim = self.now, self._dim
+        pressure, traction = self.pressures
+        x = self._x.copy()
+        x[self._points] = now.x
+        return ContactResult(
+            self.obstacle.name, now.resultant[:dim], now.resultant[dim:], self.pose.position, x,
+            pressure, traction, now.penetration,
+        )  # fmt: skip
+
+    @property
+    def jump(self) -> Array:
+        """Contact forces at the end of a dynamic step, less those at its start."""
+        return np.asarray(self.at_end - self.at_start[0])
+
+    @property
+    def pose(self) -> Pose:
+        """Present pose of the obstacle."""
+        return self.motion.pose
+
+    def energies(self, u: Array) -> tuple[float, float, float]:
+        """Work on body and obstacle from outside, dissipation by friction, and loss by impact.
+
+        Args:
+            u: Increments of the displacement.
+        """
+        q, free, resultant = self.motion.unknown, self.motion.free, self.now.resultant
+        external = float(self.motion.force[free] @ q[free] - resultant[~free] @ q[~free])
+        friction = float(self.now.dissipation.sum())
+        closed = float(self.at_end[: u.size] @ u.ravel() + resultant @ q)
+        return external, friction, -closed - friction
+
+    # -- unknowns of its own, see `tawami.solve.bordered` ---------------------
+
+    @property
+    def num_unknowns(self) -> int:
+        """Number of its free motions."""
+        return int(self.motion.free.sum())
+
+    @property
+    def residual(self) -> Array:
+        """Forces out of balance in its free motions."""
+        return sum(self._parts, np.zeros(self.num_unknowns))
+
+    @property
+    def _parts(self) -> list[Array]:
+        return self.motion.parts(self.at_start[1], self.now.resultant)
+
+    @property
+    def measure(self) -> float:
+        """Residual of each free motion relative to its largest term, the largest of these."""
+        sizes = np.abs(self._parts).max(axis=0)
+        moments = np.abs(self.now.forces).sum() * self._h  # of forces in balance
+        least = np.where(np.flatnonzero(self.motion.free) < self._dim, 0.0, moments)
+        sizes = np.maximum(sizes, least)
+        shares = np.divide(np.abs(self.residual), sizes, out=np.zeros_like(sizes), where=sizes > 0)
+        return float(shares.max(initial=0.0))
+
+    def blocks(self) -> Blocks:
+        """Derivatives of the equations of body and obstacle by each other's unknowns."""
+        free, factor, now = self.motion.free, self.motion.factor, self.now
+        of_body = np.zeros((self._size, self.num_unknowns))
+        of_body[: self._n] = -factor * (self._at_points.T @ now.by_motion[:, free])
+        by_body = np.zeros((self.num_unknowns, self._size))
+        rows = now.resultant_by_positions[free]
+        by_body[:, : self._n] = -factor * (self._at_points.T @ rows.T).T
+        own = self.motion.stiffness - factor * now.resultant_by_motion[np.ix_(free, free)]
+        return Blocks(of_body, by_body, own)
+
+    def add(self, change: Array) -> None:
+        """Go to the next iterate of its free motions."""
+        self.motion.add(change)
+
+    def check_held(self, matrix: Array) -> None:
+        """Check that its motions are held in statics.
+
+        Args:
+            matrix: Stiffness of its free motions, with that of the body.
+
+        Raises:
+            SupportError: One is free, as the obstacle does not touch the body.
+        """
+        if self.motion.times is not None:
+            return
+        arm = np.linalg.norm(self._x[self._points] - self.motion.pose.position, axis=1)
+        stiffness = float(self._penalty.max(initial=0.0)) * float(self._weights.max())
+        motions = np.flatnonzero(self.motion.free)
+        scale = np.where(motions < self._dim, 1.0, max(arm.max(initial=0.0), self._h))
+        scaled = matrix / (stiffness * np.outer(scale, scale))
+        _, sizes, directions = np.linalg.svd(scaled)
+        if sizes[-1] > UNHELD:
+            return
+        weakest = motions[int(np.argmax(np.abs(directions[-1])))]
+        state = "does not touch the body" if (self.now.state == OPEN).all() else "slides freely"
+        raise SupportError(
+            f"{self.obstacle}: nothing holds its motion '{self.obstacle.motions[weakest]}', as it "
+            f"{state}: expected an obstacle in contact, or free=... without this motion"
+        )
+
+    @property
+    def rows(self) -> list[PointHeld]:
+        """Means over patches that push, as constraints that find rigid motions in statics."""
+        if self.motion.free.any():
+            return []
+        now = self._contact.evaluate(self._x[self._points], self.motion.pose, self._held)
+        rows, directions = [], [now.surface.normal]
+        if self.obstacle.friction > 0:
+            directions += list(now.tangent.transpose(1, 0, 2))
+        shares = now.contact.patches.shares(now.contact.weights)
+        for k in np.flatnonzero(now.pressure > 0):
+            mine = now.contact.patches.number == k
+            x, y = now.x[mine][0]
+            for direction in directions:
+                along = (mine * shares)[:, None] * direction
+                weights = self._at_points.T @ along.ravel()
+                indices = np.flatnonzero(weights)
+                rows.append(PointHeld(indices, weights[indices], 0.0, f"{self.obstacle}", (x, y)))
+        return rows
