@@ -72,10 +72,7 @@ class Obstacle(Action):
         self.friction, self.free, self.mass = friction, free, mass
         self._speeds, self._changes = list(speeds), 0
         self.pose = Pose.at(shape.centre)
-        initial = [
-            speed.rates(0.0, 0.0)[0] if one else 0.0
-            for speed, one in zip(speeds, free, strict=True)
-        ]
+        first = np.array([speed.rates(0.0, 0.0)[0] for speed in speeds])
         self.rates: tuple[Array, Array] = (np.where(free, first, 0.0), np.zeros(len(free)))
         dim = place.space.dim
         self.pressure, self.traction = np.zeros(len(place)), np.zeros((len(place), dim - 1))
