@@ -67,7 +67,7 @@ class Contact:
     start: Array
 
     def evaluate(
-        self, x: Array, pose: Pose, held: Multipliers, *, sticking: bool = False
+        self, x: Array, pose: Pose, held: Multipliers, *, sticking: bool | ContactForces = False
     ) -> ContactForces:
         """Pressures, friction and forces at present positions.
 
@@ -76,8 +76,9 @@ class Contact:
             pose: Pose of the obstacle.
             held: Multipliers: at first pressure zero and friction of the last step, or both from an
                 earlier evaluation, `ContactForces.multipliers`.
-            sticking: Take all touching patches as sticking. It prevents cycles between states in the
-                first iteration of Newton's method; without friction it has no effect.
+            sticking: Take all touching patches as sticking; or the last evaluation: take those as
+                sticking whose friction would turn round. It prevents cycles between states in Newton's
+                method; without friction it has no effect.
         """
         local = pose.to_local(x)
         surface = _turned(self.shape.evaluate(local), pose.rotation)
@@ -90,7 +91,14 @@ class Contact:
         touching, size = pressure > 0, np.linalg.norm(trial, axis=1)
         limit = np.zeros_like(pressure)
         if self.friction > 0:
-            limit[touching] = np.inf if sticking else self.friction * pressure[touching]
+            limit[touching] = self.friction * pressure[touching]
+        bound = limit.copy()
+        if self.friction > 0:
+            if isinstance(sticking, ContactForces):
+                turned = np.einsum("ak,ak->a", trial, sticking.traction) < 0
+                limit[touching & turned & (sticking.state == SLIDING)] = np.inf
+            elif sticking:
+                limit[touching] = np.inf
         stuck = touching & (size < limit)
         scale = stuck.astype(float)  # ratio of the friction to the trial
         np.divide(limit, size, out=scale, where=~stuck & (size > 0))
@@ -100,6 +108,7 @@ class Contact:
             gap=gap, slip=slip, trial=trial, scale=scale, pressure=pressure,
             traction=scale[:, None] * trial, held=held,
             state=np.where(stuck, STICKING, np.where(touching, SLIDING, OPEN)),
+            exceeded=bool((stuck & (size > bound)).any()),
         )  # fmt: skip
 
 
@@ -123,6 +132,7 @@ class ContactForces:
         traction: Friction of each patch along the tangents [Pa], patches x (dim - 1).
         held: Multipliers of the evaluation.
         state: `OPEN`, `STICKING` or `SLIDING` for each patch.
+        exceeded: Whether the friction of a patch that was taken as sticking is larger than mu p.
     """
 
     contact: Contact
@@ -140,6 +150,7 @@ class ContactForces:
     traction: Array
     held: Multipliers
     state: Indices
+    exceeded: bool
 
     @cached_property
     def forces(self) -> Array:

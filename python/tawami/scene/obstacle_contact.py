@@ -60,6 +60,8 @@ class ContactResult:
 SETTLED, ROUND_OFF = 1e-3, 1e-9
 #: Distance of patches that are evaluated from the start of a step on [cells].
 REACH = 1.0
+#: Evaluations in which friction may turn round only after a patch was taken as sticking.
+RETURNS = 10
 #: Distance at which a patch touches at the start of a static step [cells].
 TOUCHING = 1e-6
 #: A motion is held by nothing if its stiffness is below this, relative to that of the penalty.
@@ -160,7 +162,7 @@ class ObstacleContact:
     def restart(self) -> None:
         """See `Term`."""
         self.motion.restart()
-        self._first = True
+        self._first, self._returns = True, 0
 
     def forces(self, coefficients: Array) -> Array:
         """See `Term`: in dynamics with the factors of both ends of the step."""
@@ -168,10 +170,14 @@ class ObstacleContact:
         reached = self._reached(pose.to_local(x))
         if reached.any():
             self._choose(reached)
-        self._sticking, self._first = self._first, False
+        sticking: bool | ContactForces = self._first
+        if not self._first and self._returns < RETURNS and len(self.now.x) == len(self._points):
+            sticking = self.now
         self.now: ContactForces = self._contact.evaluate(
-            x[self._points], pose, self._held, sticking=self._sticking
+            x[self._points], pose, self._held, sticking=sticking
         )
+        self._returns += not self._first and self.now.exceeded
+        self._first = False
         self.at_end = self._on_all(self.now.forces)
         factor = self.motion.factor
         return np.asarray(factor * self.at_end - (factor - 1) * self.at_start[0])
@@ -207,7 +213,7 @@ class ObstacleContact:
         now, penalty = self.now, self._contact.penalty
         allowed = SETTLED * np.max(now.pressure / penalty, initial=0.0)
         settled = now.violation <= max(allowed, ROUND_OFF * self._h)
-        if settled and not self._sticking:
+        if settled and not now.exceeded:
             return False
         if not settled:
             self._pressure[self._chosen] = now.pressure
