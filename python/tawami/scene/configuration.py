@@ -30,9 +30,9 @@ from tawami.scene.form_inputs import FormInputs
 from tawami.scene.held_border import HeldBorder
 from tawami.scene.loads import Loads
 from tawami.scene.model import Model
-from tawami.scene.obstacle import Obstacles
 from tawami.scene.obstacle_contact import ObstacleContact
 from tawami.scene.obstacle_motion import Times
+from tawami.scene.obstacles import Obstacles
 from tawami.scene.reactions import Reactions
 from tawami.scene.share import Moment
 from tawami.scene.step import Accepted, Problem, StepKind

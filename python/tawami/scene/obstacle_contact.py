@@ -8,52 +8,21 @@ the penalty alone: below 5e-6 h times the largest pressure over mu.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 
-from tawami.base.arrays import Array, Indices, Mask
+from tawami.base.arrays import Array, Mask
 from tawami.base.errors import SupportError
 from tawami.border.contact import OPEN, Contact, ContactForces, Multipliers
-from tawami.border.patches import Patches, patches
 from tawami.border.rigid import Pose
 from tawami.field.constraints import PointHeld
+from tawami.scene.contact_result import ContactResult
 from tawami.scene.domain import Domain
-from tawami.scene.held_border import PENALTY
+from tawami.scene.near_border import BorderNear
+from tawami.scene.obstacle import Obstacle
 from tawami.scene.obstacle_motion import ObstacleMotion
 from tawami.solve.bordered import Blocks
-
-if TYPE_CHECKING:
-    from tawami.scene.obstacle import Obstacle
-
-
-@dataclass(frozen=True)
-class ContactResult:
-    """Contact with one obstacle at the end of a step.
-
-    Attributes:
-        name: Name of the obstacle.
-        force: Force on the obstacle [N per metre depth].
-        moment: Moment on it about its centre [N m per metre depth], one for each rotation.
-        centre: Its centre [m].
-        x: Points of the border, points x dim [m], where contact was evaluated.
-        pressure: Pressure at these points [Pa], 0 where they are apart.
-        friction: Friction on the body at these points [Pa], along the normal of the obstacle turned by
-            a right angle counter-clockwise, points x (dim - 1).
-        penetration: Largest mean penetration of a patch [m].
-    """
-
-    name: str
-    force: Array
-    moment: Array
-    centre: Array
-    x: Array
-    pressure: Array
-    friction: Array
-    penetration: float
-
 
 #: Penetration, relative to that of the penalty alone, below which no other pass is needed; and the
 #: penetration that is round-off [cells].
@@ -84,69 +53,38 @@ class ObstacleContact:
         self, domain: Domain, obstacle: Obstacle, motion: ObstacleMotion, before: Array
     ) -> None:
         self.obstacle, self.motion = obstacle, motion
-        self._h, self._size = domain.model.grid.h, domain.layout.size
-        place, dim = obstacle.place, domain.model.space.dim
-        self._n, self._dim = domain.layout.num_displacement, dim
-        cells = place.cells(domain)
-        functions = cells.values(domain.layout.basis)
-        #: Displacements of all points, from the coefficients of the displacement.
-        self._at_all = sp.kron(functions, sp.identity(dim), format="csr")
-        self._x = place.x + self._at_all_points(before)
-        self._start = motion.start.to_local(self._x)
-        self._groups = patches(place.now, self._h)
-        weight = place.weight
-        self._weights = np.maximum(weight, 1e-12 * weight.max())  # 0 on an axis of symmetry
-        shear = domain.shear_of_cells[cells.location.cell]
-        self._penalty = PENALTY / self._h * self._groups.means(self._weights, shear)
-        self._distance = obstacle.shape.evaluate(self._start).distance
-        self._pressure = self._groups.means(self._weights, obstacle.pressure)
-        self._traction = self._groups.means(self._weights, obstacle.traction)
-        self._chosen = np.zeros(self._groups.count, dtype=bool)
-        reach = REACH * self._h + np.abs(motion.unknown[:dim]).max(initial=0.0)
-        self._choose((self._distance < reach) | (self._pressure > 0)[self._groups.number])
+        self._dim = domain.model.space.dim
+        self._border = BorderNear(domain, obstacle.place, obstacle.shape, motion.start, before)
+        groups, weights = self._border.groups, self._border.weights
+        self._pressure = groups.means(weights, obstacle.pressure)
+        self._traction = groups.means(weights, obstacle.traction)
+        reach = REACH * self._border.h + np.abs(motion.unknown[: self._dim]).max(initial=0.0)
+        pressed = (self._pressure > 0)[groups.number]
+        self._choose((self._border.distance < reach) | pressed)
         self.at_start = self._forces_at_start()
         if motion.times is None:
             self._touch()
 
-    def _at_all_points(self, coefficients: Array) -> Array:
-        moved = self._at_all @ coefficients[: self._n]
-        return np.asarray(moved.reshape(-1, self._dim))
+    def _choose(self, points: Mask) -> None:
+        """Evaluate the patches of further points from now on."""
+        near = self._border
+        near.choose(points)
+        self._contact = Contact(
+            self.obstacle.shape, near.patches, near.weights[near.points], self.obstacle.friction,
+            near.penalty[near.chosen], near.start[near.points],
+        )  # fmt: skip
 
     def _touch(self) -> None:
         """Let patches that touch in statics push from the first evaluation on."""
-        gap = self._groups.means(self._weights, self._distance)
-        new = (np.abs(gap) < TOUCHING * self._h) & (self._pressure == 0)
-        self._pressure[new] = (self._penalty * (np.maximum(gap, 0.0) + ROUND_OFF * self._h))[new]
-
-    # -- the patches near the obstacle ---------------------------------------
-
-    def _choose(self, points: Mask) -> None:
-        """Evaluate the patches of further points from now on."""
-        number = self._groups.number
-        self._chosen[number[points]] = True
-        self._points: Indices = np.flatnonzero(self._chosen[number])
-        new_number = np.cumsum(self._chosen) - 1
-        near = Patches(new_number[number[self._points]], int(self._chosen.sum()))
-        rows = self._dim * self._points[:, None] + np.arange(self._dim)
-        self._at_points = self._at_all[rows.ravel()]
-        self._contact = Contact(
-            self.obstacle.shape, near, self._weights[self._points], self.obstacle.friction,
-            self._penalty[self._chosen], self._start[self._points],
-        )  # fmt: skip
-        together = (near.incidence.T @ near.incidence).astype(float)
-        of_points = sp.kron(together, np.ones((self._dim, self._dim)), format="csr")
-        touched = abs(self._at_points)
-        #: Where the stiffness may have entries.
-        self._places = (touched.T @ of_points @ touched).tocoo()
+        near, h = self._border, self._border.h
+        gap = near.groups.means(near.weights, near.distance)
+        new = (np.abs(gap) < TOUCHING * h) & (self._pressure == 0)
+        self._pressure[new] = (near.penalty * (np.maximum(gap, 0.0) + ROUND_OFF * h))[new]
 
     @property
     def _held(self) -> Multipliers:
-        return Multipliers(self._pressure[self._chosen], self._traction[self._chosen])
-
-    def _reached(self, local: Array) -> Mask:
-        """Points of other patches that may have come to the obstacle since the start of the step."""
-        moved = np.linalg.norm(local - self._start, axis=1)
-        return np.asarray((self._distance <= moved) & ~self._chosen[self._groups.number])
+        chosen = self._border.chosen
+        return Multipliers(self._pressure[chosen], self._traction[chosen])
 
     # -- forces, see `Term` --------------------------------------------------
 
@@ -166,85 +104,76 @@ class ObstacleContact:
 
     def forces(self, coefficients: Array) -> Array:
         """See `Term`: in dynamics with the factors of both ends of the step."""
-        pose, x = self.motion.pose, self._x + self._at_all_points(coefficients)
-        reached = self._reached(pose.to_local(x))
+        pose, x = self.motion.pose, self._border.positions(coefficients)
+        reached = self._border.reached(pose.to_local(x))
         if reached.any():
             self._choose(reached)
         sticking: bool | ContactForces = self._first
-        if not self._first and self._returns < RETURNS and len(self.now.x) == len(self._points):
+        if (
+            not self._first
+            and self._returns < RETURNS
+            and len(self.now.x) == len(self._border.points)
+        ):
             sticking = self.now
         self.now: ContactForces = self._contact.evaluate(
-            x[self._points], pose, self._held, sticking=sticking
+            x[self._border.points], pose, self._held, sticking=sticking
         )
         self._returns += not self._first and self.now.exceeded
         self._first = False
-        self.at_end = self._on_all(self.now.forces)
+        self.at_end = self._border.on_all(self.now.forces)
         factor = self.motion.factor
         return np.asarray(factor * self.at_end - (factor - 1) * self.at_start[0])
 
-    def _on_all(self, forces: Array) -> Array:
-        """Forces on the points near the obstacle as forces on all coefficients."""
-        on_all = np.zeros(self._size)
-        on_all[: self._n] = self._at_points.T @ forces.ravel()
-        return on_all
-
     def _forces_at_start(self) -> tuple[Array, Array]:
         """Forces at the start of the step: on all coefficients, and on the obstacle."""
-        pose, x = self.motion.start, self._x[self._points]
+        pose, x = self.motion.start, self._border.x[self._border.points]
         now, held = self._contact.evaluate(x, pose, self._held), self._held
         number = self._contact.patches.number
         on_points = held.pressure[number, None] * now.surface.normal
         on_points += np.einsum("jk,jka->ja", held.traction[number], now.tangent)
         on_points *= self._contact.weights[:, None]
-        return self._on_all(on_points), -pose.resultant(x, on_points)
+        return self._border.on_all(on_points), -pose.resultant(x, on_points)
 
     def stiffness(self) -> sp.csr_matrix:
         """See `Term`. Its entries are in the same places as long as no patch comes near."""
-        matrix = self._at_points.T @ self.now.derivative @ self._at_points
-        matrix = (-self.motion.factor * matrix).tocoo()
-        places = self._places
-        data = np.concatenate([matrix.data, np.zeros(places.nnz)])
-        rows = np.concatenate([matrix.row, places.row])
-        columns = np.concatenate([matrix.col, places.col])
-        return sp.coo_matrix((data, (rows, columns)), shape=(self._size, self._size)).tocsr()
+        return self._border.on_coefficients(-self.motion.factor * self.now.derivative)
 
     def improve(self) -> bool:
         """See `Term`."""
         now, penalty = self.now, self._contact.penalty
         allowed = SETTLED * np.max(now.pressure / penalty, initial=0.0)
-        settled = now.violation <= max(allowed, ROUND_OFF * self._h)
+        settled = now.violation <= max(allowed, ROUND_OFF * self._border.h)
         if settled and not now.exceeded:
             return False
         if not settled:
-            self._pressure[self._chosen] = now.pressure
-            self._traction[self._chosen] = now.traction
+            self._pressure[self._border.chosen] = now.pressure
+            self._traction[self._border.chosen] = now.traction
         return True
 
     def accept(self) -> None:
         """Keep pressures, friction and pose for later steps."""
-        obstacle, of = self.obstacle, self._contact.patches.number
+        obstacle = self.obstacle
         pressure, traction = self.pressures
         obstacle.pressure, obstacle.traction = pressure, traction
         obstacle.pose = self.motion.pose
         obstacle.rates = self.motion.rates_at_end(self.at_start[1], self.now.resultant)
-        assert len(of) == len(self._points)
 
     @property
     def pressures(self) -> tuple[Array, Array]:
         """Pressure and friction at all points [Pa]."""
         number = self._contact.patches.number
-        pressure = np.zeros(len(self._x))
-        traction = np.zeros((len(self._x), self._dim - 1))
-        pressure[self._points] = self.now.pressure[number]
-        traction[self._points] = self.now.traction[number]
+        pressure = np.zeros(len(self._border.x))
+        traction = np.zeros((len(self._border.x), self._dim - 1))
+        pressure[self._border.points] = self.now.pressure[number]
+        traction[self._border.points] = self.now.traction[number]
         return pressure, traction
 
     def result(self) -> ContactResult:
         """The contact at the last forces."""
         now, dim = self.now, self._dim
         pressure, traction = self.pressures
-        x = self._x.copy()
-        x[self._points] = now.x
+        x = self._border.x.copy()
+        x[self._border.points] = now.x
         return ContactResult(
             self.obstacle.name, now.resultant[:dim], now.resultant[dim:], self.pose.position, x,
             pressure, traction, now.penetration,
@@ -292,7 +221,7 @@ class ObstacleContact:
     def measure(self) -> float:
         """Residual of each free motion relative to its largest term, the largest of these."""
         sizes = np.abs(self._parts).max(axis=0)
-        moments = np.abs(self.now.forces).sum() * self._h  # of forces in balance
+        moments = np.abs(self.now.forces).sum() * self._border.h  # of forces in balance
         least = np.where(np.flatnonzero(self.motion.free) < self._dim, 0.0, moments)
         sizes = np.maximum(sizes, least)
         shares = np.divide(np.abs(self.residual), sizes, out=np.zeros_like(sizes), where=sizes > 0)
@@ -301,11 +230,11 @@ class ObstacleContact:
     def blocks(self) -> Blocks:
         """Derivatives of the equations of body and obstacle by each other's unknowns."""
         free, factor, now = self.motion.free, self.motion.factor, self.now
-        of_body = np.zeros((self._size, self.num_unknowns))
-        of_body[: self._n] = -factor * (self._at_points.T @ now.by_motion[:, free])
-        by_body = np.zeros((self.num_unknowns, self._size))
+        of_body = np.zeros((self._border.size, self.num_unknowns))
+        of_body[: self._border.n] = -factor * (self._border.at_points.T @ now.by_motion[:, free])
+        by_body = np.zeros((self.num_unknowns, self._border.size))
         rows = now.resultant_by_positions[free]
-        by_body[:, : self._n] = -factor * (self._at_points.T @ rows.T).T
+        by_body[:, : self._border.n] = -factor * (self._border.at_points.T @ rows.T).T
         own = self.motion.stiffness - factor * now.resultant_by_motion[np.ix_(free, free)]
         return Blocks(of_body, by_body, own)
 
@@ -324,10 +253,12 @@ class ObstacleContact:
         """
         if self.motion.times is not None:
             return
-        arm = np.linalg.norm(self._x[self._points] - self.motion.pose.position, axis=1)
-        stiffness = float(self._penalty.max(initial=0.0)) * float(self._weights.max())
+        arm = np.linalg.norm(
+            self._border.x[self._border.points] - self.motion.pose.position, axis=1
+        )
+        stiffness = float(self._border.penalty.max(initial=0.0)) * float(self._border.weights.max())
         motions = np.flatnonzero(self.motion.free)
-        scale = np.where(motions < self._dim, 1.0, max(arm.max(initial=0.0), self._h))
+        scale = np.where(motions < self._dim, 1.0, max(arm.max(initial=0.0), self._border.h))
         scaled = matrix / (stiffness * np.outer(scale, scale))
         _, sizes, directions = np.linalg.svd(scaled)
         if sizes[-1] > UNHELD:
@@ -344,7 +275,9 @@ class ObstacleContact:
         """Means over patches that push, as constraints that find rigid motions in statics."""
         if self.motion.free.any():
             return []
-        now = self._contact.evaluate(self._x[self._points], self.motion.pose, self._held)
+        now = self._contact.evaluate(
+            self._border.x[self._border.points], self.motion.pose, self._held
+        )
         rows, directions = [], [now.surface.normal]
         if self.obstacle.friction > 0:
             directions += list(now.tangent.transpose(1, 0, 2))
@@ -354,7 +287,7 @@ class ObstacleContact:
             x, y = now.x[mine][0]
             for direction in directions:
                 along = (mine * shares)[:, None] * direction
-                weights = self._at_points.T @ along.ravel()
+                weights = self._border.at_points.T @ along.ravel()
                 indices = np.flatnonzero(weights)
                 rows.append(PointHeld(indices, weights[indices], 0.0, f"{self.obstacle}", (x, y)))
         return rows

@@ -15,9 +15,9 @@ from tawami.base.text import quoted
 from tawami.field.reduction import Reduction
 from tawami.grid import edges
 from tawami.grid.grid import EDGES, Edge
+from tawami.scene.contact_result import ContactResult
 from tawami.scene.model import Model
 from tawami.scene.obstacle import Obstacle
-from tawami.scene.obstacle_contact import ContactResult
 from tawami.scene.step import Accepted
 from tawami.scene.supports import Supports
 

@@ -20,8 +20,8 @@ from tawami.grid import edges
 from tawami.scene import presentation, quantities
 from tawami.scene.absent import Elsewhere
 from tawami.scene.configuration import Configuration, Outcome
+from tawami.scene.contact_result import ContactResult
 from tawami.scene.obstacle import Obstacle
-from tawami.scene.obstacle_contact import ContactResult
 from tawami.scene.points import ROUND_OFF, outside
 from tawami.scene.quantities import Arrays, Given, Quantity
 

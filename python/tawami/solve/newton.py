@@ -33,6 +33,7 @@ from tawami.solve.numerics import Numerics
 from tawami.solve.path import Path
 from tawami.solve.scaling import Scaling
 from tawami.solve.terms import Terms
+from tawami.solve.unknowns import complete
 
 #: Tolerance of linear solves along a path, whose first residual may be zero.
 ON_PATH = 1e-8
@@ -297,28 +298,14 @@ class Newton:
         if solver.singular:
             solver.forget()
             self._diagnosis.report_singular(solver, equations, history, singular)
-        change, of_factor = self._on_all(reduction, found), 0.0
 
         def again(right: Array) -> Array:
-            own = reduction.restricted(right)[reduction.own]
-            return self._on_all(reduction, solver.again(own, tolerance))
+            mine = reduction.restricted(right)[reduction.own]
+            return self._on_all(reduction, solver.again(mine, tolerance))
 
-        elimination = None if equations.terms is None else equations.terms.elimination(again)
-        if elimination is not None:
-            change, own = elimination.solve(change, elimination.residual)
-        if equations.path is not None:
-            rate = again(equations.path.rate)
-            if elimination is not None:
-                rate, own_rate = elimination.solve(rate, np.zeros_like(own))
-            n = reduction.layout.num_displacement
-            of_factor = equations.path.control.change(iterate.u, change[:n], rate[:n])
-            if not np.isfinite(of_factor):
-                self._fail(history, "The loads do not move the control: choose another control")
-            change = change + of_factor * rate
-            if elimination is not None:
-                own = own + of_factor * own_rate
-        if elimination is not None:
-            elimination.add(own)
+        change, of_factor = complete(equations, iterate.u, self._on_all(reduction, found), again)
+        if not np.isfinite(of_factor):
+            self._fail(history, "The loads do not move the control: choose another control")
         return change, of_factor
 
     @functools.cached_property
