@@ -57,6 +57,8 @@ class Contact:
         friction: Coefficient of friction: 0 for a smooth obstacle, infinite for one without sliding.
         penalty: r of each patch [Pa/m], about 200 mu / h.
         start: Positions at the start of the step in the frame of the obstacle, `pose.to_local(x)`.
+        least: Mean distance at which each patch touches [m]: 0, or negative for one that may stay
+            inside the obstacle where it is.
     """
 
     shape: Shape
@@ -65,6 +67,7 @@ class Contact:
     friction: float
     penalty: Array
     start: Array
+    least: Array | float = 0.0
 
     def evaluate(
         self, x: Array, pose: Pose, held: Multipliers, *, sticking: bool | ContactForces = False
@@ -84,7 +87,7 @@ class Contact:
         surface = _turned(self.shape.evaluate(local), pose.rotation)
         moved = (local - self.start) @ pose.rotation.T
         tangent, turning = tangents(surface)
-        gap = self.patches.means(self.weights, surface.distance)
+        gap = self.patches.means(self.weights, surface.distance) - self.least
         pressure = np.maximum(held.pressure - self.penalty * gap, 0.0)
         slip = self.patches.means(self.weights, np.einsum("jka,ja->jk", tangent, moved))
         trial = held.traction - self.penalty[:, None] * slip
@@ -124,7 +127,7 @@ class ContactForces:
         tangent: Tangents, points x (dim - 1) x dim.
         turning: Derivatives of the tangents by the position [1/m], points x (dim - 1) x dim x dim.
         slip_gradient: Derivative of the slip of a point by its position, points x (dim - 1) x dim.
-        gap: Mean distance of each patch [m].
+        gap: Mean distance of each patch, less the least one [m].
         slip: Mean slip of each patch since the step began [m], patches x (dim - 1).
         trial: Friction if the patch stuck [Pa], patches x (dim - 1).
         scale: Ratio of the friction to the trial.
@@ -173,7 +176,7 @@ class ContactForces:
     @property
     def penetration(self) -> float:
         """Largest mean penetration of a patch [m]."""
-        return float(np.max(-self.gap, initial=0.0))
+        return float(np.max(-(self.gap + self.contact.least), initial=0.0))
 
     @property
     def violation(self) -> float:

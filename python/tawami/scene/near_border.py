@@ -13,6 +13,9 @@ from tawami.scene.border import MovingPoints
 from tawami.scene.domain import Domain
 from tawami.scene.held_border import PENALTY
 
+#: Lengths of patches that stay, unless they were made so [cells].
+SHORTEST, LONGEST = 0.7, 2.2
+
 
 class BorderNear:
     """Patches of a part of the border, of which those near an obstacle are evaluated.
@@ -23,6 +26,8 @@ class BorderNear:
         shape: Shape of the obstacle.
         pose: Pose of the obstacle at the start.
         before: Displacement coefficients since the start where particles do not move, else 0.
+        groups: Patches of the last step, which stay while they have about the size of a cell: other
+            patches would have other distances.
 
     Attributes:
         h: Side of a cell [m].
@@ -45,7 +50,13 @@ class BorderNear:
     at_points: sp.csr_matrix
 
     def __init__(
-        self, domain: Domain, place: MovingPoints, shape: Shape, pose: Pose, before: Array
+        self,
+        domain: Domain,
+        place: MovingPoints,
+        shape: Shape,
+        pose: Pose,
+        before: Array,
+        groups: Patches | None = None,
     ) -> None:
         self.h, self._dim = domain.model.grid.h, domain.model.space.dim
         self.n, self.size = domain.layout.num_displacement, domain.layout.size
@@ -55,13 +66,23 @@ class BorderNear:
         self.x = place.x
         self.x = self.positions(before)
         self.start = pose.to_local(self.x)
-        self.groups = patches(place.now, self.h)
+        self.groups = self._grouped(place, groups)
         weight = place.weight
         self.weights = np.maximum(weight, 1e-12 * weight.max())  # 0 on an axis of symmetry
         shear = domain.shear_of_cells[cells.location.cell]
         self.penalty = PENALTY / self.h * self.groups.means(self.weights, shear)
         self.distance = shape.evaluate(self.start).distance
         self.chosen = np.zeros(self.groups.count, dtype=bool)
+
+    def _grouped(self, place: MovingPoints, groups: Patches | None) -> Patches:
+        """Patches of all points."""
+        if groups is not None:
+            length = groups.sums(place.length) / self.h
+            made = groups.sums(place.made.length) / self.h
+            least, most = np.minimum(SHORTEST, made), np.maximum(LONGEST, made)
+            if ((length >= least) & (length <= most)).all():
+                return groups
+        return patches(place.now, self.h)
 
     def positions(self, coefficients: Array) -> Array:
         """Positions of all points at increments of the displacement [m]."""

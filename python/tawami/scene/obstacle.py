@@ -10,6 +10,7 @@ import numpy as np
 from tawami.base.arrays import Array, Mask
 from tawami.base.errors import CheckpointError, InputError
 from tawami.base.text import quoted
+from tawami.border.patches import Patches
 from tawami.border.rigid import Pose
 from tawami.border.shapes import Shape
 from tawami.scene.action import Action, Owner, Value
@@ -43,11 +44,12 @@ class Obstacle(Action):
         mass: Mass and moments of inertia of its motions [kg per metre depth], [kg m2 per metre depth].
         pose: Where it is.
         rates: Velocity and acceleration of its motions.
+        groups: Patches of these points in the last step.
         pressure, traction: On the points of `place` at the end of the last step [Pa].
     """
 
     __slots__ = (
-        "_changes", "_speeds", "free", "friction", "given", "mass", "name", "place", "pose",
+        "_changes", "_speeds", "free", "friction", "given", "groups", "mass", "name", "place", "pose",
         "pressure", "rates", "shape", "traction",
     )  # fmt: skip
 
@@ -69,6 +71,7 @@ class Obstacle(Action):
         self.friction, self.free, self.mass = friction, free, mass
         self._speeds, self._changes = list(speeds), 0
         self.pose = Pose.at(shape.centre)
+        self.groups: Patches | None = None
         first = np.array([speed.rates(0.0, 0.0)[0] for speed in speeds])
         self.rates: tuple[Array, Array] = (np.where(free, first, 0.0), np.zeros(len(free)))
         dim = place.space.dim
@@ -216,6 +219,7 @@ class Obstacle(Action):
         """Pose, velocity, pressures, and the share of its values that it has."""
         return super().state() | {
             "pose": self.pose.coordinates, "rates": list(self.rates), "pressure": self.pressure,
+            "groups": [] if self.groups is None else self.groups.number,
             "traction": self.traction, "friction": self.friction, "changes": self._changes,
             "speeds": [[speed.rates(0.0, 0.0)[0]] if rests(speed) or not speed.is_function else []
                        for speed in self._speeds],
@@ -239,4 +243,5 @@ class Obstacle(Action):
         self.pose = Pose.at(self.shape.centre).moved(np.asarray(state["pose"]))
         self.rates = np.asarray(state["rates"][0]), np.asarray(state["rates"][1])
         self.pressure, self.traction = state["pressure"], state["traction"]
-        self.friction = state["friction"]
+        self.friction, number = state["friction"], np.asarray(state["groups"], dtype=np.int64)
+        self.groups = Patches(number, int(number.max()) + 1) if len(number) else None

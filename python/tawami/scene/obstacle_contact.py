@@ -54,10 +54,15 @@ class ObstacleContact:
     ) -> None:
         self.obstacle, self.motion = obstacle, motion
         self._dim = domain.model.space.dim
-        self._border = BorderNear(domain, obstacle.place, obstacle.shape, motion.start, before)
+        self._border = BorderNear(
+            domain, obstacle.place, obstacle.shape, motion.start, before, obstacle.groups
+        )
         groups, weights = self._border.groups, self._border.weights
         self._pressure = groups.means(weights, obstacle.pressure)
         self._traction = groups.means(weights, obstacle.traction)
+        gap = groups.means(weights, self._border.distance)
+        # in dynamics what pushed such a patch out would give energy to the body
+        self._least = 0 * gap if motion.times is None else np.minimum(gap, 0.0)
         reach = REACH * self._border.h + np.abs(motion.unknown[: self._dim]).max(initial=0.0)
         pressed = (self._pressure > 0)[groups.number]
         self._choose((self._border.distance < reach) | pressed)
@@ -71,7 +76,7 @@ class ObstacleContact:
         near.choose(points)
         self._contact = Contact(
             self.obstacle.shape, near.patches, near.weights[near.points], self.obstacle.friction,
-            near.penalty[near.chosen], near.start[near.points],
+            near.penalty[near.chosen], near.start[near.points], self._least[near.chosen],
         )  # fmt: skip
 
     def _touch(self) -> None:
@@ -153,6 +158,7 @@ class ObstacleContact:
     def accept(self) -> None:
         """Keep pressures, friction and pose for later steps."""
         obstacle = self.obstacle
+        obstacle.groups = self._border.groups
         pressure, traction = self.pressures
         obstacle.pressure, obstacle.traction = pressure, traction
         obstacle.pose = self.motion.pose
@@ -219,11 +225,11 @@ class ObstacleContact:
 
     @property
     def measure(self) -> float:
-        """Residual of each free motion relative to its largest term, the largest of these."""
-        sizes = np.abs(self._parts).max(axis=0)
-        moments = np.abs(self.now.forces).sum() * self._border.h  # of forces in balance
-        least = np.where(np.flatnonzero(self.motion.free) < self._dim, 0.0, moments)
-        sizes = np.maximum(sizes, least)
+        """Residual of each free motion relative to the largest force or moment, the largest of these."""
+        moves = np.flatnonzero(self.motion.free) < self._dim
+        sizes = np.maximum(np.abs(self._parts).max(axis=0), self.motion.round_off)
+        force = max(np.abs(self.now.forces).sum(), sizes[moves].max(initial=0.0))
+        sizes = np.maximum(sizes, np.where(moves, force, force * self._border.h))
         shares = np.divide(np.abs(self.residual), sizes, out=np.zeros_like(sizes), where=sizes > 0)
         return float(shares.max(initial=0.0))
 

@@ -17,6 +17,9 @@ import numpy as np
 from tawami.base.arrays import Array, Mask
 from tawami.border.rigid import Pose
 
+#: Share of slope m q below which the inertia m slope (q - dt w) is round-off; it is solved to 1e-6.
+DIGITS = 1e-9
+
 
 @dataclass(frozen=True)
 class Times:
@@ -122,6 +125,12 @@ class ObstacleMotion:
         if self.times is not None:
             found.append(self.mass * self._acceleration)
         return [part[self.free] for part in found]
+
+    @property
+    def round_off(self) -> Array:
+        """Forces on the free motions below which their inertia has no digits."""
+        slope = 0.0 if self.times is None else self.times.slope
+        return np.asarray(DIGITS * slope * self.mass * np.abs(self.unknown))[self.free]
 
     @property
     def stiffness(self) -> Array:
