@@ -195,12 +195,13 @@ class SceneBorder:
         """Names of its parts."""
         return () if self._given is None else self._given.names
 
-    def part(self, what: str, where: Part) -> MovingPoints:
+    def part(self, what: str, where: Part, *, joined: bool = False) -> MovingPoints:
         """Points of a part of the border, which are exact for this part at its present place.
 
         Args:
             what: The call, for messages.
             where: The part.
+            joined: Chains of points do not end where only the name changes.
 
         Raises:
             InputError: The body has no border, no part of this name, or nothing where the function or
@@ -215,7 +216,10 @@ class SceneBorder:
         if isinstance(where, np.ndarray):
             points = self.points.now[self._mask(what, where)]
         else:
-            points = self._pieces(what, where).points(self._grid, self._count)
+            pieces = self._pieces(what, where)
+            if joined:
+                pieces = replace(pieces, tag=np.zeros_like(pieces.tag), names=("border",))
+            points = pieces.points(self._grid, self._count)
         if not len(points):
             raise InputError(
                 f"{what}: no point of the border is in this part: expected some of it; the border has "

@@ -31,8 +31,9 @@ SETTLED, ROUND_OFF = 1e-3, 1e-9
 REACH = 1.0
 #: Evaluations in which friction may turn round only after a patch was taken as sticking.
 RETURNS = 10
-#: Distance at which a patch touches at the start of a static step [cells].
-TOUCHING = 1e-6
+#: Distance at which a patch touches at the start of a static step, and at which the nearest patch does
+#: if no other touches [cells].
+TOUCHING, ALMOST = 1e-6, 0.1
 #: A motion is held by nothing if its stiffness is below this, relative to that of the penalty.
 UNHELD = 1e-12
 
@@ -80,10 +81,15 @@ class ObstacleContact:
         )  # fmt: skip
 
     def _touch(self) -> None:
-        """Let patches that touch in statics push from the first evaluation on."""
+        """Let patches that touch in statics push from the first evaluation on.
+
+        If none does, the nearest does that is almost there, as at the apex of a curved border.
+        """
         near, h = self._border, self._border.h
         gap = near.groups.means(near.weights, near.distance)
-        new = (np.abs(gap) < TOUCHING * h) & (self._pressure == 0)
+        nearest = float(gap.min())
+        reach = max(nearest, 0.0) if nearest < ALMOST * h and not self._pressure.any() else 0.0
+        new = (np.abs(gap) < reach + TOUCHING * h) & (self._pressure == 0)
         self._pressure[new] = (near.penalty * (np.maximum(gap, 0.0) + ROUND_OFF * h))[new]
 
     @property

@@ -71,7 +71,9 @@ class Obstacles(Owner[Obstacle]):
         mu = checked_friction(what, friction)
         made = inputs.shape_of(what, shape, space, h)
         given = "the border" if where is None else label(where)
-        part = self._border.part(what, list(self._border.names) if where is None else where)
+        part = self._border.part(
+            what, list(self._border.names) if where is None else where, joined=True
+        )
         moves = inputs.free_of(what, free, space, force is not None or mass is not None)
         masses = inputs.masses_of(what, mass, inertia, space)
         by = inputs.components(f"{what}: displacement", displacement, space)
