@@ -49,6 +49,9 @@ class Attachment:
         points: Indices along the axes of the points of each rule; none for means over cells.
         values: Values of h, time, dt, b and the parameters of the form; :meth:`change` replaces them.
         version: A number that changes with them.
+        start: Coefficients at the start of a step, where particles do not move, without the volumetric
+            field, whose equation is one of increments. The ghost penalty acts on their sum with the
+            increments, as stress does, so that its forces do not fade from step to step.
     """
 
     def __init__(
@@ -67,6 +70,7 @@ class Attachment:
         self.values: dict[str, Any] = {"h": grid.h, "time": 0.0, "dt": 0.0, "b": np.zeros(dim)}
         self.values |= parameters
         self.version = 0
+        self.start: Array | None = None
         self.space = grid.function_space(compiled.element)
         number = grid.cell_numbers(grid.rectangle.ij)
         active: Mask = np.zeros(grid.cells[::-1], dtype=bool)
@@ -104,6 +108,12 @@ class Attachment:
         if any(np.any(self.values[name] != value) for name, value in values.items()):
             self.values |= values
             self.version += 1
+
+    def begin(self, total: Array | None) -> None:
+        """Begin a step where particles do not move, with all coefficients since the start."""
+        self.start = None if total is None else np.array(total)
+        if self.start is not None and self.layout.volumetric is not None:
+            self.start[self.layout.volumetric.slice] = 0.0
 
     def summed(self, of_cells: Any) -> Array:
         """The sum over all ranks of arrays from their cells."""

@@ -38,7 +38,7 @@ class FollowerPressure:
         self._x, self._area, self._pressure = x, area, pressure
         self._tabulated = cells.tabulated(layout.basis)
 
-    def begin(self, diagonal: Callable[[], Array]) -> None:
+    def begin(self, diagonal: Callable[[], Array], inertia: Array | None) -> None:
         """See `Term`."""
 
     def improve(self) -> bool:

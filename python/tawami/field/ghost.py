@@ -47,8 +47,11 @@ class GhostPenalty:
             coefficients: Increments of all fields.
             data: Particle data of each rule.
         """
-        matrix = self._on_all(data)
-        return forces if matrix is None else np.asarray(forces + matrix @ coefficients)
+        matrix, start = self._on_all(data), self._attachment.start
+        if matrix is None:
+            return forces
+        fields = coefficients if start is None else start + coefficients
+        return np.asarray(forces + matrix @ fields)
 
     def add_tangent(self, tangent: Any, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
         """A reduced tangent plus S^T G S, G the penalty; the same object as long as `tangent` is."""

@@ -24,7 +24,7 @@ from tawami.scene.action import Term
 from tawami.scene.configuration import Configuration
 from tawami.scene.constraints import constraints
 from tawami.scene.contact import ActiveSet
-from tawami.scene.held_border import HeldBorder
+from tawami.scene.held_border import HeldBorder, imposed
 from tawami.scene.obstacle_contact import ObstacleContact
 from tawami.scene.obstacle_motion import Times
 from tawami.scene.share import Moment
@@ -46,6 +46,19 @@ class Clock:
 
     steps: int = 0
     loads: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Prescribed:
+    """Prescribed velocities [m/s], or accelerations [m/s2].
+
+    Attributes:
+        edges: On all coefficients, of supports on edges and at points.
+        patches: Means over the patches of each support on patches; empty if none moves.
+    """
+
+    edges: Array
+    patches: list[Array]
 
 
 @dataclass(frozen=True)
@@ -103,9 +116,13 @@ class NewmarkStep:
         if configuration.loads.vary:
             self._first = configuration.external(self._begin)
         self._mapped = carried.mapped(self._mass)
-        self._speed = self._prescribed(lambda term: term.rates(self._finish)[0])
-        self._speed1 = self._prescribed(lambda term: term.rates(self._finish)[1])
-        self._speed_rate = (self._speed1 - self._speed) / dt
+        first = self._prescribed(lambda term: term.rates(self._finish)[0])
+        last = self._prescribed(lambda term: term.rates(self._finish)[1])
+        change = Prescribed(
+            (last.edges - first.edges) / dt,
+            [(b - a) / dt for a, b in zip(first.patches, last.patches, strict=True)],
+        )
+        self._speed, self._speed1, self._speed_rate = first, last, change
 
     @property
     def moment(self) -> Moment:
@@ -120,11 +137,21 @@ class NewmarkStep:
             now.supports, now.domain, amount, zero, now.before, moving=True, fields=fields
         )
 
-    def _prescribed(self, rate: Callable[[Term], float]) -> Array:
-        """Prescribed velocities on all coefficients [m/s]."""
+    def _prescribed(self, rate: Callable[[Term], float]) -> Prescribed:
+        """Prescribed velocities [m/s]."""
         if not any(support.moves for support in self._now.supports.all):
-            return np.zeros(self._now.domain.layout.size)
-        return self._constraints(rate)[0].offset
+            return Prescribed(np.zeros(self._now.domain.layout.size), [])
+        reduction, _, supports = self._constraints(rate)
+        return Prescribed(reduction.offset, [one.prescribed_means for one in supports])
+
+    def _imposed(
+        self, values: Array, reduction: Reduction, supports: Sequence[HeldBorder], rate: Prescribed
+    ) -> Array:
+        """Velocities or accelerations, functions x dim, that obey the supports."""
+        flat = reduction.imposed(values.ravel(), self._masses, rate.edges)
+        rates = rate.patches or [0 * one.prescribed_means for one in supports]
+        fixed = reduction.fixed[: flat.size]
+        return imposed(supports, rates, self._masses, fixed, flat).reshape(values.shape)
 
     def _displacement(self, term: Term) -> float:
         """Change of the factor of a prescribed displacement in the step."""
@@ -141,8 +168,8 @@ class NewmarkStep:
         v, a = self._mapped
         if begins:
             a = self._first_acceleration(a, obstacles)
-        v = reduction.imposed(v.ravel(), self._masses, self._speed).reshape(v.shape)
-        a = reduction.imposed(a.ravel(), self._masses, self._speed_rate).reshape(a.shape)
+        v = self._imposed(v, reduction, supports, self._speed)
+        a = self._imposed(a, reduction, supports, self._speed_rate)
         slope = 1 / (self._beta * dt**2)
         back = (0.5 / self._beta - 1) * a.ravel()
         impulse = self._masses * (v - self._mapped[0]).ravel() / dt
@@ -200,8 +227,9 @@ class NewmarkStep:
             jump = divided(contact.jump[: a1.size].reshape(a1.shape), self._mass[:, None])
             more_a, more_v = Times(self._gamma, self._beta, dt).corrected(jump)
             a1, v1 = a1 + more_a, v1 + more_v
-        v1 = start.reduction.imposed(v1.ravel(), self._masses, self._speed1).reshape(v1.shape)
-        a1 = start.reduction.imposed(a1.ravel(), self._masses, self._speed_rate).reshape(a1.shape)
+        supports = accepted.problem.supports
+        v1 = self._imposed(v1, start.reduction, supports, self._speed1)
+        a1 = self._imposed(a1, start.reduction, supports, self._speed_rate)
         before = self._mapped[0]
         arrays = self._carried.at_end(accepted.u, before, v1, a1, dt)
         energies = self._balance.of_step(self._mass, (before, start.v, v1), accepted)

@@ -116,6 +116,7 @@ class Configuration:
     def prepare(self, now: Moment, dt: float | None = None) -> None:
         """Hand the form what it reads in a step; see `FormInputs.prepare`."""
         self.inputs.prepare(self.domain, now, self.loads.acceleration(now), dt)
+        self.domain.assembly.attachment.begin(None if self.model.moves else self.total)
 
     def fields_at(self, now: Moment) -> Fields | None:
         """Prescribed values of fields without a role, if the form has any; a call for all ranks."""

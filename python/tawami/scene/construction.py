@@ -160,6 +160,7 @@ def _replace(now: Configuration, after: Domain) -> None:
         now.obstacles.keep(kept)
         now.border_sums.keep(kept)
     now.border_sums.attach(after)
+    after.assembly.attachment.start = before.assembly.attachment.start
     now.inputs.repeat(after, now.moment(), gravity)
     internal = after.newton.internal(zero)
     forces += internal - now.loads.at_start(after, first)

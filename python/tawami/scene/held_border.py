@@ -6,13 +6,14 @@ serve for all laws, forms and strain measures, and each pass leaves about a hund
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from itertools import combinations
 
 import numpy as np
 import scipy.sparse as sp
 
-from tawami.base.arrays import Array
+from tawami.base.arrays import Array, Mask
 from tawami.base.errors import SupportError
 from tawami.border.patches import patches
 from tawami.border.tied import Tied
@@ -25,6 +26,10 @@ from tawami.scene.support import Support
 PENALTY = 200.0
 #: Change of the tractions by a pass, relative to the largest, below which no other is needed.
 SETTLED = 1e-4
+#: Error of a held displacement that is round-off, relative to the displacement.
+ALIKE = 1e-6
+#: Displacement that is round-off [cells].
+ROUND_OFF_OF_GRID = 1e-13
 #: Distance of points that are the same [cells], and difference of values that is round-off.
 SAME, ROUND_OFF = 1e-6, 1e-9
 
@@ -59,12 +64,14 @@ class HeldBorder:
         self._groups = patches(place.now[self._weak], domain.model.grid.h)
         self._weights = place.weight[self._weak]
         self._before = self._at_points @ before[self._place.slice]
+        self._given = values[self._weak]
         self._values = (values + support.missing)[self._weak][:, None]
         self.prescribed = float(np.abs(self._values).max(initial=0.0))
         held = self._groups.means(self._weights, support.held[self._weak])
         self._held = held[:, None]
         K, mu = (m[place.cells(domain).location.cell] for m in domain.moduli_of_cells)
-        self._tied = self._with_penalty((K + PENALTY * mu)[self._weak])
+        self._elastic = (K + PENALTY * mu)[self._weak]
+        self._tied = self._with_penalty(self._elastic)
 
     @property
     def x(self) -> Array:
@@ -87,14 +94,22 @@ class HeldBorder:
         penalty = self._groups.means(self._weights, penalty) / self._domain.model.grid.h
         return Tied(self._groups, self._weights, self._directions[None], penalty)
 
-    def begin(self, diagonal: Callable[[], Array]) -> None:
-        """See `Term`. The penalty of a field has the size of its tangent."""
+    def begin(self, diagonal: Callable[[], Array], inertia: Array | None) -> None:
+        """See `Term`. The penalty of a field has the size of its tangent, and in dynamics that of a
+        displacement contains inertia.
+        """
         if self._support.is_field:
-            h, dim = self._domain.model.grid.h, self._domain.model.space.dim
-            assert isinstance(self._support.place, MovingPoints)
-            thickness = self._support.place.weight / self._support.place.length
-            near = abs(self._at_points) @ diagonal()[self._place.slice]
-            self._tied = self._with_penalty(PENALTY * near / thickness[self._weak] / h ** (dim - 2))
+            self._tied = self._with_penalty(PENALTY * self._near(diagonal()))
+        elif inertia is not None:
+            self._tied = self._with_penalty(self._elastic + PENALTY * self._near(inertia))
+
+    def _near(self, diagonal: Array) -> Array:
+        """Stiffness that the diagonal of a matrix stands for at each point [Pa]."""
+        assert isinstance(self._support.place, MovingPoints)
+        h, dim = self._domain.model.grid.h, self._domain.model.space.dim
+        thickness = (self._support.place.weight / self._support.place.length)[self._weak]
+        near = (abs(self._at_points) @ diagonal[self._place.slice]).reshape(len(thickness), -1)
+        return np.asarray(near[:, 0] / thickness / h ** (dim - 2))
 
     def _displacement(self, coefficients: Array) -> Array:
         moved = self._before + self._at_points @ coefficients[self._place.slice]
@@ -106,6 +121,7 @@ class HeldBorder:
         self._tractions = self._tied.multipliers(u, self._values, self._held)
         self._on_points = self._tied.forces(u, self._values, self._held)
         self._error = self._tied.error(u, self._values)
+        self._size = float(np.abs(u).max(initial=0.0))
         forces = np.zeros_like(coefficients)
         forces[self._place.slice] = self._at_points.T @ self._on_points.ravel()
         return forces
@@ -121,7 +137,10 @@ class HeldBorder:
         """See `Term`."""
         change = np.abs(self._tractions - self._held).max(initial=0.0)
         self._held = self._tractions
-        return bool(change > SETTLED * np.abs(self._held).max(initial=0.0))
+        size = max(self.prescribed, self._size)
+        least = 0.0 if self._support.is_field else ROUND_OFF_OF_GRID * self._domain.model.grid.h
+        noise = np.abs(self._error).max(initial=0.0) <= max(ALIKE * size, least)
+        return bool(change > SETTLED * np.abs(self._held).max(initial=0.0) and not noise)
 
     @property
     def unsettled(self) -> str:
@@ -151,24 +170,64 @@ class HeldBorder:
             for tag in np.unique(tags)
         }
 
+    @functools.cached_property
+    def means(self) -> sp.csr_matrix:
+        """Mean of the held component over each patch, of all coefficients: patches x coefficients."""
+        dim, points = self._directions.shape[1], len(self._weak)
+        shares = self._groups.shares(self._weights)[:, None] * self._directions
+        places = (np.repeat(self._groups.number, dim), np.arange(points * dim))
+        shape = (self._groups.count, points * dim)
+        of_points = sp.csr_matrix((shares.ravel(), places), shape=shape)
+        rows = (of_points @ self._at_points).tocoo()
+        size, columns = self._domain.layout.size, rows.col + self._place.start
+        return sp.coo_matrix((rows.data, (rows.row, columns)), shape=(shape[0], size)).tocsr()
+
+    @property
+    def prescribed_means(self) -> Array:
+        """Mean of the prescribed values over each patch."""
+        return self._groups.means(self._weights, self._given)
+
     @property
     def rows(self) -> list[PointHeld]:
         """The means of the patches as multi-point constraints, to find rigid motions."""
         if self._support.is_field:
             return []
-        rows = []
-        for k in range(self._groups.count):
-            mine = np.flatnonzero(self._groups.number == k)
-            weights = (self._weights[mine, None] * self._directions[mine]).ravel()
-            dim = self._directions.shape[1]
-            along = self._at_points[(dim * mine[:, None] + np.arange(dim)).ravel()].T @ weights
-            indices = np.flatnonzero(along)
-            total = self._weights[mine].sum()
-            x = self.x[mine[0]]
-            rows.append(
-                PointHeld(indices, along[indices] / total, 0.0, f"{self._support}", (x[0], x[1]))
+        first = np.unique(self._groups.number, return_index=True)[1]
+        parts = np.split(np.arange(self.means.nnz), self.means.indptr[1:-1])
+        return [
+            PointHeld(
+                self.means.indices[mine].astype(np.int64),
+                self.means.data[mine],
+                0.0,
+                f"{self._support}",
+                (float(x[0]), float(x[1])),
             )
-        return rows
+            for mine, x in zip(parts, self.x[first], strict=True)
+        ]
+
+
+def imposed(
+    held: Sequence[HeldBorder], rates: Sequence[Array], mass: Array, fixed: Mask, values: Array
+) -> Array:
+    """Velocities after an impulse of supports on patches, as `Reduction.imposed` for the others.
+
+    Args:
+        held: The supports.
+        rates: Rate of the mean of each patch of each of them [m/s].
+        mass: Mass of each displacement coefficient [kg per metre depth].
+        fixed: Whether other supports prescribe each of them.
+        values: Velocities, or other rates, of the displacement coefficients.
+    """
+    of_displacement = [k for k, one in enumerate(held) if not one.support.is_field]
+    if not of_displacement:
+        return values
+    n = len(mass)
+    means = sp.vstack([held[k].means[:, :n] for k in of_displacement])
+    missing = np.concatenate([rates[k] for k in of_displacement]) - means @ values
+    inverse = np.divide(1.0, mass, out=np.zeros(n), where=(mass > 0) & ~fixed)
+    weighted = sp.diags(inverse) @ means.T
+    impulse = np.linalg.lstsq((means @ weighted).toarray(), missing, rcond=None)[0]
+    return np.asarray(values + weighted @ impulse)
 
 
 def check_agreement(held: Sequence[HeldBorder], h: float) -> None:

@@ -104,7 +104,7 @@ class ObstacleContact:
         """The largest displacement that the obstacle prescribes in this step [m]."""
         return float(np.abs(self.motion.change[: self._dim]).max(initial=0.0))
 
-    def begin(self, diagonal: Callable[[], Array]) -> None:
+    def begin(self, diagonal: Callable[[], Array], inertia: Array | None) -> None:
         """See `Term`."""
         self.restart()
 

@@ -183,7 +183,8 @@ class Newton:
         self._measures.begin(self.internal if inertia is None else None, values)
         equations = Equations(reduction, external, inertia, friction, path, terms)
         if terms is not None:
-            terms.begin(functools.partial(self._diagonal, reduction))
+            of_mass = None if inertia is None else inertia.slope * inertia.mass
+            terms.begin(functools.partial(self._diagonal, reduction), of_mass)
         iterate, history, krylov = equations.first(guess), History(), list[int]()
         add_mass = None if inertia is None else inertia.adder(reduction)
         search: LineSearch | None = None
@@ -207,6 +208,8 @@ class Newton:
             met = path is None or path.control.is_met(iterate.u)
             converged = worst(measured) < self.numerics.tolerance and met
             if converged and terms is not None and terms.improve():
+                if terms.stuck:
+                    self._fail(history, terms.stuck)
                 most = len(history) + self.numerics.max_iterations
                 forces, measured = self._evaluate(iterate, equations)
                 history[-1] = measured

@@ -9,13 +9,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from tawami.base.arrays import Array
-from tawami.base.errors import SupportError
 from tawami.field.reduction import Reduction
 from tawami.field.sum import Sum
 from tawami.solve.bordered import Bordering, Elimination
 
 #: Passes with better multipliers in one step.
-PASSES = 12
+PASSES = 20
 
 
 class Term(Protocol):
@@ -33,11 +32,12 @@ class Term(Protocol):
     def implicit(self) -> bool:
         """Whether the forces are those of contact, with weights of their own in dynamics."""
 
-    def begin(self, diagonal: Callable[[], Array]) -> None:
+    def begin(self, diagonal: Callable[[], Array], inertia: Array | None) -> None:
         """Start a step.
 
         Args:
             diagonal: Gives the diagonal of the tangent at its start, on all coefficients.
+            inertia: Diagonal of the inertia, on the displacement coefficients; None in statics.
         """
 
     def forces(self, coefficients: Array) -> Array:
@@ -63,6 +63,9 @@ class Terms:
     Args:
         terms: The actions.
         comm: Communicator.
+
+    Attributes:
+        stuck: Message if the multipliers do not settle.
     """
 
     def __init__(self, terms: Sequence[Term], comm: Any) -> None:
@@ -78,11 +81,11 @@ class Terms:
         """Whether all of them are."""
         return all(term.smooth for term in self._terms)
 
-    def begin(self, diagonal: Callable[[], Array]) -> None:
+    def begin(self, diagonal: Callable[[], Array], inertia: Array | None) -> None:
         """Start a step; see `Term.begin`."""
-        self._passes = 0
+        self._passes, self.stuck = 0, ""
         for term in self._terms:
-            term.begin(diagonal)
+            term.begin(diagonal, inertia)
 
     def restart(self) -> None:
         """Go back to the first guess of the unknowns of their own."""
@@ -125,15 +128,11 @@ class Terms:
         return Elimination(terms, solve) if terms else None
 
     def improve(self) -> bool:
-        """Improve all multipliers; whether another solve is needed.
-
-        Raises:
-            SupportError: They do not settle.
-        """
+        """Improve all multipliers; whether another solve is needed."""
         self._passes += 1
         pending = [term for term in self._terms if term.improve()]
         if pending and self._passes >= PASSES:
-            raise SupportError(pending[0].unsettled)
+            self.stuck = pending[0].unsettled
         return bool(pending)
 
     def accept(self) -> None:
