@@ -39,6 +39,7 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "heated_wall": ("Heated wall", "verification", ()),
     "creep": ("Creep", "verification", ()),
     "fracture": ("Fracture", "verification", ()),
+    "ring": ("Ring", "verification", ()),
     "elastica": ("Elastica", "verification", ("strip",)),
     "footing": ("Footing", "verification", ()),
     "bearing_capacity": ("Bearing capacity", "verification", ()),

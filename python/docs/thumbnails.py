@@ -20,6 +20,7 @@ PARTS: dict[str, tuple[str, tuple[float, float, float, float]]] = {
     "consolidation": ("consolidation.png", (0.333, 0.0, 0.667, 1.0)),
     "soft_clay": ("soft_clay.png", (0.0, 0.0, 0.333, 1.0)),
     "heated_wall": ("heated_wall.png", (0.0, 0.0, 0.5, 1.0)),
+    "ring": ("ring.png", (0.5, 0.0, 1.0, 1.0)),
     "creep": ("creep.png", (0.0, 0.0, 0.5, 1.0)),
     "fracture": ("fracture.png", (0.37, 0.17, 0.62, 0.745)),
     "collapse": ("film.png", (0.0, 0.165, 0.305, 0.645)),

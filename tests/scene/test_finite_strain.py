@@ -76,8 +76,9 @@ def test_a_rotation_of_the_body_gives_no_force(random_scene, finite, angle, law)
 def test_small_increments_give_the_small_strain(random_scene, finite, law):
     small = finite["form"].removesuffix("_finite")
     consistent = {"theta": 0.0} if small == "u_epsv" else {}
-    scene = random_scene(law=law, **finite, **consistent)
-    other = random_scene(**finite | {"form": small})
+    penalty = {"ghost_penalty": "off"} if small == "u_epsv" else {}  # on other sides
+    scene = random_scene(law=law, **finite | penalty, **consistent)
+    other = random_scene(**finite | penalty | {"form": small})
     c = 1e-8 * np.random.default_rng(0).standard_normal(scene.num_coefficients)
     a, b = scene.residual(c), other.residual(c)
     assert np.abs(a - b).max() < 1e-6 * np.abs(b).max()

@@ -144,6 +144,10 @@ class Assembly(ABC):
             f"border: expected a body with a border{parts}, as tawami.box(...) gives it"
         )
 
+    def integrate_with(self, volume: Array) -> None:
+        """Replace the volumes of this rank's particles in all sums of the form."""
+        self.attachment.volume = volume
+
     def follow(self, earlier: Assembly) -> None:  # noqa: B027 (by default there is nothing to use)
         """Use what an earlier assembly made for its matrix, if the cells and unknowns are the same.
 

@@ -23,39 +23,20 @@ INWARD = 1e-6
 REACH = 2
 
 
-class BorderInCells:
-    """Points of a border in the cells of a grid.
+class PointsInCells:
+    """Points in the cells of a grid.
 
     Args:
         grid: The grid.
-        active: Whether each cell holds particles, on any rank, ny x nx.
-        x: Positions [m], points x dim.
-        normal: Outward unit normals, points x dim.
-        where: Name of the border, for messages.
-
-    Attributes:
-        grid: The grid.
         location: Cells and positions in them.
 
-    Raises:
-        SupportError: No cell near a point holds particles.
+    Attributes:
+        grid, location: As given.
     """
 
-    def __init__(
-        self, grid: Grid, active: Mask, x: Array, normal: Array, where: str = "border"
-    ) -> None:
-        self.grid = grid
+    def __init__(self, grid: Grid, location: _rust.Location) -> None:
+        self.grid, self.location = grid, location
         self._known: dict[Basis, tuple[Indices, Array, Array]] = {}
-        scaled = (x - np.array(grid.origin)) / grid.h
-        most = np.array(grid.cells) - 1
-        index = np.clip(np.floor(scaled - INWARD * normal), 0, most).astype(np.int64)
-        flat = active.ravel()
-        away = ~flat[grid.cell_numbers(index)]
-        if away.any():
-            index[away] = _nearest(grid, flat, scaled[away], where)
-        xi = np.ascontiguousarray(scaled - index)
-        cell = grid.cell_numbers(index).astype(np.uint32)
-        self.location = grid.rust.place(cell, xi)
 
     def __len__(self) -> int:
         return len(self.location)
@@ -88,6 +69,39 @@ class BorderInCells:
         start = np.arange(0, numbers.size + 1, numbers.shape[1])
         entries = (np.ascontiguousarray(values).ravel(), numbers.ravel(), start)
         return sp.csr_matrix(entries, shape=(len(numbers), count))
+
+
+class BorderInCells(PointsInCells):
+    """Points of a border in the cells of a grid.
+
+    Args:
+        grid: The grid.
+        active: Whether each cell holds particles, on any rank, ny x nx.
+        x: Positions [m], points x dim.
+        normal: Outward unit normals, points x dim.
+        where: Name of the border, for messages.
+
+    Attributes:
+        grid: The grid.
+        location: Cells and positions in them.
+
+    Raises:
+        SupportError: No cell near a point holds particles.
+    """
+
+    def __init__(
+        self, grid: Grid, active: Mask, x: Array, normal: Array, where: str = "border"
+    ) -> None:
+        scaled = (x - np.array(grid.origin)) / grid.h
+        most = np.array(grid.cells) - 1
+        index = np.clip(np.floor(scaled - INWARD * normal), 0, most).astype(np.int64)
+        flat = active.ravel()
+        away = ~flat[grid.cell_numbers(index)]
+        if away.any():
+            index[away] = _nearest(grid, flat, scaled[away], where)
+        xi = np.ascontiguousarray(scaled - index)
+        cell = grid.cell_numbers(index).astype(np.uint32)
+        super().__init__(grid, grid.rust.place(cell, xi))
 
 
 def _nearest(grid: Grid, active: Mask, scaled: Array, where: str) -> Indices:

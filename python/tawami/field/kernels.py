@@ -27,6 +27,9 @@ class KernelsAtPoints:
         residual: Integrals of rank 1.
         tangent: Integrals of rank 2.
         couplings: Pairs of integrals of rank 1 whose products are part of the tangent.
+
+    Attributes:
+        weight: As given; another array may replace it.
     """
 
     def __init__(
@@ -38,7 +41,7 @@ class KernelsAtPoints:
         tangent: Sequence[Integral],
         couplings: Sequence[Pair] = (),
     ) -> None:
-        self._attachment, self._location, self._weight = attachment, location, weight
+        self._attachment, self._location, self.weight = attachment, location, weight
         self._integrals = residual, tangent, [one for pair in couplings for one in pair]
         #: Kernels, which hold the values of the constants, with the version of these.
         self._residual: tuple[int, _rust.Kernels] | None = None
@@ -64,7 +67,7 @@ class KernelsAtPoints:
             coefficients: Increments of all fields.
             absolute: Whether absolute values are summed.
         """
-        kernels, weight = self._of_residual, self._weight
+        kernels, weight = self._of_residual, self.weight
         return self.assembler.vector(kernels, data, weight, coefficients, absolute)
 
     def write_matrix(
@@ -86,7 +89,7 @@ class KernelsAtPoints:
             add: Whether they are kept and added to.
         """
         self.assembler.matrix(
-            *self._of_tangent, data, self._weight, coefficients, pattern, values, add
+            *self._of_tangent, data, self.weight, coefficients, pattern, values, add
         )
 
     def _kernel(self, integral: Integral) -> tuple[Any, ...]:

@@ -51,6 +51,11 @@ class PointAssembly(Assembly):
             compiled.residual, compiled.tangent, compiled.couplings,
         )  # fmt: skip
 
+    def integrate_with(self, volume: Array) -> None:
+        """See `Assembly.integrate_with`."""
+        super().integrate_with(volume)
+        self._kernels.weight = volume
+
     def follow(self, earlier: Assembly) -> None:
         """See `Assembly.follow`."""
         if isinstance(earlier, PointAssembly):

@@ -23,6 +23,7 @@ from tawami.base.warn import warn
 from tawami.body import rings
 from tawami.body.body import Body
 from tawami.border.pieces import Border
+from tawami.field import fitted_volumes
 from tawami.form.compilation import CompiledForm, check_used, compile_form
 from tawami.form.form import Form
 from tawami.form.symbols import Assembly
@@ -41,7 +42,7 @@ LOCKS = 50.0
 #: Arguments of `Scene` that are not parameters of the form.
 KEYWORDS = (
     "material_of", "form", "basis", "tolerance", "max_iterations", "assembly", "factorise",
-    "linear_solver", "density", "leaving",
+    "linear_solver", "density", "leaving", "volumes",
 )  # fmt: skip
 
 
@@ -64,6 +65,7 @@ class Model:
         names: Name of the group of each material; empty if the body has no names.
         leaving: 'stop' or 'remove', for particles that leave the grid.
         num_particles: Particles of the body, on all ranks.
+        fits: Whether the form integrates with volumes that fit the border of the body.
         border: The border of the body; None if it has none.
     """
 
@@ -81,6 +83,7 @@ class Model:
     names: tuple[str, ...]
     leaving: Leaving
     num_particles: int
+    fits: bool
     border: Border | None
 
     @property
@@ -160,6 +163,7 @@ class Model:
                 "laws": [*self.texts, *laws],
                 "density": None if self.density is None else self.density.tolist(),
                 "leaving": self.leaving,
+                "volumes": "fitted" if self.fits else "own",
                 "number of particles": self.num_particles,
             }
         )
@@ -174,6 +178,7 @@ def build(
     basis: Basis,
     density: float | Sequence[float] | Mapping[str, float] | None,
     leaving: Leaving,
+    volumes: fitted_volumes.Volumes | None,
     assembly: Assembly,
     parameters: Mapping[str, Any],
 ) -> tuple[Model, _rust.Particles]:
@@ -216,6 +221,7 @@ def build(
         grid, loaded, compiled, basis, values,
         used, in_time, in_space, Settings(options, fixed),
         laws, densities, _names(body, len(materials)), leaving, len(particles),
+        fitted_volumes.chosen(volumes, body.border, moves=loaded.strain.finite, static=density is None),
         body.border,
     )  # fmt: skip
     return model, particles

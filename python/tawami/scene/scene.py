@@ -31,10 +31,12 @@ from tawami.scene.conditions import Conditions
 from tawami.scene.configuration import Configuration
 from tawami.scene.construction import Construction
 from tawami.scene.model import build
+from tawami.scene.obstacle import Obstacle
 from tawami.scene.solution import Solution
 from tawami.scene.sources import Source
 from tawami.scene.statics import StaticStep
 from tawami.scene.step import StepKind
+from tawami.scene.support import Support
 from tawami.solve.numerics import Factorise, Numerics, SolverName
 
 Array = npt.NDArray[np.float64]
@@ -63,6 +65,9 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
             dictionary as for the materials); gravity needs it.
         leaving: Treatment of particles that leave the grid: 'stop' with an error before they do, or
             'remove' them; `left` lists them.
+        volumes: Volumes in the integrals of the form: 'own' of the particles, or 'fitted', so that the
+            divergence theorem holds for the functions of the grid; masses stay. By default 'fitted' for
+            bodies with a border in scenes of finite strain without a density.
         parameters: Parameters and options of the form: alpha, stabilisation, ... A parameter is a
             number, a function of time [s], or one number for each particle: a function f(x, y), an
             array, `tawami.table(...)` or `tawami.earlier(...)`.
@@ -104,6 +109,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         linear_solver: SolverName = "direct",
         density: float | Sequence[float] | Mapping[str, float] | None = None,
         leaving: Literal["stop", "remove"] = "stop",
+        volumes: Literal["fitted", "own"] | None = None,
         **parameters: Any,
     ) -> None:
         check_process()
@@ -117,6 +123,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
             basis,
             density,
             leaving,
+            volumes,
             assembly,
             parameters,
         )
@@ -294,7 +301,9 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
     def advanced(self, kind: StepKind) -> Solution:
         """Take a static step, as :meth:`solve` does."""
         with self.configuration.activity.step("solve()"):
-            for support in self.configuration.supports.all:
+            now = self.configuration
+            actions: list[Support | Obstacle] = [*now.supports.all, *now.obstacles.all]
+            for support in actions:
                 if support.has_velocity:
                     raise InputError(
                         f"{support} has a velocity, which static steps do not follow: expected a value, "

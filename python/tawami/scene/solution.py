@@ -20,6 +20,8 @@ from tawami.grid import edges
 from tawami.scene import presentation, quantities
 from tawami.scene.absent import Elsewhere
 from tawami.scene.configuration import Configuration
+from tawami.scene.contact_result import ContactResult
+from tawami.scene.obstacle import Obstacle
 from tawami.scene.outcome import Outcome
 from tawami.scene.outline import Outline
 from tawami.scene.points import ROUND_OFF, outside
@@ -292,8 +294,19 @@ class Solution(Elsewhere, Sealed, Unique):
 
     # -- forces --------------------------------------------------------------
 
-    def reaction(self, place: str | Sequence[float]) -> Array:
-        """Force (x, y) [N per metre depth] that a support or wall exerts on the body.
+    def contact(self, obstacle: Obstacle | str) -> ContactResult:
+        """Contact with an obstacle: force and moment on it, pressure and friction at the border.
+
+        Args:
+            obstacle: As `scene.obstacle` returned it, or its name.
+
+        Raises:
+            InputError: The scene had no such obstacle in this step.
+        """
+        return self._reactions.contact(obstacle)
+
+    def reaction(self, place: str | Sequence[float] | Obstacle) -> Array:
+        """Force (x, y) [N per metre depth] that a support, wall or obstacle exerts on the body.
 
         In dynamics it is the force at the end of the step and the impulse at its beginning over its
         length.
@@ -302,7 +315,7 @@ class Solution(Elsewhere, Sealed, Unique):
             place: Name of a part of the border or of an edge of the grid. Along an edge of the grid it
                 is the sum over the functions of the edge, so that forces at a corner belong to both
                 edges, and parts of the border on one edge share its force. Or the point (x, y) of a
-                `hold` [m], as it was given or where it is now.
+                `hold` [m], as it was given or where it is now. Or an obstacle or its name.
 
         Raises:
             InputError: No such part or nothing that supports it, or no point held there.

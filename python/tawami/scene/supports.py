@@ -260,9 +260,8 @@ class Supports(Owner[Support]):
         """Parts of the border with supports, each with the edges of the grid that it is held on."""
         found = dict[str, set[Edge]]()
         for support in self.all:
-            if isinstance(support.place, MovingPoints):
-                for name, edges_held in support.names.items():
-                    found.setdefault(name, set()).update(edges_held)
+            for name, edges_held in support.names.items():
+                found.setdefault(name, set()).update(edges_held)
         return found
 
     @property

@@ -1,0 +1,47 @@
+"""A ring under internal pressure: Lame's and Rivlin's solutions, anywhere on the grid."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+
+from cases.verification import ring
+
+
+@pytest.mark.parametrize("shift", [(0.0, 0.0), (0.37, 0.61)])
+@pytest.mark.parametrize(
+    ("gauss", "radius", "rms", "largest"), [(False, 0.1, 0.5, 6.0), (True, 0.01, 0.08, 1.0)]
+)
+def test_a_ring_at_small_strain(shift, gauss, radius, rms, largest):
+    found = ring.small(8, shift, gauss=gauss)
+    assert abs(found.radius) < radius
+    assert found.rms < rms
+    assert found.largest < largest
+
+
+def test_a_ring_at_large_strain():
+    found = ring.large(4, steps=5)
+    assert abs(found.radius) < 0.5
+    assert found.rms < 2.5
+    assert found.largest < 16
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("shift", ring.SHIFTS)
+@pytest.mark.parametrize("gauss", [False, True])
+def test_rings_of_sixteen_cells_per_metre(shift, gauss):
+    radius, rms, largest = (0.05, 0.05, 2.0) if gauss else (0.5, 0.5, 6.0)
+    found = ring.small(16, shift, gauss=gauss)
+    assert abs(found.radius) < radius
+    assert found.rms < rms
+    assert found.largest < largest
+
+
+@pytest.mark.slow
+def test_the_stress_at_large_strain_converges():
+    rings = [ring.large(n) for n in (4, 8, 16)]
+    assert all(abs(one.radius) < 0.5 for one in rings)
+    assert all(fine.rms < 0.7 * coarse.rms for coarse, fine in pairwise(rings))
+    own = ring.large(8, volumes="own")
+    assert own.rms > 2 * rings[1].rms  # without fitting it does not converge

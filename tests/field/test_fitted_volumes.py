@@ -1,0 +1,65 @@
+"""Fitted volumes: a uniform pressure on the border balances a uniform stress in the body."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import tawami
+
+LAW = tawami.neo_hookean(E=1e3, nu=0.3)
+
+
+def moved(geometry="plane_strain", x0=0.0, **options):
+    """A disc with a uniform pressure in it and around it, somewhere on the grid."""
+    grid = tawami.Grid(
+        MPI.COMM_WORLD, origin=(x0, -1.0), h=0.125, cells=(16, 16), geometry=geometry
+    )
+    disc = tawami.disc(grid, (x0 + 1.03, 0.02), 0.8)
+    scene = tawami.Scene(grid, disc, LAW, form="u_finite", **options)
+    scene.initial("stress", (-3.0, -3.0, -3.0, 0.0))
+    scene.traction(
+        "outer", (lambda x, y: -3 * (x - x0 - 1.03) / 0.8, lambda x, y: -3 * (y - 0.02) / 0.8)
+    )
+    return scene
+
+
+@pytest.mark.parametrize(("geometry", "x0"), [("plane_strain", -1.0), ("axisymmetric", 0.5)])
+def test_a_uniform_stress_balances_a_uniform_pressure(geometry, x0):
+    unbalanced = {}
+    for volumes in ("own", "fitted"):
+        scene = moved(geometry, x0, volumes=volumes)
+        external = scene.configuration.external()
+        n = len(external)
+        forces = scene.residual(np.zeros(scene.num_coefficients))[:n]
+        assert np.linalg.norm(external) > 1
+        unbalanced[volumes] = np.linalg.norm(forces - external)
+    assert unbalanced["fitted"] < 0.5 * unbalanced["own"]
+
+
+def test_volumes_and_masses_of_the_particles_stay():
+    scenes = [moved(volumes=volumes, density=2e3) for volumes in ("own", "fitted")]
+    np.testing.assert_array_equal(*(scene.particles.volume for scene in scenes))
+    np.testing.assert_array_equal(*(scene.mass for scene in scenes))
+
+
+def test_static_scenes_of_finite_strain_have_them_by_default():
+    residuals = {}
+    for name, options in {"default": {}, "fitted": {"volumes": "fitted"}, "own": {"volumes": "own"},
+                          "motion": {"density": 1.0}}.items():  # fmt: skip
+        scene = moved(**options)
+        residuals[name] = scene.residual(np.zeros(scene.num_coefficients))
+    np.testing.assert_array_equal(residuals["default"], residuals["fitted"])
+    np.testing.assert_array_equal(residuals["motion"], residuals["own"])
+    assert np.abs(residuals["default"] - residuals["own"]).max() > 1e-3
+
+
+def test_bodies_without_a_border_are_rejected():
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.5, cells=(2, 2))
+    loose = tawami.Body(np.array([[0.4, 0.4]]), np.array([0.1]))
+    with pytest.raises(tawami.InputError, match="has no border: expected volumes='own', or"):
+        tawami.Scene(grid, loose, LAW, form="u_finite", volumes="fitted")
+    tawami.Scene(grid, loose, LAW, form="u_finite", volumes="own")
+    with pytest.raises(tawami.InputError, match="volumes = 'exact': expected"):
+        tawami.Scene(grid, loose, LAW, form="u_finite", volumes="exact")
