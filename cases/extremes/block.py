@@ -45,7 +45,10 @@ def scene(
     grid = grid or tawami.Grid(MPI.COMM_WORLD, origin=origin, h=H, cells=cells)
     half = SIDE / 2
     body = tawami.box(grid, (-half, -half), (half, half), per_axis=per_axis)
-    body = tawami.Body(body.x + H * np.array(shift), body.volume)
+    by = H * np.array(shift)
+    corners = half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) + by
+    border = tawami.polyline(corners, names=["bottom", "right", "top", "left"])
+    body = tawami.Body(body.x + by, body.volume, border=border)
     law = tawami.linear_elastic(E=E, nu=0.4) if law is None else law
     if form == "u_epsv_finite":
         options.setdefault("alpha", 0.01)

@@ -225,8 +225,8 @@ def solve(
 
     try:
         tawami.ramp(scene, step, each=record, stop="raise")
-    except (tawami.ConvergenceError, tawami.SingularError) as error:
-        run.stopped = error.__notes__[0]
+    except (tawami.ConvergenceError, tawami.SingularError, tawami.SupportError) as error:
+        run.stopped = getattr(error, "__notes__", [f"{error}"])[0]
     run.x = np.array(scene.particles.x)
     run.plastic = np.array(scene.particles.history("plastic_strain"))
     run.seconds = perf_counter() - begin

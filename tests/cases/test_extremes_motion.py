@@ -45,8 +45,8 @@ REFUSED: dict[Any, dict[str, str]] = {
         " as end": "end = ",
         " as gravity": r"gravity\[1\] = .*: expected a finite number",
         " as load": r"load\(...\): force\[0\] = ",
-        " as traction": r"traction\(edge='top'\): .* expected a finite number",
-        " as velocity of a support": r"fix\(edge='left'\): velocity at .* expected a finite number",
+        " as traction": r"traction\('top'\): .* expected a finite number",
+        " as velocity of a support": r"fix\('left'\): velocity at .* expected a finite number",
         " as velocity at the start": r"velocity of particle 0 is .* expected finite numbers",
     },
     departure: {

@@ -215,8 +215,8 @@ def test_points_of_a_tiny_body_are_distinguished():
     scene.hold(left, "x")
     scene.hold(left, "y")
     scene.hold(right, "y")
-    scene.traction("top", (0.0, -3.0), between=(0.0, 2 * h))
-    scene.traction("top", (0.0, -1.0), between=(2 * h, 4 * h))
+    scene.traction(lambda x, y: (y == grid.upper[1]) & (x < 2 * h), (0.0, -3.0))
+    scene.traction(lambda x, y: (y == grid.upper[1]) & (x > 2 * h), (0.0, -1.0))
     solution = scene.solve()
     forces = [solution.reaction(place)[1] for place in (left, right)]
     # 6 h at x = h and 2 h at x = 3 h, about the left point: (-6/2 + 2 3/2) h over a distance of h
