@@ -248,7 +248,8 @@ class ContactForces:
 
     @property
     def _modes(self) -> Array:
-        return self.pose.modes(self.x).reshape(self.x.size, -1)
+        modes = self.pose.modes(self.x)
+        return modes.reshape(self.x.size, modes.shape[2])
 
     @property
     def _turned_forces(self) -> Array:
@@ -256,7 +257,8 @@ class ContactForces:
         num, dim = self.x.shape
         turned = np.einsum("kab,jb->jak", generators(dim), self.forces)
         fixed = np.zeros((num, dim, dim))
-        return np.asarray(np.concatenate([fixed, turned], axis=2).reshape(num * dim, -1))
+        both = np.concatenate([fixed, turned], axis=2)
+        return np.asarray(both.reshape(num * dim, both.shape[2]))
 
     def _law(self) -> tuple[Array, Array]:
         """Derivatives of the friction by the gap and by the slip, for each patch.

@@ -56,6 +56,9 @@ class SceneBorder:
         self._count = MOVING if model.moves else STAYING
         self.points: MovingPoints | None = None
         self._ends: MovingPoints | None = None
+        #: Pieces between two lines of the grid, as they were at the start, and which of them are left.
+        self._pieces_at_lines: Border | None = None
+        self._left: Indices = np.zeros(0, dtype=np.int64)
         self._has_moved = False
         self.parts: list[MovingPoints] = []
         border = model.border
@@ -63,8 +66,10 @@ class SceneBorder:
             area = particles.volume / model.space.thickness(particles.x)
             check_fits(self._grid, border.points(self._grid, STAYING), particles.x, area)
             self.points = MovingPoints(border.points(self._grid, self._count), self._grid)
+            self._pieces_at_lines = border.at_lines(self._grid)
+            self._left = np.arange(len(self._pieces_at_lines.start))
             if model.moves:
-                self._ends = MovingPoints(_ends(border.at_lines(self._grid)), self._grid)
+                self._ends = MovingPoints(_ends(self._pieces_at_lines), self._grid)
 
     @property
     def all(self) -> list[MovingPoints]:
@@ -167,10 +172,13 @@ class SceneBorder:
     def _present(self) -> Border:
         """The border as it is: after a motion its pieces between lines of the grid are straight."""
         assert self._given is not None
+        assert self._pieces_at_lines is not None
         if self._ends is None or not self._has_moved:
-            return self._given
+            if len(self._left) == len(self._pieces_at_lines.start):
+                return self._given
+            return self._pieces_at_lines[self._left]
         start, end = np.split(self._ends.x, 2)
-        tag = self._ends.made.tag[: len(start)]
+        tag = self._pieces_at_lines.tag[self._left]
         return Border(start, end, np.zeros(len(start)), tag, self._given.names)
 
     def whole_edges(self, part: MovingPoints) -> dict[Edge, Mask]:
@@ -196,9 +204,14 @@ class SceneBorder:
             For each of the parts the mask of the points that remain.
         """
         kept = {points: points.remains(before, after) for points in self.all if len(points)}
-        if self._ends is not None:
-            both = np.logical_and(*np.split(kept[self._ends], 2))
-            kept[self._ends] = np.tile(both, 2)
+        if self.points is not None:
+            assert self._pieces_at_lines is not None
+            pieces = self._present if self._has_moved else self._pieces_at_lines[self._left]
+            middle = MovingPoints(_middles(pieces), self._grid)
+            left = middle.remains(before, after)
+            self._left = self._left[left]
+            if self._ends is not None:
+                kept[self._ends] = np.tile(left, 2)
         for points, mask in kept.items():
             points.keep(mask)
         return kept
@@ -215,7 +228,10 @@ class SceneBorder:
 
     def state(self) -> dict[str, Any]:
         """Positions and areas of all points, for a checkpoint."""
-        return {"moved": self._has_moved, "points": [points.state() for points in self.all]}
+        return {
+            "moved": self._has_moved, "left": self._left,
+            "points": [points.state() for points in self.all],
+        }  # fmt: skip
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`state`.
@@ -231,7 +247,7 @@ class SceneBorder:
             )
         for points, stored in zip(self.all, state["points"], strict=True):
             points.restore(stored)
-        self._has_moved = state["moved"]
+        self._has_moved, self._left = state["moved"], state["left"]
 
 
 def check_fits(grid: Grid, points: BorderPoints, x: Array, area: Array) -> None:
@@ -276,14 +292,23 @@ def label(where: Part) -> str:
     return ", ".join(repr(name) for name in names)
 
 
+def _middles(border: Border) -> BorderPoints:
+    """The middles of pieces as points."""
+    n = len(border.start)
+    of, half = np.arange(n), np.full(n, 0.5)
+    return _as_points(border, border.at(of, half), border.direction(of, half), of)
+
+
 def _ends(border: Border) -> BorderPoints:
     """The ends of pieces as points: first where they start, then where they end."""
-    n, x = len(border.start), np.concatenate([border.start, border.end])
-    along = border.end - border.start
+    x = np.concatenate([border.start, border.end])
+    of = np.tile(np.arange(len(border.start)), 2)
+    return _as_points(border, x, (border.end - border.start)[of], of)
+
+
+def _as_points(border: Border, x: Array, along: Array, of: Indices) -> BorderPoints:
+    """Points of pieces, without lengths and chains; `along` are directions and `of` the pieces."""
     normal = np.stack([along[:, 1], -along[:, 0]], axis=1)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    number: Indices = np.zeros(2 * n, dtype=np.int64)
-    tag = np.tile(border.tag, 2)
-    return BorderPoints(
-        x, np.ones(2 * n), np.tile(normal, (2, 1)), tag, border.names, number, np.zeros(2 * n)
-    )
+    one, number = np.ones(len(x)), np.zeros(len(x), dtype=np.int64)
+    return BorderPoints(x, one, normal, border.tag[of], border.names, number, 0 * one)
