@@ -11,14 +11,15 @@ from mpi4py import MPI
 
 import tawami
 
-#: Shipped forms of small strain with their stabilisations.
+U_EPSV = {"form": "u_epsv", "alpha": 0.1, "ghost_penalty": "off"}
+#: Shipped forms of small strain with their stabilisations, without the penalty of cut cells.
 FORMS: dict[str, dict[str, Any]] = {
     "u": {"form": "u"},
     "u_bbar": {"form": "u_bbar"},
-    "u_epsv": {"form": "u_epsv", "alpha": 0.1},
-    "u_epsv_alpha0": {"form": "u_epsv", "alpha": 0.0},
-    "u_epsv_residual_based": {"form": "u_epsv", "alpha": 0.1, "stabilisation": "residual_based"},
-    "u_epsv_projection": {"form": "u_epsv", "alpha": 0.1, "stabilisation": "projection"},
+    "u_epsv": U_EPSV,
+    "u_epsv_alpha0": U_EPSV | {"alpha": 0.0},
+    "u_epsv_residual_based": U_EPSV | {"stabilisation": "residual_based"},
+    "u_epsv_projection": U_EPSV | {"stabilisation": "projection"},
     "u_p": {"form": "u_p", "alpha": 0.1},
 }
 #: Shipped forms of finite strain.

@@ -38,6 +38,7 @@ from tawami.body.mesh import mesh
 from tawami.body.polygon import polygon
 from tawami.border.pieces import Border
 from tawami.border.polyline import polyline
+from tawami.border.shapes import half_plane, rigid_disc, rigid_polygon
 from tawami.check.form_check import check_form
 from tawami.check.report import FormReport
 from tawami.form.form import Form
@@ -56,7 +57,7 @@ from tawami.particles.laws import (
     von_mises,
 )
 from tawami.particles.numpy_law import NumpyLaw
-from tawami.results.outputs import GridOutput, ParticleOutput
+from tawami.results.outputs import BorderOutput, GridOutput, ParticleOutput
 from tawami.results.plot import plot
 from tawami.results.results import Results
 from tawami.results.table import TableOutput
@@ -70,6 +71,7 @@ from tawami.study import Series, Study, recommend
 __all__ = [
     "Body",
     "Border",
+    "BorderOutput",
     "CheckpointError",
     "CheckpointWarning",
     "ConvergenceError",
@@ -118,6 +120,7 @@ __all__ = [
     "drucker_prager",
     "earlier",
     "follow",
+    "half_plane",
     "law",
     "level_set",
     "linear_elastic",
@@ -130,6 +133,8 @@ __all__ = [
     "polyline",
     "ramp",
     "recommend",
+    "rigid_disc",
+    "rigid_polygon",
     "run",
     "settle",
     "table",

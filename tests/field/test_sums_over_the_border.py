@@ -240,3 +240,35 @@ def test_data_of_the_border_that_are_missing_or_not_finite():
         scene.solve(until=1.0)
     with pytest.raises(tawami.InputError, match=r"data 'k' is inf at the point .* of the border"):
         scene.data("k", lambda x, y: np.where(y > LOWER[1] + 1e-9, 1.0, np.inf))
+
+
+def on_springs(u, w, P, grad, sum_p, sum_b, old, k):
+    return sum_p(P, grad(w)) + sum_b(k * dot(old.u + u, w)) - sum_b(w[0])
+
+
+def test_springs_remember_the_way_of_a_body_that_moves():
+    """Springs all around, of stiffness k per length, balance a force of 1 per length: u_x = 1/k."""
+    form = Form(
+        ONE_FIELD, on_springs, strain="finite", data={"k": "stiffness of the foundation [Pa/m]"}
+    )
+    scene = block(form)
+    scene.data("k", lambda x, y: 20.0 + 0 * x)
+    for _ in range(2):
+        scene.solve()
+        moved = np.asarray(scene.particles.displacement)
+        assert moved == pytest.approx(np.tile([0.05, 0.0], (len(moved), 1)), abs=1e-7)
+
+
+def test_a_removal_keeps_the_numbers_of_the_border_that_remains():
+    """The foundation carries the load on what remains of the top."""
+    scene = block(FOUNDATION)
+    scene.fix("bottom", "x")
+    scene.data("k", lambda x, y: 40.0 + 10 * x)
+    scene.solve(until=1.0)
+    scene.remove(np.asarray(scene.particles.x)[:, 0] > 1.0)
+    solution, points = scene.solve(), scene.configuration.border.points.now
+    base, top = (points.tag == SIDES.index(name) for name in ("bottom", "top"))
+    u = np.array([solution.displacement(tuple(x))[1] for x in points.x[base]])
+    carried = points.length[base] @ ((40 + 10 * points.x[base, 0]) * u)
+    assert carried == pytest.approx(-points.length[top].sum(), rel=1e-8)
+    assert points.length[top].sum() < 0.8 * WIDTH

@@ -207,16 +207,29 @@ def test_wrong_supports_and_loads_are_rejected():
     for call, message in [
         (
             lambda: scene.fix("west", "x"),
-            "edge 'west': expected 'left', 'right', 'bottom' or 'top'",
+            r"fix\('west'\): the border has no part 'west', .* expected one of 'bottom', 'right', 'top'",
         ),
-        (lambda: scene.fix("left", "z"), "component 'z': expected 'x' or 'y'"),
+        (
+            lambda: scene.fix("left", "z"),
+            "component 'z': expected one of 'x', 'y', 'normal', 'tangent'",
+        ),
         (lambda: scene.hold((9.0, 1.0), "x"), r"hold.*expected a point within the grid"),
         (lambda: scene.hold((0.0, 1.0), "z"), "component 'z'"),
         (lambda: scene.hold((0.0,), "x"), r"expected two numbers, a point \(x, y\)"),
         (lambda: scene.hold(5, "x"), r"hold\(point=5\) = 5: expected two numbers"),
         (lambda: scene.hold((0.0, "a"), "x"), r"\[1\] = 'a': expected a number"),
         (lambda: scene.hold((0.0, 1.0), "x", np.nan), "nan: expected a finite"),
-        (lambda: scene.traction("up", (0, 0)), "edge 'up'"),
+        (lambda: scene.traction("up", (0, 0)), r"traction\('up'\): the border has no part 'up'"),
+        (
+            lambda: scene.pressure("left", (0, 1)),
+            r"pressure\('left'\) = \(0, 1\): expected a number or a func",
+        ),
+        (lambda: scene.pressure(lambda x, y: x > 9, 1.0), "no point of the border is in this part"),
+        (lambda: scene.fix(lambda x, y: x, "x"), r"fix\(where f\(x, y\)\): .*expected"),
+        (
+            lambda: scene.traction(np.ones(3, dtype=bool), (0, 1)),
+            r"a mask of type bool and shape \(3,\): expected True or False for each of the \d+ points",
+        ),
         (
             lambda: scene.traction("right", 5.0),
             r"traction\('right'\) = 5.0: expected two comp",
@@ -282,7 +295,6 @@ def test_only_the_arrays_that_a_scene_needs_exist():
                 _ = scene.particles.eps_v
         else:
             assert scene.particles.eps_v.shape == scene.particles.volume.shape
-        assert scene.configuration.model.compiled.traction is not None
     assert bytes_of == {"u": 112, "u_epsv": 120}
 
 

@@ -15,7 +15,7 @@ SCENE = {
     "grid", "form", "basis", "parameters", "options", "numerics", "particles", "num_particles",
     "laws", "mass", "particles_per_cell", "left", "stopwatch", "configuration",
     "initial", "data", "parameter", "flux", "fix", "hold", "wall", "release", "traction", "load",
-    "gravity", "remove", "change_material",
+    "pressure", "border", "gravity", "remove", "change_material",
     "time", "solve", "solve_part", "advanced",
     "residual", "tangent", "reduction", "split", "num_coefficients",
 }  # fmt: skip

@@ -57,6 +57,8 @@ class Contact:
         friction: Coefficient of friction: 0 for a smooth obstacle, infinite for one without sliding.
         penalty: r of each patch [Pa/m], about 200 mu / h.
         start: Positions at the start of the step in the frame of the obstacle, `pose.to_local(x)`.
+        least: Mean distance at which each patch touches [m]: 0, or negative for one that may stay
+            inside the obstacle where it is.
     """
 
     shape: Shape
@@ -65,9 +67,10 @@ class Contact:
     friction: float
     penalty: Array
     start: Array
+    least: Array | float = 0.0
 
     def evaluate(
-        self, x: Array, pose: Pose, held: Multipliers, *, sticking: bool = False
+        self, x: Array, pose: Pose, held: Multipliers, *, sticking: bool | ContactForces = False
     ) -> ContactForces:
         """Pressures, friction and forces at present positions.
 
@@ -76,21 +79,29 @@ class Contact:
             pose: Pose of the obstacle.
             held: Multipliers: at first pressure zero and friction of the last step, or both from an
                 earlier evaluation, `ContactForces.multipliers`.
-            sticking: Take all touching patches as sticking. It prevents cycles between states in the
-                first iteration of Newton's method; without friction it has no effect.
+            sticking: Take all touching patches as sticking; or the last evaluation: take those as
+                sticking whose friction would turn round. It prevents cycles between states in Newton's
+                method; without friction it has no effect.
         """
         local = pose.to_local(x)
         surface = _turned(self.shape.evaluate(local), pose.rotation)
         moved = (local - self.start) @ pose.rotation.T
         tangent, turning = tangents(surface)
-        gap = self.patches.means(self.weights, surface.distance)
+        gap = self.patches.means(self.weights, surface.distance) - self.least
         pressure = np.maximum(held.pressure - self.penalty * gap, 0.0)
         slip = self.patches.means(self.weights, np.einsum("jka,ja->jk", tangent, moved))
         trial = held.traction - self.penalty[:, None] * slip
         touching, size = pressure > 0, np.linalg.norm(trial, axis=1)
         limit = np.zeros_like(pressure)
         if self.friction > 0:
-            limit[touching] = np.inf if sticking else self.friction * pressure[touching]
+            limit[touching] = self.friction * pressure[touching]
+        bound = limit.copy()
+        if self.friction > 0:
+            if isinstance(sticking, ContactForces):
+                turned = np.einsum("ak,ak->a", trial, sticking.traction) < 0
+                limit[touching & turned & (sticking.state == SLIDING)] = np.inf
+            elif sticking:
+                limit[touching] = np.inf
         stuck = touching & (size < limit)
         scale = stuck.astype(float)  # ratio of the friction to the trial
         np.divide(limit, size, out=scale, where=~stuck & (size > 0))
@@ -100,6 +111,7 @@ class Contact:
             gap=gap, slip=slip, trial=trial, scale=scale, pressure=pressure,
             traction=scale[:, None] * trial, held=held,
             state=np.where(stuck, STICKING, np.where(touching, SLIDING, OPEN)),
+            exceeded=bool((stuck & (size > bound)).any()),
         )  # fmt: skip
 
 
@@ -115,7 +127,7 @@ class ContactForces:
         tangent: Tangents, points x (dim - 1) x dim.
         turning: Derivatives of the tangents by the position [1/m], points x (dim - 1) x dim x dim.
         slip_gradient: Derivative of the slip of a point by its position, points x (dim - 1) x dim.
-        gap: Mean distance of each patch [m].
+        gap: Mean distance of each patch, less the least one [m].
         slip: Mean slip of each patch since the step began [m], patches x (dim - 1).
         trial: Friction if the patch stuck [Pa], patches x (dim - 1).
         scale: Ratio of the friction to the trial.
@@ -123,6 +135,7 @@ class ContactForces:
         traction: Friction of each patch along the tangents [Pa], patches x (dim - 1).
         held: Multipliers of the evaluation.
         state: `OPEN`, `STICKING` or `SLIDING` for each patch.
+        exceeded: Whether the friction of a patch that was taken as sticking is larger than mu p.
     """
 
     contact: Contact
@@ -140,6 +153,7 @@ class ContactForces:
     traction: Array
     held: Multipliers
     state: Indices
+    exceeded: bool
 
     @cached_property
     def forces(self) -> Array:
@@ -162,7 +176,7 @@ class ContactForces:
     @property
     def penetration(self) -> float:
         """Largest mean penetration of a patch [m]."""
-        return float(np.max(-self.gap, initial=0.0))
+        return float(np.max(-(self.gap + self.contact.least), initial=0.0))
 
     @property
     def violation(self) -> float:

@@ -52,7 +52,7 @@ class Border(Curves):
         Every part between two lines of the grid has a Gauss rule in its length or angle. With `count`
         points, functions of degree 2 count - 1 along straight parts are exact. Arcs get more points
         where they turn far, so that lengths and normals integrate to 1e-14 of their length. Straight
-        parts shorter than h/16 have at most two points, and those shorter than h/128 have one.
+        parts shorter than h/16 have at most three points.
         Pieces on the axis of an axisymmetric grid have none.
 
         Consecutive pieces of one name that form no corner (less than 20 degrees) are one chain. Chains
@@ -71,7 +71,7 @@ class Border(Curves):
         following = chains.followers(parts, same, parts.tag)
         order, chain = chains.chained(following)
         parts = parts[order]
-        chain = chains.without_short(parts, parts.tag, chain, rule.TWO * grid.h, same)
+        chain = chains.without_short(parts, parts.tag, chain, rule.SHORT * grid.h, same)
         of, s, share = rule.gauss(parts, count, grid.h)
         length = parts.length
         before = np.cumsum(length) - length

@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import scipy.sparse as sp
 
 from tawami.base import ranks
@@ -120,6 +121,20 @@ class Assembly(ABC):
         """Read the numbers of the points of the border again: they may have changed."""
         if self._border is not None:
             self._border.refresh()
+
+    def border_work(self, coefficients: Array) -> float:
+        """Work of the sums over the border on the displacement of a step, by the trapezoidal rule.
+
+        It is exact for forces that are linear in the displacement. A collective call.
+
+        Args:
+            coefficients: Increments of all fields in the step.
+        """
+        if not self._compiled.border:
+            return 0.0
+        zero, u = np.zeros(self.layout.size), slice(self.layout.num_displacement)
+        ends = [self.border.add_vector(zero, c, absolute=False) for c in (zero, coefficients)]
+        return -float(self.attachment.summed(sum(ends) / 2)[u] @ coefficients[u])
 
     def _no_border(self) -> InputError:
         names = sorted({name for term in self._compiled.border for name in term.on or ()})

@@ -28,8 +28,8 @@ class FollowerPressure:
         pressure: At each point [Pa].
     """
 
-    #: It prescribes no displacement and has one tangent everywhere.
-    prescribed, smooth, unsettled = 0.0, True, ""
+    #: It prescribes no displacement, has one tangent everywhere, and is no contact.
+    prescribed, smooth, implicit, unsettled = 0.0, True, False, ""
 
     def __init__(
         self, layout: Layout, cells: BorderInCells, x: Array, area: Array, pressure: Array

@@ -33,15 +33,15 @@ class Energies:
     """A balance of energy.
 
     Attributes:
-        kinetic: 1/2 sum m v^2 of the particles, without that of their affine fields.
+        kinetic: 1/2 sum m v^2 of particles and free obstacles, without that of affine fields.
         elastic: Stored by the laws.
         dissipated: Work of the stress on plastic strains.
-        friction: Lost to the friction of walls.
-        external: Work of loads and of supports that move; between two steps of a motion, the elastic
-            energy that static steps and new laws add.
+        friction: Lost to the friction of walls and obstacles.
+        external: Work of loads, and of supports and obstacles that move; between two steps of a motion,
+            the elastic energy that static steps and new laws add.
         transfer: Energy lost on the way from the particles to the grid and back: kinetic, and elastic
             where the mean stress of a mixed form is projected on the present grid.
-        impact: Kinetic energy lost where supports stop the grid.
+        impact: Kinetic energy lost where supports stop the grid and where contact begins.
         left: Kinetic and elastic energy of the particles that left the grid or were removed.
         integration: Remainder of the balance.
     """
@@ -145,9 +145,10 @@ class Balance:
 
     @property
     def kinetic(self) -> float:
-        """1/2 sum m v^2 of the particles [J per metre depth]."""
+        """1/2 sum m v^2 of particles and free obstacles [J per metre depth]."""
         v = self._carried.velocity
-        return self.sum(0.5 * self._now.domain.mass @ (v**2).sum(axis=1))
+        of_body = self.sum(0.5 * self._now.domain.mass @ (v**2).sum(axis=1))
+        return of_body + self._now.obstacles.kinetic
 
     @property
     def elastic(self) -> float:
@@ -178,6 +179,7 @@ class Balance:
             mass = self._now.domain.lumped_mass
             v, _ = self._carried.mapped(mass)
             kinetic = e.kinetic - 0.5 * float(mass @ (v**2).sum(axis=1))
+            kinetic -= self._now.obstacles.kinetic
         left = kinetic + elastic
         self.energies = replace(
             e, kinetic=e.kinetic - kinetic, elastic=e.elastic - elastic, left=e.left + left
@@ -197,13 +199,17 @@ class Balance:
         """
         mapped, imposed, end = (0.5 * float(mass @ (v**2).sum(axis=1)) for v in velocities)
         friction, u = accepted.friction, accepted.u
+        parts = [contact.energies(u) for contact in accepted.problem.obstacles]
+        pushed, rubbed, stopped = np.sum(parts, axis=0) if parts else np.zeros(3)
+        moving = self._now.obstacles.kinetic
         work = accepted.problem.external[: u.size].reshape(u.shape) + accepted.forces_at_end
+        on_border = self._now.domain.assembly.border_work(accepted.step.coefficients)
         return Energies(
             kinetic=end,
-            external=float((work - friction).ravel() @ u.ravel()),
-            friction=-float(friction.ravel() @ u.ravel()),
-            transfer=self.energies.kinetic - mapped,
-            impact=mapped - imposed,
+            external=float((work - friction).ravel() @ u.ravel()) + float(pushed) + on_border,
+            friction=-float(friction.ravel() @ u.ravel()) + float(rubbed),
+            transfer=self.energies.kinetic - mapped - moving,
+            impact=mapped - imposed + float(stopped),
         )
 
     def store(self, step: Energies, dissipated: float, steps: int, time: float) -> None:
@@ -217,6 +223,7 @@ class Balance:
         """
         self._stored_kinetic = self.kinetic
         before = self.energies
+        step.kinetic += self._now.obstacles.kinetic
         kinetic = self._stored_kinetic if self._now.model.moves else step.kinetic
         step.dissipated = self.sum(dissipated)
         step.transfer += step.kinetic - kinetic

@@ -9,7 +9,7 @@ these; at the end of the step prescribed values replace v1 and a1.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,8 @@ from tawami.scene.configuration import Configuration
 from tawami.scene.constraints import constraints
 from tawami.scene.contact import ActiveSet
 from tawami.scene.held_border import HeldBorder
+from tawami.scene.obstacle_contact import ObstacleContact
+from tawami.scene.obstacle_motion import Times
 from tawami.scene.share import Moment
 from tawami.scene.step import Accepted, Problem
 from tawami.scene.step_values import Fields
@@ -133,9 +135,12 @@ class NewmarkStep:
         now, dt = self._now, self._dt
         fields = now.fields_at(self._finish)
         reduction, contact, supports = self._constraints(self._displacement, fields)
+        begins = self._loads != self._clock.loads  # a belongs to other loads
+        times = Times(self._gamma, self._beta, dt)
+        obstacles = now.obstacles_in_step(self._finish, times, begins=begins)
         v, a = self._mapped
-        if self._loads != self._clock.loads:  # a belongs to other loads
-            a = self._first_acceleration(a)
+        if begins:
+            a = self._first_acceleration(a, obstacles)
         v = reduction.imposed(v.ravel(), self._masses, self._speed).reshape(v.shape)
         a = reduction.imposed(a.ravel(), self._masses, self._speed_rate).reshape(a.shape)
         slope = 1 / (self._beta * dt**2)
@@ -145,7 +150,7 @@ class NewmarkStep:
         self._start = Start(v, a, reduction, inertia)
         return Problem(
             reduction, contact, self._external, inertia, self._guess(dt * v.ravel()), supports,
-            now.terms(self._finish, supports), now.supports.supported_edges,
+            obstacles, now.terms(self._finish, supports, obstacles), now.supports.supported_edges,
         )  # fmt: skip
 
     @functools.cached_property
@@ -154,10 +159,21 @@ class NewmarkStep:
         domain = self._now.domain
         return domain.newton.internal(np.zeros(domain.layout.size))
 
-    def _first_acceleration(self, like: Array) -> Array:
+    @functools.cached_property
+    def _on_border(self) -> Array:
+        """Forces on the border at the start of the step that depend on the displacement, without those
+        of obstacles [N per metre depth].
+        """
+        supports = self._constraints(lambda _: 0.0)[2]
+        terms = self._now.terms(self._begin, supports)
+        zero = np.zeros(self._now.domain.layout.size)
+        return zero if terms is None else terms.forces(zero)
+
+    def _first_acceleration(self, like: Array, obstacles: Sequence[ObstacleContact]) -> Array:
         """Acceleration by the momentum equation: g in free fall, 0 at rest."""
-        force = (self._first - self._internal)[: like.size].reshape(like.shape)
-        return divided(force, self._mass[:, None])
+        force = self._first - self._internal + self._on_border
+        force = sum((contact.at_start[0] for contact in obstacles), force)
+        return divided(force[: like.size].reshape(like.shape), self._mass[:, None])
 
     def _guess(self, u: Array) -> Array:
         """First iterate: u = dt v, eps_v the lumped projection of its div u (ln det f)."""
@@ -180,6 +196,10 @@ class NewmarkStep:
         start, dt, a1 = self._start, self._dt, accepted.acceleration
         self._rotation.check(accepted.u, dt)
         v1 = start.v + dt * ((1 - self._gamma) * start.a + self._gamma * a1)
+        for contact in accepted.problem.obstacles:
+            jump = divided(contact.jump[: a1.size].reshape(a1.shape), self._mass[:, None])
+            more_a, more_v = Times(self._gamma, self._beta, dt).corrected(jump)
+            a1, v1 = a1 + more_a, v1 + more_v
         v1 = start.reduction.imposed(v1.ravel(), self._masses, self._speed1).reshape(v1.shape)
         a1 = start.reduction.imposed(a1.ravel(), self._masses, self._speed_rate).reshape(a1.shape)
         before = self._mapped[0]
@@ -188,12 +208,21 @@ class NewmarkStep:
         given = float(start.inertia.impulse @ start.v.ravel()) * dt
         energies.external += given
         energies.impact += given
-        energies.external += self._work_of_mean(accepted)
+        energies.external += self._work_of_mean(accepted) + self._work_on_border(accepted)
         clock = Clock(self._clock.steps + 1, self._loads)
         return NewmarkUpdate(
             self._now, self._carried, self._balance, self._clock, clock, self._finish, arrays,
             (v1, a1), energies, len(self._now.left),
         )  # fmt: skip
+
+    def _work_on_border(self, accepted: Accepted) -> float:
+        """Work of the mean of the forces on the border at both ends of the step, without those of
+        obstacles [J per metre depth].
+        """
+        terms, u = accepted.problem.terms, accepted.u.ravel()
+        if terms is None or not terms.loads.any():
+            return 0.0
+        return float(0.5 * (self._on_border + terms.loads)[: u.size] @ u)
 
     def _work_of_mean(self, accepted: Accepted) -> float:
         """Work of the mean of the forces at both ends of the step, of loads that follow an amplitude and
@@ -241,7 +270,7 @@ class NewmarkUpdate:
 
     def finish(self) -> None:
         """After the particles have moved."""
-        self.configuration.supports.apply(self.moment)
+        self.configuration.apply(self.moment)
         self.configuration.accept(self.moment)
         self.balance.project(self.configuration.projected)
         if len(self.configuration.left) > self.left:
@@ -250,4 +279,7 @@ class NewmarkUpdate:
 
 def signature(configuration: Configuration) -> tuple[int, ...]:
     """A value that changes with loads and supports."""
-    return configuration.loads.version, configuration.supports.version
+    return tuple(
+        owner.version
+        for owner in (configuration.loads, configuration.supports, configuration.obstacles)
+    )

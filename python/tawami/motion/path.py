@@ -194,7 +194,7 @@ class PathUpdate:
         following.factor, following.direction = self.factor, self.direction
         following.point = self.point
         self.configuration.activity.statics += 1
-        self.configuration.supports.apply(self.configuration.moment(self.factor))
+        self.configuration.apply(self.configuration.moment(self.factor))
 
 
 def follow(

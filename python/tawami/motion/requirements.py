@@ -8,12 +8,23 @@ from tawami.base import checks
 from tawami.base.errors import InputError
 from tawami.motion.transfer import Transfer
 from tawami.scene.configuration import Configuration
+from tawami.scene.obstacle import Obstacle
 from tawami.scene.scene import Scene
+from tawami.scene.support import Support
 
 
 def check_displacements(now: Configuration) -> None:
     """Check that the body has the displacements that supports prescribe at the present time."""
-    for support in now.supports.all:
+    for obstacle in now.obstacles.all:
+        names = np.array(obstacle.motions)[obstacle.free & ~(obstacle.mass > 0)]
+        if len(names):
+            argument = "inertia" if names[0] not in now.model.space.axes else "mass"
+            raise InputError(
+                f"{obstacle}: its motion '{names[0]}' is free and has no mass, which Dynamics needs: "
+                f"expected scene.obstacle(..., {argument}=...)"
+            )
+    actions: list[Support | Obstacle] = [*now.supports.all, *now.obstacles.all]
+    for support in actions:
         if support.is_ahead(now.moment()):
             raise InputError(
                 f"{support} prescribes a displacement that the body does not have yet: expected "

@@ -17,7 +17,7 @@ from tawami.base.errors import OutputError
 from tawami.base.files import atomic_file
 from tawami.picture import style
 from tawami.picture.figure import lay_out, new_figure, save
-from tawami.picture.particles import Corners, Scale, Squares, draw_frame, size_of, view
+from tawami.picture.particles import Corners, Scale, Squares, draw_border, draw_frame, size_of, view
 
 if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation
@@ -42,12 +42,14 @@ class Frame:
         x: Positions [m], particles x 2.
         shape: Of the particles; see `Squares.show`.
         values: Quantity that colours them.
+        sides: Ends of the sides of the border [m], sides x 2 x 2; None draws none.
     """
 
     title: str
     x: Array
     shape: Array | float
     values: Array
+    sides: Array | None = None
 
 
 class Film:
@@ -68,6 +70,7 @@ class Film:
         draw_frame(self.axes, lower, upper, grid)
         self.squares = Squares(self.axes, scale)
         self.squares.add_bar(self.axes)
+        self._border = draw_border(self.axes, np.empty((0, 2, 2)))
         self.show(-1)
         lay_out(self.figure)
         self.figure.set_layout_engine("none")  # the same view in all frames
@@ -76,6 +79,7 @@ class Film:
         """Draw a frame."""
         frame = self.frames[number]
         self.squares.show(frame.x, frame.shape, frame.values)
+        self._border.set_segments([] if frame.sides is None else list(frame.sides))
         self.axes.set_title(frame.title)
 
     def picture(self, path: Path) -> Path:

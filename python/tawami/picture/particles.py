@@ -128,6 +128,21 @@ class Squares:
         self.add_bar(axes, cax=axes.inset_axes((1.03, 0.0, 0.035, 1.0)))
 
 
+def draw_border(axes: Axes, sides: Array) -> Any:
+    """Draw the border of a body as a thin line; return the artist.
+
+    Args:
+        axes: Of matplotlib.
+        sides: Ends of its sides [m], sides x 2 x 2.
+    """
+    from matplotlib.collections import LineCollection
+
+    lines = LineCollection(list(sides), colors="0.15", linewidths=0.7, capstyle="projecting")
+    lines.set_zorder(3)
+    axes.add_collection(lines, autolim=False)
+    return lines
+
+
 def view(x: Array, grid: Corners) -> tuple[Array, Array]:
     """Corners of the view: the grid, or the part of it that particles at x reach."""
     lower, upper = x.min(axis=0), x.max(axis=0)

@@ -4,12 +4,13 @@
 """
 
 from tawami.results.output import Output
-from tawami.results.outputs import GridOutput, ParticleOutput
+from tawami.results.outputs import BorderOutput, GridOutput, ParticleOutput
 from tawami.results.results import Results
 from tawami.results.single import write_grid, write_particles
 from tawami.results.table import TableOutput
 
 __all__ = [
+    "BorderOutput",
     "GridOutput",
     "Output",
     "ParticleOutput",

@@ -26,7 +26,9 @@ def scalars(frame: Frame) -> dict[str, tuple[str, Array]]:
     return numbers.scalars(numbers.derived(frame.on_points))
 
 
-def film_of(phase: str, times: Times, quantity: str, grid: Corners) -> film.Film:
+def film_of(
+    phase: str, times: Times, quantity: str, grid: Corners, border: Times = ()
+) -> film.Film:
     """The particles of a phase in colours.
 
     Args:
@@ -34,7 +36,9 @@ def film_of(phase: str, times: Times, quantity: str, grid: Corners) -> film.Film
         times: Its series.
         quantity: Quantity for the colours.
         grid: Corners of the grid.
+        border: Series of the border, which is drawn at the times that it has.
     """
+    sides_at = dict(border)
     wanted = np.unique(np.linspace(0, len(times) - 1, MOST).round().astype(int))
     frames, unit, side = list[film.Frame](), "", 0.0
     for k in wanted:
@@ -43,8 +47,14 @@ def film_of(phase: str, times: Times, quantity: str, grid: Corners) -> film.Film
         unit, values = scalars(frame)[quantity]
         x = frame.points[:, : PLANE.dim]
         side = side or _spacing(x)
-        frames.append(film.Frame(_title(phase, time), x, side, values))
+        sides = _sides(sides_at[time]()) if time in sides_at else None
+        frames.append(film.Frame(_title(phase, time), x, side, values, sides))
     return film.Film(frames, scale_of(quantity, unit, [frame.values for frame in frames]), grid)
+
+
+def _sides(frame: Frame) -> Array:
+    """Ends of the lines of a border [m], lines x 2 x 2."""
+    return np.asarray(frame.points[frame.cells][:, :, : PLANE.dim])
 
 
 def _spacing(x: Array) -> float:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from tawami.motion.observer import Snapshot
 from tawami.results.grid_quantities import GridQuantity
 from tawami.results.projection import vertices
+from tawami.scene.outline import Outline
 from tawami.scene.quantities import Arrays, Quantity
 
 Array = npt.NDArray[Any]
@@ -23,14 +24,14 @@ class Frame:
 
     Attributes:
         points: Positions, points x 3 [m].
-        kind: Of the cells: 'vertex' or 'quad'.
-        cells: Numbers of their points, cells x 1 or 4.
+        kind: Of the cells: 'vertex', 'line' or 'quad'.
+        cells: Numbers of their points, cells x 1, 2 or 4.
         on_points: Fields by label, points or points x components.
         on_cells: Fields of the cells, likewise.
     """
 
     points: Array
-    kind: Literal["vertex", "quad"]
+    kind: Literal["vertex", "line", "quad"]
     cells: Array
     on_points: dict[str, Array] = field(default_factory=dict)
     on_cells: dict[str, Array] = field(default_factory=dict)
@@ -52,6 +53,28 @@ def grid_frame(quantities: Sequence[GridQuantity], snapshot: Snapshot) -> Frame:
     for quantity in quantities:
         data[quantity.cells][quantity.label] = _spatial(quantity.of(snapshot))
     return Frame(with_z(vertices(snapshot.scene)), "quad", squares, *data)
+
+
+def border_frame(snapshot: Snapshot) -> Frame:
+    """The border of the body as lines, one for each of its points."""
+    now, scene = snapshot.scene.configuration, snapshot.scene
+    assert now.border.points is not None
+    outline = Outline(now.border.points, now.domain, scene.split(now.before)[0])
+    length = np.linalg.norm(outline.area, axis=1)
+    space, dim = scene.grid.space, outline.x.shape[1]
+    traction = outline.tractions([*now.loads.tractions, *now.supports.tractions])
+    return Frame(
+        with_z(outline.sides(1.0 if now.model.moves else 0.0).reshape(-1, dim)),
+        "line",
+        np.arange(2 * len(length)).reshape(-1, 2),
+        {"displacement [m]": with_z(outline.displacements().reshape(-1, dim))},
+        {
+            "normal [-]": with_z(outline.area / length[:, None]),
+            f"area [{space.unit('m2')}]": length * space.thickness(outline.x),
+            "part [-]": outline.part.astype(np.int32),
+            "traction [Pa]": with_z(traction),
+        },
+    )
 
 
 def with_z(values: npt.ArrayLike) -> Array:

@@ -1,4 +1,4 @@
-"""Outputs of particles and grid as series of VTU files.
+"""Outputs of particles, border and grid as series of VTU files.
 
 ParaView and pyvista open a series by its index (.pvd). A vertex of the grid without particles around
 it has no stress: NaN, which ParaView draws in its NaN colour. A threshold of `particles [-]` from 1
@@ -10,9 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from tawami.base.errors import NotModelledError
 from tawami.base.ranks import raise_together
 from tawami.motion.observer import Snapshot, Subject
-from tawami.results.frame import Frame, grid_frame, particle_frame
+from tawami.results.frame import Frame, border_frame, grid_frame, particle_frame
 from tawami.results.grid_quantities import on_grid, usual_on_grid
 from tawami.results.output import Output
 from tawami.results.projection import Projection, check_projection
@@ -65,6 +66,47 @@ class ParticleOutput(_SeriesOutput):
 
     def _frame(self, snapshot: Snapshot) -> Frame:
         return particle_frame(self._quantities, body_arrays(snapshot.subject))
+
+
+class BorderOutput(_SeriesOutput):
+    """The border of the body as short lines, one for each of its points.
+
+    Each has its displacement since the start [m] at both ends, its outward normal, the area that it
+    counts for [m2 per metre depth], the number of its part among `scene.border.names`, and the traction
+    [Pa] of loads and of supports on patches. Supports on edges of the grid are left out: their forces
+    are those of the grid (`GridOutput("reaction")`). At small strain the lines are those of the start.
+
+    Args:
+        every, every_steps: When; see `Output`. Every step by default.
+        name: Of index and folder.
+        phases: As in `Output`.
+
+    Raises:
+        NotModelledError: The body has no border; raised by the run.
+    """
+
+    takes_quantities = False
+
+    def __init__(
+        self,
+        *,
+        every: float | None = None,
+        every_steps: int | None = None,
+        name: str = "border",
+        phases: Sequence[str] | None = None,
+    ) -> None:
+        super().__init__((), every, every_steps, name, phases)
+
+    def _resolve(self, subject: Subject) -> None:
+        if subject.scene.configuration.border.points is None:
+            raise NotModelledError(
+                f"BorderOutput: '{self.name}' needs a body with a border: expected "
+                "Body(x, volume, border=tawami.polyline(corners)), or a body of box, polygon, disc, "
+                "level_set or mesh"
+            )
+
+    def _frame(self, snapshot: Snapshot) -> Frame:
+        return border_frame(snapshot)
 
 
 class GridOutput(_SeriesOutput):

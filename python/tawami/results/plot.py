@@ -60,7 +60,7 @@ def plot(
     if movie == "mp4" and shutil.which("ffmpeg") is None:
         raise MissingDependencyError("movie = 'mp4' needs ffmpeg: install it, or use movie='gif'")
     phases = _phases(home)
-    series = [(path.name, times) for path in phases if (times := _particles(path))]
+    series = [(path.name, times) for path in phases if (times := _series(path, "vertex"))]
     tables = [(path, table) for path in phases for table in sorted(path.glob("*.csv"))]
     known = list(dict.fromkeys(k for _, times in series for k in scalars(times[-1][1]())))
     if not known and (quantity is not None or not tables):
@@ -76,7 +76,7 @@ def plot(
     written = []
     for phase, times in series:
         if quantity in scalars(times[-1][1]()):
-            film = film_of(phase, times, quantity, grid)
+            film = film_of(phase, times, quantity, grid, _series(home / phase, "line"))
             written.append(film.picture(pictures / f"{phase}-{stem}.png"))
             if movie is not None and len(times) > 1:
                 written.append(film.movie(pictures / f"{phase}-{stem}.{movie}", movie))
@@ -126,11 +126,11 @@ def _phases(home: Path) -> list[Path]:
     )
 
 
-def _particles(phase: Path) -> Times:
-    """The first series of particles in a folder."""
+def _series(phase: Path, kind: str) -> Times:
+    """The first series in a folder of particles ('vertex') or of the border ('line')."""
     for index in sorted(phase.glob("*.pvd")):
         times = frames(index)
-        if times and times[-1][1]().kind == "vertex":
+        if times and times[-1][1]().kind == kind:
             return times
     return []
 

@@ -31,7 +31,7 @@ class Results:
 
     Args:
         folder: Created if it does not exist.
-        outputs: `ParticleOutput`, `GridOutput` and `TableOutput` objects.
+        outputs: `ParticleOutput`, `BorderOutput`, `GridOutput` and `TableOutput` objects.
         checkpoint_steps: Accepted steps between checkpoints; None for none by number.
         checkpoint_minutes: Wall time between checkpoints [min]; None for none by time. One is always
             written at the end of a phase, on SIGTERM and Ctrl-C, and on an error that ends the run.

@@ -21,7 +21,7 @@ class TableOutput(Output):
     """A row at each time: step, time, and the quantities.
 
     Args:
-        names: 'energies', 'momentum', 'angular momentum', 'reaction left' or another edge,
+        names: 'energies', 'momentum', 'angular momentum', 'reaction left' or another part of the border,
             'reaction (2, 0)' of a point with a support, 'displacement (2, 0)' since the start of a
             point of the body at the start, 'run-out' (the largest x), 'particles' (those that have
             not left), 'Newton iterations', 'step size'.

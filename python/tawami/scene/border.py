@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from tawami.border.points import BorderPoints
 from tawami.grid.grid import EDGES, ON_LINE, Edge, Grid
 from tawami.scene.domain import Domain
 from tawami.scene.model import Model
-from tawami.scene.moving_points import MovingPoints
+from tawami.scene.moving_points import MovingPoints, moved
 
 #: Gauss points on a piece of the border between two lines of the grid: where particles stay, three are
 #: exact; points that move to other places in their cells need five (noise of a pressure .5 and .14 %).
@@ -87,12 +88,13 @@ class SceneBorder:
         length = self.points.length.sum()
         return f"SceneBorder({len(self.points)} points, {length:.6g} m: {', '.join(self.names)})"
 
-    def part(self, what: str, where: Part) -> MovingPoints:
+    def part(self, what: str, where: Part, *, joined: bool = False) -> MovingPoints:
         """Points of a part of the border, which are exact for this part at its present place.
 
         Args:
             what: The call, for messages.
             where: The part.
+            joined: Chains of points do not end where only the name changes.
 
         Raises:
             InputError: The body has no border, no part of this name, or nothing where the function or
@@ -107,7 +109,10 @@ class SceneBorder:
         if isinstance(where, np.ndarray):
             points = self.points.now[self._mask(what, where)]
         else:
-            points = self._pieces(what, where).points(self._grid, self._count)
+            pieces = self._pieces(what, where)
+            if joined:
+                pieces = replace(pieces, tag=np.zeros_like(pieces.tag), names=("border",))
+            points = pieces.points(self._grid, self._count)
         if not len(points):
             raise InputError(
                 f"{what}: no point of the border is in this part: expected some of it; the border has "
@@ -200,7 +205,7 @@ class SceneBorder:
 
     def moved(self, domain: Domain, u: Array) -> list[tuple[Array, Array]]:
         """Positions and areas of all points after a step, for :meth:`move`."""
-        return [points.moved(domain, u) for points in self.all]
+        return moved(self.all, domain, u)
 
     def move(self, moved: list[tuple[Array, Array]]) -> None:
         """Move all points."""

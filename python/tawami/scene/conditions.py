@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy.typing as npt
@@ -10,6 +10,7 @@ import numpy.typing as npt
 from tawami.base import checks
 from tawami.base.errors import InputError
 from tawami.base.text import quoted
+from tawami.border.shapes import Shape
 from tawami.grid.edges import Profile
 from tawami.grid.grid import Edge
 from tawami.scene import selection
@@ -17,6 +18,7 @@ from tawami.scene.border import Part, label
 from tawami.scene.configuration import Configuration
 from tawami.scene.factor import InTime
 from tawami.scene.load import Load, Pressure, Traction
+from tawami.scene.obstacle import Obstacle
 from tawami.scene.points import check_in_body
 from tawami.scene.selection import Where
 from tawami.scene.support import Support
@@ -109,6 +111,57 @@ class Conditions:
             InputError: An unknown edge, a negative friction, or an edge that has a wall already.
         """
         return self.configuration.supports.wall(edge, friction, separates)
+
+    def obstacle(
+        self,
+        shape: Shape | Callable[..., Any],
+        friction: float = 0.0,
+        where: Part | None = None,
+        *,
+        name: str | None = None,
+        displacement: Sequence[float] | None = None,
+        amplitude: InTime | None = None,
+        velocity: Sequence[InTime] | None = None,
+        free: str | Sequence[str] | None = None,
+        force: Sequence[float] | None = None,
+        mass: float | None = None,
+        inertia: float | None = None,
+    ) -> Obstacle:
+        """Put a rigid obstacle with Coulomb friction before the border of the body.
+
+        Contact starts where the border comes to it and ends where it leaves. Pressure and friction act
+        on means over patches of the border about as long as a cell. The obstacle rests, moves as
+        prescribed, or moves freely under forces and contact. A call for all ranks.
+
+        Args:
+            shape: `tawami.half_plane(...)`, `rigid_disc(...)`, `rigid_polygon(...)`, or a function
+                f(x, y) on arrays: the distance [m] from it, negative inside.
+            friction: Coefficient of friction; 0 is smooth, infinity does not slide.
+            where: The part of the border that may touch it, as in `fix`; all of it by default.
+            name: Its name for `solution.contact(...)`.
+            displacement: Displacement (x, y) [m], or (x, y, rotation) [m, rad], of its prescribed
+                motions from now on; in statics the obstacle moves as supports do.
+            amplitude: Factor of displacement and force, a number or a function of time [s].
+            velocity: For `Dynamics`: (x, y) [m/s] or (x, y, rotation) [m/s, rad/s], numbers or functions
+                of time [s]; of a free motion its velocity at first, a number.
+            free: Names of the motions that are free: 'x', 'y', 'rotation'. All by default if a force or
+                a mass is given, else none.
+            force: (x, y) [N per metre depth] or (x, y, moment) on its free motions. In axisymmetry
+                [N], along the axis.
+            mass: [kg per metre depth], on which gravity acts; `Dynamics` needs it for free motions.
+            inertia: Moment of inertia about its centre [kg m2 per metre depth].
+
+        Raises:
+            InputError: No shape, an obstacle that overlaps the body by more than h/10, a negative
+                friction, a body without a border, a part that it does not have, or an argument that does
+                not fit its motions.
+        """
+        now = self.configuration
+        return now.obstacles.add(
+            now.domain, now.before, shape, friction, where, name=name, displacement=displacement,
+            amplitude=amplitude, velocity=velocity, free=free, force=force, mass=mass,
+            inertia=inertia,
+        )  # fmt: skip
 
     def flux(
         self, where: Part, field: str, value: Profile, *, amplitude: InTime | None = None

@@ -31,6 +31,9 @@ from tawami.scene.form_inputs import FormInputs
 from tawami.scene.held_border import HeldBorder
 from tawami.scene.loads import Loads
 from tawami.scene.model import Model
+from tawami.scene.obstacle_contact import ObstacleContact
+from tawami.scene.obstacle_motion import Times
+from tawami.scene.obstacles import Obstacles
 from tawami.scene.outcome import Moved, Outcome
 from tawami.scene.reactions import Reactions
 from tawami.scene.share import Moment
@@ -58,7 +61,7 @@ class Configuration:
     Attributes:
         domain: The particles where they are; another object after a step that moves them.
         border: The border of the body.
-        supports, loads: As the driver script made them.
+        supports, loads, obstacles: As the driver script made them.
         inputs: Parameters and data of the form.
         activity: Time and activity of the scene.
         total: Coefficients of all fields since the start, where particles do not move.
@@ -82,6 +85,7 @@ class Configuration:
         self.activity = Activity()
         own = model.form.own_fields
         self.supports = Supports(model.grid, model.basis, own, self.border, self.activity)
+        self.obstacles = Obstacles(self.border, self.activity)
         self.loads = Loads(model.grid, np.array(particles.volume), self.activity)
         self.total = np.zeros(self.domain.layout.size)
         self.inputs = FormInputs(model, self.activity.time, self.border_sums)
@@ -132,23 +136,42 @@ class Configuration:
         end = checks.number("until", until, low=start)
         return Moment(part, start, end if part == 1.0 else start + part * (end - start))
 
-    def terms(self, now: Moment, supports: Sequence[HeldBorder]) -> Terms | None:
+    def obstacles_in_step(
+        self, now: Moment, times: Times | None = None, *, begins: bool = False
+    ) -> list[ObstacleContact]:
+        """Contact with each obstacle in a step that ends at a moment; see `Obstacles.in_step`."""
+        gravity = self.loads.acceleration(now)
+        return self.obstacles.in_step(self.domain, self.before, now, gravity, times, begins=begins)
+
+    def terms(
+        self,
+        now: Moment,
+        supports: Sequence[HeldBorder],
+        obstacles: Sequence[ObstacleContact] = (),
+    ) -> Terms | None:
         """Forces on the border that depend on the solution of a step; None without any.
 
         Args:
             now: The end of the step.
             supports: Supports on patches of the border.
+            obstacles: Contact with obstacles.
         """
-        found: list[Term] = [*self.loads.following(self.domain, now), *supports]
+        found: list[Term] = [*self.loads.following(self.domain, now), *supports, *obstacles]
         return Terms(found, self.model.grid.comm) if found else None
 
     def external(self, now: Moment | None = None) -> Array:
         """External forces on all coefficients [N per metre depth], under all loads by default."""
         return self.loads.external(self.domain, now or self.moment())
 
+    def apply(self, now: Moment) -> None:
+        """The body is in equilibrium with supports and obstacles at this moment."""
+        self.supports.apply(now)
+        self.obstacles.apply(now)
+
     def accept(self, now: Moment) -> None:
         """Let later parts of loads and prescribed displacements grow from this moment."""
         self.supports.accept(now)
+        self.obstacles.accept(now)
         self.loads.accept(now)
         self.activity.time = now.time
 
@@ -200,6 +223,8 @@ class Configuration:
                     dissipated = self.domain.stage.commit(*fields)
                     own_fields.accept(self.domain, accepted.step.coefficients)
                 committed = True
+                if accepted.problem.terms is not None:
+                    accepted.problem.terms.accept()
                 update.store(dissipated)
                 self.inputs.finish(kind.moment)
                 outcome = self._store(accepted, moved, kind.end)
@@ -229,9 +254,7 @@ class Configuration:
     def _store(self, accepted: Accepted, moved: Moved | None, time: float) -> Outcome:
         """Store a step that the laws have committed, and move the particles."""
         self.begun = True
-        coefficients, terms = accepted.step.coefficients, accepted.problem.terms
-        if terms is not None:
-            terms.accept()
+        coefficients = accepted.step.coefficients
         if moved is None:
             coefficients = self.total = self.total + coefficients
             return self._outcome(accepted, coefficients)
@@ -270,6 +293,7 @@ class Configuration:
             "tolerance": self.numerics.tolerance,
             "supports": self.supports.identity(),
             "loads": self.loads.identity(),
+            "obstacles": self.obstacles.identity(),
         }
         return self.model.identity() | facts | particles
 
@@ -287,6 +311,7 @@ class Configuration:
             "coverage_checked": self._coverage_checked,
             "supports": self.supports.state(),
             "loads": self.loads.state(),
+            "obstacles": self.obstacles.state(),
             "border": self.border.state(),
             "newton": self.domain.newton.state(),
         }
@@ -313,6 +338,7 @@ class Configuration:
         self.inputs.restore(state["inputs"])
         self.supports.restore(state["supports"])
         self.loads.restore(state["loads"])
+        self.obstacles.restore(state["obstacles"])
         self.border.restore(state["border"])
         self._attach(particles, location)
         self.domain.newton.record()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -30,6 +30,7 @@ def constraints(
     *,
     moving: bool,
     fields: step_values.Fields | None = None,
+    also: Sequence[PointHeld] = (),
 ) -> tuple[Reduction, ActiveSet, list[HeldBorder]]:
     """Unknowns that the supports leave free, the walls in their present states, and the supports on
     patches of the border.
@@ -43,6 +44,7 @@ def constraints(
             0 where they do. Walls measure distances from it.
         moving: Inertia or stress holds the body: rigid motions may be free.
         fields: Fields without a role and what is prescribed for them; they stay by default.
+        also: Constraints by contact that prevent rigid motions.
 
     Raises:
         SupportError: The body has left a point, or supports contradict each other.
@@ -78,6 +80,7 @@ def constraints(
         held += wall.held(layout.active, prescribed[-1], start, before)
     contact = ActiveSet(supports.walls, prescribed)
     rows = [row for one in border for row in one.rows] if not moving else []
+    rows += also
     may_move = moving or domain.model.compiled.may_hold
     reduction = Reduction(layout, held, points, start, moving=may_move, also=rows)
     return reduction, contact, border

@@ -157,6 +157,7 @@ def _replace(now: Configuration, after: Domain) -> None:
     if after.particles is not before.particles:
         kept = now.border.keep(before, after)
         now.supports.keep(kept)
+        now.obstacles.keep(kept)
         now.border_sums.keep(kept)
     now.border_sums.attach(after)
     now.inputs.repeat(after, now.moment(), gravity)

@@ -32,6 +32,7 @@ def lines(now: Configuration, motion: str = "") -> dict[str, str]:
         "models": ", ".join(_models(now, motion)),
         "form": now.model.form_line,
         "supports": now.supports.line,
+        "obstacles": now.obstacles.line,
         "loads": now.loads.line,
         "motion": motion,
         "solver": now.numerics.line(now.model.grid.comm.size),
@@ -87,8 +88,8 @@ def _not_modelled(now: Configuration, motion: str) -> Iterator[str]:
         yield f"a field for the volume (form='{form.strain.mixed_form}')"
     if model.options.get("ghost_penalty") == "off":
         yield "ghost penalty (ghost_penalty='on')"
-    if not now.supports.walls:
-        yield "contact (scene.wall(...))"
+    if not now.supports.walls and not now.obstacles.all:
+        yield "contact (scene.wall(...), scene.obstacle(...))"
     if not now.loads.gravity.any():
         density = ", Scene(..., density=...)" if model.density is None else ""
         yield f"weight (scene.gravity(...){density})"

@@ -62,6 +62,11 @@ class Factor:
         return checks.number(f"{what} at {time:g} s", value)
 
     @property
+    def is_function(self) -> bool:
+        """Whether it is given by a function of time."""
+        return callable(self._given)
+
+    @property
     def moves(self) -> bool:
         """Whether the factor may change in time."""
         return self.has_velocity or callable(self._given)

@@ -40,7 +40,7 @@ class HeldBorder:
         before: Coefficients at the start, which the values include.
     """
 
-    smooth = True
+    smooth, implicit = True, False
 
     def __init__(self, domain: Domain, support: Support, values: Array, before: Array) -> None:
         assert isinstance(support.place, MovingPoints)

@@ -107,6 +107,12 @@ class Traction(OnBorder):
         given = checks.pair(f"{self}", value, "components (t_x, t_y)")
         return tuple(checks.profile(f"{self}: t_{n}", t) for n, t in zip(names, given, strict=True))
 
+    def tractions(self, term: Term) -> Array:
+        """The whole traction per present area [Pa], points x dim."""
+        return np.asarray(
+            self.at_points(term) * (self.points.reference / self.points.weight)[:, None]
+        )
+
     def on(self, domain: Domain, term: Term) -> Array:
         """Forces of the whole traction, functions x dim [N per metre depth]."""
         functions = self.points.cells(domain).values(domain.layout.basis)
@@ -122,6 +128,10 @@ class Pressure(OnBorder):
 
     def _checked(self, value: Any) -> tuple[Value, ...]:
         return (checks.profile(f"{self}", value),)
+
+    def tractions(self, term: Term) -> Array:
+        """The whole pressure as tractions [Pa], points x dim."""
+        return -self.at_points(term) * self.points.normal
 
     def on(self, domain: Domain, term: Term) -> Array:
         """Forces of the whole pressure where the border is, functions x dim [N per metre depth]."""

@@ -165,6 +165,16 @@ class Loads(Owner[Load]):
         """Whether a load depends on the displacement in a step."""
         return isinstance(load, Pressure) and domain.model.moves
 
+    @property
+    def tractions(self) -> list[tuple[MovingPoints, Array]]:
+        """Points of each load on the border, and its present tractions there [Pa], points x dim."""
+        found = []
+        for load in self.all:
+            if isinstance(load, Traction | Pressure):
+                parts = [term.share.carried * load.tractions(term) for term in load.terms]
+                found.append((load.points, np.asarray(sum(parts))))
+        return found
+
     def check_reach(self, before: Domain, after: Domain) -> None:
         """Check that loads on the border still load something once particles were removed.
 

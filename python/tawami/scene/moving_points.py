@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from tawami import _rust
 from tawami.base.arrays import Array, Mask
 from tawami.base.errors import CheckpointError
 from tawami.base.space import Space
@@ -116,20 +117,6 @@ class MovingPoints:
         self.x, self.area, self.reference = self.x[kept], self.area[kept], self.reference[kept]
         self.number, self._located = self.number[kept], None
 
-    def moved(self, domain: Domain, u: Array) -> tuple[Array, Array]:
-        """Positions and areas after a step (Nanson: n dA = cof(F) n0 dA0).
-
-        Args:
-            domain: The particles at its start.
-            u: Increments of the displacement, functions x dim.
-        """
-        cells, basis = self.cells(domain), domain.layout.basis
-        gradient = np.stack([slope @ u for slope in cells.slopes(basis)], axis=2)
-        f = gradient + np.eye(self.space.dim)
-        cofactor = np.linalg.det(f)[:, None, None] * np.linalg.inv(f).transpose(0, 2, 1)
-        area = np.einsum("nij,nj->ni", cofactor, self.area)
-        return self.x + cells.values(basis) @ u, area
-
     def state(self) -> dict[str, Any]:
         """Positions and areas, for a checkpoint."""
         return {
@@ -151,3 +138,31 @@ class MovingPoints:
         self.x, self.area, self.reference = state["x"], state["area"], state["reference"]
         self.number = number
         self._located = None
+
+
+def moved(
+    all_points: Sequence[MovingPoints], domain: Domain, u: Array
+) -> list[tuple[Array, Array]]:
+    """Positions and areas of points after a step (Nanson: n dA = cof(F) n0 dA0).
+
+    Args:
+        all_points: The points of several parts.
+        domain: The particles at its start.
+        u: Increments of the displacement, functions x dim.
+    """
+    if not all_points:
+        return []
+    grid, basis, space = domain.model.grid, domain.layout.basis, domain.model.space
+    x, area = (
+        np.concatenate(arrays) for arrays in zip(*((p.x, p.area) for p in all_points), strict=True)
+    )
+    normal = area / np.linalg.norm(area, axis=1)[:, None]
+    location = BorderInCells(grid, domain.active, x, normal).location
+    flat = np.ascontiguousarray(u).ravel()
+    gradient = space.in_space(space.gradients(_rust.gradients(location, basis, flat)))
+    f = gradient + np.eye(space.dim)
+    cofactor = np.linalg.det(f)[:, None, None] * np.linalg.inv(f).transpose(0, 2, 1)
+    x = x + _rust.interpolate(location, basis, space.dim, flat)
+    area = np.einsum("nij,nj->ni", cofactor, area)
+    ends = np.cumsum([len(p) for p in all_points])[:-1]
+    return list(zip(np.split(x, ends), np.split(area, ends), strict=True))

@@ -15,7 +15,16 @@ from tawami.base.space import Space
 from tawami.grid.grid import Grid
 from tawami.picture import style
 from tawami.picture.figure import lay_out, shown_axes
-from tawami.picture.particles import Corners, Squares, draw_frame, scale_of, size_of, view
+from tawami.picture.particles import (
+    Corners,
+    Squares,
+    draw_border,
+    draw_frame,
+    scale_of,
+    size_of,
+    view,
+)
+from tawami.scene.outline import Outline
 from tawami.scene.quantities import GRADIENT, PARTICLES, Arrays, Given, Quantity
 from tawami.scene.scalars import pick, scalars
 
@@ -84,6 +93,7 @@ def plot(
     deformed: float,
     limits: tuple[float, float] | None,
     more: Mapping[str, Quantity],
+    outline: Outline | None = None,
 ) -> Axes:
     """Draw particles; see `Solution.plot`."""
     deformed, limits = checks.number("deformed", deformed), checked_limits(limits)
@@ -100,6 +110,8 @@ def plot(
     draw_frame(axes, lower, upper, corners)
     squares = Squares(axes, scale_of(name, unit, [values], limits))
     squares.show(x, shapes(arrays, grid.space, moved=moved, deformed=deformed), values)
+    if outline is not None:
+        draw_border(axes, outline.sides(deformed))
     (squares.add_bar if new else squares.add_bar_beside)(axes)
     factor = "at the start" if deformed == 0 else f"displacements x {deformed:g}"
     axes.set_title(name if deformed == 1 else f"{name}, {factor}")

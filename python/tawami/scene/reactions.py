@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,9 @@ from tawami.base.text import quoted
 from tawami.field.reduction import Reduction
 from tawami.grid import edges
 from tawami.grid.grid import EDGES, Edge
+from tawami.scene.contact_result import ContactResult
 from tawami.scene.model import Model
+from tawami.scene.obstacle import Obstacle
 from tawami.scene.step import Accepted
 from tawami.scene.supports import Supports
 
@@ -95,6 +98,7 @@ class Reactions:
         on_edges: Of edges and walls, functions x dim [N per metre depth].
         at_points: Of points.
         on_border: Of patches of the border [N per metre depth], by the names of its parts.
+        on_obstacles: Contact with obstacles.
         supported: Names of the edges with supports.
         names: Parts of the border with supports, each with the edges of the grid that it is held on.
     """
@@ -102,6 +106,7 @@ class Reactions:
     on_edges: Array
     at_points: Sequence[AtPoint] = field(default_factory=list)
     on_border: Sequence[tuple[str, Array]] = ()
+    on_obstacles: Sequence[ContactResult] = ()
     supported: Collection[str] = ()
     names: Mapping[str, Collection[Edge]] = field(default_factory=dict)
 
@@ -130,11 +135,26 @@ class Reactions:
             for part in held.resultants.items()
         ]
         held_edges = accepted.problem.held_edges
-        return cls(on_edges, at_points, on_border, held_edges, supports.names)
+        contacts = [contact.result() for contact in accepted.problem.obstacles]
+        return cls(on_edges, at_points, on_border, contacts, held_edges, supports.names)
 
-    def at(self, model: Model, place: str | Sequence[float]) -> Array:
+    def contact(self, obstacle: Any) -> ContactResult:
+        """Contact with an obstacle, given by its handle or name."""
+        name = getattr(obstacle, "name", obstacle)
+        for one in self.on_obstacles:
+            if one.name == name:
+                return one
+        known = quoted([one.name for one in self.on_obstacles])
+        raise InputError(
+            f"contact({checks.shown(name)}): the step had no such obstacle: expected one of "
+            f"{known or 'none'}"
+        )
+
+    def at(self, model: Model, place: str | Sequence[float] | Obstacle) -> Array:
         """Force (x, y) [N per metre depth] of a support; see `Solution.reaction`."""
         force, found = np.zeros(model.space.dim), False
+        if isinstance(place, Obstacle) or any(place == one.name for one in self.on_obstacles):
+            return -self.contact(place).force
         if isinstance(place, str):
             _check_known(place, self.supported, self.names)
             on_edges = {*self.names.get(place, ())}

@@ -31,10 +31,12 @@ from tawami.scene.conditions import Conditions
 from tawami.scene.configuration import Configuration
 from tawami.scene.construction import Construction
 from tawami.scene.model import build
+from tawami.scene.obstacle import Obstacle
 from tawami.scene.solution import Solution
 from tawami.scene.sources import Source
 from tawami.scene.statics import StaticStep
 from tawami.scene.step import StepKind
+from tawami.scene.support import Support
 from tawami.solve.numerics import Factorise, Numerics, SolverName
 
 Array = npt.NDArray[np.float64]
@@ -299,7 +301,9 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
     def advanced(self, kind: StepKind) -> Solution:
         """Take a static step, as :meth:`solve` does."""
         with self.configuration.activity.step("solve()"):
-            for support in self.configuration.supports.all:
+            now = self.configuration
+            actions: list[Support | Obstacle] = [*now.supports.all, *now.obstacles.all]
+            for support in actions:
                 if support.has_velocity:
                     raise InputError(
                         f"{support} has a velocity, which static steps do not follow: expected a value, "

@@ -20,7 +20,10 @@ from tawami.grid import edges
 from tawami.scene import presentation, quantities
 from tawami.scene.absent import Elsewhere
 from tawami.scene.configuration import Configuration
+from tawami.scene.contact_result import ContactResult
+from tawami.scene.obstacle import Obstacle
 from tawami.scene.outcome import Outcome
+from tawami.scene.outline import Outline
 from tawami.scene.points import ROUND_OFF, outside
 from tawami.scene.quantities import Arrays, Given, Quantity
 
@@ -83,6 +86,11 @@ class Solution(Elsewhere, Sealed, Unique):
         self._reactions = outcome.reactions
         self.on_edges = outcome.reactions.on_edges
         particles = outcome.particles
+        now = scene.configuration
+        #: The border of the body; None if it has none.
+        self.outline = None
+        if now.border.points is not None:
+            self.outline = Outline(now.border.points, now.domain, self.u)
         #: Arrays of the particles by name, for quantities.
         self.arrays = Arrays(self._array)
         self.number = particles["number"]
@@ -211,7 +219,7 @@ class Solution(Elsewhere, Sealed, Unique):
         deformed: float = 1.0,
         limits: tuple[float, float] | None = None,
     ) -> Axes:
-        """Draw the particles as squares, coloured by a quantity, with the border of the grid.
+        """Draw the particles as squares, coloured by a quantity, with the borders of body and grid.
 
         On several ranks each rank that calls it draws all particles in a figure of its own.
 
@@ -232,7 +240,7 @@ class Solution(Elsewhere, Sealed, Unique):
         """
         return presentation.plot(
             self.arrays, self._model.grid, quantity, axes, moved=self._model.moves, deformed=deformed,
-            limits=limits, more=quantities.of_scene(self.scene),
+            limits=limits, more=quantities.of_scene(self.scene), outline=self.outline,
         )  # fmt: skip
 
     def to_pandas(self, *names: Given) -> Any:
@@ -286,8 +294,19 @@ class Solution(Elsewhere, Sealed, Unique):
 
     # -- forces --------------------------------------------------------------
 
-    def reaction(self, place: str | Sequence[float]) -> Array:
-        """Force (x, y) [N per metre depth] that a support or wall exerts on the body.
+    def contact(self, obstacle: Obstacle | str) -> ContactResult:
+        """Contact with an obstacle: force and moment on it, pressure and friction at the border.
+
+        Args:
+            obstacle: As `scene.obstacle` returned it, or its name.
+
+        Raises:
+            InputError: The scene had no such obstacle in this step.
+        """
+        return self._reactions.contact(obstacle)
+
+    def reaction(self, place: str | Sequence[float] | Obstacle) -> Array:
+        """Force (x, y) [N per metre depth] that a support, wall or obstacle exerts on the body.
 
         In dynamics it is the force at the end of the step and the impulse at its beginning over its
         length.
@@ -296,7 +315,7 @@ class Solution(Elsewhere, Sealed, Unique):
             place: Name of a part of the border or of an edge of the grid. Along an edge of the grid it
                 is the sum over the functions of the edge, so that forces at a corner belong to both
                 edges, and parts of the border on one edge share its force. Or the point (x, y) of a
-                `hold` [m], as it was given or where it is now.
+                `hold` [m], as it was given or where it is now. Or an obstacle or its name.
 
         Raises:
             InputError: No such part or nothing that supports it, or no point held there.

@@ -46,14 +46,15 @@ class StaticStep:
             return term.at(self.now) - (term.share.applied if moves else 0.0)
 
         with now.stopwatch("set-up"):
+            obstacles = now.obstacles_in_step(self.now)
             reduction, contact, supports = constraints(
                 now.supports, now.domain, amount, now.before, now.before, moving=self.stressed,
-                fields=now.fields_at(self.now),
+                fields=now.fields_at(self.now), also=[row for o in obstacles for row in o.rows],
             )  # fmt: skip
             external = now.external(self.now)
-            terms = now.terms(self.now, supports)
+            terms = now.terms(self.now, supports, obstacles)
         return Problem(
-            reduction, contact, external, supports=supports, terms=terms,
+            reduction, contact, external, supports=supports, obstacles=obstacles, terms=terms,
             held_edges=now.supports.supported_edges, load=self.now.part,
         )  # fmt: skip
 
@@ -67,6 +68,6 @@ class StaticStep:
     def finish(self) -> None:
         """Record that the body is in equilibrium with this part."""
         self.configuration.activity.statics += 1
-        self.configuration.supports.apply(self.now)
+        self.configuration.apply(self.now)
         if self.now.part == 1.0:
             self.configuration.accept(self.now)

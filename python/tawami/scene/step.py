@@ -12,6 +12,7 @@ import numpy.typing as npt
 from tawami.field.reduction import Reduction
 from tawami.scene.contact import ActiveSet
 from tawami.scene.held_border import HeldBorder
+from tawami.scene.obstacle_contact import ObstacleContact
 from tawami.scene.share import Moment
 from tawami.solve.inertia import Inertia
 from tawami.solve.newton import Converged
@@ -32,6 +33,7 @@ class Problem:
         inertia: Of a dynamic step.
         guess: Increments of all fields to start from.
         supports: Supports on patches of the border.
+        obstacles: Contact with each obstacle.
         terms: Forces on the border that depend on the solution.
         held_edges: Names of the edges of the grid that supports or walls hold.
         path: Path on which the load factor is an unknown; `external` is at its start.
@@ -44,6 +46,7 @@ class Problem:
     inertia: Inertia | None = None
     guess: Array | None = None
     supports: Sequence[HeldBorder] = ()
+    obstacles: Sequence[ObstacleContact] = ()
     terms: Terms | None = None
     held_edges: Collection[str] = ()
     path: Path | None = None

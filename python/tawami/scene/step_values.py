@@ -10,7 +10,7 @@ import numpy as np
 from tawami.base.arrays import Array, Indices
 from tawami.field.constraints import Held, PointHeld, held_edge, held_point
 from tawami.grid.edges import evaluate
-from tawami.grid.grid import ON_LINE, Edge
+from tawami.grid.grid import Edge
 from tawami.scene.action import Term
 from tawami.scene.border import SceneBorder
 from tawami.scene.domain import Domain
@@ -64,15 +64,14 @@ def touched(domain: Domain, border: SceneBorder, support: Support, edge: Edge) -
     row = grid.cells[axis] - 1 if end else 0
     if not isinstance(support.place, MovingPoints) or border.points is None:
         return np.flatnonzero(np.take(active, row, axis=1 - axis))
-    found = []
-    tolerance = NEAR if domain.model.moves else ON_LINE
-    for points in (support.place, border.points):
-        near = points.edge(edge, tolerance)
-        if points is border.points and not domain.model.moves:
-            continue
-        index = grid.cell_indices(points.cells(domain).location.cell[near].astype(np.int64))
-        found.append(index[index[:, axis] == row, 1 - axis])
-    return np.asarray(np.unique(np.concatenate(found)))
+    own = support.place
+    near = [own.x[own.edge(edge)]]
+    if domain.model.moves:
+        near.append(border.points.x[border.points.edge(edge, NEAR)])
+    along = 1 - axis
+    scaled = (np.concatenate(near)[:, along] - grid.origin[along]) / grid.h
+    cells = np.unique(np.clip(scaled, 0, grid.cells[along] - 1).astype(np.int64))
+    return np.asarray(cells[np.take(active, row, axis=1 - axis)[cells]])
 
 
 def on_edge(

@@ -260,10 +260,20 @@ class Supports(Owner[Support]):
         """Parts of the border with supports, each with the edges of the grid that it is held on."""
         found = dict[str, set[Edge]]()
         for support in self.all:
-            if isinstance(support.place, MovingPoints):
-                for name, edges_held in support.names.items():
-                    found.setdefault(name, set()).update(edges_held)
+            for name, edges_held in support.names.items():
+                found.setdefault(name, set()).update(edges_held)
         return found
+
+    @property
+    def tractions(self) -> list[tuple[MovingPoints, Array]]:
+        """Points of each support of the displacement on patches, and the tractions that held them [Pa],
+        points x dim.
+        """
+        return [
+            (s.place, -s.held[:, None] * s.directions)
+            for s in self.all
+            if isinstance(s.place, MovingPoints) and not s.is_field
+        ]
 
     @property
     def supported_edges(self) -> set[str]:

@@ -142,6 +142,8 @@ class Measures:
         scale = max(self._at_start, *(norm(part[:n]) for part in parts))
         at_rest = not forces.external.any() and self._is_at_rest(scale, coefficients[:n], equations)
         momentum = 0.0 if at_rest or scale == 0 else norm(free[of_u]) / scale
+        if equations.terms is not None:
+            momentum = max(momentum, equations.terms.measure)
         volume = None
         if self._responses.form.kinematics.has_mean_stress:
             sums = self._responses.sums(self._volume_scale(coefficients)[:, None])

@@ -33,6 +33,7 @@ from tawami.solve.numerics import Numerics
 from tawami.solve.path import Path
 from tawami.solve.scaling import Scaling
 from tawami.solve.terms import Terms
+from tawami.solve.unknowns import complete
 
 #: Tolerance of linear solves along a path, whose first residual may be zero.
 ON_PATH = 1e-8
@@ -186,6 +187,7 @@ class Newton:
         iterate, history, krylov = equations.first(guess), History(), list[int]()
         add_mass = None if inertia is None else inertia.adder(reduction)
         search: LineSearch | None = None
+        most = self.numerics.max_iterations
         while True:
             try:
                 forces, measured = self._evaluate(iterate, equations)
@@ -196,6 +198,8 @@ class Newton:
                     self._fail(history, f"Then {error}. {equations.advice}")
                 guess = search = None
                 iterate = equations.first(guess)
+                if terms is not None:
+                    terms.restart()
                 continue
             history.append(measured)
             if not np.isfinite(worst(measured)):
@@ -203,6 +207,7 @@ class Newton:
             met = path is None or path.control.is_met(iterate.u)
             converged = worst(measured) < self.numerics.tolerance and met
             if converged and terms is not None and terms.improve():
+                most = len(history) + self.numerics.max_iterations
                 forces, measured = self._evaluate(iterate, equations)
                 history[-1] = measured
                 converged = worst(measured) < self.numerics.tolerance
@@ -212,7 +217,7 @@ class Newton:
                     iterate.coefficients, forces.acceleration, forces.reactions, history, krylov,
                     self._solver.condition, self._solver.symmetric, iterate.factor,
                 )  # fmt: skip
-            if len(history) > self.numerics.max_iterations:
+            if len(history) > most:
                 advice = self._diagnosis.material()
                 self._fail(history, advice or equations.advice)
             with reported():
@@ -273,7 +278,7 @@ class Newton:
             self._restore(tangent, reduction)
         self._measures.observe(tangent, reduction)
         tolerance = ON_PATH
-        if equations.path is None:
+        if equations.path is None and not (equations.terms and equations.terms.bordering):
             tolerance = forcing(history, self.numerics.tolerance)
         singular: SingularError | None = None
         try:
@@ -293,16 +298,15 @@ class Newton:
         if solver.singular:
             solver.forget()
             self._diagnosis.report_singular(solver, equations, history, singular)
-        change = self._on_all(reduction, found)
-        if equations.path is None:
-            return change, 0.0
-        loads = reduction.restricted(equations.path.rate)[reduction.own]
-        rate = self._on_all(reduction, solver.again(loads, tolerance))
-        n = reduction.layout.num_displacement
-        of_factor = equations.path.control.change(iterate.u, change[:n], rate[:n])
+
+        def again(right: Array) -> Array:
+            mine = reduction.restricted(right)[reduction.own]
+            return self._on_all(reduction, solver.again(mine, tolerance))
+
+        change, of_factor = complete(equations, iterate.u, self._on_all(reduction, found), again)
         if not np.isfinite(of_factor):
             self._fail(history, "The loads do not move the control: choose another control")
-        return change + of_factor * rate, of_factor
+        return change, of_factor
 
     @functools.cached_property
     def _signs(self) -> Array:

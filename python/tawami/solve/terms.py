@@ -12,6 +12,7 @@ from tawami.base.arrays import Array
 from tawami.base.errors import SupportError
 from tawami.field.reduction import Reduction
 from tawami.field.sum import Sum
+from tawami.solve.bordered import Bordering, Elimination
 
 #: Passes with better multipliers in one step.
 PASSES = 12
@@ -27,6 +28,10 @@ class Term(Protocol):
     @property
     def smooth(self) -> bool:
         """Whether the forces are those of a potential with one tangent everywhere."""
+
+    @property
+    def implicit(self) -> bool:
+        """Whether the forces are those of contact, with weights of their own in dynamics."""
 
     def begin(self, diagonal: Callable[[], Array]) -> None:
         """Start a step.
@@ -79,15 +84,45 @@ class Terms:
         for term in self._terms:
             term.begin(diagonal)
 
+    def restart(self) -> None:
+        """Go back to the first guess of the unknowns of their own."""
+        for term in self.bordering:
+            term.restart()
+
     def forces(self, coefficients: Array) -> Array:
         """Their sum, as `Term.forces`."""
-        parts = (term.forces(coefficients) for term in self._terms)
-        return sum(parts, np.zeros_like(coefficients))
+        #: Of all that are no contact.
+        self.loads = np.zeros_like(coefficients)
+        total = np.zeros_like(coefficients)
+        for term in self._terms:
+            forces = term.forces(coefficients)
+            total += forces
+            if not term.implicit:
+                self.loads += forces
+        return total
 
     def add_tangent(self, tangent: Any, reduction: Reduction) -> Any:
         """A reduced tangent with their stiffness."""
-        first, *more = (term.stiffness() for term in self._terms)
-        return self._sum.of(tangent, sum(more, first), reduction)
+        return self._sum.of(tangent, _added([t.stiffness() for t in self._terms]), reduction)
+
+    @property
+    def bordering(self) -> list[Bordering]:
+        """The terms with unknowns of their own."""
+        return [t for t in self._terms if isinstance(t, Bordering) and t.num_unknowns]
+
+    @property
+    def measure(self) -> float:
+        """The largest of the measures of their own equations."""
+        return max((term.measure for term in self.bordering), default=0.0)
+
+    def elimination(self, solve: Callable[[Array], Array]) -> Elimination | None:
+        """The elimination of their own unknowns; None if there are none.
+
+        Args:
+            solve: As in `Elimination`.
+        """
+        terms = self.bordering
+        return Elimination(terms, solve) if terms else None
 
     def improve(self) -> bool:
         """Improve all multipliers; whether another solve is needed.
@@ -105,3 +140,14 @@ class Terms:
         """Keep what later steps need, once a step is stored."""
         for term in self._terms:
             term.accept()
+
+
+def _added(matrices: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
+    """A sum with an entry wherever one of them has one, zeros too."""
+    if len(matrices) == 1:
+        return matrices[0]
+    parts = [matrix.tocoo() for matrix in matrices]
+    data, rows, columns = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("data", "row", "col")
+    )
+    return sp.coo_matrix((data, (rows, columns)), shape=parts[0].shape).tocsr()

@@ -1,0 +1,197 @@
+"""The rigid obstacles of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from tawami.base import checks
+from tawami.base.arrays import Array, Mask
+from tawami.base.errors import InputError
+from tawami.base.text import listed
+from tawami.scene import obstacle_inputs as inputs
+from tawami.scene.action import Owner, restored
+from tawami.scene.activity import Activity
+from tawami.scene.border import Part, SceneBorder, label
+from tawami.scene.domain import Domain
+from tawami.scene.factor import Factor, InTime
+from tawami.scene.moving_points import MovingPoints
+from tawami.scene.obstacle import Obstacle
+from tawami.scene.obstacle_contact import ObstacleContact
+from tawami.scene.obstacle_motion import Times
+from tawami.scene.share import Moment
+from tawami.scene.walls import checked_friction
+
+#: Depth in the body at which an obstacle may begin [cells].
+OVERLAP = 0.1
+
+
+class Obstacles(Owner[Obstacle]):
+    """The obstacles of one scene.
+
+    Args:
+        border: The border of the body.
+        activity: Time and activity of the scene.
+    """
+
+    def __init__(self, border: SceneBorder, activity: Activity) -> None:
+        super().__init__(activity)
+        self._border = border
+
+    def add(
+        self,
+        domain: Domain,
+        total: Array,
+        shape: Any,
+        friction: float,
+        where: Part | None,
+        *,
+        name: str | None,
+        displacement: Any,
+        amplitude: InTime | None,
+        velocity: Any,
+        free: Any,
+        force: Any,
+        mass: Any,
+        inertia: Any,
+    ) -> Obstacle:
+        """Put an obstacle into the scene.
+
+        Args:
+            domain: The particles.
+            total: Displacement coefficients since the start where particles do not move, else 0.
+            shape, friction, where, name, displacement, amplitude, velocity, free, force, mass, inertia:
+                As in `scene.obstacle`.
+        """
+        space, h = domain.model.space, domain.model.grid.h
+        name = self._name(name)
+        what = f"obstacle '{name}'"
+        self.activity.check_between_steps(what)
+        mu = checked_friction(what, friction)
+        made = inputs.shape_of(what, shape, space, h)
+        given = "the border" if where is None else label(where)
+        part = self._border.part(
+            what, list(self._border.names) if where is None else where, joined=True
+        )
+        moves = inputs.free_of(what, free, space, force is not None or mass is not None)
+        masses = inputs.masses_of(what, mass, inertia, space)
+        by = inputs.components(f"{what}: displacement", displacement, space)
+        forces = inputs.components(f"{what}: force", force, space)
+        inputs.check_fit(what, np.array(by), np.array(forces), moves, inputs.motions_of(space))
+        factor = Factor(what, amplitude, time=self.activity.time)
+        speeds = inputs.speeds_of(what, velocity, space, self.activity.time)
+        inputs.check_motions(what, space, speeds, moves, np.array(by), np.array(forces))
+        obstacle = Obstacle(
+            self, part, given, name, made, mu, moves, masses, np.where(moves, forces, by), factor,
+            speeds,
+        )  # fmt: skip
+        try:
+            _check_overlap(obstacle, domain, total)
+        except InputError:
+            self._border.parts.remove(part)
+            raise
+        self.all.append(obstacle)
+        self.changed()
+        return obstacle
+
+    def _name(self, name: Any) -> str:
+        known = [one.name for one in self.all]
+        if name is None:
+            return f"obstacle {self._made + 1}"
+        if not isinstance(name, str) or not name or name in known:
+            raise InputError(
+                f"obstacle: name = {checks.shown(name)}: expected a text that no other obstacle has"
+            )
+        return name
+
+    def in_step(
+        self,
+        domain: Domain,
+        before: Array,
+        now: Moment,
+        gravity: Array,
+        times: Times | None = None,
+        *,
+        begins: bool = False,
+    ) -> list[ObstacleContact]:
+        """Contact with each obstacle in a step.
+
+        Args:
+            domain: The particles at its start.
+            before: Displacement coefficients since the start where particles do not move, else 0.
+            now: The end of the step.
+            gravity: Acceleration of weights [m/s2].
+            times: The step in dynamics.
+            begins: Accelerations belong to other loads.
+        """
+        found = []
+        for obstacle in self.all:
+            motion = obstacle.motion(now, gravity, times)
+            contact = ObstacleContact(domain, obstacle, motion, before)
+            if begins and motion.free.any():
+                forces, free = motion.force + contact.at_start[1], motion.free
+                zero = np.zeros_like(forces)
+                a = np.divide(forces, motion.mass, out=zero, where=free)
+                motion.rates = motion.rates[0], a
+            found.append(contact)
+        return found
+
+    def keep(self, kept: Mapping[MovingPoints, Mask]) -> None:
+        """Keep the points of the border that remain after particles were removed."""
+        for obstacle in self.all:
+            mask = kept[obstacle.place]
+            obstacle.pressure, obstacle.traction = obstacle.pressure[mask], obstacle.traction[mask]
+            obstacle.groups = None
+
+    def apply(self, now: Moment) -> None:
+        """The body is in equilibrium with the obstacles at this moment."""
+        for obstacle in self.all:
+            obstacle.apply(now)
+
+    @property
+    def kinetic(self) -> float:
+        """Kinetic energy of free obstacles [J per metre depth]."""
+        return sum(obstacle.kinetic_energy for obstacle in self.all)
+
+    @property
+    def line(self) -> str:
+        """The obstacles in words, for the header of a run."""
+        return listed([obstacle.line for obstacle in self.all])
+
+    def identity(self) -> list[Any]:
+        """Facts that decide the results of a run, in the types of JSON."""
+        return [obstacle.identity() for obstacle in self.all]
+
+    def state(self) -> list[dict[str, Any]]:
+        """State of each obstacle, for a checkpoint."""
+        return [obstacle.state() for obstacle in self.all]
+
+    def restore(self, state: Sequence[Mapping[str, Any]]) -> None:
+        """The reverse of :meth:`state`, for the same obstacles.
+
+        Raises:
+            CheckpointError: The script has made others.
+        """
+        self.all = restored("obstacle", self.all, state)
+        self.changed()
+
+
+def _check_overlap(obstacle: Obstacle, domain: Domain, total: Array) -> None:
+    """Check that an obstacle does not overlap the body.
+
+    Raises:
+        InputError: It does.
+    """
+    place, layout, h = obstacle.place, domain.layout, domain.model.grid.h
+    u = domain.model.space.vectors(total[: layout.num_displacement])
+    x = place.x + place.cells(domain).values(layout.basis) @ u
+    distance = obstacle.shape.evaluate(x).distance
+    worst = int(np.argmin(distance))
+    if distance[worst] < -OVERLAP * h:
+        at = ", ".join(f"{c:g}" for c in x[worst])
+        raise InputError(
+            f"{obstacle}: the body is {-distance[worst]:.3g} m inside it at ({at}) m: expected an "
+            f"obstacle that overlaps the body by at most h/10 = {OVERLAP * h:.3g} m"
+        )

@@ -1,0 +1,112 @@
+"""Terms on the border with unknowns of their own, such as a free obstacle: block elimination.
+
+K x + B q = -r        X = K^-1 B,  x0 = -K^-1 r
+C x + D q = -s        (D - C X) q = -s - C x0,  x = x0 - X q
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from tawami.base.arrays import Array
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Derivatives of residuals.
+
+    Attributes:
+        of_body: Of all coefficients' residual by the own unknowns, coefficients x unknowns.
+        by_body: Of the own residual by all coefficients, unknowns x coefficients.
+        own: Of the own residual by the own unknowns.
+    """
+
+    of_body: Array
+    by_body: Array
+    own: Array
+
+
+@runtime_checkable
+class Bordering(Protocol):
+    """A term with unknowns of its own."""
+
+    @property
+    def num_unknowns(self) -> int:
+        """Number of them; it may be 0."""
+
+    @property
+    def residual(self) -> Array:
+        """Residual of its equations at the last forces."""
+
+    @property
+    def measure(self) -> float:
+        """Size of the residual relative to the terms of its equations."""
+
+    def blocks(self) -> Blocks:
+        """Derivatives at the last forces."""
+
+    def add(self, change: Array) -> None:
+        """Go to the next iterate."""
+
+    def restart(self) -> None:
+        """Go back to the first guess."""
+
+    def check_held(self, matrix: Array) -> None:
+        """Check that its equations can be solved.
+
+        Args:
+            matrix: D - C X.
+
+        Raises:
+            SupportError: They cannot.
+        """
+
+
+class Elimination:
+    """Solves for the unknowns of terms together with all coefficients.
+
+    Args:
+        terms: The terms.
+        solve: Gives the coefficients K^-1 f for forces f on all coefficients.
+    """
+
+    def __init__(self, terms: Sequence[Bordering], solve: Callable[[Array], Array]) -> None:
+        self._terms, blocks = terms, [term.blocks() for term in terms]
+        of_body = np.hstack([block.of_body for block in blocks])
+        self._by_body = np.vstack([block.by_body for block in blocks])
+        solved = [solve(column) if column.any() else 0 * column for column in of_body.T]
+        self._columns = np.column_stack(solved)
+        own = block_diag(*(block.own for block in blocks))
+        self._matrix = own - self._by_body @ self._columns
+        start = 0
+        for term in terms:
+            mine = slice(start, start + term.num_unknowns)
+            term.check_held(self._matrix[mine, mine])
+            start = mine.stop
+
+    def solve(self, change: Array, residual: Array) -> tuple[Array, Array]:
+        """x and q.
+
+        Args:
+            change: x0.
+            residual: s.
+        """
+        q = np.linalg.solve(self._matrix, -residual - self._by_body @ change)
+        return change - self._columns @ q, q
+
+    @property
+    def residual(self) -> Array:
+        """s of all terms."""
+        return np.concatenate([term.residual for term in self._terms])
+
+    def add(self, change: Array) -> None:
+        """Go to the next iterate of all terms."""
+        start = 0
+        for term in self._terms:
+            term.add(change[start : start + term.num_unknowns])
+            start += term.num_unknowns
