@@ -35,7 +35,7 @@ def test_the_header_counts_particles_bytes_and_unknowns(assembly):
     data = scene.configuration.domain.responses.data["particle"]
     # sigma 3 and its derivatives 3 x (3 + 1), K, K^2/mu; and K and mu themselves
     assert data.shape[1] == 3 + 12 + 2
-    assert f"{8 * (17 + 2)} more bytes each" in line(header, "particles")
+    assert f"{8 * (17 + 2 + 2)} more bytes each" in line(header, "particles")
 
 
 def test_only_cells_with_particles_have_unknowns():
