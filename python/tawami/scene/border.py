@@ -56,7 +56,7 @@ class SceneBorder:
         self._count = MOVING if model.moves else STAYING
         self.points: MovingPoints | None = None
         self._ends: MovingPoints | None = None
-        #: Pieces between two lines of the grid, as they were at the start, and which of them are left.
+        #: Pieces between two lines of the grid at the start, and numbers of those that are left.
         self._pieces_at_lines: Border | None = None
         self._left: Indices = np.zeros(0, dtype=np.int64)
         self._has_moved = False

@@ -22,7 +22,15 @@ from tawami.base.process import check_process
 from tawami.base.program import leave_together
 from tawami.base.timing import Stopwatch
 from tawami.particles import placement
-from tawami.scene import coverage, fitting, mean_stress, own_fields, quantities, strain_limit
+from tawami.scene import (
+    coverage,
+    fitting,
+    left_edges,
+    mean_stress,
+    own_fields,
+    quantities,
+    strain_limit,
+)
 from tawami.scene.activity import Activity
 from tawami.scene.border import SceneBorder
 from tawami.scene.border_sums import BorderSums
@@ -263,7 +271,9 @@ class Configuration:
         self.supports.follow(accepted.u, points)
         projects = self._travel.must_project(self.domain, moved.particles)
         self.domain.particles.move_to(moved.particles)
+        on_edges = left_edges.on_edges(self.supports.all)
         self.border.move(moved.border)
+        left_edges.take_over(self.domain, on_edges, accepted.forces)
         outcome = self._outcome(accepted, coefficients)
         outside = placement.outside(grid, self.domain.particles.x)
         particles, gone = placement.removed(grid, self.domain.particles, outside)

@@ -1,0 +1,53 @@
+"""Supports that have left an edge of the grid: their points take the tractions over."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from tawami.base.arrays import Array
+from tawami.field.border import BorderInCells
+from tawami.grid.grid import Edge
+from tawami.scene.domain import Domain
+from tawami.scene.moving_points import MovingPoints
+from tawami.scene.support import Support
+
+#: A support, an edge of the grid that it is on, and the positions of its points there [m].
+OnEdge = tuple[Support, Edge, Array]
+
+
+def on_edges(supports: Iterable[Support]) -> list[OnEdge]:
+    """Supports on edges of the grid where they are."""
+    return [
+        (support, edge, support.place.x[support.whole[edge]])
+        for support in supports
+        if isinstance(support.place, MovingPoints) and not support.is_field
+        for edge in support.edges
+    ]
+
+
+def take_over(domain: Domain, before: Sequence[OnEdge], forces: Array) -> None:
+    """Give the points of supports that have left their edge the tractions of the last step.
+
+    These are the lumped projection of the forces on the functions of the edge, with the same resultant.
+
+    Args:
+        domain: The particles at the start of the step.
+        before: The supports on edges then.
+        forces: Of supports on the body, functions x dim [N per metre depth].
+    """
+    grid = domain.model.grid
+    for support, edge, x in before:
+        if edge in support.edges or not isinstance(support.place, MovingPoints):
+            continue
+        mask = support.whole[edge]
+        axis, sign = support.along_edge(edge, grid)
+        across, end = grid.edge(edge)
+        normal = np.zeros_like(x)
+        normal[:, across] = 1.0 if end else -1.0
+        cells = BorderInCells(grid, domain.active, x, normal, f"{support}")
+        functions = cells.values(domain.layout.basis)
+        sums = functions.T @ support.place.weight[mask]
+        tractions = np.divide(forces[:, axis], sums, out=np.zeros_like(sums), where=sums > 0)
+        support.held[mask] = -sign * (functions @ tractions)
