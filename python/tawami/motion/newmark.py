@@ -24,7 +24,7 @@ from tawami.scene.action import Term
 from tawami.scene.configuration import Configuration
 from tawami.scene.constraints import constraints
 from tawami.scene.contact import ActiveSet
-from tawami.scene.held_border import HeldBorder, imposed
+from tawami.scene.held_border import HeldBorder, imposed, work
 from tawami.scene.obstacle_contact import ObstacleContact
 from tawami.scene.obstacle_motion import Times
 from tawami.scene.share import Moment
@@ -187,6 +187,13 @@ class NewmarkStep:
         return domain.newton.internal(np.zeros(domain.layout.size))
 
     @functools.cached_property
+    def _followers(self) -> Array:
+        """Forces at the start of the step of pressures that follow the border."""
+        terms = self._now.terms(self._begin, ())
+        zero = np.zeros(self._now.domain.layout.size)
+        return zero if terms is None else terms.forces(zero)
+
+    @functools.cached_property
     def _on_border(self) -> Array:
         """Forces on the border at the start of the step that depend on the displacement, without those
         of obstacles [N per metre depth].
@@ -247,10 +254,20 @@ class NewmarkStep:
         """Work of the mean of the forces on the border at both ends of the step, without those of
         obstacles [J per metre depth].
         """
-        terms, u = accepted.problem.terms, accepted.u.ravel()
-        if terms is None or not terms.loads.any():
+        problem, u = accepted.problem, accepted.u.ravel()
+        if problem.terms is None or not problem.terms.loads.any():
             return 0.0
-        return float(0.5 * (self._on_border + terms.loads)[: u.size] @ u)
+        n, supports, start = u.size, problem.supports, self._start
+        last = problem.terms.loads[:n]
+        of_supports = sum((one.on_body[:n] for one in supports), np.zeros(n))
+        followers = 0.5 * (self._followers[:n] + last - of_supports) @ u
+        # those of supports at the start of the step balance the others, as a was made to obey them
+        first = self._internal + np.pad(self._masses * start.a.ravel(), (0, len(self._first) - n))
+        first = (first - self._first - self._followers)[:n]
+        fixed = problem.reduction.fixed[:n]
+        return float(followers + 0.5 * of_supports @ u) + work(
+            supports, self._masses, fixed, 0.5 * first, u
+        )
 
     def _work_of_mean(self, accepted: Accepted) -> float:
         """Work of the mean of the forces at both ends of the step, of loads that follow an amplitude and

@@ -124,6 +124,7 @@ class HeldBorder:
         self._size = float(np.abs(u).max(initial=0.0))
         forces = np.zeros_like(coefficients)
         forces[self._place.slice] = self._at_points.T @ self._on_points.ravel()
+        self.on_body = forces
         return forces
 
     def stiffness(self) -> sp.csr_matrix:
@@ -221,13 +222,38 @@ def imposed(
     of_displacement = [k for k, one in enumerate(held) if not one.support.is_field]
     if not of_displacement:
         return values
-    n = len(mass)
-    means = sp.vstack([held[k].means[:, :n] for k in of_displacement])
+    means, weighted = _weighted([held[k] for k in of_displacement], mass, fixed)
     missing = np.concatenate([rates[k] for k in of_displacement]) - means @ values
-    inverse = np.divide(1.0, mass, out=np.zeros(n), where=(mass > 0) & ~fixed)
-    weighted = sp.diags(inverse) @ means.T
     impulse = np.linalg.lstsq((means @ weighted).toarray(), missing, rcond=None)[0]
     return np.asarray(values + weighted @ impulse)
+
+
+def work(held: Sequence[HeldBorder], mass: Array, fixed: Mask, forces: Array, u: Array) -> float:
+    """Work of supports on patches, given the forces out of balance without them.
+
+    Args:
+        held, mass, fixed: As of :func:`imposed`.
+        forces: On the displacement coefficients [N per metre depth]; the part that the supports cannot
+            exert does no work.
+        u: Increments of the displacement coefficients [m].
+    """
+    supports = [one for one in held if not one.support.is_field]
+    if not supports:
+        return 0.0
+    means, weighted = _weighted(supports, mass, fixed)
+    matrix = (means @ weighted).toarray()
+    multipliers = np.linalg.lstsq(matrix, weighted.T @ forces, rcond=None)[0]
+    return float(multipliers @ (means @ u))
+
+
+def _weighted(
+    held: Sequence[HeldBorder], mass: Array, fixed: Mask
+) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """Means C over patches, patches x coefficients, and M^-1 C^T, 0 for fixed coefficients."""
+    n = len(mass)
+    means = sp.vstack([one.means[:, :n] for one in held]).tocsr()
+    inverse = np.divide(1.0, mass, out=np.zeros(n), where=(mass > 0) & ~fixed)
+    return means, (sp.diags(inverse) @ means.T).tocsr()
 
 
 def check_agreement(held: Sequence[HeldBorder], h: float) -> None:
