@@ -14,7 +14,8 @@ OF_A_RUN = {"scene", "motion", "state", "restore", "identity", "header"}
 SCENE = {
     "grid", "form", "basis", "parameters", "options", "numerics", "particles", "num_particles",
     "laws", "mass", "particles_per_cell", "left", "stopwatch", "configuration",
-    "initial", "data", "parameter", "flux", "fix", "hold", "wall", "obstacle", "release", "traction", "load",
+    "initial", "data", "parameter", "flux", "fix", "hold", "wall", "obstacle", "release",
+    "traction", "load",
     "gravity", "remove", "change_material",
     "time", "solve", "solve_part", "advanced",
     "residual", "tangent", "reduction", "split", "num_coefficients",
@@ -28,7 +29,8 @@ SOLUTION = {
     "scene", "u", "volumetric", "unknowns", "load", "iterations", "history", "krylov", "condition",
     "symmetric", "arrays", "number", "x", "volume", "stress", "strain", "mean_stress",
     "displacement_of_particles",
-    "eps_v", "field", "coefficients", "displacement", "reaction", "contact", "on_edges", "on_points", "plot",
+    "eps_v", "field", "coefficients", "displacement", "reaction", "contact", "on_edges",
+    "on_points", "plot",
     "to_pandas", "to_pyvista",
 }  # fmt: skip
 
