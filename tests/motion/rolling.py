@@ -30,7 +30,7 @@ def block_on_incline(angle, friction):
 
 
 def disc_on_incline(angle, friction, cells, length=0.35):
-    """A disc of radius .5 m in equilibrium, with its weight across the plane; then it is inclined.
+    """A disc of radius .5 m in equilibrium on a level plane, which is then inclined.
 
     Args:
         angle: [rad]

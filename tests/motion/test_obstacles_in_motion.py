@@ -20,7 +20,7 @@ def scene_of(low, high, form="u", *, E=1e5, cells=(14, 12)):
 
 
 def record(motion, end, dt, *more):
-    """Rows of kinetic + elastic - external, friction, impact and other values, after each step."""
+    """Rows of kinetic + elastic - external, friction, impact, and other values after each step."""
     rows, iterations = [], []
 
     def each(solution):

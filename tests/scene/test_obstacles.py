@@ -121,7 +121,10 @@ def test_a_restored_scene_continues_in_the_same_way():
     assert found.force == pytest.approx(expected.force, rel=1e-9)
     assert found.pressure == pytest.approx(expected.pressure, rel=1e-9)
     assert other.x == pytest.approx(plane.x)
-    assert again.identity() == scene.identity() or found.name == expected.name
+    one, another = made(), made()
+    assert one[0].identity() == another[0].identity()
+    another[1].change(friction=0.4)
+    assert one[0].identity() != another[0].identity()
 
 
 @pytest.mark.parametrize(
