@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from mpi4py import MPI
-from rolling import G, block_on_incline, disc_on_incline, speed_of
 
 import tawami
+from cases.verification.rolling import G, speed_of
 
 FLOOR = (0.0, 1.0)
 
@@ -33,46 +33,6 @@ def record(motion, end, dt, *more):
     assert np.mean(iterations) <= 10
     assert max(iterations) <= 25
     return np.array(rows)
-
-
-def test_a_block_slides_down_an_incline():
-    angle, friction = np.radians(25.0), 0.2
-    scene, _ = block_on_incline(angle, friction)
-    motion = tawami.Dynamics(scene)
-    record(motion, 0.2, 0.02)
-    exact = G * (np.sin(angle) - friction * np.cos(angle))
-    assert speed_of(motion) / motion.time == pytest.approx(exact, rel=5e-3)
-
-
-def test_a_block_sticks_on_an_incline():
-    scene, plane = block_on_incline(np.radians(25.0), 0.7)
-    motion = tawami.Dynamics(scene)
-    record(motion, 0.06, 0.02)
-    assert abs(speed_of(motion)) < 1e-5 * G * motion.time
-    assert not np.any(plane.velocity)
-
-
-def rolled(cells, end):
-    """Acceleration of a disc that rolls down 30 degrees, over the exact one."""
-    angle = np.radians(30.0)
-    scene, _ = disc_on_incline(angle, 0.6, cells)
-    motion, speeds = tawami.Dynamics(scene), []
-
-    def each(solution):
-        speeds.append((motion.time, speed_of(motion)))
-
-    motion.run(end, 0.01, each=each)
-    slope = np.polyfit(*np.transpose(speeds), 1)[0]
-    return float(slope / (2 / 3 * G * np.sin(angle)))
-
-
-def test_a_disc_rolls_down_an_incline():
-    assert rolled(5, 0.2) == pytest.approx(1.0, abs=0.05)
-
-
-@pytest.mark.slow
-def test_a_fine_disc_rolls_down_an_incline():
-    assert rolled(20, 0.3) == pytest.approx(1.0, abs=0.03)
 
 
 def test_a_bouncing_block_never_gains_energy():
