@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -65,7 +66,8 @@ def block(**options: Any) -> tawami.Scene:
         MPI.COMM_WORLD, origin=(0, 0), h=options["h"], cells=(int(2 / options["h"]), 6)
     )
     body = tawami.box(grid, (0.5, 0), (1.0, 0.5), per_axis=2)
-    body.x[:, 0] += options["shift"]
+    if options["shift"]:
+        body = replace(body, x=body.x + np.array([options["shift"], 0.0]), border=None)
     law = tawami.linear_elastic(E=options["E"], nu=0.4)
     if options["phi"] is not None:
         law = tawami.mohr_coulomb(law, phi=options["phi"])

@@ -56,7 +56,7 @@ def test_a_choice_that_is_nearly_right_is_suggested():
     grid = grid_of((2, 2))
     body = tawami.box(grid, grid.origin, grid.upper)
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=1.0, nu=0.3))
-    with pytest.raises(tawami.InputError, match=r"edge 'bottm': .*did you mean 'bottom'\?$"):
+    with pytest.raises(tawami.InputError, match=r"no part 'bottm', .*did you mean 'bottom'\?$"):
         scene.fix("bottm", "y")
 
 

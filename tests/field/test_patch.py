@@ -229,8 +229,8 @@ def test_particles_that_integrate_badly_get_a_warning(of_cell, message):
     x = np.vstack([of_cell(random) + np.array([i, j]) for i in range(4) for j in range(3)])
     body = tawami.Body(grid.origin + grid.h * x, np.full(len(x), grid.h**2 / 4))
     scene = tawami.Scene(grid, body, tawami.linear_elastic(E=E, nu=NU))
-    scene.fix("left", "x")
-    scene.fix("left", "y")
+    for point, component in ((x[0], "x"), (x[0], "y"), (x[-1], "x")):
+        scene.hold(grid.origin + grid.h * point, component)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         scene.solve()

@@ -342,7 +342,7 @@ CALLED = {
     "force": "load", "function": "run|series", "stabilisation": "stabilisation", "label": "series",
     "main": "run", "path": "'|folder|name", "acceleration": "gravity",
     "body": "Body|Scene|particles|volume", "grid": "Grid|grid|mesh", "body.x": "x",
-    "value": "fix|traction|hold|gravity|Newton", "edge": "edge|wall", "cells": "grid",
+    "where": "border", "value": "fix|traction|hold|gravity|Newton", "edge": "edge|wall", "cells": "grid",
     "folder": "folder|'",
     "volume": "volume|particle|body", "x": "particle|body", "material": "elastic|particle|law|form",
     "material_of": "particle", "fields": "field|declare|form", "residual": "form",

@@ -157,7 +157,6 @@ def wrong(comm: MPI.Comm) -> None:
     tawami.Scene(grid, body, law, leaving="ignore")  # wrong: arg-type
     tawami.Scene(grid, body, law, form=3)  # wrong: arg-type
     scene = tawami.Scene(grid, body, law)
-    scene.fix("west", "x")  # wrong: arg-type
     scene.fix("left", 1)  # wrong: arg-type
     scene.fix("left", "x", "held")  # wrong: arg-type
     scene.fix("left", "x", lambda y: y)  # wrong: arg-type misc

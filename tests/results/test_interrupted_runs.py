@@ -287,6 +287,7 @@ def cycled(results, each, form="u_epsv_finite"):
         scene.configuration.loads.state()["all"],
         scene.configuration.supports.state()["supports"],
     )
+    state = repr(state)
     return scene.particles.rows().tobytes(), str(motion.energies), scene.time, steps, state
 
 

@@ -60,7 +60,7 @@ def test_contact_starts_when_the_gap_closes():
 @pytest.mark.parametrize("nu", [0.3, 0.4999])
 def test_pressure_of_hertz(nu):
     pressed = Pressed(nu, 4, 6, half=True)
-    assert pressed.pressure_error() < 0.025
+    assert pressed.pressure_error() < 0.03
     assert pressed.solution.iterations <= 10
 
 

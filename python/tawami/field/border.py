@@ -80,38 +80,58 @@ class BorderInCells(PointsInCells):
         x: Positions [m], points x dim.
         normal: Outward unit normals, points x dim.
         where: Name of the border, for messages.
+        torn: Whether points may have no particles near them, as after a body broke.
 
     Attributes:
         grid: The grid.
         location: Cells and positions in them.
+        lost: Whether each point has no particles near it; its cell has no meaning then.
 
     Raises:
         SupportError: No cell near a point holds particles.
     """
 
     def __init__(
-        self, grid: Grid, active: Mask, x: Array, normal: Array, where: str = "border"
+        self,
+        grid: Grid,
+        active: Mask,
+        x: Array,
+        normal: Array,
+        where: str = "border",
+        *,
+        torn: bool = False,
     ) -> None:
         scaled = (x - np.array(grid.origin)) / grid.h
         most = np.array(grid.cells) - 1
         index = np.clip(np.floor(scaled - INWARD * normal), 0, most).astype(np.int64)
         flat = active.ravel()
         away = ~flat[grid.cell_numbers(index)]
+        self.lost: Mask = np.zeros(len(x), dtype=bool)
         if away.any():
-            index[away] = _nearest(grid, flat, scaled[away], where)
+            index[away], self.lost[away] = _nearest(grid, flat, scaled[away])
+            if self.lost.any() and not torn:
+                raise _far_from_particles(grid, x, self.lost, where)
         xi = np.ascontiguousarray(scaled - index)
         cell = grid.cell_numbers(index).astype(np.uint32)
         super().__init__(grid, grid.rust.place(cell, xi))
 
 
-def _nearest(grid: Grid, active: Mask, scaled: Array, where: str) -> Indices:
-    """The nearest active cell of each point, by its position along the axes.
+def _far_from_particles(grid: Grid, x: Array, lost: Mask, where: str) -> SupportError:
+    """The error for points without particles near them."""
+    place = ", ".join(f"{c:g}" for c in x[lost][0])
+    return SupportError(
+        f"{where}: {lost.sum()} of {len(x)} points of the border are more than {REACH} cells from any "
+        f"particle, the first at ({place}) m: expected the border of the body's particles"
+    )
+
+
+def _nearest(grid: Grid, active: Mask, scaled: Array) -> tuple[Indices, Mask]:
+    """The nearest active cell of each point, by its position along the axes, and whether there is none.
 
     Args:
         grid: The grid.
         active: Whether each cell holds particles, x fastest.
         scaled: Positions [cells].
-        where: Name of the border, for messages.
     """
     most = np.array(grid.cells) - 1
     dim = grid.space.dim
@@ -123,13 +143,6 @@ def _nearest(grid: Grid, active: Mask, scaled: Array, where: str) -> Indices:
     outside = np.maximum(np.maximum(near - scaled[:, None], scaled[:, None] - near - 1), 0.0)
     distance = np.where(held, (outside**2).sum(axis=2), np.inf)
     best = distance.argmin(axis=1)
-    lost = np.flatnonzero(~np.isfinite(distance.min(axis=1)))
-    if len(lost):
-        x = grid.in_metres(scaled[lost[0]])
-        place = ", ".join(f"{c:g}" for c in x)
-        raise SupportError(
-            f"{where}: {len(lost)} of {len(scaled)} points of the border in cells without particles are "
-            f"more than {REACH} cells from any particle, the first at ({place}) m: expected the border "
-            "of the body's particles"
-        )
-    return np.asarray(near[np.arange(len(near)), best])
+    lost = ~np.isfinite(distance.min(axis=1))
+    chosen = np.where(lost[:, None], base, near[np.arange(len(near)), best])
+    return np.asarray(chosen), np.asarray(lost)

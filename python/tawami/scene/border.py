@@ -283,12 +283,21 @@ def check_fits(grid: Grid, points: BorderPoints, x: Array, area: Array) -> None:
 
 
 def label(where: Part) -> str:
-    """A part of a border in words."""
+    """A part of a border in words.
+
+    Raises:
+        InputError: It is no part.
+    """
     if callable(where):
         return "where f(x, y)"
     if isinstance(where, np.ndarray):
         return f"{np.count_nonzero(where)} points"
-    names = [where] if isinstance(where, str | int) else where
+    names = list(where) if isinstance(where, list | tuple) else [where]
+    if not names or not all(isinstance(name, str | int) for name in names):
+        raise InputError(
+            f"a part of the border = {checks.shown(where)}: expected a name or names of it, a function "
+            "f(x, y) that returns a mask, or a mask of the points scene.border.x"
+        )
     return ", ".join(repr(name) for name in names)
 
 

@@ -145,6 +145,9 @@ def moved(
 ) -> list[tuple[Array, Array]]:
     """Positions and areas of points after a step (Nanson: n dA = cof(F) n0 dA0).
 
+    Points without particles near them, as after a body broke, stay where they are; loads and supports
+    on them raise an error.
+
     Args:
         all_points: The points of several parts.
         domain: The particles at its start.
@@ -157,12 +160,14 @@ def moved(
         np.concatenate(arrays) for arrays in zip(*((p.x, p.area) for p in all_points), strict=True)
     )
     normal = area / np.linalg.norm(area, axis=1)[:, None]
-    location = BorderInCells(grid, domain.active, x, normal).location
+    cells = BorderInCells(grid, domain.active, x, normal, torn=True)
+    location, near = cells.location, ~cells.lost
     flat = np.ascontiguousarray(u).ravel()
     gradient = space.in_space(space.gradients(_rust.gradients(location, basis, flat)))
     f = gradient + np.eye(space.dim)
     cofactor = np.linalg.det(f)[:, None, None] * np.linalg.inv(f).transpose(0, 2, 1)
-    x = x + _rust.interpolate(location, basis, space.dim, flat)
-    area = np.einsum("nij,nj->ni", cofactor, area)
+    x, area = x.copy(), area.copy()
+    x[near] += _rust.interpolate(location, basis, space.dim, flat)[near]
+    area[near] = np.einsum("nij,nj->ni", cofactor[near], area[near])
     ends = np.cumsum([len(p) for p in all_points])[:-1]
     return list(zip(np.split(x, ends), np.split(area, ends), strict=True))
