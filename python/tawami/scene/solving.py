@@ -42,9 +42,10 @@ def solved(
             a = step.acceleration
             return Accepted(problem, step, u, None if a is None else space.vectors(a))
     assert step is not None
-    what = f"contact and friction of the walls did not settle in {PASSES} solves"
     raise ConvergenceError(
-        f"{what}. Nothing was changed in the particles. Use a smaller step", step.history
+        f"contact and friction of the walls did not settle in {PASSES} solves. Nothing was changed in "
+        "the particles. Use a smaller step",
+        step.history,
     )
 
 
