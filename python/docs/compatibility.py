@@ -4,7 +4,8 @@ python python/docs/compatibility.py            on the present ranks: JSON of eve
 
 Static: a block on a smooth floor is compressed by 1 % in four steps; the forces of floor and top must be
 opposite. Dynamic: a block stretches in free fall for three steps; its momentum must be m (v + g t). A
-law with history must have flowed. Two ranks must give the same numbers.
+law with history must have flowed. Border: a pressure, a support on patches and an obstacle with friction
+carry a block; their forces must be those of the closed form. Two ranks must give the same numbers.
 """
 
 from __future__ import annotations
@@ -29,6 +30,9 @@ PRESSED, CELL = 0.01, 0.25  # [m], [m]
 STEP = 1e-3  # [s]
 CLAY = {"M": 1.0, "lambda_star": 0.1, "kappa_star": 0.02, "preconsolidation": 1e4}
 TIMES = ("static", "dynamic")
+#: Conditions on the border: name and time of their cells.
+BORDER = ("pressure", "support on patches", "obstacle")
+PRESSURE, GAP = 1e3, 0.3 * CELL  # [Pa], from the grid to a border off its edges [m]
 #: Forms with their options, and bases.
 FORMS: dict[str, dict[str, Any]] = {
     "u": {"form": "u"},
@@ -104,7 +108,8 @@ class Cell:
     """Result of a combination.
 
     Attributes:
-        form, law, time: Keys of `FORMS` and `LAWS`, one of `TIMES`.
+        form, law, time: Keys of `FORMS` and `LAWS`, one of `TIMES`; or one of `BORDER` as the law, and
+            "border" as the time.
         ranks: Number of ranks.
         error: Class of the exception; empty if the combination works.
         says: Message of the exception.
@@ -130,18 +135,21 @@ def attempt(form: str, law: str, time: str) -> Cell:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            scene = _block(form, law, moving=time == "dynamic")
-            numbers = (_press if time == "static" else _fall)(scene, law)
+            if time == "border":
+                numbers = _carry(form, law)
+            else:
+                scene = _block(form, law, moving=time == "dynamic")
+                numbers = (_press if time == "static" else _fall)(scene, law)
     except tawami.TawamiError as error:
         return Cell(form, law, time, ranks, type(error).__name__, str(error))
     return Cell(form, law, time, ranks, numbers=numbers)
 
 
-def _block(form: str, law: str, *, moving: bool) -> tawami.Scene:
-    cells = (8, 8) if moving else (6, 4)
+def _block(form: str, law: str, *, moving: bool, gap: float = 0.0) -> tawami.Scene:
+    cells = (8, 8) if moving else (6, 6 if gap else 4)
     options = dict(FORMS[form])
     geometry = options.pop("geometry", "plane_strain")
-    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=CELL, cells=cells, geometry=geometry)
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, -gap), h=CELL, cells=cells, geometry=geometry)
     low = 2 * CELL if moving else 0.0
     body = tawami.box(grid, (low, low), (low + 1, low + 1), per_axis=3, gauss=True)
     scene = tawami.Scene(grid, body, LAWS[law](), density=RHO, **options)
@@ -180,6 +188,33 @@ def _fall(scene: tawami.Scene, law: str) -> tuple[float, ...]:
     assert np.allclose(momentum, exact, atol=1e-6 * mass), (law, momentum)
     _check_flow(scene, law)
     return (*map(float, momentum), motion.kinetic_energy)
+
+
+def _carry(form: str, condition: str) -> tuple[float, ...]:
+    """Forces of a condition on the border [N per metre depth, or N of the ring], mean stress [Pa]."""
+    scene = _block(
+        form, "linear_elastic", moving=False, gap=0.0 if condition == "pressure" else GAP
+    )
+    scene.fix("left", "x")
+    area = np.pi if scene.grid.space.hoop else 1.0
+    exact, place = RHO * -G * area, "bottom"
+    if condition == "pressure":
+        scene.fix("bottom", "y")
+        scene.pressure("top", PRESSURE)
+        exact = PRESSURE * area
+    else:
+        scene.gravity((0.0, G))
+        if condition == "obstacle":
+            place = "floor"
+            scene.obstacle(tawami.half_plane((0, 0), (0, 1)), 0.3, "bottom", name=place)
+        else:
+            scene.fix("bottom", "y")
+    last: list[tawami.Solution] = []
+    tawami.ramp(scene, 0.5, each=last.append, until=1.0)
+    force = float(last[-1].reaction(place)[1])
+    # at finite strain the pressure acts on the present length
+    assert abs(force - exact) < (0.01 if condition == "pressure" else 1e-3) * exact, (form, force)
+    return force, float(np.mean(last[-1].mean_stress))
 
 
 def _positions(scene: tawami.Scene) -> Any:
@@ -239,7 +274,9 @@ def _entry(cell: Cell, footnotes: dict[str, int]) -> str:
 def page(cells: Sequence[Cell], seconds: Mapping[int, float]) -> str:
     """The tables with their footnotes and the time they took."""
     footnotes: dict[str, int] = {}
-    text = [f"## {time.capitalize()}\n\n{table(cells, time, footnotes)}" for time in TIMES]
+    text = [
+        f"## {time.capitalize()}\n\n{table(cells, time, footnotes)}" for time in (*TIMES, "border")
+    ]
     text.append(
         "## Rejected combinations\n\n" + "\n".join(f"{n}. {says}" for says, n in footnotes.items())
     )
@@ -259,6 +296,8 @@ def main() -> None:
     logging.disable(logging.INFO)  # compiling forms logs much
     forms = [f for f in FORMS if MPI.COMM_WORLD.size == 1 or FORMS[f] == {"form": f}]
     cells = [attempt(f, law, time) for f in forms for law in LAWS for time in TIMES]
+    plain = [f for f in forms if FORMS[f].keys() <= {"form", "geometry"}]
+    cells += [attempt(f, one, "border") for f in plain for one in BORDER]
     if MPI.COMM_WORLD.rank == 0:
         json.dump([asdict(cell) for cell in cells], sys.stdout)
 

@@ -70,7 +70,7 @@ def _of_module(tree: ast.Module) -> Iterator[tuple[str, str]]:
     fails = _kind_of_fail(tree)
     for node in ast.walk(tree):
         if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and node.exc.args:
-            yield ast.unparse(node.exc.func), _pattern(node.exc.args[0])
+            yield ast.unparse(node.exc.func), _pattern(_text(tree, node.exc.args[0]))
         elif isinstance(node, ast.Return) and isinstance(node.value, ast.Call) and node.value.args:
             call = node.value  # an error that the caller raises
             yield ast.unparse(call.func), _pattern(call.args[0])
@@ -78,9 +78,25 @@ def _of_module(tree: ast.Module) -> Iterator[tuple[str, str]]:
             called = ast.unparse(node.func)
             if called in ("warn", "warnings.warn"):
                 kind = ast.unparse(node.args[1]) if len(node.args) > 1 else "UserWarning"
-                yield kind, _pattern(node.args[0])
+                yield kind, _pattern(_text(tree, node.args[0]))
             elif called == "self._fail" and fails:
                 yield fails, _pattern(node.args[-1])
+        elif isinstance(node, ast.FunctionDef) and node.name == "unsettled":
+            for inner in ast.walk(node):  # a message of Newton's method
+                if isinstance(inner, ast.Return) and inner.value is not None:
+                    yield "ConvergenceError", _pattern(inner.value)
+
+
+def _text(tree: ast.Module, node: ast.expr) -> ast.expr:
+    """The text that was last assigned to a name before its use; other expressions as they are."""
+    found = [
+        (one.lineno, one.value)
+        for one in ast.walk(tree)
+        if isinstance(node, ast.Name) and isinstance(one, ast.Assign) and one.lineno < node.lineno
+        if isinstance(one.value, ast.JoinedStr)
+        if isinstance(one.targets[0], ast.Name) and one.targets[0].id == node.id
+    ]
+    return max(found, key=lambda pair: pair[0])[1] if found else node
 
 
 def _kind_of_fail(tree: ast.Module) -> str:

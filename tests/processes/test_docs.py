@@ -434,6 +434,19 @@ def test_a_compressed_cylinder_of_the_table():
     assert falling.error == ""
 
 
+def test_conditions_on_the_border_of_the_table():
+    """Weight on an obstacle, and on patches of an axisymmetric body."""
+    weight = -compatibility.RHO * compatibility.G
+    cells = [
+        compatibility.attempt("u", "obstacle", "border"),
+        compatibility.attempt("u_epsv, axisymmetric", "support on patches", "border"),
+    ]
+    assert [cell.error for cell in cells] == ["", ""]
+    assert cells[0].numbers[0] == pytest.approx(weight, rel=1e-3)
+    assert cells[1].numbers[0] == pytest.approx(np.pi * weight, rel=1e-3)
+    assert "`obstacle` |" in compatibility.page(cells[:1], {1: 1.0})
+
+
 def test_the_table_shows_the_results(tried):
     text = compatibility.page(tried, {1: 1.0})
     assert text.count("| works |") + text.count("| works ") >= 7

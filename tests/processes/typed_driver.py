@@ -116,6 +116,33 @@ def dynamics(comm: MPI.Comm) -> None:
     print(energy, motion.angular_momentum(), motion.time, steps[-1].size, len(scene.left))
 
 
+def contact(scene: tawami.Scene) -> float:
+    """Rigid obstacles."""
+    plane = scene.obstacle(tawami.half_plane((0, 0), (0, 1)), 0.3, "bottom", name="floor")
+    block = tawami.rigid_polygon([(0, 1), (1, 1), (1, 2)], radius=0.1)
+    footing = scene.obstacle(block, force=(0.0, -1e3), free=("x", "y"), mass=10.0)
+    moved = scene.obstacle(tawami.rigid_disc((0, 3), 1.0), velocity=(0.1, lambda t: -t, 0.0))
+    scene.obstacle(
+        lambda x, y: np.hypot(x, y) - 1, displacement=(0.0, 0.1), amplitude=0.5
+    ).release()
+    plane.change(friction=0.5)
+    moved.change(velocity=(0.0, 0.0))
+    footing.change((0.0, -2e3), amplitude=lambda t: t)
+    result = scene.solve().contact(footing)
+    pressure: Array = result.pressure
+    print(scene.solve().contact("floor").moment, footing.rotation, scene.border.names)
+    return float(pressure.max() + result.force[1] + footing.x[0] + result.penetration)
+
+
+def bordered(grid: tawami.Grid, cloud: tawami.Body) -> tawami.Scene:
+    """A body of loose particles with a border, and its files."""
+    border: tawami.Border = tawami.polyline([(0, 0), (1, 0), (1, 1)], names=["a", "b", "c"])
+    body = tawami.Body(cloud.x, cloud.volume, border=border)
+    scene = tawami.Scene(grid, body, materials()[0], volumes="fitted")
+    tawami.Results("results", tawami.BorderOutput(every=0.1), tawami.TableOutput("reaction a"))
+    return scene
+
+
 def weak_form() -> bool:
     """A form of the script, and its check."""
 
@@ -157,6 +184,7 @@ def wrong(comm: MPI.Comm) -> None:
     tawami.Scene(grid, body, law, leaving="ignore")  # wrong: arg-type
     tawami.Scene(grid, body, law, form=3)  # wrong: arg-type
     scene = tawami.Scene(grid, body, law)
+    scene.wall("west")  # wrong: arg-type
     scene.fix("left", 1)  # wrong: arg-type
     scene.fix("left", "x", "held")  # wrong: arg-type
     scene.fix("left", "x", lambda y: y)  # wrong: arg-type misc
@@ -164,6 +192,11 @@ def wrong(comm: MPI.Comm) -> None:
     scene.traction("right", 1e3)  # wrong: arg-type
     scene.traction("right", (0.0, "down"))  # wrong: arg-type
     scene.gravity(-9.81)  # wrong: arg-type
+    scene.pressure("top", "high")  # wrong: arg-type
+    scene.obstacle("plane")  # wrong: arg-type
+    scene.obstacle(tawami.rigid_disc((0, 1), 1.0), force=1e3)  # wrong: arg-type
+    tawami.Scene(grid, body, law, volumes="exact")  # wrong: arg-type
+    tawami.BorderOutput(every="often")  # wrong: arg-type
     print(scene.solve().strains)  # wrong: attr-defined
     print(scene.solve().plot(3))  # wrong: arg-type
     tawami.Dynamics(scene, transfer="musl")  # wrong: arg-type

@@ -29,8 +29,7 @@ SOLUTION = {
     "symmetric", "arrays", "number", "x", "volume", "stress", "strain", "mean_stress",
     "displacement_of_particles",
     "eps_v", "field", "coefficients", "displacement", "reaction", "contact", "on_edges", "on_points",
-    "outline",
-    "plot", "to_pandas", "to_pyvista",
+    "plot", "to_pandas", "to_pyvista", "outline",
 }  # fmt: skip
 
 

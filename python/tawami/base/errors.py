@@ -174,6 +174,7 @@ __all__ = [
     "SofteningWarning",
     "SolverError",
     "SupportError",
+    "SupportWarning",
     "TangentWarning",
     "TawamiError",
     "TawamiWarning",
