@@ -26,7 +26,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -137,11 +137,11 @@ def large(
     *,
     steps: int = 10,
     gauss: bool = False,
-    **options: Any,
+    volumes: Literal["fitted", "own"] = "fitted",
 ) -> Ring:
     """The ring at large strain."""
     law, form = tawami.neo_hookean(K=K, mu=MU), "u_epsv_finite"
-    scene, x, volume = build(n, 2.75, shift, law, gauss, form=form, **options)
+    scene, x, volume = build(n, 2.75, shift, law, gauss, form=form, volumes=volumes)
     scene.pressure("inner", P_MU * MU)
     centre = np.array(shift) / n
     inner = np.linalg.norm(scene.border.x - centre, axis=1) < (A + B) / 2
@@ -152,7 +152,7 @@ def large(
     a = float(np.linalg.norm(scene.border.x[inner] - centre, axis=1).mean())
     found = errors(mean, exact_mean(R), volume, P_MU * MU)
     return Ring(
-        "large", n, "Gauss" if gauss else "even", options.get("volumes", "fitted"), shift[0],
+        "large", n, "Gauss" if gauss else "even", volumes, shift[0],
         100 * (a / (2 * A) - 1), *found, R, mean,
     )  # fmt: skip
 

@@ -178,7 +178,7 @@ def build(
     basis: Basis,
     density: float | Sequence[float] | Mapping[str, float] | None,
     leaving: Leaving,
-    volumes: fitted_volumes.Volumes | None,
+    volumes: fitted_volumes.Volumes,
     assembly: Assembly,
     parameters: Mapping[str, Any],
 ) -> tuple[Model, _rust.Particles]:
@@ -221,7 +221,7 @@ def build(
         grid, loaded, compiled, basis, values,
         used, in_time, in_space, Settings(options, fixed),
         laws, densities, _names(body, len(materials)), leaving, len(particles),
-        fitted_volumes.chosen(volumes, body.border, moves=loaded.strain.finite, static=density is None),
+        fitted_volumes.chosen(volumes, body.border),
         body.border,
     )  # fmt: skip
     return model, particles

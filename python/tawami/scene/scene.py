@@ -66,8 +66,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         leaving: Treatment of particles that leave the grid: 'stop' with an error before they do, or
             'remove' them; `left` lists them.
         volumes: Volumes in the integrals of the form: 'own' of the particles, or 'fitted', so that the
-            divergence theorem holds for the functions of the grid; masses stay. By default 'fitted' for
-            bodies with a border in scenes of finite strain without a density.
+            divergence theorem holds for the functions of the grid; masses stay.
         parameters: Parameters and options of the form: alpha, stabilisation, ... A parameter is a
             number, a function of time [s], or one number for each particle: a function f(x, y), an
             array, `tawami.table(...)` or `tawami.earlier(...)`.
@@ -109,7 +108,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         linear_solver: SolverName = "direct",
         density: float | Sequence[float] | Mapping[str, float] | None = None,
         leaving: Literal["stop", "remove"] = "stop",
-        volumes: Literal["fitted", "own"] | None = None,
+        volumes: Literal["own", "fitted"] = "own",
         **parameters: Any,
     ) -> None:
         check_process()
