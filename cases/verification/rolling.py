@@ -13,8 +13,9 @@ mu < tan(angle), with friction as large as Coulomb's law allows, and sticks othe
     a = (2/3) g sin(angle),    a = g (sin(angle) - mu cos(angle)),    a = 0.
 
 Gravity is inclined in the model, and the plane is horizontal: it lies between two lines of the grid. The
-bodies move at finite strain, first come to rest on the plane, and then start together with gravity along
-it. The acceleration is the slope of the velocity over time.
+bodies move at finite strain and start in equilibrium: the disc on a level plane, which is then inclined,
+the block on a plane with mu = 1, which then becomes smoother. The acceleration is the slope of the
+velocity over time.
 
 python -m cases.verification.rolling
 """

@@ -47,6 +47,7 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "dilatancy": ("Dilatancy", "verification", ("block", "enumeration")),
     "vibrating_beam": ("Vibrating beam", "verification", ("beam",)),
     "spinning_disc": ("Spinning disc", "verification", ("disc",)),
+    "penetration": ("Penetration", "verification", ()),
     "rolling": ("Rolling disc", "verification", ()),
     "collapse": ("Collapse", "showcase", ("pile",)),
     "projection": ("Nodal projection", "costs", ()),
