@@ -74,6 +74,15 @@ def test_functions_that_are_no_distance_are_rejected(f, message):
         Function(f, 1e-4, np.zeros(2)).evaluate(on_circle)
 
 
+def test_a_function_is_checked_to_be_a_distance_far_away_too():
+    far = np.array([[0.0, 1.0]])
+    Function(lambda x, y: 5 - y, 1e-4, np.zeros(2)).check(far)
+    double = Function(lambda x, y: 2 * (5 - y), 1e-4, np.zeros(2))
+    double.evaluate(far)
+    with pytest.raises(InputError, match=r"gradient of length 2 at \(0, 1\)"):
+        double.check(far)
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from runs import Kill, Killed, block, run, static_scene
+from mpi4py import MPI
+from runs import ELASTIC, Kill, Killed, block, run, static_scene
 
 import tawami
 from tawami.base import archive
@@ -88,6 +89,39 @@ def resumed_from_all(scene, folder, begin, step):
 
 def test_a_forged_checkpoint_is_rejected_with_an_error_message(tmp_path):
     assert resumed_from_all(block, tmp_path, 7, 79) > 10
+
+
+def pressed() -> tawami.Scene:
+    """A block on patches under a disc that presses it."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(8, 8))
+    body = tawami.box(grid, (0.35, 0.1), (1.35, 0.6), per_axis=2)
+    scene = tawami.Scene(grid, body, ELASTIC, form="u")
+    scene.fix("bottom", "x")
+    scene.fix("bottom", "y")
+    disc = tawami.rigid_disc((0.85, 1.0), 0.4)
+    scene.obstacle(disc, 0.2, where="top", displacement=(0.0, -0.005))
+    return scene
+
+
+def test_forged_arrays_of_border_supports_and_obstacles_are_rejected():
+    """Arrays of another length, and with numbers that they cannot have, before anything is solved."""
+    scene = pressed()
+    scene.solve()
+    state, tried = scene.state(), set()
+    rooms = ("border", "supports", "obstacles")
+    for at in (at for room in rooms for at in places(state[room], (room,))):
+        value = reduce(lambda part, key: part[key], at, state)
+        if not (isinstance(value, np.ndarray) and value.size):
+            continue
+        nan = value.astype(float)
+        nan.flat[-1] = np.nan
+        shorter = nan if at[-1] == "left" else value[:-1]  # some pieces may have been removed
+        for wrong in (shorter, np.concatenate([value, value]), nan, value.astype("U")):
+            with pytest.raises(tawami.CheckpointError, match="in the checkpoint"):
+                scene.restore(forged(state, at, wrong))
+        tried.add(at[-1])
+    assert tried >= {"x", "area", "reference", "number", "left", "held", "missing", "pressure"}
+    scene.restore(state)
 
 
 def test_forged_particles_are_no_initial_state(tmp_path):

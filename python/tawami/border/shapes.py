@@ -170,7 +170,8 @@ class Function:
         # at a ridge of the distance one-sided slopes differ by about 1: the mean normal, no curvature
         ridge = (np.abs(curvature) > 0.1 / self.step).any(axis=(1, 2))
         size = np.linalg.norm(gradient, axis=1)
-        self._check_slope(x, here, np.where(ridge, 1.0, size))
+        near = np.abs(here) < 1000 * self.step
+        self._check_slope(x, np.where(near & ~ridge, size, 1.0))
         curvature[ridge] = 0.0
         gradient[ridge] /= np.maximum(size[ridge], LEAST)[:, None]
         return Distance(here, gradient, curvature)
@@ -199,8 +200,16 @@ class Function:
             )
         return values
 
-    def _check_slope(self, x: Array, distance: Array, size: Array) -> None:
-        bad = np.flatnonzero((np.abs(distance) < 1000 * self.step) & (np.abs(size - 1) > 0.05))
+    def check(self, x: Array) -> None:
+        """Check that it is a distance at points [m], points x dim, however far away they are.
+
+        Raises:
+            InputError: The length of its gradient is not 1 at one of them.
+        """
+        self._check_slope(x, np.linalg.norm(self.evaluate(x).normal, axis=1))
+
+    def _check_slope(self, x: Array, size: Array) -> None:
+        bad = np.flatnonzero(np.abs(size - 1) > 0.05)
         if len(bad):
             at = ", ".join(f"{c:g}" for c in x[bad[0]])
             raise InputError(

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami import _rust
-from tawami.base import checks
+from tawami.base import checks, stored
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import CheckpointError, InputError
 from tawami.base.text import meant, quoted
@@ -161,6 +161,7 @@ class SceneBorder:
 
     def _mask(self, what: str, where: npt.NDArray[Any]) -> Mask:
         assert self.points is not None
+        where = checks.any_array(f"{what}: the mask", where)
         if where.dtype != bool or where.shape != (len(self.points),):
             raise InputError(
                 f"{what}: a mask of type {where.dtype} and shape {where.shape}: expected True or False "
@@ -245,9 +246,16 @@ class SceneBorder:
                 f"script made {len(self.all)}: expected the same loads and supports, made between two "
                 "phases"
             )
-        for points, stored in zip(self.all, state["points"], strict=True):
-            points.restore(stored)
-        self._has_moved, self._left = state["moved"], state["left"]
+        count = 0 if self._pieces_at_lines is None else len(self._pieces_at_lines.start)
+        left = stored.some_of("pieces of the border", state["left"], count)
+        for points, given in zip(self.all, state["points"], strict=True):
+            points.restore(given)
+        if self._ends is not None and len(self._ends) != 2 * len(left):
+            raise CheckpointError(
+                f"the border has {len(left)} pieces in the checkpoint, and {len(self._ends)} ends: "
+                "expected two of each"
+            )
+        self._has_moved, self._left = bool(state["moved"]), left
 
 
 def check_fits(grid: Grid, points: BorderPoints, x: Array, area: Array) -> None:

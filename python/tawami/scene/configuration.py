@@ -347,10 +347,10 @@ class Configuration:
         self._coverage_checked, self.begun = state["coverage_checked"], True
         self._travel.cells = state["travel"]
         self.inputs.restore(state["inputs"])
+        self.border.restore(state["border"])
         self.supports.restore(state["supports"])
         self.loads.restore(state["loads"])
         self.obstacles.restore(state["obstacles"])
-        self.border.restore(state["border"])
         self._attach(particles, location)
         self.domain.newton.record()
         self.domain.newton.restore(state["newton"])

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from tawami import _rust
+from tawami.base import stored
 from tawami.base.arrays import Array, Mask
-from tawami.base.errors import CheckpointError
 from tawami.base.space import Space
 from tawami.border.points import BorderPoints
 from tawami.field.border import BorderInCells
@@ -129,14 +129,12 @@ class MovingPoints:
         Raises:
             CheckpointError: It was made with other points.
         """
-        number = state["number"]
-        if np.max(number, initial=-1) >= len(self.first):
-            raise CheckpointError(
-                f"{self.what} had more border points when the run was stored than {len(self.first)}, "
-                "which it is made of now: expected the same parts of the border"
-            )
-        self.x, self.area, self.reference = state["x"], state["area"], state["reference"]
-        self.number = number
+        what, n = f"{self.what}: points of the border", len(self.first)
+        number = stored.some_of(what, state["number"], n)
+        shape = (len(number), self.space.dim)
+        x, area = (stored.values(f"{what}: {name}", state[name], shape) for name in ("x", "area"))
+        reference = stored.values(f"{what}: reference", state["reference"], shape[:1])
+        self.x, self.area, self.reference, self.number = x, area, reference, number
         self._located = None
 
 

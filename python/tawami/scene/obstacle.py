@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from tawami.base import stored
 from tawami.base.arrays import Array, Mask
 from tawami.base.errors import CheckpointError, InputError
 from tawami.base.text import quoted
@@ -229,7 +230,7 @@ class Obstacle(Action):
         """The reverse of :meth:`state`.
 
         Raises:
-            CheckpointError: It got a velocity that is a function during the run.
+            CheckpointError: It got a velocity that is a function during the run, or has other arrays.
         """
         super().restore(state)
         if state["changes"] != self._changes:
@@ -240,8 +241,19 @@ class Obstacle(Action):
                 )
             self._speeds = [Factor(f"{self}", None, one) for (one,) in state["speeds"]]
             self._changes = state["changes"]
-        self.pose = Pose.at(self.shape.centre).moved(np.asarray(state["pose"]))
-        self.rates = np.asarray(state["rates"][0]), np.asarray(state["rates"][1])
-        self.pressure, self.traction = state["pressure"], state["traction"]
-        self.friction, number = state["friction"], np.asarray(state["groups"], dtype=np.int64)
-        self.groups = Patches(number, int(number.max()) + 1) if len(number) else None
+        n, dim, motions = len(self.place), self.place.space.dim, (len(self.free),)
+        pose = stored.values(f"{self}: pose", state["pose"], motions)
+        first, last = (stored.values(f"{self}: rates", one, motions) for one in state["rates"])
+        pressure = stored.values(f"{self}: pressure", state["pressure"], (n,))
+        traction = stored.values(f"{self}: traction", state["traction"], (n, dim - 1))
+        groups = None
+        if np.size(state["groups"]):
+            number = stored.numbers(f"{self}: patches", state["groups"], n, n)
+            groups = Patches(number, int(number.max()) + 1)
+            if not np.bincount(number).all():
+                raise CheckpointError(
+                    f"{self}: patches in the checkpoint have no points: expected one at least in each"
+                )
+        self.pose, self.rates = Pose.at(self.shape.centre).moved(pose), (first, last)
+        self.pressure, self.traction, self.groups = pressure, traction, groups
+        self.friction = checked_friction(f"{self}", state["friction"])

@@ -11,6 +11,7 @@ from tawami.base import checks
 from tawami.base.arrays import Array, Mask
 from tawami.base.errors import InputError
 from tawami.base.text import listed
+from tawami.border.shapes import Function
 from tawami.scene import obstacle_inputs as inputs
 from tawami.scene.action import Owner, restored
 from tawami.scene.activity import Activity
@@ -88,7 +89,7 @@ class Obstacles(Owner[Obstacle]):
             speeds,
         )  # fmt: skip
         try:
-            _check_overlap(obstacle, domain, total)
+            _check_place(obstacle, domain, total)
         except InputError:
             self._border.parts.remove(part)
             raise
@@ -178,15 +179,17 @@ class Obstacles(Owner[Obstacle]):
         self.changed()
 
 
-def _check_overlap(obstacle: Obstacle, domain: Domain, total: Array) -> None:
-    """Check that an obstacle does not overlap the body.
+def _check_place(obstacle: Obstacle, domain: Domain, total: Array) -> None:
+    """Check that an obstacle does not overlap the body, and that its distance is one.
 
     Raises:
-        InputError: It does.
+        InputError: It does, or a function that gives it is no distance at the border.
     """
     place, layout, h = obstacle.place, domain.layout, domain.model.grid.h
     u = domain.model.space.vectors(total[: layout.num_displacement])
     x = place.x + place.cells(domain).values(layout.basis) @ u
+    if isinstance(obstacle.shape, Function):
+        obstacle.shape.check(x)
     distance = obstacle.shape.evaluate(x).distance
     worst = int(np.argmin(distance))
     if distance[worst] < -OVERLAP * h:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tawami.base import checks
+from tawami.base import checks, stored
 from tawami.base.arrays import Array, Mask
 from tawami.base.errors import InputError
 from tawami.border.tied import NORMAL, TANGENT, directions
@@ -202,6 +202,26 @@ class Support(Action):
                 change = term.at(now) - term.share.applied
                 missing[term.values] = missing.get(term.values, 0.0) + change
         return any(abs(change) > ALIKE for change in missing.values())
+
+    def state(self) -> dict[str, Any]:
+        """Position of a point, multipliers, and the share of its values that the body carries."""
+        place = self.place if isinstance(self.place, tuple) else ()
+        return super().state() | {"place": place, "held": self.held, "missing": self.missing}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """The reverse of :meth:`state`.
+
+        Raises:
+            CheckpointError: As for other actions, or arrays of another length.
+        """
+        super().restore(state)
+        if isinstance(self.place, tuple):
+            x, y = stored.values(f"{self}: place", state["place"], (len(self.place),))
+            self.place = (float(x), float(y))
+        shape = (len(self.place) if isinstance(self.place, MovingPoints) else 0,)
+        self.held, self.missing = (
+            stored.values(f"{self}: {name}", state[name], shape) for name in ("held", "missing")
+        )
 
     def __str__(self) -> str:
         if isinstance(self.place, tuple):

@@ -298,15 +298,7 @@ class Supports(Owner[Support]):
     def state(self) -> dict[str, Any]:
         """Positions of points, the share of each support that the body carries, and contact states."""
         return {
-            "supports": [
-                support.state()
-                | {
-                    "place": support.place if isinstance(support.place, tuple) else (),
-                    "held": support.held,
-                    "missing": support.missing,
-                }
-                for support in self.all
-            ],
+            "supports": [support.state() for support in self.all],
             "walls": [wall.stored() for wall in self.walls],
         }
 
@@ -322,11 +314,6 @@ class Supports(Owner[Support]):
                 f"{len(self.walls)}: expected walls to be added and released between two phases"
             )
         self.all = restored("support", self.all, state["supports"])
-        for support, values in zip(self.all, state["supports"], strict=True):
-            if isinstance(support.place, tuple):
-                x, y = values["place"]
-                support.place = (x, y)
-            support.held, support.missing = values["held"], values["missing"]
         for wall, values in zip(self.walls, state["walls"], strict=True):
             wall.restore(values)
         self.changed()
