@@ -310,7 +310,7 @@ def inverted() -> dict[str, np.ndarray]:
     scene = tawami.Scene(grid, body, law, form="u_epsv_finite")
     scene.fix("left", "x")
     scene.fix("bottom", "y")
-    scene.fix("top", "y", -0.01)
+    scene.fix("top", "y", -0.05)
     evaluate, seen = Newton.internal, list[int]()
 
     def internal(self, coefficients):
@@ -322,7 +322,7 @@ def inverted() -> dict[str, np.ndarray]:
 
     Newton.internal, last = internal, list[tawami.Solution]()
     try:
-        tawami.ramp(scene, 0.25, each=last.append)
+        tawami.ramp(scene, 0.5, each=last.append)
     finally:
         Newton.internal = evaluate
     times = sum(COMM.allgather(len(seen)))
