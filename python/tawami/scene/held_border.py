@@ -26,6 +26,8 @@ from tawami.scene.support import Support
 PENALTY = 200.0
 #: Change of the tractions by a pass, relative to the largest, below which no other is needed.
 SETTLED = 1e-4
+#: Change of the tractions by a pass, relative to the one before, below which they settle.
+SETTLING = 0.9
 #: Error of a held displacement that is round-off, relative to the displacement.
 ALIKE = 1e-6
 #: Displacement that is round-off [cells].
@@ -98,6 +100,7 @@ class HeldBorder:
         """See `Term`. The penalty of a field has the size of its tangent, and in dynamics that of a
         displacement contains inertia.
         """
+        self.settling, self._change = False, np.inf
         if self._support.is_field:
             self._tied = self._with_penalty(PENALTY * self._near(diagonal()))
         elif inertia is not None:
@@ -137,6 +140,7 @@ class HeldBorder:
     def improve(self) -> bool:
         """See `Term`."""
         change = np.abs(self._tractions - self._held).max(initial=0.0)
+        self.settling, self._change = bool(change < SETTLING * self._change), change
         self._held = self._tractions
         size = max(self.prescribed, self._size)
         least = 0.0 if self._support.is_field else ROUND_OFF_OF_GRID * self._domain.model.grid.h

@@ -13,8 +13,8 @@ from tawami.field.reduction import Reduction
 from tawami.field.sum import Sum
 from tawami.solve.bordered import Bordering, Elimination
 
-#: Passes with better multipliers in one step.
-PASSES = 20
+#: Passes with better multipliers in one step, and as long as each changes them less than the one before.
+PASSES, WHILE_SETTLING = 20, 100
 
 
 class Term(Protocol):
@@ -48,6 +48,10 @@ class Term(Protocol):
 
     def improve(self) -> bool:
         """Improve the multipliers at a solution; whether another solve is needed."""
+
+    @property
+    def settling(self) -> bool:
+        """Whether the last pass changed the multipliers clearly less than the one before."""
 
     @property
     def unsettled(self) -> str:
@@ -131,7 +135,8 @@ class Terms:
         """Improve all multipliers; whether another solve is needed."""
         self._passes += 1
         pending = [term for term in self._terms if term.improve()]
-        if pending and self._passes >= PASSES:
+        settling = all(term.settling for term in pending)
+        if pending and self._passes >= (WHILE_SETTLING if settling else PASSES):
             self.stuck = pending[0].unsettled
         return bool(pending)
 
