@@ -12,6 +12,7 @@ from tawami.base.arrays import Array
 from tawami.field.reduction import Reduction
 from tawami.field.sum import Sum
 from tawami.solve.bordered import Bordering, Elimination
+from tawami.solve.inertia import Inertia
 
 #: Passes with better multipliers in one step.
 PASSES = 20
@@ -81,11 +82,12 @@ class Terms:
         """Whether all of them are."""
         return all(term.smooth for term in self._terms)
 
-    def begin(self, diagonal: Callable[[], Array], inertia: Array | None) -> None:
+    def begin(self, diagonal: Callable[[], Array], inertia: Inertia | None) -> None:
         """Start a step; see `Term.begin`."""
+        of_mass = None if inertia is None else inertia.slope * inertia.mass
         self._passes, self.stuck = 0, ""
         for term in self._terms:
-            term.begin(diagonal, inertia)
+            term.begin(diagonal, of_mass)
 
     def restart(self) -> None:
         """Go back to the first guess of the unknowns of their own."""
