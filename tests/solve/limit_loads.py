@@ -11,20 +11,16 @@ import tawami
 from tawami.base.arrays import Array, Mask
 
 
-def _left_half_of_top(x: Array, y: Array) -> Mask:
-    return np.asarray((y == 1) & (x < 0.5))
-
-
 def pulled(nu: float, up: float) -> tawami.Scene:
-    """A block of 4 x 4 cells on a rough base, which a rough plate pulls up on half its top."""
+    """A block of 4 x 4 cells on a rough base, which a rough plate pulls up."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(4, 4))
     body = tawami.box(grid, (0, 0), (1, 1), per_axis=3)
     elastic = tawami.linear_elastic(E=1e3, nu=nu)
     scene = tawami.Scene(grid, body, tawami.mohr_coulomb(elastic, phi=20.0, c=1.0))
     for component in ("x", "y"):
         scene.fix("bottom", component)
-    scene.fix(_left_half_of_top, "x")
-    scene.fix(_left_half_of_top, "y", up)
+    scene.fix("top", "x")
+    scene.fix("top", "y", up)
     return scene
 
 

@@ -29,7 +29,7 @@ class FollowerPressure:
     """
 
     #: It prescribes no displacement, has one tangent everywhere, and is no contact.
-    prescribed, smooth, implicit, settling, unsettled = 0.0, True, False, False, ""
+    prescribed, smooth, implicit, unsettled = 0.0, True, False, ""
 
     def __init__(
         self, layout: Layout, cells: BorderInCells, x: Array, area: Array, pressure: Array

@@ -107,9 +107,8 @@ class Configuration:
         of = self.model, particles, location, self.numerics, self.stopwatch
         self.domain = Domain.attach(*of, getattr(self, "domain", None))
         self.border_sums.attach(self.domain)
-        if self.model.fits:
-            with self.stopwatch("set-up"):
-                fitting.fit(self.domain, self.border)
+        with self.stopwatch("set-up"):
+            fitting.fit(self.domain, self.border)
 
     @property
     def before(self) -> Array:
@@ -246,11 +245,7 @@ class Configuration:
             raise
 
     def _moved(self, accepted: Accepted, time: float) -> Moved | None:
-        """Positions at the end of the step; None where particles do not move.
-
-        Raises:
-            InputError: A particle would leave the grid, and must not.
-        """
+        """Positions at the end of the step; None where particles do not move."""
         if not self.model.moves:
             return None
         particles = self.domain.particles
@@ -267,13 +262,12 @@ class Configuration:
         if moved is None:
             coefficients = self.total = self.total + coefficients
             return self._outcome(accepted, coefficients)
-        grid, points = self.model.grid, accepted.problem.reduction.points
-        self.supports.follow(accepted.u, points)
+        grid = self.model.grid
+        self.supports.follow(accepted.u, accepted.problem.reduction.points)
         projects = self._travel.must_project(self.domain, moved.particles)
         self.domain.particles.move_to(moved.particles)
-        on_edges = left_edges.on_edges(self.supports.all)
-        self.border.move(moved.border)
-        left_edges.take_over(self.domain, on_edges, accepted.forces)
+        with left_edges.taken_over(self.domain, self.supports.all, accepted.forces):
+            self.border.move(moved.border)
         outcome = self._outcome(accepted, coefficients)
         outside = placement.outside(grid, self.domain.particles.x)
         particles, gone = placement.removed(grid, self.domain.particles, outside)

@@ -12,7 +12,7 @@ from tawami.scene.domain import Domain
 
 
 def fit(domain: Domain, border: SceneBorder) -> None:
-    """Let the form integrate with fitted volumes; those of the particles stay as they are.
+    """Let the form integrate with fitted volumes if the scene asks for them.
 
     Where a part of the border has no particles near it, as after a body broke, volumes are not fitted.
     A call for all ranks.
@@ -22,7 +22,7 @@ def fit(domain: Domain, border: SceneBorder) -> None:
         border: The border of the body.
     """
     particles, points, model = domain.particles, border.points, domain.model
-    if points is None:
+    if points is None or not model.fits:
         return
     try:
         cells = points.cells(domain)

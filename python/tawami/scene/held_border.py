@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -26,8 +27,8 @@ from tawami.scene.support import Support
 PENALTY = 200.0
 #: Change of the tractions by a pass, relative to the largest, below which no other is needed.
 SETTLED = 1e-4
-#: Change of the tractions by a pass, relative to the one before, below which they settle.
-SETTLING = 0.9
+#: Share of the error that a pass may leave, and factor of the penalty if it leaves more.
+SLOW, STIFFER = 0.3, 10.0
 #: Error of a held displacement that is round-off, relative to the displacement.
 ALIKE = 1e-6
 #: Displacement that is round-off [cells].
@@ -70,7 +71,7 @@ class HeldBorder:
         self._values = (values + support.missing)[self._weak][:, None]
         self.prescribed = float(np.abs(self._values).max(initial=0.0))
         held = self._groups.means(self._weights, support.held[self._weak])
-        self._held = held[:, None]
+        self._held, self._largest = held[:, None], np.inf
         K, mu = (m[place.cells(domain).location.cell] for m in domain.moduli_of_cells)
         self._elastic = (K + PENALTY * mu)[self._weak]
         self._tied = self._with_penalty(self._elastic)
@@ -100,7 +101,6 @@ class HeldBorder:
         """See `Term`. The penalty of a field has the size of its tangent, and in dynamics that of a
         displacement contains inertia.
         """
-        self.settling, self._change = False, np.inf
         if self._support.is_field:
             self._tied = self._with_penalty(PENALTY * self._near(diagonal()))
         elif inertia is not None:
@@ -140,11 +140,14 @@ class HeldBorder:
     def improve(self) -> bool:
         """See `Term`."""
         change = np.abs(self._tractions - self._held).max(initial=0.0)
-        self.settling, self._change = bool(change < SETTLING * self._change), change
         self._held = self._tractions
         size = max(self.prescribed, self._size)
+        error, before = np.abs(self._error).max(initial=0.0), self._largest
+        if error > SLOW * before:
+            self._tied = replace(self._tied, penalty=STIFFER * self._tied.penalty)
+        self._largest = error
         least = 0.0 if self._support.is_field else ROUND_OFF_OF_GRID * self._domain.model.grid.h
-        noise = np.abs(self._error).max(initial=0.0) <= max(ALIKE * size, least)
+        noise = error <= max(ALIKE * size, least)
         return bool(change > SETTLED * np.abs(self._held).max(initial=0.0) and not noise)
 
     @property

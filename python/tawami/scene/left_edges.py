@@ -1,8 +1,9 @@
-"""Supports that have left an edge of the grid: their points take the tractions over."""
+"""Supports that leave an edge of the grid: their points take its tractions over."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -27,16 +28,19 @@ def on_edges(supports: Iterable[Support]) -> list[OnEdge]:
     ]
 
 
-def take_over(domain: Domain, before: Sequence[OnEdge], forces: Array) -> None:
-    """Give the points of supports that have left their edge the tractions of the last step.
+@contextmanager
+def taken_over(domain: Domain, supports: Iterable[Support], forces: Array) -> Iterator[None]:
+    """A block that moves the border. Points of supports that leave their edge get its tractions.
 
     These are the lumped projection of the forces on the functions of the edge, with the same resultant.
 
     Args:
         domain: The particles at the start of the step.
-        before: The supports on edges then.
-        forces: Of supports on the body, functions x dim [N per metre depth].
+        supports: The supports.
+        forces: Of supports on the body in this step, functions x dim [N per metre depth].
     """
+    before = on_edges(supports)
+    yield
     grid = domain.model.grid
     for support, edge, x in before:
         if edge in support.edges or not isinstance(support.place, MovingPoints):

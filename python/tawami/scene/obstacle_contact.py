@@ -48,7 +48,7 @@ class ObstacleContact:
         before: Displacement coefficients since the start where particles do not move, else 0.
     """
 
-    smooth, implicit, settling = False, True, False
+    smooth, implicit = False, True
 
     def __init__(
         self, domain: Domain, obstacle: Obstacle, motion: ObstacleMotion, before: Array

@@ -183,12 +183,10 @@ class Newton:
         self._measures.begin(self.internal if inertia is None else None, values)
         equations = Equations(reduction, external, inertia, friction, path, terms)
         if terms is not None:
-            of_mass = None if inertia is None else inertia.slope * inertia.mass
-            terms.begin(functools.partial(self._diagonal, reduction), of_mass)
+            terms.begin(functools.partial(self._diagonal, reduction), inertia)
         iterate, history, krylov = equations.first(guess), History(), list[int]()
         add_mass = None if inertia is None else inertia.adder(reduction)
-        search: LineSearch | None = None
-        most = self.numerics.max_iterations
+        search, most = None, self.numerics.max_iterations
         while True:
             try:
                 forces, measured = self._evaluate(iterate, equations)
@@ -211,9 +209,8 @@ class Newton:
                 if terms.stuck:
                     self._fail(history, terms.stuck)
                 most = len(history) + self.numerics.max_iterations
-                forces, measured = self._evaluate(iterate, equations)
-                history[-1] = measured
-                converged = worst(measured) < self.numerics.tolerance
+                forces, history[-1] = self._evaluate(iterate, equations)
+                converged = worst(history[-1]) < self.numerics.tolerance
             if converged:
                 tally.steps += 1
                 return Converged(

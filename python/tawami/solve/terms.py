@@ -12,9 +12,10 @@ from tawami.base.arrays import Array
 from tawami.field.reduction import Reduction
 from tawami.field.sum import Sum
 from tawami.solve.bordered import Bordering, Elimination
+from tawami.solve.inertia import Inertia
 
-#: Passes with better multipliers in one step, and as long as each changes them less than the one before.
-PASSES, WHILE_SETTLING = 20, 100
+#: Passes with better multipliers in one step.
+PASSES = 20
 
 
 class Term(Protocol):
@@ -50,10 +51,6 @@ class Term(Protocol):
         """Improve the multipliers at a solution; whether another solve is needed."""
 
     @property
-    def settling(self) -> bool:
-        """Whether the last pass changed the multipliers clearly less than the one before."""
-
-    @property
     def unsettled(self) -> str:
         """Message if the multipliers do not settle: what is wrong, and what to do."""
 
@@ -85,11 +82,12 @@ class Terms:
         """Whether all of them are."""
         return all(term.smooth for term in self._terms)
 
-    def begin(self, diagonal: Callable[[], Array], inertia: Array | None) -> None:
+    def begin(self, diagonal: Callable[[], Array], inertia: Inertia | None) -> None:
         """Start a step; see `Term.begin`."""
+        of_mass = None if inertia is None else inertia.slope * inertia.mass
         self._passes, self.stuck = 0, ""
         for term in self._terms:
-            term.begin(diagonal, inertia)
+            term.begin(diagonal, of_mass)
 
     def restart(self) -> None:
         """Go back to the first guess of the unknowns of their own."""
@@ -135,8 +133,7 @@ class Terms:
         """Improve all multipliers; whether another solve is needed."""
         self._passes += 1
         pending = [term for term in self._terms if term.improve()]
-        settling = all(term.settling for term in pending)
-        if pending and self._passes >= (WHILE_SETTLING if settling else PASSES):
+        if pending and self._passes >= PASSES:
             self.stuck = pending[0].unsettled
         return bool(pending)
 
