@@ -27,8 +27,8 @@ from tawami.scene.support import Support
 PENALTY = 200.0
 #: Change of the tractions by a pass, relative to the largest, below which no other is needed.
 SETTLED = 1e-4
-#: Share of the error that a pass may leave, and factor of the penalty if it leaves more.
-SLOW, STIFFER = 0.3, 10.0
+#: Share of the error that a pass may leave, factor of the penalty if it leaves more, and largest factor.
+SLOW, STIFFER, STIFFEST = 0.3, 10.0, 1e4
 #: Error of a held displacement that is round-off, relative to the displacement.
 ALIKE = 1e-6
 #: Displacement that is round-off [cells].
@@ -71,7 +71,7 @@ class HeldBorder:
         self._values = (values + support.missing)[self._weak][:, None]
         self.prescribed = float(np.abs(self._values).max(initial=0.0))
         held = self._groups.means(self._weights, support.held[self._weak])
-        self._held, self._largest = held[:, None], np.inf
+        self._held, self._largest, self._stiffened = held[:, None], np.inf, 1.0
         K, mu = (m[place.cells(domain).location.cell] for m in domain.moduli_of_cells)
         self._elastic = (K + PENALTY * mu)[self._weak]
         self._tied = self._with_penalty(self._elastic)
@@ -143,7 +143,8 @@ class HeldBorder:
         self._held = self._tractions
         size = max(self.prescribed, self._size)
         error, before = np.abs(self._error).max(initial=0.0), self._largest
-        if error > SLOW * before:
+        if error > SLOW * before and self._stiffened < STIFFEST:
+            self._stiffened *= STIFFER
             self._tied = replace(self._tied, penalty=STIFFER * self._tied.penalty)
         self._largest = error
         least = 0.0 if self._support.is_field else ROUND_OFF_OF_GRID * self._domain.model.grid.h
