@@ -91,6 +91,10 @@ def _matrices(scene: Scene) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix
         )
     if now.supports.walls:
         raise InputError("modes: the scene has walls, and contact is not linear: expected no walls")
+    if now.obstacles.all:
+        raise InputError(
+            "modes: the scene has obstacles, and contact is not linear: expected no obstacles"
+        )
     domain = now.domain
     size, n = domain.layout.size, domain.layout.num_displacement
     mass = np.zeros(size)

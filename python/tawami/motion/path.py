@@ -119,6 +119,11 @@ class PathStep:
         stressed = now.model.moves and bool(self.following.loads)
         static = StaticStep(now, now.moment(factor), stressed).problem()
         rate = now.external(now.moment(1.0)) - now.external(now.moment(0.0))
+        if now.loads.follower_changes(now.domain, now.moment(0.0), now.moment(1.0)):
+            raise InputError(
+                "follow(...): a new pressure follows the border, and a path scales dead loads only: "
+                "expected traction(...), or scene.solve() or ramp(scene) before for the pressure"
+            )
         if not rate.any():
             raise InputError(
                 "follow(...): there is no new load: expected a traction, a force or gravity that the "

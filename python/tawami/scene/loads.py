@@ -160,6 +160,15 @@ class Loads(Owner[Load]):
             if isinstance(load, Pressure) and self._follows(load, domain)
         ]
 
+    def follower_changes(self, domain: Domain, first: Moment, last: Moment) -> bool:
+        """Whether a pressure that follows the border differs between two moments."""
+        return any(
+            isinstance(load, Pressure) and term.at(first) != term.at(last) and not term.is_zero
+            for load in self.all
+            if self._follows(load, domain)
+            for term in load.terms
+        )
+
     @staticmethod
     def _follows(load: Load, domain: Domain) -> bool:
         """Whether a load depends on the displacement in a step."""
