@@ -9,7 +9,7 @@ import tawami
 
 
 def block():
-    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(4, 6))
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(6, 6))
     body = tawami.box(grid, (0, 0), (1, 1), per_axis=2)
     law = tawami.linear_elastic(E=1e3, nu=0.3)
     scene = tawami.Scene(grid, body, law, form="u_epsv_finite", density=1.0)
