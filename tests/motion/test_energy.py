@@ -218,6 +218,7 @@ def test_the_work_of_moving_supports_is_that_of_their_mean_force(support):
     assert not warned
 
 
+@pytest.mark.slow
 def test_the_work_of_moving_supports_has_an_error_of_second_order():
     """At finite strain each reset of the grid takes some energy; the rest depends on the step."""
     found = [shaken("u_finite", "edge", dt)[0].integration for dt in (0.01, 0.005, 0.0025)]
