@@ -19,9 +19,10 @@ class Pressed:
         cells: Cells over half of the contact.
         size: Depth and half-width of the body, in halves of the contact.
         half: Only one half of it, with a plane of symmetry.
+        options: Of the scene.
     """
 
-    def __init__(self, nu, cells, size, *, half):
+    def __init__(self, nu, cells, size, *, half, **options):
         self.load = np.pi * E / (1 - nu**2) * HALF**2 / (4 * RADIUS)
         h, left = HALF / cells, 0.0 if half else -size
         shape = (round((size - left) / h), round(size / h) + 1)
@@ -29,7 +30,7 @@ class Pressed:
         x, top = np.linspace(size, left, 2 * shape[0] + 1), size - 0.43 * h  # cuts the cells
         corners = [(left, 0.0), (size, 0.0), *zip(x, top - x**2 / (2 * RADIUS), strict=True)]
         body = tawami.polygon(grid, corners, per_axis=2)
-        self.scene = tawami.Scene(grid, body, tawami.linear_elastic(E=E, nu=nu))
+        self.scene = tawami.Scene(grid, body, tawami.linear_elastic(E=E, nu=nu), **options)
         for component in ("x", "y"):
             self.scene.fix(lambda x, y: y < 1e-9, component)
         if half:

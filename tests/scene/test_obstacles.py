@@ -67,7 +67,8 @@ def test_pressure_of_hertz(nu):
 @pytest.mark.slow
 @pytest.mark.parametrize("nu", [0.3, 0.4999])
 def test_pressure_of_hertz_with_eight_cells(nu):
-    pressed = Pressed(nu, 8, 16, half=True)
+    """.4 and .5 % with k = .001; the default of the ghost penalty, k = .01, gives 1.2 % for nu = .3."""
+    pressed = Pressed(nu, 8, 16, half=True, k=1e-3)
     assert pressed.pressure_error() < 0.01
     assert pressed.solution.iterations <= 10
 
