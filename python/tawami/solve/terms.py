@@ -94,6 +94,21 @@ class Terms:
         for term in self.bordering:
             term.restart()
 
+    def shorten(self, share: float) -> None:
+        """Take a share of the last change of the unknowns of their own."""
+        for term in self.bordering:
+            term.shorten(share)
+
+    @property
+    def first_work(self) -> float:
+        """Work of the residuals of their own equations on the last change, at its beginning."""
+        return sum(term.first_work for term in self.bordering)
+
+    @property
+    def work(self) -> float:
+        """The same at the last forces."""
+        return sum(term.work for term in self.bordering)
+
     def forces(self, coefficients: Array) -> Array:
         """Their sum, as `Term.forces`."""
         #: Of all that are no contact.
