@@ -32,7 +32,7 @@ def evaluate(profile: Profile, points: Array, what: str) -> Array:
     Raises:
         InputError: The function fails, returns another shape, or returns NaN or infinity.
     """
-    x, *others = points.T
+    x, *others = points.T.copy()  # a function may change its arguments
     try:
         value = profile(x, *others) if callable(profile) else profile
         values = np.broadcast_to(checks.real_values(value), x.shape)
