@@ -103,8 +103,7 @@ def means(
         places: Numbers of these unknowns, points x functions.
         size: Number of all unknowns.
     """
-    rows = np.repeat(patches.number, places.shape[1])
-    values = (patches.shares(weights)[:, None] * functions).ravel()
-    found = sp.csr_matrix((values, (rows, places.ravel())), shape=(patches.count, size))
-    found.eliminate_zeros()
-    return found
+    point, function = functions.nonzero()
+    values = patches.shares(weights)[point] * functions[point, function]
+    entries = (values, (patches.number[point], places[point, function]))
+    return sp.csr_matrix(entries, shape=(patches.count, size))
