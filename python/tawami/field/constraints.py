@@ -14,6 +14,7 @@ from tawami import _rust
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import SupportError
 from tawami.base.space import Position, lattice, tensor_product
+from tawami.base.text import position
 from tawami.field.layout import Place
 from tawami.grid.basis import Basis, functions_on, values_1d
 from tawami.grid.edges import Profile, edge_functions, evaluate, locate_point
@@ -129,7 +130,7 @@ def held_point(
         InputError: The point is outside the grid.
         SupportError: The body does not reach the point.
     """
-    where = f"hold(point=({', '.join(f'{x:g}' for x in point)}))"
+    where = f"hold(point={position(point)})"
     location = locate_point(grid, point, where)
     cell = np.unravel_index(int(location.cell[0]), grid.cells, order="F")
     xi = location.xi[0]

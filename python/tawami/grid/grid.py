@@ -17,7 +17,7 @@ from tawami.base.checks import choice, number, one_of, pair, point, room, shown,
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
 from tawami.base.space import SPACES, Counts, Position
-from tawami.base.text import meant
+from tawami.base.text import meant, position
 from tawami.fem import mesh
 
 Edge = Literal["left", "right", "bottom", "top"]
@@ -112,9 +112,9 @@ class Grid(Unique):
     def line(self) -> str:
         """The grid in words, for the header of a run."""
         cells = " x ".join(map(str, self.cells))
-        corners = (", ".join(f"{x:g}" for x in corner) for corner in (self.origin, self.upper))
         about = ", axisymmetric about x = 0" if self.space.hoop else ""
-        return f"{cells} cells of {self.h:g} m from ({next(corners)}) to ({next(corners)}){about}"
+        corners = f"from {position(self.origin)} to {position(self.upper)}"
+        return f"{cells} cells of {self.h:g} m {corners}{about}"
 
     def __repr__(self) -> str:
         cells = " x ".join(map(str, self.cells))
