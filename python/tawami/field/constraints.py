@@ -84,7 +84,7 @@ def held_edge(
         value: Value along the edge [m], or in the unit of the field.
         where: The support, for messages.
     """
-    axis, end = grid.edge(edge)
+    axis, _ = grid.edge(edge)
     along = 1 - axis
     used = functions_on(place.basis, grid.cells[along], touched)
     functions = edge_functions(grid, place.basis, edge)[used]
@@ -94,7 +94,7 @@ def held_edge(
     points, weights = _rust.gauss(POINTS)
     cell, t = np.repeat(touched, POINTS), np.tile(points, len(touched))
     position = grid.axis_positions(along, cell, t)
-    fixed = np.full_like(position, grid.upper[axis] if end else grid.origin[axis])
+    fixed = np.full_like(position, grid.line_of_edge(edge))
     x = np.stack([fixed, position] if axis == 0 else [position, fixed], axis=-1)
     values = values_1d(place.basis, grid.cells[along], cell, t)[:, used]
     weighted = sp.diags(np.tile(weights, len(touched))) @ values

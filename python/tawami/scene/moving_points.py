@@ -100,13 +100,7 @@ class MovingPoints:
             edge: Name of the edge.
             tolerance: Distance that is ignored [cells].
         """
-        axis, end = self._grid.edge(edge)
-        inside = (
-            self._grid.upper[axis] - self.x[:, axis]
-            if end
-            else self.x[:, axis] - self._grid.origin[axis]
-        )
-        return np.asarray(inside <= tolerance * self._grid.h)
+        return np.asarray(self._grid.inwards(edge, self.x) <= tolerance * self._grid.h)
 
     def remains(self, before: Domain, after: Domain) -> Mask:
         """Mask of the points whose cells still hold particles after some were removed."""
