@@ -15,6 +15,7 @@ from tawami.base.errors import InputError
 from tawami.base.optional import optional
 from tawami.base.space import lattice
 from tawami.base.text import position
+from tawami.border.curves import left
 from tawami.border.polyline import unclosed
 
 
@@ -120,8 +121,7 @@ class Polygon:
     def _normals(self) -> Array:
         """Outward unit normals of the sides, sides x 2."""
         to = np.roll(self.corners, -1, axis=0) - self.corners
-        normals = np.column_stack([to[:, 1], -to[:, 0]])
-        return np.asarray(normals / np.linalg.norm(to, axis=1)[:, None])
+        return np.asarray(-left(to) / np.linalg.norm(to, axis=1)[:, None])
 
     def _nearest(self, x: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_], Array]:
         """The nearest side of each point, whether an end of it is nearest, and the way from there."""

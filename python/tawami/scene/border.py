@@ -14,6 +14,7 @@ from tawami.base import checks, stored
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import CheckpointError, InputError
 from tawami.base.text import meant, quoted
+from tawami.border.curves import left
 from tawami.border.pieces import Border
 from tawami.border.points import BorderPoints
 from tawami.grid.grid import EDGES, ON_LINE, Edge, Grid
@@ -318,7 +319,6 @@ def _ends(border: Border) -> BorderPoints:
 
 def _as_points(border: Border, x: Array, along: Array, of: Indices) -> BorderPoints:
     """Points of pieces, without lengths and chains; `along` are directions and `of` the pieces."""
-    normal = np.stack([along[:, 1], -along[:, 0]], axis=1)
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    normal = -left(along) / np.linalg.norm(along, axis=1)[:, None]
     one, number = np.ones(len(x)), np.zeros(len(x), dtype=np.int64)
     return BorderPoints(x, one, normal, border.tag[of], border.names, number, 0 * one)
