@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +20,7 @@ from tawami.border.points import BorderPoints
 from tawami.grid.grid import EDGES, ON_LINE, Edge, Grid
 from tawami.scene.domain import Domain
 from tawami.scene.model import Model
-from tawami.scene.moving_points import MovingPoints, moved
+from tawami.scene.moving_points import MovingPoints, halve, moved
 
 #: Gauss points on a piece of the border between two lines of the grid: where particles stay, three are
 #: exact; points that move to other places in their cells need five (noise of a pressure .5 and .14 %).
@@ -40,6 +40,18 @@ Part = (
 )
 
 
+class User(Protocol):
+    """One that has numbers at points of the border."""
+
+    def keep(self, kept: Mapping[MovingPoints, Indices]) -> None:
+        """Keep the numbers of points.
+
+        Args:
+            kept: For each part of the border the place that each point had before; several may be parts
+                of one.
+        """
+
+
 class SceneBorder:
     """The border of the body of a scene.
 
@@ -50,6 +62,7 @@ class SceneBorder:
     Attributes:
         points: All points; None for a body without a border.
         parts: Points that actions own.
+        users: Those that have numbers at the points.
     """
 
     def __init__(self, model: Model, particles: _rust.Particles) -> None:
@@ -62,6 +75,7 @@ class SceneBorder:
         self._left: Indices = np.zeros(0, dtype=np.int64)
         self._has_moved = False
         self.parts: list[MovingPoints] = []
+        self.users: list[User] = []
         border = model.border
         if border is not None:
             area = particles.volume / model.space.thickness(particles.x)
@@ -195,13 +209,17 @@ class SceneBorder:
                 found[edge] = mask
         return found
 
-    def keep(self, before: Domain, after: Domain) -> dict[MovingPoints, Mask]:
-        """Drop points where particles were removed.
+    def divide(self) -> None:
+        """Divide points and pieces where the border has been stretched."""
+        if self._ends is not None:
+            self._left = self._left[halve(self._ends, self._grid.h)]
+        kept = {points: points.divide() for points in self.all if points is not self._ends}
+        for user in self.users:
+            user.keep(kept)
 
-        Returns:
-            For each of the parts the mask of the points that remain.
-        """
-        kept = {points: points.remains(before, after) for points in self.all if len(points)}
+    def keep(self, before: Domain, after: Domain) -> None:
+        """Drop points where particles were removed."""
+        masks = {points: points.remains(before, after) for points in self.all if len(points)}
         if self.points is not None:
             assert self._pieces_at_lines is not None
             pieces = self._present if self._has_moved else self._pieces_at_lines[self._left]
@@ -209,10 +227,12 @@ class SceneBorder:
             left = middle.remains(before, after)
             self._left = self._left[left]
             if self._ends is not None:
-                kept[self._ends] = np.tile(left, 2)
-        for points, mask in kept.items():
-            points.keep(mask)
-        return kept
+                masks[self._ends] = np.tile(left, 2)
+        kept = {points: np.flatnonzero(mask) for points, mask in masks.items()}
+        for points, numbers in kept.items():
+            points.keep(numbers)
+        for user in self.users:
+            user.keep(kept)
 
     def moved(self, domain: Domain, u: Array) -> list[tuple[Array, Array]]:
         """Positions and areas of all points after a step, for :meth:`move`."""
@@ -242,7 +262,7 @@ class SceneBorder:
             "the same loads and supports, made between two phases",
         )  # fmt: skip
         count = 0 if self._pieces_at_lines is None else len(self._pieces_at_lines.start)
-        left = stored.some_of("pieces of the border", state["left"], count)
+        left = stored.some_of("pieces of the border", state["left"], count, repeated=True)
         for points, given in zip(self.all, state["points"], strict=True):
             points.restore(given)
         if self._ends is not None and len(self._ends) != 2 * len(left):

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from tawami.base import checks
-from tawami.base.arrays import Array, Mask
+from tawami.base.arrays import Array, Indices
 from tawami.base.errors import InputError
 from tawami.base.text import listed, position
+from tawami.border.patches import Patches
 from tawami.border.shapes import Function
 from tawami.scene import obstacle_inputs as inputs
 from tawami.scene.action import Owner, restored
@@ -139,12 +140,14 @@ class Obstacles(Owner[Obstacle]):
             found.append(contact)
         return found
 
-    def keep(self, kept: Mapping[MovingPoints, Mask]) -> None:
-        """Keep the points of the border that remain after particles were removed."""
+    def keep(self, kept: Mapping[MovingPoints, Indices]) -> None:
+        """Keep the points of the border that remain, or their parts; see `SceneBorder`."""
         for obstacle in self.all:
-            mask = kept[obstacle.place]
-            obstacle.pressure, obstacle.traction = obstacle.pressure[mask], obstacle.traction[mask]
-            obstacle.groups = None
+            of, groups = kept[obstacle.place], obstacle.groups
+            obstacle.pressure, obstacle.traction = obstacle.pressure[of], obstacle.traction[of]
+            if groups is not None:
+                whole = len(np.unique(of)) == len(groups.number)
+                obstacle.groups = Patches(groups.number[of], groups.count) if whole else None
 
     def apply(self, now: Moment) -> None:
         """The body is in equilibrium with the obstacles at this moment."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tawami.base import checks, stored
-from tawami.base.arrays import Array, Mask
+from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import InputError, SupportError
 from tawami.base.text import listed, quoted
 from tawami.field.constraints import PointHeld
@@ -231,8 +231,8 @@ class Supports(Owner[Support]):
                     "supports on particles that remain; release() it before. Nothing was changed"
                 )
 
-    def keep(self, kept: Mapping[MovingPoints, Mask]) -> None:
-        """Keep the points of the border that remain after particles were removed."""
+    def keep(self, kept: Mapping[MovingPoints, Indices]) -> None:
+        """Keep the points of the border that remain, or their parts; see `SceneBorder`."""
         for support in self.all:
             if isinstance(support.place, MovingPoints):
                 support.keep(kept[support.place])
