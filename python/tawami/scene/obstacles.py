@@ -17,6 +17,7 @@ from tawami.scene import obstacle_inputs as inputs
 from tawami.scene.action import Owner, restored
 from tawami.scene.activity import Activity
 from tawami.scene.border import Part, SceneBorder, label
+from tawami.scene.depth import warn_of_deep, warn_of_small
 from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor, InTime
 from tawami.scene.moving_points import MovingPoints
@@ -40,7 +41,7 @@ class Obstacles(Owner[Obstacle]):
 
     def __init__(self, border: SceneBorder, activity: Activity) -> None:
         super().__init__(activity)
-        self._border = border
+        self._border, self._deep = border, set[Obstacle]()
 
     def add(
         self,
@@ -94,6 +95,7 @@ class Obstacles(Owner[Obstacle]):
         except InputError:
             self._border.parts.remove(part)
             raise
+        warn_of_small(what, made, h)
         self.all.append(obstacle)
         self.changed()
         return obstacle
@@ -153,6 +155,18 @@ class Obstacles(Owner[Obstacle]):
         """The body is in equilibrium with the obstacles at this moment."""
         for obstacle in self.all:
             obstacle.apply(now)
+
+    def warn(self, domain: Domain, coefficients: Array) -> None:
+        """Warn, once for each obstacle, of particles deep inside it after a step; a call for all ranks.
+
+        Args:
+            domain: The particles.
+            coefficients: Of all fields since the start, where particles do not move.
+        """
+        model, n = domain.model, domain.layout.num_displacement
+        u = None if model.moves else model.space.vectors(coefficients[:n])
+        new = [obstacle for obstacle in self.all if obstacle not in self._deep]
+        self._deep.update(one for one in new if warn_of_deep(one, domain, u))
 
     @property
     def kinetic(self) -> float:
