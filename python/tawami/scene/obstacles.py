@@ -12,7 +12,7 @@ from tawami.base.arrays import Array, Indices
 from tawami.base.errors import InputError
 from tawami.base.text import listed
 from tawami.border.patches import Patches
-from tawami.border.shapes import Function
+from tawami.border.shapes import Function, Shape
 from tawami.scene import obstacle_inputs as inputs
 from tawami.scene.action import Owner, restored
 from tawami.scene.activity import Activity
@@ -86,17 +86,14 @@ class Obstacles(Owner[Obstacle]):
         factor = Factor(what, amplitude, time=self.activity.time)
         speeds = inputs.speeds_of(what, velocity, space, self.activity.time)
         inputs.check_motions(what, space, speeds, moves, np.array(by), np.array(forces))
+        _check_place(what, made, part, domain, total)
+        warn_of_small(what, made, h)
         obstacle = Obstacle(
             self, part, given, name, made, mu, moves, masses, np.where(moves, forces, by), factor,
             speeds,
         )  # fmt: skip
-        try:
-            _check_place(obstacle, domain, total)
-        except InputError:
-            self._border.parts.remove(part)
-            raise
-        warn_of_small(what, made, h)
         self.all.append(obstacle)
+        self._border.parts.append(part)
         self.changed()
         return obstacle
 
@@ -196,22 +193,24 @@ class Obstacles(Owner[Obstacle]):
         self.changed()
 
 
-def _check_place(obstacle: Obstacle, domain: Domain, total: Array) -> None:
+def _check_place(
+    what: str, shape: Shape, place: MovingPoints, domain: Domain, total: Array
+) -> None:
     """Check that an obstacle does not overlap the body, and that its distance is one.
 
     Raises:
         InputError: It does, or a function that gives it is no distance at the border.
     """
-    place, layout, h = obstacle.place, domain.layout, domain.model.grid.h
+    layout, h = domain.layout, domain.model.grid.h
     u = domain.model.space.vectors(total[: layout.num_displacement])
     x = place.x + place.cells(domain).values(layout.basis) @ u
-    if isinstance(obstacle.shape, Function):
-        obstacle.shape.check(x)
-    distance = obstacle.shape.evaluate(x).distance
+    if isinstance(shape, Function):
+        shape.check(x)
+    distance = shape.evaluate(x).distance
     worst = int(np.argmin(distance))
     if distance[worst] < -OVERLAP * h:
         at = ", ".join(f"{c:g}" for c in x[worst])
         raise InputError(
-            f"{obstacle}: the body is {-distance[worst]:.3g} m inside it at ({at}) m: expected an "
+            f"{what}: the body is {-distance[worst]:.3g} m inside it at ({at}) m: expected an "
             f"obstacle that overlaps the body by at most h/10 = {OVERLAP * h:.3g} m"
         )
