@@ -63,6 +63,25 @@ def some_of(what: str, given: Any, count: int, *, repeated: bool = False) -> Ind
     return left
 
 
+def check_count(what: str, stored: int, made: int, advice: str) -> None:
+    """Check that a script has made as many things as the run had.
+
+    Args:
+        what: The things, for the message.
+        stored: Their number when the run was stored.
+        made: Their number now.
+        advice: What is expected.
+
+    Raises:
+        CheckpointError: The numbers differ.
+    """
+    if stored != made:
+        raise CheckpointError(
+            f"the run had {stored} {what} when it was stored, and the script made {made}: expected "
+            f"{advice}"
+        )
+
+
 def _array(given: Any) -> npt.NDArray[Any]:
     """An array of what a checkpoint holds; numbers in lists are read as those in arrays."""
     try:

@@ -14,6 +14,9 @@ from tawami.base.checks import LEAST, array, number, shown
 from tawami.base.errors import InputError
 from tawami.base.optional import optional
 from tawami.base.space import lattice
+from tawami.base.text import position
+from tawami.border.curves import left
+from tawami.border.polyline import unclosed
 
 
 @dataclass(frozen=True)
@@ -135,8 +138,7 @@ class Polygon:
     def _normals(self) -> Array:
         """Outward unit normals of the sides, sides x 2."""
         to = np.roll(self.corners, -1, axis=0) - self.corners
-        normals = np.column_stack([to[:, 1], -to[:, 0]])
-        return np.asarray(normals / np.linalg.norm(to, axis=1)[:, None])
+        return np.asarray(-left(to) / np.linalg.norm(to, axis=1)[:, None])
 
     def _nearest(self, x: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_], Array]:
         """The nearest side of each point, whether an end of it is nearest, and the way from there."""
@@ -211,10 +213,9 @@ class Function:
             )
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
-            at = ", ".join(f"{c:g}" for c in points[bad[0]])
             raise InputError(
-                f"the obstacle's distance is {values[bad[0]]} at ({at}) m: expected a finite number "
-                "everywhere"
+                f"the obstacle's distance is {values[bad[0]]} at {position(points[bad[0]])} m: "
+                "expected a finite number everywhere"
             )
         return values
 
@@ -229,10 +230,10 @@ class Function:
     def _check_slope(self, x: Array, size: Array) -> None:
         bad = np.flatnonzero(np.abs(size - 1) > 0.05)
         if len(bad):
-            at = ", ".join(f"{c:g}" for c in x[bad[0]])
             raise InputError(
-                f"the obstacle's distance has a gradient of length {size[bad[0]]:.3g} at ({at}) m: "
-                "expected a signed distance [m], whose gradient has the length 1, positive outside"
+                f"the obstacle's distance has a gradient of length {size[bad[0]]:.3g} at "
+                f"{position(x[bad[0]])} m: expected a signed distance [m], whose gradient has the "
+                "length 1, positive outside"
             )
 
 
@@ -282,9 +283,7 @@ def rigid_polygon(corners: npt.ArrayLike, radius: float = 0.0) -> Polygon:
     """
     import shapely
 
-    given = array("corners", corners, 2)
-    if len(given) > 1 and np.array_equal(given[0], given[-1]):
-        given = given[:-1]  # a closed line repeats its first point
+    given = unclosed(array("corners", corners, 2))
     if len(given) < 3 or given.shape[1] != 2 or not np.isfinite(given).all():
         raise InputError(
             f"rigid_polygon: corners of shape {given.shape}: expected three or more finite points (x, y)"

@@ -14,6 +14,7 @@ from tawami import _rust
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import SupportError
 from tawami.base.space import lattice
+from tawami.base.text import position
 from tawami.grid.basis import Basis
 from tawami.grid.grid import Grid
 
@@ -118,10 +119,9 @@ class BorderInCells(PointsInCells):
 
 def _far_from_particles(grid: Grid, x: Array, lost: Mask, where: str) -> SupportError:
     """The error for points without particles near them."""
-    place = ", ".join(f"{c:g}" for c in x[lost][0])
     return SupportError(
         f"{where}: {lost.sum()} of {len(x)} points of the border are more than {REACH} cells from any "
-        f"particle, the first at ({place}) m: expected the border of the body's particles"
+        f"particle, the first at {position(x[lost][0])} m: expected the border of the body's particles"
     )
 
 

@@ -14,6 +14,7 @@ from tawami.base import checks, stored
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import CheckpointError, InputError
 from tawami.base.text import meant, quoted
+from tawami.border.curves import left
 from tawami.border.pieces import Border
 from tawami.border.points import BorderPoints
 from tawami.grid.grid import EDGES, ON_LINE, Edge, Grid
@@ -158,10 +159,8 @@ class SceneBorder:
         if name in border.names:
             return np.asarray(border.tag == border.names.index(name))
         if name in EDGES:
-            axis, end = self._grid.edge(name)
-            line = self._grid.upper[axis] if end else self._grid.origin[axis]
-            ends = np.stack([border.start[:, axis], border.end[:, axis]])
-            along = (np.abs(ends - line) <= ON_LINE * self._grid.h).all(axis=0)
+            ends = [self._grid.inwards(name, x) for x in (border.start, border.end)]
+            along = (np.abs(ends) <= ON_LINE * self._grid.h).all(axis=0)
             mask: Mask = along & (border.curvature == 0)
             if mask.any():
                 return mask
@@ -203,9 +202,9 @@ class SceneBorder:
         assert self.points is not None
         for edge in EDGES:
             mask = part.edge(edge)
-            all_of_it = float(self.points.length[self.points.edge(edge)].sum())
-            covered = float(part.length[mask].sum())
-            if covered > 0 and abs(covered - all_of_it) <= ON_LINE * self._grid.h:
+            covered = part.length[mask].sum()
+            whole = self.points.length[self.points.edge(edge)].sum()
+            if covered > 0 and abs(covered - whole) <= ON_LINE * self._grid.h:
                 found[edge] = mask
         return found
 
@@ -257,12 +256,10 @@ class SceneBorder:
         Raises:
             CheckpointError: Other parts of the border.
         """
-        if len(state["points"]) != len(self.all):
-            raise CheckpointError(
-                f"the run had {len(state['points'])} parts of the border when it was stored, and the "
-                f"script made {len(self.all)}: expected the same loads and supports, made between two "
-                "phases"
-            )
+        stored.check_count(
+            "parts of the border", len(state["points"]), len(self.all),
+            "the same loads and supports, made between two phases",
+        )  # fmt: skip
         count = 0 if self._pieces_at_lines is None else len(self._pieces_at_lines.start)
         left = stored.some_of("pieces of the border", state["left"], count, repeated=True)
         for points, given in zip(self.all, state["points"], strict=True):
@@ -291,9 +288,8 @@ def check_fits(grid: Grid, points: BorderPoints, x: Array, area: Array) -> None:
     axis = 1 if grid.space.hoop else 0  # the axis of rotation closes the border
     if np.abs(flux.sum(axis=0)[axis:]).max() > CLOSED * points.length.sum():
         return
-    middle = points.x.mean(
-        axis=0
-    )  # positions relative to it: round-off far from the origin cancels
+    # positions relative to the middle: round-off far from the origin cancels
+    middle = points.x.mean(axis=0)
     middle[:axis] = 0.0
     enclosed = ((points.x - middle) * flux).sum() / grid.space.dim
     centroid = ((points.x - middle) ** 2 * flux).sum(axis=0) / 2 / enclosed
@@ -342,7 +338,6 @@ def _ends(border: Border) -> BorderPoints:
 
 def _as_points(border: Border, x: Array, along: Array, of: Indices) -> BorderPoints:
     """Points of pieces, without lengths and chains; `along` are directions and `of` the pieces."""
-    normal = np.stack([along[:, 1], -along[:, 0]], axis=1)
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    normal = -left(along) / np.linalg.norm(along, axis=1)[:, None]
     one, number = np.ones(len(x)), np.zeros(len(x), dtype=np.int64)
     return BorderPoints(x, one, normal, border.tag[of], border.names, number, 0 * one)

@@ -13,7 +13,7 @@ from tawami.base import stored
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.space import Space
 from tawami.border.curves import spread
-from tawami.border.points import BorderPoints
+from tawami.border.points import BorderPoints, transformed
 from tawami.field.border import BorderInCells
 from tawami.grid.grid import ON_LINE, Edge, Grid
 from tawami.scene.domain import Domain
@@ -104,13 +104,7 @@ class MovingPoints:
             edge: Name of the edge.
             tolerance: Distance that is ignored [cells].
         """
-        axis, end = self._grid.edge(edge)
-        inside = (
-            self._grid.upper[axis] - self.x[:, axis]
-            if end
-            else self.x[:, axis] - self._grid.origin[axis]
-        )
-        return np.asarray(inside <= tolerance * self._grid.h)
+        return np.asarray(self._grid.inwards(edge, self.x) <= tolerance * self._grid.h)
 
     def remains(self, before: Domain, after: Domain) -> Mask:
         """Mask of the points whose cells still hold particles after some were removed."""
@@ -213,7 +207,7 @@ def halve(ends: MovingPoints, longest: float) -> Indices:
 def moved(
     all_points: Sequence[MovingPoints], domain: Domain, u: Array
 ) -> list[tuple[Array, Array]]:
-    """Positions and areas of points after a step (Nanson: n dA = cof(F) n0 dA0).
+    """Positions and areas of points after a step.
 
     Points without particles near them, as after a body broke, stay where they are; loads and supports
     on them raise an error.
@@ -235,9 +229,8 @@ def moved(
     flat = np.ascontiguousarray(u).ravel()
     gradient = space.in_space(space.gradients(_rust.gradients(location, basis, flat)))
     f = gradient + np.eye(space.dim)
-    cofactor = np.linalg.det(f)[:, None, None] * np.linalg.inv(f).transpose(0, 2, 1)
     x, area = x.copy(), area.copy()
     x[near] += _rust.interpolate(location, basis, space.dim, flat)[near]
-    area[near] = np.einsum("nij,nj->ni", cofactor[near], area[near])
+    area[near] = transformed(area[near], f[near])
     ends = np.cumsum([len(p) for p in all_points])[:-1]
     return list(zip(np.split(x, ends), np.split(area, ends), strict=True))

@@ -13,11 +13,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from tawami.base.arrays import Array, Mask
-from tawami.base.errors import SupportError
+from tawami.base.errors import SingularError, SupportError
 from tawami.border.contact import OPEN, Contact, ContactForces, Multipliers
 from tawami.border.rigid import Pose
 from tawami.field.constraints import PointHeld
 from tawami.scene.contact_result import ContactResult
+from tawami.scene.contact_states import ContactStates
 from tawami.scene.domain import Domain
 from tawami.scene.near_border import BorderNear
 from tawami.scene.obstacle import Obstacle
@@ -29,8 +30,6 @@ from tawami.solve.bordered import Blocks
 SETTLED, ROUND_OFF = 1e-3, 1e-9
 #: Distance of patches that are evaluated from the start of a step on [cells].
 REACH = 1.0
-#: Evaluations in which friction may turn round only after a patch was taken as sticking.
-RETURNS = 10
 #: Distance at which a patch touches at the start of a static step, and at which the nearest patch does
 #: if no other touches [cells].
 TOUCHING, ALMOST = 1e-6, 0.1
@@ -48,7 +47,7 @@ class ObstacleContact:
         before: Displacement coefficients since the start where particles do not move, else 0.
     """
 
-    smooth, implicit = False, True
+    smooth, implicit, first_work = False, True, 0.0
 
     def __init__(
         self, domain: Domain, obstacle: Obstacle, motion: ObstacleMotion, before: Array
@@ -111,7 +110,7 @@ class ObstacleContact:
     def restart(self) -> None:
         """See `Term`."""
         self.motion.restart()
-        self._first, self._returns = True, 0
+        self._states = ContactStates()
 
     def forces(self, coefficients: Array) -> Array:
         """See `Term`: in dynamics with the factors of both ends of the step."""
@@ -119,21 +118,22 @@ class ObstacleContact:
         reached = self._border.reached(pose.to_local(x))
         if reached.any():
             self._choose(reached)
-        sticking: bool | ContactForces = self._first
-        if (
-            not self._first
-            and self._returns < RETURNS
-            and len(self.now.x) == len(self._border.points)
-        ):
-            sticking = self.now
+        x = x[self._border.points]
         self.now: ContactForces = self._contact.evaluate(
-            x[self._border.points], pose, self._held, sticking=sticking
+            x, pose, self._held, sticking=self._states.sticking(len(x))
         )
-        self._returns += not self._first and self.now.exceeded
-        self._first = False
+        self._pulls = self._is_loose and bool(self._held.pressure.any())
+        if self._pulls:  # otherwise nothing would bring it back
+            self.now = self._contact.evaluate(x, pose, self._held, sticking=True, tied=True)
         self.at_end = self._border.on_all(self.now.forces)
         factor = self.motion.factor
         return np.asarray(factor * self.at_end - (factor - 1) * self.at_start[0])
+
+    @property
+    def _is_loose(self) -> bool:
+        """Whether it is free and away from the body in statics, where only contact holds it."""
+        is_held = self.motion.times is not None or not self.motion.free.any()
+        return not is_held and bool((self.now.state == OPEN).all())
 
     def _forces_at_start(self) -> tuple[Array, Array]:
         """Forces at the start of the step: on all coefficients, and on the obstacle."""
@@ -147,6 +147,7 @@ class ObstacleContact:
 
     def stiffness(self) -> sp.csr_matrix:
         """See `Term`. Its entries are in the same places as long as no patch comes near."""
+        self.now = self._states.linearised(self.now)
         return self._border.on_coefficients(-self.motion.factor * self.now.derivative)
 
     def improve(self) -> bool:
@@ -154,11 +155,12 @@ class ObstacleContact:
         now, penalty = self.now, self._contact.penalty
         allowed = SETTLED * np.max(now.pressure / penalty, initial=0.0)
         settled = now.violation <= max(allowed, ROUND_OFF * self._border.h)
-        if settled and not now.exceeded:
+        if settled and not now.exceeded and not self._pulls:
             return False
-        if not settled:
-            self._pressure[self._border.chosen] = now.pressure
-            self._traction[self._border.chosen] = now.traction
+        if not settled or self._pulls:
+            held = now.multipliers
+            self._pressure[self._border.chosen] = held.pressure
+            self._traction[self._border.chosen] = held.traction
         return True
 
     @property
@@ -260,7 +262,17 @@ class ObstacleContact:
 
     def add(self, change: Array) -> None:
         """Go to the next iterate of its free motions."""
+        self.first_work = float(self.residual @ change)
         self.motion.add(change)
+
+    def shorten(self, share: float) -> None:
+        """Take a share of the last change of its free motions."""
+        self.motion.shorten(share)
+
+    @property
+    def work(self) -> float:
+        """Work of its residual on the last change."""
+        return float(self.residual @ self.motion.last_change)
 
     def check_held(self, matrix: Array) -> None:
         """Check that its motions are held in statics.
@@ -269,7 +281,8 @@ class ObstacleContact:
             matrix: Stiffness of its free motions, with that of the body.
 
         Raises:
-            SupportError: One is free, as the obstacle does not touch the body.
+            SupportError: One is free, as the obstacle does not touch the body, or slides.
+            SingularError: The body gives way to it after the first iteration.
         """
         if self.motion.times is not None:
             return
@@ -284,8 +297,10 @@ class ObstacleContact:
         if sizes[-1] > UNHELD:
             return
         weakest = motions[int(np.argmax(np.abs(directions[-1])))]
-        state = "does not touch the body" if (self.now.state == OPEN).all() else "slides freely"
-        raise SupportError(
+        away = bool((self.now.state == OPEN).all())
+        state = "does not touch the body" if away else "slides freely, or the body gives way"
+        error = SupportError if away or self._states.tangents == 1 else SingularError
+        raise error(
             f"{self.obstacle}: nothing holds its motion '{self.obstacle.motions[weakest]}', as it "
             f"{state}: expected an obstacle in contact, or free=... without this motion"
         )

@@ -10,7 +10,7 @@ import numpy as np
 from tawami.base import checks
 from tawami.base.arrays import Array, Indices
 from tawami.base.errors import InputError
-from tawami.base.text import listed
+from tawami.base.text import listed, position
 from tawami.border.patches import Patches
 from tawami.border.shapes import Function, Shape
 from tawami.scene import obstacle_inputs as inputs
@@ -209,8 +209,7 @@ def _check_place(
     distance = shape.evaluate(x).distance
     worst = int(np.argmin(distance))
     if distance[worst] < -OVERLAP * h:
-        at = ", ".join(f"{c:g}" for c in x[worst])
         raise InputError(
-            f"{what}: the body is {-distance[worst]:.3g} m inside it at ({at}) m: expected an "
-            f"obstacle that overlaps the body by at most h/10 = {OVERLAP * h:.3g} m"
+            f"{what}: the body is {-distance[worst]:.3g} m inside it at {position(x[worst])} m: "
+            f"expected an obstacle that overlaps the body by at most h/10 = {OVERLAP * h:.3g} m"
         )

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tawami.base import checks
+from tawami.base import checks, stored
 from tawami.base.arrays import Array, Indices, Mask
-from tawami.base.errors import CheckpointError, InputError, SupportError
+from tawami.base.errors import InputError, SupportError
 from tawami.base.text import listed, quoted
 from tawami.field.constraints import PointHeld
 from tawami.form.fields import Field
@@ -310,11 +310,10 @@ class Supports(Owner[Support]):
         Raises:
             CheckpointError: The script has made others.
         """
-        if len(state["walls"]) != len(self.walls):
-            raise CheckpointError(
-                f"the run had {len(state['walls'])} walls when it was stored, and the script made "
-                f"{len(self.walls)}: expected walls to be added and released between two phases"
-            )
+        stored.check_count(
+            "walls", len(state["walls"]), len(self.walls),
+            "walls to be added and released between two phases",
+        )  # fmt: skip
         self.all = restored("support", self.all, state["supports"])
         for wall, values in zip(self.walls, state["walls"], strict=True):
             wall.restore(values)

@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami.base import checks
+from tawami.base.arrays import of_components
 from tawami.base.errors import InputError
 from tawami.field.constraints import Held
 from tawami.grid.basis import Basis
@@ -164,8 +165,7 @@ class Wall:
         Args:
             fixed: Whether other supports prescribe each displacement coefficient.
         """
-        dim = self.grid.space.dim
-        mask: Mask = fixed[dim * self.functions[:, None] + np.arange(dim)]
+        mask: Mask = fixed[of_components(self.functions, self.grid.space.dim)]
         return mask
 
     def held(self, active: Mask, prescribed: Mask, start: Array, before: Array) -> list[Held]:

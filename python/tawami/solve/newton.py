@@ -189,9 +189,7 @@ class Newton:
         search, most = None, self.numerics.max_iterations
         while True:
             try:
-                forces, measured = self._evaluate(iterate, equations)
-                if search is not None and worst(measured) > worst(history[-1]):
-                    forces, measured = self._shortened(search, iterate, equations, forces, measured)
+                forces, measured = self._reached(search, iterate, equations, history)
             except _rust.InvertedError as error:
                 if guess is None:
                     self._fail(history, f"Then {error}. {equations.advice}")
@@ -222,8 +220,8 @@ class Newton:
                 self._fail(history, advice or equations.advice)
             with reported():
                 change, of_factor = self._change(iterate, forces, equations, add_mass, history)
-            if equations.at_rest and not self._responses.form.strain.finite:
-                search = LineSearch(self._comm, change, forces.residual, self._signs)
+            if equations.is_searched(self._responses.form.strain.finite):
+                search = LineSearch(self._comm, change, forces.residual, self._signs, terms)
             iterate.add(change, of_factor)
             krylov.append(self._solver.iterations)
             self._stopwatch.lap()
@@ -236,27 +234,21 @@ class Newton:
             measured = self._measures.of(forces, iterate.coefficients, equations)
         return forces, measured
 
-    def _shortened(
-        self,
-        search: LineSearch,
-        iterate: Iterate,
-        equations: Equations,
-        forces: Forces,
-        measured: Measured,
+    def _reached(
+        self, search: LineSearch | None, iterate: Iterate, equations: Equations, history: History
     ) -> tuple[Forces, Measured]:
-        """Shorten the last change if it overshoots; forces and measures at the iterate then."""
-        if not search.overshoots(forces.residual):
-            return forces, measured
-        found = [(forces, measured)]
+        """Forces and measures at an iterate, or nearer to the last one if it went too far."""
 
-        def residual_at(share: float) -> Array:
-            iterate.shorten(share)
-            found.append(self._evaluate(iterate, equations))
-            return found[-1][0].residual
+        def evaluate(share: float) -> tuple[Forces, Measured]:
+            if share < 1:
+                iterate.shorten(share)
+                if equations.terms is not None:
+                    equations.terms.shorten(share)
+            return self._evaluate(iterate, equations)
 
-        search.length(residual_at, forces.residual)
-        tally.line_searches += 1
-        return found[-1]
+        if search is None:
+            return evaluate(1.0)
+        return search.advance(evaluate, lambda measured: worst(measured) > worst(history[-1]))
 
     def _change(
         self,
@@ -303,7 +295,12 @@ class Newton:
             mine = reduction.restricted(right)[reduction.own]
             return self._on_all(reduction, solver.again(mine, tolerance))
 
-        change, of_factor = complete(equations, iterate.u, self._on_all(reduction, found), again)
+        try:
+            change, of_factor = complete(
+                equations, iterate.u, self._on_all(reduction, found), again
+            )
+        except SingularError as error:
+            self._fail(history, f"Then {error}. {equations.advice}")
         if not np.isfinite(of_factor):
             self._fail(history, "The loads do not move the control: choose another control")
         return change, of_factor
