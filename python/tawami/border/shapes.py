@@ -41,6 +41,10 @@ class Shape(Protocol):
     def centre(self) -> Array:
         """The point about which it rotates [m]."""
 
+    @property
+    def width(self) -> float:
+        """Width at its narrowest place [m]; infinite if it is not known."""
+
     def evaluate(self, x: Array) -> Distance:
         """Distance of points [m], points x dim."""
 
@@ -56,6 +60,7 @@ class HalfPlane:
 
     centre: Array
     normal: Array
+    width = np.inf
 
     def evaluate(self, x: Array) -> Distance:
         """Distance of points [m], points x dim."""
@@ -75,6 +80,11 @@ class Disc:
 
     centre: Array
     radius: float
+
+    @property
+    def width(self) -> float:
+        """Its diameter [m]."""
+        return 2 * self.radius
 
     def evaluate(self, x: Array) -> Distance:
         """Distance of points [m], points x dim."""
@@ -99,6 +109,13 @@ class Polygon:
         a, b = self.corners, np.roll(self.corners, -1, axis=0)
         double = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
         return np.asarray(double @ (a + b) / (3 * double.sum()))
+
+    @property
+    def width(self) -> float:
+        """Shortest of its sides and of the distances of a corner from other sides, plus 2 radii [m]."""
+        import shapely
+
+        return float(shapely.minimum_clearance(shapely.Polygon(self.corners))) + 2 * self.radius
 
     def evaluate(self, x: Array) -> Distance:
         """Distance of points [m], points x 2; beyond a corner, from the corner."""
@@ -147,6 +164,7 @@ class Function:
     f: Callable[..., npt.ArrayLike]
     step: float
     centre: Array
+    width = np.inf
 
     def evaluate(self, x: Array) -> Distance:
         """Distance of points [m], points x dim.

@@ -109,7 +109,8 @@ class SceneBorder:
         return f"SceneBorder({len(self.points)} points, {length:.6g} m: {', '.join(self.names)})"
 
     def part(self, what: str, where: Part, *, joined: bool = False) -> MovingPoints:
-        """Points of a part of the border, which are exact for this part at its present place.
+        """Points of a part of the border, which are exact for this part at its present place. Its owner
+        adds them to `parts`.
 
         Args:
             what: The call, for messages.
@@ -138,9 +139,7 @@ class SceneBorder:
                 f"{what}: no point of the border is in this part: expected some of it; the border has "
                 f"{quoted(self.names)}"
             )
-        made = MovingPoints(points, self._grid, what)
-        self.parts.append(made)
-        return made
+        return MovingPoints(points, self._grid, what)
 
     def _pieces(self, what: str, where: Part) -> Border:
         """The pieces of a part."""

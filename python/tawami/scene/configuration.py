@@ -100,8 +100,7 @@ class Configuration:
         self.inputs = FormInputs(model, self.activity.time, self.border_sums)
         self.inputs.begin(model, self.domain)
         self.left, self.removed = list[tuple[int, tuple[float, float], float]](), np.zeros(2)
-        self.begun = self._coverage_checked = False
-        self.projected = 0.0
+        self.begun, self._coverage_checked, self.projected = False, False, 0.0
         self._travel, self._limits = mean_stress.Travel(), StrainLimits(small=not model.moves)
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
@@ -280,6 +279,7 @@ class Configuration:
         return outcome
 
     def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:
+        self.obstacles.warn(self.domain, coefficients)
         arrays = quantities.of_body(self.model.grid.comm, self.domain.particles)
         return Outcome(accepted, coefficients, Reactions.of(accepted, self.supports), arrays)
 

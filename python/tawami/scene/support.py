@@ -206,7 +206,8 @@ class Support(Action):
     def state(self) -> dict[str, Any]:
         """Position of a point, multipliers, and the share of its values that the body carries."""
         place = self.place if isinstance(self.place, tuple) else ()
-        return super().state() | {"place": place, "held": self.held, "missing": self.missing}
+        held, missing = np.array(self.held), np.array(self.missing)
+        return super().state() | {"place": place, "held": held, "missing": missing}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`state`.

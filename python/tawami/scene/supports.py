@@ -148,6 +148,8 @@ class Supports(Owner[Support]):
         unit = self._fields[str(axis)].unit if is_field else "m"
         support = Support(self, place, given, axis, unit, value, factor, whole)
         self.all.append(support)
+        if isinstance(place, MovingPoints):
+            self.border.parts.append(place)
         return support
 
     def _component(self, component: str, more: Sequence[str] = ()) -> int | str:

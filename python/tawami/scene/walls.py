@@ -135,7 +135,8 @@ class Wall:
     def stored(self) -> dict[str, Any]:
         """Its states for a checkpoint."""
         state = self.state
-        return {"touching": state.touching, "slip": state.slip, "friction": self.friction}
+        touching, slip = np.array(state.touching), np.array(state.slip)
+        return {"touching": touching, "slip": slip, "friction": self.friction}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`stored`."""
