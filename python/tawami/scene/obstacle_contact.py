@@ -297,12 +297,13 @@ class ObstacleContact:
         if sizes[-1] > UNHELD:
             return
         weakest = motions[int(np.argmax(np.abs(directions[-1])))]
-        away = bool((self.now.state == OPEN).all())
-        state = "does not touch the body" if away else "slides freely, or the body gives way"
-        error = SupportError if away or self._states.tangents == 1 else SingularError
-        raise error(
-            f"{self.obstacle}: nothing holds its motion '{self.obstacle.motions[weakest]}', as it "
-            f"{state}: expected an obstacle in contact, or free=... without this motion"
+        motion, away = self.obstacle.motions[weakest], bool((self.now.state == OPEN).all())
+        if not away and self._states.tangents > 1:
+            raise SingularError(f"{self.obstacle}: the body gives way to its motion '{motion}'")
+        state = "does not touch the body" if away else "slides freely"
+        raise SupportError(
+            f"{self.obstacle}: nothing holds its motion '{motion}', as it {state}: expected an obstacle "
+            "in contact, or free=... without this motion"
         )
 
     @property
