@@ -249,6 +249,9 @@ def test_the_header_names_obstacles():
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings(
+    "ignore:.*a particle of the body is:tawami.SupportWarning"
+)  # sides fold up
 def test_a_block_between_rough_plates_is_pressed_to_half_its_height():
     """Its free sides bulge across the cells. Between smooth plates they would wrinkle: Biot (1965) finds
     the border of an incompressible half-space unstable at a compression of 46 % in plane strain.

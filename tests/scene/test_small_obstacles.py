@@ -40,9 +40,9 @@ def test_a_distance_that_enters_the_body_between_patches_warns_once(form):
     scene = bed(form)
 
     def pin(x, y):
-        return np.hypot(x - 1.1, np.maximum(1 + 0.3 * H - y, 0.0)) - 0.3 * H
+        return np.hypot(x - 1.1, np.maximum(1 + 0.45 * H - y, 0.0)) - 0.45 * H
 
-    scene.obstacle(pin, where="top", displacement=(0.0, -0.6 * H))
+    scene.obstacle(pin, where="top", displacement=(0.0, -0.8 * H))
     with pytest.warns(
         tawami.SupportWarning, match="a particle of the body is .* m inside it"
     ) as told:

@@ -160,10 +160,12 @@ class Obstacles(Owner[Obstacle]):
             domain: The particles.
             coefficients: Of all fields since the start, where particles do not move.
         """
-        model, n = domain.model, domain.layout.num_displacement
+        model, n, border = domain.model, domain.layout.num_displacement, self._border.points
+        if border is None:
+            return
         u = None if model.moves else model.space.vectors(coefficients[:n])
         new = [obstacle for obstacle in self.all if obstacle not in self._deep]
-        self._deep.update(one for one in new if warn_of_deep(one, domain, u))
+        self._deep.update(one for one in new if warn_of_deep(one, domain, border, u))
 
     @property
     def kinetic(self) -> float:
