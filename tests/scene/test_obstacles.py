@@ -250,8 +250,10 @@ def test_the_header_names_obstacles():
 
 @pytest.mark.slow
 def test_a_block_between_rough_plates_is_pressed_to_half_its_height():
-    """Its free sides bulge across the cells and roll onto the upper plate. Between smooth plates they would wrinkle: Biot (1965) finds
-    the border of an incompressible half-space unstable at a compression of 46 % in plane strain.
+    """Its free sides bulge across the cells and roll onto the upper plate.
+
+    Between smooth plates they would wrinkle: Biot (1965) finds the border of an incompressible
+    half-space unstable at a compression of 46 % in plane strain.
     """
     forces = []
     for h in (0.25, 0.125, 0.0625):
