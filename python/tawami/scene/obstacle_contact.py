@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from tawami.base.arrays import Array, Mask
-from tawami.base.errors import SingularError, SupportError
+from tawami.base.errors import SupportError
 from tawami.border.contact import OPEN, Contact, ContactForces, Multipliers
 from tawami.border.rigid import Pose
 from tawami.field.constraints import PointHeld
@@ -23,7 +23,7 @@ from tawami.scene.domain import Domain
 from tawami.scene.near_border import BorderNear
 from tawami.scene.obstacle import Obstacle
 from tawami.scene.obstacle_motion import ObstacleMotion
-from tawami.solve.bordered import Blocks
+from tawami.solve.bordered import Blocks, GivesWayError
 
 #: Penetration, relative to that of the penalty alone, below which no other pass is needed; and the
 #: penetration that is round-off [cells].
@@ -282,7 +282,7 @@ class ObstacleContact:
 
         Raises:
             SupportError: One is free, as the obstacle does not touch the body, or slides.
-            SingularError: The body gives way to it after the first iteration.
+            GivesWayError: The body gives way to it after the first iteration.
         """
         if self.motion.times is not None:
             return
@@ -299,7 +299,7 @@ class ObstacleContact:
         weakest = motions[int(np.argmax(np.abs(directions[-1])))]
         motion, away = self.obstacle.motions[weakest], bool((self.now.state == OPEN).all())
         if not away and self._states.tangents > 1:
-            raise SingularError(f"{self.obstacle}: the body gives way to its motion '{motion}'")
+            raise GivesWayError(f"{self.obstacle}: the body gives way to its motion '{motion}'")
         state = "does not touch the body" if away else "slides freely"
         raise SupportError(
             f"{self.obstacle}: nothing holds its motion '{motion}', as it {state}: expected an obstacle "

@@ -19,6 +19,7 @@ from tawami.base.timing import Stopwatch, tally
 from tawami.field.assembly import Assembly
 from tawami.field.reduction import Reduction
 from tawami.particles.responses import Responses
+from tawami.solve.bordered import GivesWayError
 from tawami.solve.diagnosis import Diagnosis
 from tawami.solve.direct import DirectSolver
 from tawami.solve.equations import Equations
@@ -299,7 +300,7 @@ class Newton:
             change, of_factor = complete(
                 equations, iterate.u, self._on_all(reduction, found), again
             )
-        except SingularError as error:
+        except GivesWayError as error:
             self._fail(history, f"Then {error}. {equations.advice}")
         if not np.isfinite(of_factor):
             self._fail(history, "The loads do not move the control: choose another control")
