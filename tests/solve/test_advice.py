@@ -22,7 +22,7 @@ RAISED = {
     "motion/stepping.py": 1,
     "solve/diagnosis.py": 3,
     "solve/direct.py": 2,  # no advice
-    "solve/iterative.py": 2,
+    "solve/multigrid.py": 2,
     "solve/linear_solver.py": 1,
 }
 
@@ -204,7 +204,7 @@ def test_a_softer_stiff_material_or_supports():
 def test_the_direct_solver_names_the_cells():
     given = {"per_axis": 1, "ghost_penalty": "off"}
     with pytest.raises(tawami.SingularError, match="linear_solver='direct' names the cells"):
-        block(**given, linear_solver="iterative")[0].solve()
+        block(**given, linear_solver="multigrid")[0].solve()
     with pytest.raises(tawami.SingularError, match=r"weakest at the cells \(i, j\): \(\d, \d\)"):
         block(**given, linear_solver="direct")[0].solve()
 

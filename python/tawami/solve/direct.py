@@ -29,7 +29,8 @@ from tawami.base.arrays import Array
 from tawami.base.errors import SingularError
 from tawami.base.timing import Stopwatch
 from tawami.solve import failures
-from tawami.solve.linear_solver import Blocks, LinearSolver
+from tawami.solve.linear_solver import LinearSolver
+from tawami.solve.operators import Part
 
 #: Iterations of FGMRES up to which the factorisation is kept for the next tangent.
 PAYS = 8
@@ -133,7 +134,7 @@ class DirectSolver(LinearSolver):
         scale: Callable[[], Array],
         right: Array,
         tolerance: float,
-        blocks: Callable[[], Blocks],
+        parts: Callable[[], list[Part]],
     ) -> Array:
         """See `LinearSolver.solve`; direct if the tangent is factorised.
 
@@ -154,7 +155,7 @@ class DirectSolver(LinearSolver):
         """Solve by FGMRES with the present factorisation; None if it takes too many iterations."""
         with self._stopwatch("solve"):
             self._handles["ksp"].setConvergenceTest(_Pays(tolerance))
-            converged = self._fgmres(self._scale * right, tolerance, LIMIT)
+            converged = self._krylov(self._scale * right, tolerance, LIMIT)
             self._handles["ksp"].setConvergenceTest(None)
             if not converged:
                 return None
@@ -254,17 +255,6 @@ class DirectSolver(LinearSolver):
         x = self._handles["x"]
         x.setArray(vector)
         return float(x.norm())
-
-    def _is_symmetric(self, matrix: Any, probe: Array) -> bool:
-        x, y = (self._handles[name] for name in ("x", "b"))
-        x.setArray(probe)
-        matrix.mult(x, y)
-        forward = y.copy()
-        matrix.multTranspose(x, y)
-        size = forward.norm()
-        y.axpy(-1.0, forward)
-        forward.destroy()
-        return bool(y.norm() <= 1e-12 * size)
 
 
 class _Pays:

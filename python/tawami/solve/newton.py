@@ -25,11 +25,12 @@ from tawami.solve.equations import Equations
 from tawami.solve.failures import reported
 from tawami.solve.inertia import Inertia
 from tawami.solve.iterate import Forces, Friction, Iterate
-from tawami.solve.iterative import IterativeSolver
 from tawami.solve.line_search import LineSearch
 from tawami.solve.linear_solver import LinearSolver
 from tawami.solve.measures import History, Measured, Measures, diagonal_of, forcing, worst
+from tawami.solve.multigrid import MultigridSolver
 from tawami.solve.numerics import Numerics
+from tawami.solve.operators import Operators
 from tawami.solve.path import Path
 from tawami.solve.scaling import Scaling
 from tawami.solve.terms import Terms
@@ -96,10 +97,11 @@ class Newton:
         self._comm = assembly.layout.grid.comm
         self._measures = Measures(assembly, responses)
         self._scaling = Scaling(assembly.layout, responses)
+        self._operators = Operators(assembly, responses)
         self._diagnosis = Diagnosis(assembly, responses, self._scaling, elastic)
         self._solver: LinearSolver
-        if numerics.linear_solver == "iterative":
-            self._solver = IterativeSolver(self._comm, stopwatch)
+        if numerics.linear_solver == "multigrid":
+            self._solver = MultigridSolver(self._comm, stopwatch)
         else:
             always = numerics.factorise == "always"
             self._solver = DirectSolver(self._comm, stopwatch, always=always)
@@ -287,7 +289,7 @@ class Newton:
                 functools.partial(self._scaling.factors, tangent, reduction),
                 -reduction.restricted(forces.residual)[reduction.own],
                 tolerance,
-                functools.partial(self._scaling.blocks, reduction),
+                functools.partial(self._operators.parts, equations),
             )
         except SingularError as error:
             if not solver.singular:

@@ -13,7 +13,7 @@ from tawami.base import checks
 from tawami.form.symbols import Assembly
 
 Factorise = Literal["when_it_pays", "always"]
-SolverName = Literal["direct", "iterative"]
+SolverName = Literal["direct", "multigrid"]
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Numerics:
             computes P^T K P. They agree up to round-off for sums of expressions up to degree 4.
         factorise: 'when_it_pays' uses a factorisation in later iterations and steps, 'always' factorises
             in each Newton iteration.
-        linear_solver: 'direct' (MUMPS) or 'iterative' (FGMRES, with multigrid for the displacement).
+        linear_solver: 'direct' (MUMPS) or 'multigrid' (MINRES or FGMRES).
 
     Raises:
         InputError: A value is out of its range.

@@ -67,6 +67,7 @@ class Terms:
 
     Attributes:
         stuck: Message if the multipliers do not settle.
+        stiffness: That of the last tangent, on all coefficients.
     """
 
     def __init__(self, terms: Sequence[Term], comm: Any) -> None:
@@ -108,7 +109,8 @@ class Terms:
 
     def add_tangent(self, tangent: Any, reduction: Reduction) -> Any:
         """A reduced tangent with their stiffness."""
-        return self._sum.of(tangent, _added([t.stiffness() for t in self._terms]), reduction)
+        self.stiffness = _added([term.stiffness() for term in self._terms])
+        return self._sum.of(tangent, self.stiffness, reduction)
 
     @property
     def bordering(self) -> list[Bordering]:
