@@ -42,6 +42,7 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "ring": ("Ring", "verification", ()),
     "elastica": ("Elastica", "verification", ("strip",)),
     "footing": ("Footing", "verification", ()),
+    "rigid_footing": ("Rigid footing", "verification", ("footing",)),
     "bearing_capacity": ("Bearing capacity", "verification", ()),
     "circular_footing": ("Circular footing", "verification", ()),
     "dilatancy": ("Dilatancy", "verification", ("block", "enumeration")),

@@ -15,6 +15,7 @@ PARTS: dict[str, tuple[str, tuple[float, float, float, float]]] = {
     "one_line": ("mean_stress.png", (0.0, 0.0, 0.88, 1.0)),
     "elastica": ("shapes.png", (0.0, 0.335, 0.62, 1.0)),
     "footing": ("zones.png", (0.0, 0.0, 0.86, 0.5)),
+    "rigid_footing": ("rigid_footing.png", (0.0, 0.0, 0.5, 1.0)),
     "vibrating_beam": ("motion.png", (0.0, 0.0, 0.5, 0.33)),
     "spinning_disc": ("film.png", (0.0, 0.0, 0.262, 0.315)),
     "consolidation": ("consolidation.png", (0.333, 0.0, 0.667, 1.0)),

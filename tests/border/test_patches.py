@@ -9,7 +9,7 @@ import pytest
 from border.contacts import line
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tawami.border.patches import Patches, patches, transferred
+from tawami.border.patches import Patches, patches
 from tawami.border.points import BorderPoints
 
 
@@ -87,6 +87,6 @@ def test_regrouping_a_stretched_border_keeps_the_resultant():
     lengths = new.sums(stretched)
     assert_allclose(lengths, lengths.mean(), atol=stretched.max())
     values = np.array([1.0, -2.0, 5.0, 3.0])
-    carried = transferred(old, new, stretched, values)
+    carried = new.means(stretched, values[old.number])
     assert new.sums(stretched) @ carried == pytest.approx(old.sums(stretched) @ values)
-    assert_allclose(transferred(old, new, stretched, np.ones(4)), 1.0)
+    assert_allclose(new.means(stretched, np.ones(4)[old.number]), 1.0)

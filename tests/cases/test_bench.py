@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import csv
+import re
 
 import pytest
 
 import tawami
 from cases.costs import ordering
 from cases.costs.bench import __main__ as bench
-from cases.costs.bench import compare
+from cases.costs.bench import borders, compare
 
 
 def test_ratios_are_medians_over_pairs():
@@ -35,6 +36,17 @@ def test_a_checkout_against_itself(tmp_path, capsys):
             row = rows[scene, stage]
             ratio = float(row["new_ms"]) / float(row["old_ms"])
             assert float(row["ratio"]) == pytest.approx(ratio)
+
+
+def test_terms_on_the_border_are_compared_in_one_run(capsys):
+    borders.print_ratios([2], pairs=2)
+    lines = capsys.readouterr().out.splitlines()
+    found = [re.search(r": ([\d.]+) \(([\d.]+) to ([\d.]+)\), iterations \d+ / \d+$", text)
+             for text in lines if "/" in text]  # fmt: skip
+    assert len(found) == 2
+    for one in found:
+        ratio, low, high = map(float, one.groups())
+        assert 0 < low <= ratio <= high
 
 
 def test_every_ordering_is_measured(tmp_path):

@@ -82,6 +82,58 @@ def test_friction_of_cattaneo_and_mindlin():
     assert pressed.solution.iterations <= 10
 
 
+def block(form, nu, h, base):
+    """A block of 2 x .9 m on a held base, which lies on the edge of the grid or above it."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(-0.5, 0), h=h, cells=(round(3 / h), round(1.5 / h)))
+    body = tawami.box(grid, (0.0, base * h), (2.0, HEIGHT), per_axis=3)
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=E, nu=nu), form=form)
+    scene.fix("bottom", "x")
+    scene.fix("bottom", "y")
+    return scene
+
+
+@pytest.mark.parametrize(
+    ("form", "nu", "h", "base", "radius", "mu", "move"),
+    [
+        ("u_epsv", 0.3, 0.125, 0.37, 1.0, 0.0, 0.05),
+        ("u_epsv", 0.4999, 0.25, 0.37, 0.3, 0.3, 0.05),
+        ("u_epsv_finite", 0.4999, 0.25, 0.0, 0.3, 0.3, 0.05),
+        ("u_epsv_finite", 0.3, 0.125, 0.37, 4.0, 0.0, 0.05),
+        ("u_epsv_finite", 0.3, 0.25, 0.37, 1.0, 0.0, 0.01),  # does not reach a patch
+    ],
+)
+@pytest.mark.filterwarnings("ignore::tawami.base.errors.SmallStrainWarning")
+def test_newton_finds_contact_in_large_steps(form, nu, h, base, radius, mu, move):
+    """Pressed by up to .4 h at once, and then by as much again."""
+    scene = block(form, nu, h, base)
+    shape = tawami.rigid_disc((1.0 + 0.4 * h * (move > 0.01), HEIGHT + radius), radius)
+    disc = scene.obstacle(shape, mu, displacement=(0.0, -move))
+    first = scene.solve()
+    disc.change((0.0, -2 * move))
+    last = scene.solve()
+    assert last.reaction("bottom") == pytest.approx(-last.reaction(disc), abs=1e-5 * E)
+    assert max(first.iterations, last.iterations) <= 20
+    if not mu and "finite" not in form:  # one step leads to the same place
+        scene = block(form, nu, h, base)
+        disc = scene.obstacle(shape, mu, displacement=(0.0, -2 * move))
+        at_once = scene.solve().reaction(disc)
+        assert at_once == pytest.approx(last.reaction(disc), rel=1e-3, abs=1e-3 * abs(at_once[1]))
+
+
+def test_a_free_obstacle_follows_a_force_that_falls():
+    """To a thirtieth: Newton's method would lose the body without the forces that pull it back."""
+    scene = block("u_epsv", 0.3, 0.25, 0.0)
+    plane = scene.obstacle(tawami.half_plane((1.0, HEIGHT), DOWN), force=(0.0, -3e4), free="y")
+    deep = scene.solve()
+    plane.change((0.0, -1e3))
+    last = scene.solve()
+    assert last.reaction("bottom")[1] == pytest.approx(1e3, rel=1e-5)
+    assert last.iterations <= deep.iterations + 2
+    plane.change((0.0, 1e3))
+    with pytest.raises(tawami.SupportError, match="does not touch the body"):
+        scene.solve()
+
+
 def test_a_distance_function_gives_the_contact_of_its_shape():
     forces = []
     for shape in (

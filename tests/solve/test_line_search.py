@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from limit_loads import pressed, pulled
 from mpi4py import MPI
 
 import tawami
+from tawami import _rust
 from tawami.base.timing import tally
+from tawami.solve import line_search
 from tawami.solve.line_search import LineSearch
 
 
@@ -27,7 +31,7 @@ def test_a_block_in_tension_needs_a_third_of_the_solves(nu, monkeypatch):
     assert steps <= 25  # hardly any step failed
     assert count < 350
     assert searched > 20
-    monkeypatch.setattr(LineSearch, "overshoots", lambda _self, _residual: False)
+    monkeypatch.setattr(line_search, "OVERSHOT", np.inf)
     steps, without, _ = solves(nu, 0.05)
     assert steps > 35
     assert without > 3 * count
@@ -47,7 +51,7 @@ def test_at_a_limit_load_it_costs_no_iteration(nu, psi, monkeypatch):
     tally.reset()
     found = iterations(pressed(nu, psi), 0.01)
     assert tally.line_searches > 0  # of the steps beyond the limit load
-    monkeypatch.setattr(LineSearch, "overshoots", lambda _self, _residual: False)
+    monkeypatch.setattr(line_search, "OVERSHOT", np.inf)
     without = iterations(pressed(nu, psi), 0.01)
     assert max(without) < 1.0
     assert max(found) >= max(without)
@@ -60,7 +64,7 @@ def test_at_a_limit_load_it_costs_no_iteration(nu, psi, monkeypatch):
 @pytest.mark.parametrize("nu", [0.3, 0.49])
 def test_where_a_block_in_tension_converges_without_it_it_costs_no_iteration(nu, monkeypatch):
     found = iterations(pulled(nu, 0.006), 0.01)
-    monkeypatch.setattr(LineSearch, "overshoots", lambda _self, _residual: False)
+    monkeypatch.setattr(line_search, "OVERSHOT", np.inf)
     without = iterations(pulled(nu, 0.006), 0.01)
     assert list(found) == list(without)
     assert sum(found.values()) <= sum(without.values())
@@ -76,45 +80,58 @@ def test_a_run_that_does_not_overshoot_is_the_same_to_the_bit(monkeypatch):
     assert tally.newton_iterations > 60  # it yields
     assert tally.line_searches == 0
     stress = np.array(scene.particles.stress)
-    monkeypatch.setattr(LineSearch, "overshoots", lambda _self, _residual: False)
+    monkeypatch.setattr(line_search, "OVERSHOT", np.inf)
     scene = pulled(0.49, 0.005)
     tawami.ramp(scene, 0.05)
     assert np.array_equal(scene.particles.stress, stress)
 
 
-def test_the_secant_method_ends_where_the_work_is_half_as_large():
-    """g(t) = -1 + 3 t^3 along one coefficient: g(1) = 2, and the search stops at |g| <= 1/2."""
+def advanced(work, search=None, rose=True):
+    """Shares of a step that are tried, of which the last is taken, where the residual is work(share)."""
+    if search is None:
+        search = LineSearch(MPI.COMM_WORLD, np.array([1.0]), np.array([-1.0]), np.array([1.0]))
     tried = []
 
-    def residual_at(t):
-        tried.append(t)
-        return np.array([-1 + 3 * t**3])
+    def evaluate(share):
+        tried.append(share)
+        return SimpleNamespace(residual=np.atleast_1d(work(share))), (0.0, None)
 
-    search = LineSearch(MPI.COMM_WORLD, np.array([1.0]), np.array([-1.0]), np.array([1.0]))
-    assert search.overshoots(np.array([2.0]))
-    assert not search.overshoots(np.array([0.7]))
-    assert not search.overshoots(np.array([-2.0]))
-    t = search.length(residual_at, np.array([2.0]))
-    assert t == tried[-1]
-    assert abs(-1 + 3 * t**3) <= 0.5
-    assert len(tried) <= 4
+    forces, _ = search.advance(evaluate, lambda _: rose)
+    assert np.array_equal(forces.residual, np.atleast_1d(work(tried[-1])))
+    return tried
+
+
+def test_the_secant_method_ends_where_the_work_is_half_as_large():
+    """g(t) = -1 + 3 t^3 along one coefficient: g(1) = 2, and the search stops at |g| <= 1/2."""
+    tried = advanced(lambda t: -1 + 3 * t**3)
+    assert abs(-1 + 3 * tried[-1] ** 3) <= 0.5
+    assert len(tried) <= 5
+    for work in (lambda t: -1 + 1.7 * t, lambda t: -1 - t):
+        assert advanced(work) == [1.0]
+    assert advanced(lambda t: -1 + 3 * t, rose=False) == [1.0]
 
 
 def test_the_search_ends_after_eight_evaluations_and_takes_no_tiny_step():
     """A work that never falls: the step is shortened to 1/20 at most."""
-    tried = []
+    tried = advanced(lambda _: 2.0)
+    assert tried[-1] >= 0.05
+    assert len(tried) <= 9
 
-    def residual_at(t):
-        tried.append(t)
-        return np.array([2.0])
 
-    search = LineSearch(MPI.COMM_WORLD, np.array([1.0]), np.array([-1.0]), np.array([1.0]))
-    assert search.length(residual_at, np.array([2.0])) >= 0.05
-    assert len(tried) <= 8
+def test_a_step_that_inverts_a_particle_is_halved():
+    def work(t):
+        if t > 0.3:
+            raise _rust.InvertedError
+        return -1.0
+
+    assert advanced(work) == [1.0, 0.5, 0.25]
+    with pytest.raises(_rust.InvertedError):
+        advanced(lambda t: work(max(t, 0.4)))
 
 
 def test_the_volume_counts_with_the_other_sign():
     """At a saddle point, a change of eps_v that lowers the energy is one in the wrong direction."""
     change, residual, signs = np.array([[1.0, 1.0], [-2.0, 1.0], [1.0, -1.0]])
     search = LineSearch(MPI.COMM_WORLD, change, residual, signs)
-    assert search.overshoots(np.array([0.0, -3.0]))  # g(0) = -3, g(1) = 3
+    # g(0) = -3, g(1) = 3
+    assert len(advanced(lambda t: np.array([-3.0, 0.0]) + t * np.array([3.0, -3.0]), search)) > 1

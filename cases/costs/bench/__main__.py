@@ -1,7 +1,7 @@
 """Speed and memory of a Newton step, stage by stage.
 
 By default it measures the cantilever for sizes, particles per cell, threads, ranks and both assemblies,
-then the import, the Python part of a step and the particles of a level set.
+then the import, the Python part of a step, the particles of a level set, and terms on the border.
 Every setting runs in a separate process. One run gives a table, a CSV file and ratios.
 
 With --against it compares this checkout with another one that has been set up, interleaved, and prints
@@ -26,7 +26,7 @@ from typing import Any
 
 from cases.common.program import Program, numbers
 from cases.common.table import as_csv, as_text
-from cases.costs.bench import compare, overheads, report
+from cases.costs.bench import borders, compare, overheads, report
 from cases.costs.bench.measure import empty_cells
 from cases.costs.bench.setting import ROOT, in_own_process, settings
 
@@ -97,6 +97,7 @@ def survey(
     print("\n".join(overheads.lines(found)))
     for assembly in ("dolfinx", "points"):
         empty_cells(max(max(cells) // 4, 8), assembly)
+    borders.print_ratios([max(n // 4, 2) for n in cells])
 
 
 if __name__ == "__main__":

@@ -70,7 +70,13 @@ class Contact:
     least: Array | float = 0.0
 
     def evaluate(
-        self, x: Array, pose: Pose, held: Multipliers, *, sticking: bool | ContactForces = False
+        self,
+        x: Array,
+        pose: Pose,
+        held: Multipliers,
+        *,
+        sticking: bool | ContactForces = False,
+        tied: bool = False,
     ) -> ContactForces:
         """Pressures, friction and forces at present positions.
 
@@ -82,19 +88,21 @@ class Contact:
             sticking: Take all touching patches as sticking; or the last evaluation: take those as
                 sticking whose friction would turn round. It prevents cycles between states in Newton's
                 method; without friction it has no effect.
+            tied: Take all patches whose held pressure is positive as touching, even if they pull.
         """
         local = pose.to_local(x)
         surface = _turned(self.shape.evaluate(local), pose.rotation)
         moved = (local - self.start) @ pose.rotation.T
         tangent, turning = tangents(surface)
         gap = self.patches.means(self.weights, surface.distance) - self.least
-        pressure = np.maximum(held.pressure - self.penalty * gap, 0.0)
+        pressure = held.pressure - self.penalty * gap
+        touching = (held.pressure > 0) if tied else (pressure > 0)
+        pressure[~touching] = 0.0
         slip = self.patches.means(self.weights, np.einsum("jka,ja->jk", tangent, moved))
         trial = held.traction - self.penalty[:, None] * slip
-        touching, size = pressure > 0, np.linalg.norm(trial, axis=1)
-        limit = np.zeros_like(pressure)
+        size, limit = np.linalg.norm(trial, axis=1), np.zeros_like(pressure)
         if self.friction > 0:
-            limit[touching] = self.friction * pressure[touching]
+            limit[pressure > 0] = self.friction * pressure[pressure > 0]
         bound = limit.copy()
         if self.friction > 0:
             if isinstance(sticking, ContactForces):
@@ -136,6 +144,9 @@ class ContactForces:
         held: Multipliers of the evaluation.
         state: `OPEN`, `STICKING` or `SLIDING` for each patch.
         exceeded: Whether the friction of a patch that was taken as sticking is larger than mu p.
+        bends: Whether derivatives count the change of normals and tangents along the obstacle. They are
+            exact with it. Without, the stiffness of pressures alone is never negative, and Newton's
+            method takes no steps along a border whose patches still change between open and closed.
     """
 
     contact: Contact
@@ -154,6 +165,7 @@ class ContactForces:
     held: Multipliers
     state: Indices
     exceeded: bool
+    bends: bool = True
 
     @cached_property
     def forces(self) -> Array:
@@ -171,7 +183,7 @@ class ContactForces:
     @property
     def multipliers(self) -> Multipliers:
         """The multipliers of the next augmented pass, or of the next step."""
-        return Multipliers(self.pressure, self.traction)
+        return Multipliers(np.maximum(self.pressure, 0.0), self.traction)
 
     @property
     def penetration(self) -> float:
@@ -202,16 +214,16 @@ class ContactForces:
 
     @cached_property
     def derivative(self) -> sp.csr_matrix:
-        """Derivative of the forces by the positions of all points [N/m per m], exact.
+        """Derivative of the forces by the positions of all points [N/m per m].
 
         Rows and columns are the components of the first point, then of the second, and so on. It is
         symmetric without friction.
         """
         number = self.contact.patches.number
-        loaded = np.flatnonzero(self.pressure[number] > 0)
+        loaded = np.flatnonzero(self.state[number] != OPEN)
         blocks = self.pressure[number[loaded], None, None] * self.surface.curvature[loaded]
         blocks += np.einsum("jk,jkab->jab", self.traction[number[loaded]], self.turning[loaded])
-        blocks *= self.contact.weights[loaded, None, None]
+        blocks *= self.bends * self.contact.weights[loaded, None, None]
         by_gap, by_slip = self._law()
         gap, normal = self._pair(loaded, self.surface.normal, self.surface.normal)
         total = _block_diagonal(loaded, blocks, self.x.shape)

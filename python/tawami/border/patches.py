@@ -84,20 +84,6 @@ def patches(points: BorderPoints, size: float, length: Array | None = None) -> P
     return Patches(number, count)
 
 
-def transferred(old: Patches, new: Patches, weights: Array, values: Array) -> Array:
-    """Values of old patches as values of new ones, by weighted means over the points.
-
-    The integral of the values over the border is unchanged.
-
-    Args:
-        old: Patches that have the values.
-        new: Other patches of the same points.
-        weights: Weight of each point.
-        values: Values of the old patches, old patches x ...
-    """
-    return new.means(weights, values[old.number])
-
-
 def _runs(points: BorderPoints) -> Iterator[Indices]:
     """Points that follow one another along a chain without a gap, in order."""
     order = np.lexsort((points.along, points.chain))

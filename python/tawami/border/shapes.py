@@ -14,6 +14,7 @@ from tawami.base.checks import LEAST, array, number, shown
 from tawami.base.errors import InputError
 from tawami.base.optional import optional
 from tawami.base.space import lattice
+from tawami.border.polyline import unclosed
 
 
 @dataclass(frozen=True)
@@ -264,9 +265,7 @@ def rigid_polygon(corners: npt.ArrayLike, radius: float = 0.0) -> Polygon:
     """
     import shapely
 
-    given = array("corners", corners, 2)
-    if len(given) > 1 and np.array_equal(given[0], given[-1]):
-        given = given[:-1]  # a closed line repeats its first point
+    given = unclosed(array("corners", corners, 2))
     if len(given) < 3 or given.shape[1] != 2 or not np.isfinite(given).all():
         raise InputError(
             f"rigid_polygon: corners of shape {given.shape}: expected three or more finite points (x, y)"

@@ -1,8 +1,8 @@
 """Supports of a border off the lines of the grid: means over patches are held.
 
-On a patch, for each held direction d (points x dim), with areas w and the prescribed displacement g:
+On a patch, for a held direction d of each point, with areas w and the prescribed displacement g:
 
-    error    e = mean of d . (u - g)
+    error    e = mean of d . u - g
     forces   f = -w (lambda + r e) d       on each point
 """
 
@@ -10,11 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
-from tawami.base.arrays import Array
+from tawami.base.arrays import Array, Indices
 from tawami.base.checks import choice
 from tawami.base.space import Space
 from tawami.border.patches import Patches
@@ -49,71 +50,60 @@ def directions(space: Space, components: Sequence[str], normals: Array) -> Array
 
 @dataclass(frozen=True)
 class Tied:
-    """A part of a border whose displacement is held in some directions, in the mean of each patch.
+    """A part of a border whose displacement is held in the mean of each patch.
 
     A displacement that agrees with the prescribed one at the points causes no forces, and the forces
     are the same for all points of a patch, so the patch test is fulfilled.
 
     Attributes:
-        patches: Patches of the points.
-        weights: Area of each point [m2]: its length in plane strain.
-        directions: Held unit vectors, directions x points x dim.
+        means: Mean of the held component over each patch, of all unknowns, patches x unknowns.
+        areas: Area of each patch [m2]: its length in plane strain.
         penalty: r of each patch [Pa/m], about 200 mu / h.
     """
 
-    patches: Patches
-    weights: Array
-    directions: Array
+    means: sp.csr_matrix
+    areas: Array
     penalty: Array
 
-    def zero(self) -> Array:
-        """Multipliers at the start [Pa], patches x directions."""
-        return np.zeros((self.patches.count, len(self.directions)))
-
-    def error(self, u: Array, prescribed: Array) -> Array:
-        """Mean of the displacement minus the prescribed one [m], patches x directions.
-
-        Args:
-            u: Displacements of the points [m], points x dim.
-            prescribed: Prescribed displacements along each direction [m], points x directions.
-        """
-        along = np.einsum("kja,ja->jk", self.directions, u)
-        return self.patches.means(self.weights, along - prescribed)
-
-    def multipliers(self, u: Array, prescribed: Array, held: Array) -> Array:
-        """lambda + r e [Pa], patches x directions: the multipliers of the next augmented pass.
+    def multipliers(self, error: Array, held: Array) -> Array:
+        """lambda + r e [Pa] of each patch: the multipliers of the next augmented pass.
 
         Their negative values are the tractions of the support on the body along the directions.
 
         Args:
-            u: Displacements of the points [m], points x dim.
-            prescribed: Prescribed displacements along each direction [m], points x directions.
-            held: Multipliers of this pass [Pa], patches x directions.
+            error: Mean of the displacement minus the prescribed one [m].
+            held: Multipliers of this pass [Pa].
         """
-        return np.asarray(held + self.penalty[:, None] * self.error(u, prescribed))
+        return np.asarray(held + self.penalty * error)
 
-    def forces(self, u: Array, prescribed: Array, held: Array) -> Array:
-        """Forces of the support on the points [N per m], points x dim.
+    def forces(self, multipliers: Array) -> Array:
+        """Forces of the support on all unknowns [N per metre depth]."""
+        return np.asarray(-(self._transposed @ (self.areas * multipliers)))
 
-        Args:
-            u: Displacements of the points [m], points x dim.
-            prescribed: Prescribed displacements along each direction [m], points x directions.
-            held: Multipliers [Pa], patches x directions.
-        """
-        along = self.multipliers(u, prescribed, held)[self.patches.number]
-        forces = np.einsum("jk,kja->ja", along, self.directions)
-        return np.asarray(-self.weights[:, None] * forces)
+    @cached_property
+    def _transposed(self) -> sp.csc_matrix:
+        return self.means.T
 
+    @cached_property
     def stiffness(self) -> sp.csr_matrix:
-        """Minus the derivative of the forces by the displacements: symmetric, not negative."""
-        sizes = self.patches.sums(self.weights)
-        root = np.sqrt(self.penalty / sizes)
-        num, dim = self.directions.shape[1:]
-        rows = np.repeat(self.patches.number, dim)
-        total = sp.csr_matrix((num * dim, num * dim))
-        for direction in self.directions:
-            values = (self.weights * root[self.patches.number])[:, None] * direction
-            entries = (values.ravel(), (rows, np.arange(num * dim)))
-            factor = sp.csr_matrix(entries, shape=(self.patches.count, num * dim))
-            total = total + factor.T @ factor
-        return total.tocsr()
+        """Minus the derivative of the forces by the unknowns: symmetric, not negative."""
+        weighted = sp.diags(self.areas * self.penalty) @ self.means
+        return (self._transposed @ weighted).tocsr()
+
+
+def means(
+    patches: Patches, weights: Array, functions: Array, places: Indices, size: int
+) -> sp.csr_matrix:
+    """Means over patches of a sum of unknowns at their points, patches x unknowns.
+
+    Args:
+        patches: Patches of the points.
+        weights: Area of each point [m2].
+        functions: Factors of the unknowns at each point, points x functions.
+        places: Numbers of these unknowns, points x functions.
+        size: Number of all unknowns.
+    """
+    point, function = functions.nonzero()
+    values = patches.shares(weights)[point] * functions[point, function]
+    entries = (values, (patches.number[point], places[point, function]))
+    return sp.csr_matrix(entries, shape=(patches.count, size))

@@ -20,7 +20,6 @@ from tawami.form.lines import line_of
 from tawami.form.quantities import LawQuantity, ParticleScalar
 from tawami.form.symbols import Symbols
 
-PASCAL = dimension("Pa")
 #: Units of names that every form has; those of other quantities of the law are numbers.
 UNITS: Mapping[str, str] = {
     "h": "m", "time": "s", "dt": "s", "b": "m/s2", "K": "Pa", "mu": "Pa", "rho": "kg/m3",

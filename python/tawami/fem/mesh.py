@@ -57,12 +57,6 @@ class Rectangle:
             "bottom", "left", "right", "top")  # fmt: skip
         return names.index(edge)
 
-    def facet_order(self, cells: Integers, local: int) -> Integers:
-        """Order in which the facets `local` of `cells` are assembled."""
-        if not OLD:
-            return np.arange(len(cells), dtype=np.int32)
-        return np.argsort(self._facets(cells, local)).astype(np.int32)
-
     def _facets(self, cells: Integers, local: int) -> Integers:
         topology = self.mesh.topology
         topology.create_connectivity(2, 1)

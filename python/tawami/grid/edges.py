@@ -10,15 +10,13 @@ import numpy as np
 
 from tawami import _rust
 from tawami.base import checks
-from tawami.base.arrays import Array, Indices, Mask
+from tawami.base.arrays import Array, Indices
 from tawami.base.errors import InputError
 from tawami.base.space import Counts
 from tawami.grid.basis import Basis
 from tawami.grid.grid import Edge, Grid
 
 Component = Literal["x", "y"]
-#: A part of an edge: from one line of the grid to another [m].
-Interval = tuple[float, float]
 #: A number, or a function of position f(x, y) on arrays.
 Profile = float | Callable[[Array, Array], Any]
 
@@ -34,7 +32,7 @@ def evaluate(profile: Profile, points: Array, what: str) -> Array:
     Raises:
         InputError: The function fails, returns another shape, or returns NaN or infinity.
     """
-    x, *others = points.T
+    x, *others = points.T.copy()  # a function may change its arguments
     try:
         value = profile(x, *others) if callable(profile) else profile
         values = np.broadcast_to(checks.real_values(value), x.shape)
@@ -51,29 +49,6 @@ def evaluate(profile: Profile, points: Array, what: str) -> Array:
             "finite number"
         )
     return values
-
-
-def cells_between(grid: Grid, edge: Edge, between: Interval | None) -> Mask:
-    """Mask of the cells along an edge that lie in a part of it.
-
-    Raises:
-        InputError: The part does not go from one line of the grid to a later one.
-    """
-    (axis,) = grid.space.other_axes(grid.edge(edge)[0])
-    n = grid.cells[axis]
-    if between is None:
-        return np.ones(n, dtype=bool)
-    ends = checks.pair(f"edge='{edge}': between", between, "positions [m]")
-    low, high = (checks.number(f"edge='{edge}': between", end) for end in ends)
-    found = grid.cells_between(axis, low, high)
-    if found is None or found[0] >= found[1]:
-        raise InputError(
-            f"edge='{edge}': between = {checks.shown(between)}: expected two lines of the grid, in "
-            f"order, every {grid.h:g} m from {grid.origin[axis]:g} to {grid.upper[axis]:g} m"
-        )
-    inside = np.zeros(n, dtype=bool)
-    inside[slice(*found)] = True
-    return inside
 
 
 def edge_functions(grid: Grid, basis: Basis, edge: Edge) -> Indices:

@@ -24,7 +24,8 @@ from tawami.scene.action import Term
 from tawami.scene.configuration import Configuration
 from tawami.scene.constraints import constraints
 from tawami.scene.contact import ActiveSet
-from tawami.scene.held_border import HeldBorder, imposed, work
+from tawami.scene.held_border import HeldBorder
+from tawami.scene.impulses import Impulses
 from tawami.scene.obstacle_contact import ObstacleContact
 from tawami.scene.obstacle_motion import Times
 from tawami.scene.share import Moment
@@ -67,13 +68,14 @@ class Start:
 
     Attributes:
         v, a: [m/s], [m/s2]
-        reduction: The supports.
+        reduction, impulses: The supports, and the impulses of those on patches.
         inertia: The inertia made of them.
     """
 
     v: Array
     a: Array
     reduction: Reduction
+    impulses: Impulses
     inertia: Inertia
 
 
@@ -145,13 +147,11 @@ class NewmarkStep:
         return Prescribed(reduction.offset, [one.prescribed_means for one in supports])
 
     def _imposed(
-        self, values: Array, reduction: Reduction, supports: Sequence[HeldBorder], rate: Prescribed
+        self, values: Array, reduction: Reduction, impulses: Impulses, rate: Prescribed
     ) -> Array:
         """Velocities or accelerations, functions x dim, that obey the supports."""
         flat = reduction.imposed(values.ravel(), self._masses, rate.edges)
-        rates = rate.patches or [0 * one.prescribed_means for one in supports]
-        fixed = reduction.fixed[: flat.size]
-        return imposed(supports, rates, self._masses, fixed, flat).reshape(values.shape)
+        return impulses.imposed(rate.patches, flat).reshape(values.shape)
 
     def _displacement(self, term: Term) -> float:
         """Change of the factor of a prescribed displacement in the step."""
@@ -168,13 +168,14 @@ class NewmarkStep:
         v, a = self._mapped
         if begins:
             a = self._first_acceleration(a, obstacles)
-        v = self._imposed(v, reduction, supports, self._speed)
-        a = self._imposed(a, reduction, supports, self._speed_rate)
+        impulses = Impulses(supports, self._masses, reduction.fixed[: self._masses.size])
+        v = self._imposed(v, reduction, impulses, self._speed)
+        a = self._imposed(a, reduction, impulses, self._speed_rate)
         slope = 1 / (self._beta * dt**2)
         back = (0.5 / self._beta - 1) * a.ravel()
         impulse = self._masses * (v - self._mapped[0]).ravel() / dt
         inertia = Inertia(self._masses, slope, dt * v.ravel(), back, impulse)
-        self._start = Start(v, a, reduction, inertia)
+        self._start = Start(v, a, reduction, impulses, inertia)
         return Problem(
             reduction, contact, self._external, inertia, self._guess(dt * v.ravel()), supports,
             obstacles, now.terms(self._finish, supports, obstacles), now.supports.supported_edges,
@@ -234,9 +235,8 @@ class NewmarkStep:
             jump = divided(contact.jump[: a1.size].reshape(a1.shape), self._mass[:, None])
             more_a, more_v = Times(self._gamma, self._beta, dt).corrected(jump)
             a1, v1 = a1 + more_a, v1 + more_v
-        supports = accepted.problem.supports
-        v1 = self._imposed(v1, start.reduction, supports, self._speed1)
-        a1 = self._imposed(a1, start.reduction, supports, self._speed_rate)
+        v1 = self._imposed(v1, start.reduction, start.impulses, self._speed1)
+        a1 = self._imposed(a1, start.reduction, start.impulses, self._speed_rate)
         before = self._mapped[0]
         arrays = self._carried.at_end(accepted.u, before, v1, a1, dt)
         energies = self._balance.of_step(self._mass, (before, start.v, v1), accepted)
@@ -257,17 +257,14 @@ class NewmarkStep:
         problem, u = accepted.problem, accepted.u.ravel()
         if problem.terms is None or not problem.terms.loads.any():
             return 0.0
-        n, supports, start = u.size, problem.supports, self._start
+        n, start = u.size, self._start
         last = problem.terms.loads[:n]
-        of_supports = sum((one.on_body[:n] for one in supports), np.zeros(n))
+        of_supports = sum((one.on_body[:n] for one in problem.supports), np.zeros(n))
         followers = 0.5 * (self._followers[:n] + last - of_supports) @ u
         # those of supports at the start of the step balance the others, as a was made to obey them
         first = self._internal + np.pad(self._masses * start.a.ravel(), (0, len(self._first) - n))
         first = (first - self._first - self._followers)[:n]
-        fixed = problem.reduction.fixed[:n]
-        return float(followers + 0.5 * of_supports @ u) + work(
-            supports, self._masses, fixed, 0.5 * first, u
-        )
+        return float(followers + 0.5 * of_supports @ u) + start.impulses.work(0.5 * first, u)
 
     def _work_of_mean(self, accepted: Accepted) -> float:
         """Work of the mean of the forces at both ends of the step, of loads that follow an amplitude and

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tawami.base.arrays import Array, Mask
-from tawami.scene import sources
+from tawami.grid.edges import evaluate
 from tawami.scene.border import SceneBorder
 from tawami.scene.domain import Domain
 from tawami.scene.model import Model
@@ -61,7 +61,7 @@ class BorderSums(Mapping[str, Array]):
         """
         self._given.pop(name, None)
         if self._points is not None and callable(source):
-            self._given[name] = sources.of_function(source, self._points.x, what)
+            self._given[name] = evaluate(source, self._points.x, f"{what} at the border")
 
     def __getitem__(self, name: str) -> Array:
         if name not in self._axis:

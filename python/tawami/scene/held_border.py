@@ -6,7 +6,6 @@ serve for all laws, forms and strain measures, and each pass leaves about a hund
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import combinations
@@ -14,10 +13,10 @@ from itertools import combinations
 import numpy as np
 import scipy.sparse as sp
 
-from tawami.base.arrays import Array, Mask
+from tawami.base.arrays import Array, of_components
 from tawami.base.errors import SupportError
 from tawami.border.patches import patches
-from tawami.border.tied import Tied
+from tawami.border.tied import Tied, means
 from tawami.field.constraints import PointHeld
 from tawami.scene.domain import Domain
 from tawami.scene.moving_points import MovingPoints
@@ -53,28 +52,35 @@ class HeldBorder:
     def __init__(self, domain: Domain, support: Support, values: Array, before: Array) -> None:
         assert isinstance(support.place, MovingPoints)
         self._support, self._domain = support, domain
-        self._weak = np.flatnonzero(support.weak)
-        place, names = support.place, domain.layout.fields
-        self._place = (
-            names[str(support.component)] if support.is_field else next(iter(names.values()))
-        )
+        self._weak = weak = np.flatnonzero(support.weak)
+        place, fields, h = support.place, domain.layout.fields, domain.model.grid.h
+        field = fields[str(support.component)] if support.is_field else next(iter(fields.values()))
+        cells = place.cells(domain)
+        numbers, functions, _ = cells.tabulated(field.basis)
+        #: Functions at the points, and their coefficients, points x functions x components.
+        self._functions = functions[weak]
+        self._places = field.start + of_components(numbers[weak], field.components)
         directions = np.ones((len(place), 1)) if support.is_field else support.directions
-        self._directions = directions[self._weak]
-        functions = place.cells(domain).values(self._place.basis)[self._weak]
-        components = sp.identity(self._place.components)
-        #: Values at the points, of all coefficients of the field: points components x coefficients.
-        self._at_points = sp.kron(functions, components, format="csr")
-        self._groups = patches(place.now[self._weak], domain.model.grid.h)
-        self._weights = place.weight[self._weak]
-        self._before = self._at_points @ before[self._place.slice]
-        self._given = values[self._weak]
-        self._values = (values + support.missing)[self._weak][:, None]
-        self.prescribed = float(np.abs(self._values).max(initial=0.0))
-        held = self._groups.means(self._weights, support.held[self._weak])
-        self._held, self._largest, self._stiffened = held[:, None], np.inf, 1.0
-        K, mu = (m[place.cells(domain).location.cell] for m in domain.moduli_of_cells)
-        self._elastic = (K + PENALTY * mu)[self._weak]
+        self._directions, self._weights = directions[weak], place.weight[weak]
+        self._groups = patches(place.now[weak], h)
+        along = (self._functions[:, :, None] * self._directions[:, None]).reshape(len(weak), -1)
+        #: Mean of the held component over each patch, of all coefficients: patches x coefficients.
+        self.means = means(
+            self._groups, self._weights, along, self._places.reshape(len(weak), -1), len(before)
+        )
+        #: Prescribed values at its points, and their means over the patches.
+        self.values = (values + support.missing)[weak]
+        self._given, self._target = values[weak], self._mean(self.values)
+        self.prescribed = float(np.abs(self.values).max(initial=0.0))
+        self._before, self._held = before, self._mean(support.held[weak])
+        self._largest, self._stiffened = np.inf, 1.0
+        K, mu = (m[cells.location.cell] for m in domain.moduli_of_cells)
+        self._elastic = (K + PENALTY * mu)[weak]
         self._tied = self._with_penalty(self._elastic)
+
+    def _mean(self, values: Array) -> Array:
+        """Means over the patches."""
+        return self._groups.means(self._weights, values)
 
     @property
     def x(self) -> Array:
@@ -83,19 +89,14 @@ class HeldBorder:
         return np.asarray(self._support.place.x[self._weak])
 
     @property
-    def values(self) -> Array:
-        """Prescribed values at its points."""
-        return np.asarray(self._values[:, 0])
-
-    @property
     def support(self) -> Support:
         """The support."""
         return self._support
 
     def _with_penalty(self, penalty: Array) -> Tied:
         """Ties with a penalty, given at each point [Pa]."""
-        penalty = self._groups.means(self._weights, penalty) / self._domain.model.grid.h
-        return Tied(self._groups, self._weights, self._directions[None], penalty)
+        areas, h = self._groups.sums(self._weights), self._domain.model.grid.h
+        return Tied(self.means, areas, self._mean(penalty) / h)
 
     def begin(self, diagonal: Callable[[], Array], inertia: Array | None) -> None:
         """See `Term`. The penalty of a field has the size of its tangent, and in dynamics that of a
@@ -111,37 +112,27 @@ class HeldBorder:
         assert isinstance(self._support.place, MovingPoints)
         h, dim = self._domain.model.grid.h, self._domain.model.space.dim
         thickness = (self._support.place.weight / self._support.place.length)[self._weak]
-        near = (abs(self._at_points) @ diagonal[self._place.slice]).reshape(len(thickness), -1)
-        return np.asarray(near[:, 0] / thickness / h ** (dim - 2))
-
-    def _displacement(self, coefficients: Array) -> Array:
-        moved = self._before + self._at_points @ coefficients[self._place.slice]
-        return np.asarray(moved.reshape(len(self._weak), -1))
+        near = np.einsum("pf,pf->p", np.abs(self._functions), diagonal[self._places[..., 0]])
+        return np.asarray(near / thickness / h ** (dim - 2))
 
     def forces(self, coefficients: Array) -> Array:
         """See `Term`."""
-        u = self._displacement(coefficients)
-        self._tractions = self._tied.multipliers(u, self._values, self._held)
-        self._on_points = self._tied.forces(u, self._values, self._held)
-        self._error = self._tied.error(u, self._values)
-        self._size = float(np.abs(u).max(initial=0.0))
-        forces = np.zeros_like(coefficients)
-        forces[self._place.slice] = self._at_points.T @ self._on_points.ravel()
-        self.on_body = forces
-        return forces
+        self._last = self._before + coefficients
+        self._error = self.means @ self._last - self._target
+        self._tractions = self._tied.multipliers(self._error, self._held)
+        self.on_body = self._tied.forces(self._tractions)
+        return self.on_body
 
     def stiffness(self) -> sp.csr_matrix:
-        """See `Term`."""
-        matrix = (self._at_points.T @ self._tied.stiffness() @ self._at_points).tocoo()
-        size, first = self._domain.layout.size, self._place.start
-        places = (matrix.row + first, matrix.col + first)
-        return sp.coo_matrix((matrix.data, places), shape=(size, size)).tocsr()
+        """See `Term`; the same object until the penalty changes."""
+        return self._tied.stiffness
 
     def improve(self) -> bool:
         """See `Term`."""
         change = np.abs(self._tractions - self._held).max(initial=0.0)
         self._held = self._tractions
-        size = max(self.prescribed, self._size)
+        u = np.einsum("pf,pfi->pi", self._functions, self._last[self._places])
+        size = max(self.prescribed, float(np.abs(u).max(initial=0.0)))
         error, before = np.abs(self._error).max(initial=0.0), self._largest
         if error > SLOW * before and self._stiffened < STIFFEST:
             self._stiffened *= STIFFER
@@ -164,37 +155,27 @@ class HeldBorder:
     def accept(self) -> None:
         """Keep the tractions, and what is missing of the prescribed displacement, for later steps."""
         support, number = self._support, self._groups.number
-        support.held[self._weak] = self._tractions[number, 0]
+        support.held[self._weak] = self._tractions[number]
         if self._domain.model.moves:
-            support.missing[self._weak] = -self._error[number, 0]
+            support.missing[self._weak] = -self._error[number]
 
     @property
     def resultants(self) -> dict[str, Array]:
         """Force on the body at each part of the border that the support covers [N per metre depth]."""
         assert isinstance(self._support.place, MovingPoints)
         made, resultant = self._support.place.made, self._domain.model.space.resultant
+        tractions = -(self._weights * self._tractions[self._groups.number])[:, None]
+        on_points = tractions * self._directions
         tags = made.tag[self._weak]
         return {
-            made.names[tag]: resultant(self._on_points[tags == tag].sum(axis=0))
+            made.names[tag]: resultant(on_points[tags == tag].sum(axis=0))
             for tag in np.unique(tags)
         }
-
-    @functools.cached_property
-    def means(self) -> sp.csr_matrix:
-        """Mean of the held component over each patch, of all coefficients: patches x coefficients."""
-        dim, points = self._directions.shape[1], len(self._weak)
-        shares = self._groups.shares(self._weights)[:, None] * self._directions
-        places = (np.repeat(self._groups.number, dim), np.arange(points * dim))
-        shape = (self._groups.count, points * dim)
-        of_points = sp.csr_matrix((shares.ravel(), places), shape=shape)
-        rows = (of_points @ self._at_points).tocoo()
-        size, columns = self._domain.layout.size, rows.col + self._place.start
-        return sp.coo_matrix((rows.data, (rows.row, columns)), shape=(shape[0], size)).tocsr()
 
     @property
     def prescribed_means(self) -> Array:
         """Mean of the prescribed values over each patch."""
-        return self._groups.means(self._weights, self._given)
+        return self._mean(self._given)
 
     @property
     def rows(self) -> list[PointHeld]:
@@ -213,55 +194,6 @@ class HeldBorder:
             )
             for mine, x in zip(parts, self.x[first], strict=True)
         ]
-
-
-def imposed(
-    held: Sequence[HeldBorder], rates: Sequence[Array], mass: Array, fixed: Mask, values: Array
-) -> Array:
-    """Velocities after an impulse of supports on patches, as `Reduction.imposed` for the others.
-
-    Args:
-        held: The supports.
-        rates: Rate of the mean of each patch of each of them [m/s].
-        mass: Mass of each displacement coefficient [kg per metre depth].
-        fixed: Whether other supports prescribe each of them.
-        values: Velocities, or other rates, of the displacement coefficients.
-    """
-    of_displacement = [k for k, one in enumerate(held) if not one.support.is_field]
-    if not of_displacement:
-        return values
-    means, weighted = _weighted([held[k] for k in of_displacement], mass, fixed)
-    missing = np.concatenate([rates[k] for k in of_displacement]) - means @ values
-    impulse = np.linalg.lstsq((means @ weighted).toarray(), missing, rcond=None)[0]
-    return np.asarray(values + weighted @ impulse)
-
-
-def work(held: Sequence[HeldBorder], mass: Array, fixed: Mask, forces: Array, u: Array) -> float:
-    """Work of supports on patches, given the forces out of balance without them.
-
-    Args:
-        held, mass, fixed: As of :func:`imposed`.
-        forces: On the displacement coefficients [N per metre depth]; the part that the supports cannot
-            exert does no work.
-        u: Increments of the displacement coefficients [m].
-    """
-    supports = [one for one in held if not one.support.is_field]
-    if not supports:
-        return 0.0
-    means, weighted = _weighted(supports, mass, fixed)
-    matrix = (means @ weighted).toarray()
-    multipliers = np.linalg.lstsq(matrix, weighted.T @ forces, rcond=None)[0]
-    return float(multipliers @ (means @ u))
-
-
-def _weighted(
-    held: Sequence[HeldBorder], mass: Array, fixed: Mask
-) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-    """Means C over patches, patches x coefficients, and M^-1 C^T, 0 for fixed coefficients."""
-    n = len(mass)
-    means = sp.vstack([one.means[:, :n] for one in held]).tocsr()
-    inverse = np.divide(1.0, mass, out=np.zeros(n), where=(mass > 0) & ~fixed)
-    return means, (sp.diags(inverse) @ means.T).tocsr()
 
 
 def check_agreement(held: Sequence[HeldBorder], h: float) -> None:

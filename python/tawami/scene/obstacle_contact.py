@@ -8,6 +8,7 @@ the penalty alone: below 5e-6 h times the largest pressure over mu.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -48,7 +49,7 @@ class ObstacleContact:
         before: Displacement coefficients since the start where particles do not move, else 0.
     """
 
-    smooth, implicit = False, True
+    smooth, implicit, first_work = False, True, 0.0
 
     def __init__(
         self, domain: Domain, obstacle: Obstacle, motion: ObstacleMotion, before: Array
@@ -111,7 +112,8 @@ class ObstacleContact:
     def restart(self) -> None:
         """See `Term`."""
         self.motion.restart()
-        self._first, self._returns = True, 0
+        self._linearised: ContactForces | None = None  # those of the last tangent
+        self._returns = 0
 
     def forces(self, coefficients: Array) -> Array:
         """See `Term`: in dynamics with the factors of both ends of the step."""
@@ -119,21 +121,30 @@ class ObstacleContact:
         reached = self._border.reached(pose.to_local(x))
         if reached.any():
             self._choose(reached)
-        sticking: bool | ContactForces = self._first
-        if (
-            not self._first
-            and self._returns < RETURNS
-            and len(self.now.x) == len(self._border.points)
-        ):
-            sticking = self.now
+        x = x[self._border.points]
         self.now: ContactForces = self._contact.evaluate(
-            x[self._border.points], pose, self._held, sticking=sticking
+            x, pose, self._held, sticking=self._sticking
         )
-        self._returns += not self._first and self.now.exceeded
-        self._first = False
+        self._pulls = self._is_loose and bool(self._held.pressure.any())
+        if self._pulls:  # otherwise nothing would bring it back
+            self.now = self._contact.evaluate(x, pose, self._held, sticking=True, tied=True)
         self.at_end = self._border.on_all(self.now.forces)
         factor = self.motion.factor
         return np.asarray(factor * self.at_end - (factor - 1) * self.at_start[0])
+
+    @property
+    def _is_loose(self) -> bool:
+        """Whether it is free and away from the body in statics, where only contact holds it."""
+        is_held = self.motion.times is not None or not self.motion.free.any()
+        return not is_held and bool((self.now.state == OPEN).all())
+
+    @property
+    def _sticking(self) -> bool | ContactForces:
+        """Patches to take as sticking, see `Contact.evaluate`."""
+        last = self._linearised
+        if last is None or self._returns >= RETURNS:
+            return last is None
+        return last if len(last.x) == len(self._border.points) else False
 
     def _forces_at_start(self) -> tuple[Array, Array]:
         """Forces at the start of the step: on all coefficients, and on the obstacle."""
@@ -146,7 +157,16 @@ class ObstacleContact:
         return self._border.on_all(on_points), -pose.resultant(x, on_points)
 
     def stiffness(self) -> sp.csr_matrix:
-        """See `Term`. Its entries are in the same places as long as no patch comes near."""
+        """See `Term`. Its entries are in the same places as long as no patch comes near.
+
+        While patches open and close, border points may be far from their places on the obstacle, whose
+        bends at the wrong places lead Newton's method astray.
+        """
+        last = self._linearised
+        if last is not None:
+            self._returns += self.now.exceeded
+        settled = last is not None and np.array_equal(last.state > OPEN, self.now.state > OPEN)
+        self.now = self._linearised = replace(self.now, bends=settled)
         return self._border.on_coefficients(-self.motion.factor * self.now.derivative)
 
     def improve(self) -> bool:
@@ -154,11 +174,12 @@ class ObstacleContact:
         now, penalty = self.now, self._contact.penalty
         allowed = SETTLED * np.max(now.pressure / penalty, initial=0.0)
         settled = now.violation <= max(allowed, ROUND_OFF * self._border.h)
-        if settled and not now.exceeded:
+        if settled and not now.exceeded and not self._pulls:
             return False
-        if not settled:
-            self._pressure[self._border.chosen] = now.pressure
-            self._traction[self._border.chosen] = now.traction
+        if not settled or self._pulls:
+            held = now.multipliers
+            self._pressure[self._border.chosen] = held.pressure
+            self._traction[self._border.chosen] = held.traction
         return True
 
     @property
@@ -260,7 +281,17 @@ class ObstacleContact:
 
     def add(self, change: Array) -> None:
         """Go to the next iterate of its free motions."""
+        self.first_work = float(self.residual @ change)
         self.motion.add(change)
+
+    def shorten(self, share: float) -> None:
+        """Take a share of the last change of its free motions."""
+        self.motion.shorten(share)
+
+    @property
+    def work(self) -> float:
+        """Work of its residual on the last change."""
+        return float(self.residual @ self.motion.last_change)
 
     def check_held(self, matrix: Array) -> None:
         """Check that its motions are held in statics.

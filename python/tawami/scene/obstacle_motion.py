@@ -87,6 +87,7 @@ class ObstacleMotion:
         """Go back to the first guess."""
         coasting = np.zeros_like(self.change) if self.times is None else self._coasting
         self.unknown = np.where(self.free, coasting, self.change)
+        self._before, self.last_change = self.unknown, np.zeros(int(self.free.sum()))
 
     @property
     def _coasting(self) -> Array:
@@ -105,8 +106,13 @@ class ObstacleMotion:
 
     def add(self, change: Array) -> None:
         """Go to the next iterate of the free motions."""
-        self.unknown = self.unknown.copy()
-        self.unknown[self.free] += change
+        self._before, self.last_change = self.unknown, change
+        self.shorten(1.0)
+
+    def shorten(self, share: float) -> None:
+        """Take a share of the last change."""
+        self.unknown = self._before.copy()
+        self.unknown[self.free] += share * self.last_change
 
     @property
     def _acceleration(self) -> Array:

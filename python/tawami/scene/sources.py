@@ -58,28 +58,6 @@ def values(
     return found
 
 
-def of_function(f: Callable[[Array, Array], Any], x: Array, label: str) -> Array:
-    """Values of a function f(x, y) on arrays, one at each position.
-
-    Args:
-        f: The function.
-        x: Positions [m], points x 2.
-        label: What the values are called in messages.
-
-    Raises:
-        InputError: It fails, or returns no number for a position.
-    """
-    found = _of_function(f, x, label, "value")[:, 0]
-    bad = np.flatnonzero(~np.isfinite(found))
-    if len(bad):
-        place = ", ".join(f"{c:g}" for c in x[bad[0]])
-        raise InputError(
-            f"{label} is {found[bad[0]]:g} at the point ({place}) m of the border: expected finite "
-            "numbers"
-        )
-    return np.asarray(found, dtype=float)
-
-
 def _of_numbers(source: Any, n: int, width: int, name: str) -> Array:
     """One row for each of the n particles of the body."""
     few = {1: "a number", 2: "two numbers"}.get(width, f"{width} numbers")

@@ -33,7 +33,13 @@ class Blocks:
 
 @runtime_checkable
 class Bordering(Protocol):
-    """A term with unknowns of its own."""
+    """A term with unknowns of its own.
+
+    Attributes:
+        first_work: Work of the residual on the last change, at its beginning.
+    """
+
+    first_work: float
 
     @property
     def num_unknowns(self) -> int:
@@ -52,6 +58,13 @@ class Bordering(Protocol):
 
     def add(self, change: Array) -> None:
         """Go to the next iterate."""
+
+    def shorten(self, share: float) -> None:
+        """Take a share of the last change."""
+
+    @property
+    def work(self) -> float:
+        """Work of the residual on the last change, at the last forces."""
 
     def restart(self) -> None:
         """Go back to the first guess."""

@@ -58,10 +58,19 @@ class Equations:
         return iterate.forces(internal, external, self.friction, border)
 
     @property
-    def at_rest(self) -> bool:
-        """Whether it is a static step at a given load without friction, which may use a line search."""
-        smooth = self.friction is None and (self.terms is None or self.terms.smooth)
-        return self.inertia is None and smooth and self.path is None
+    def is_smooth(self) -> bool:
+        """Whether no term has states, as contact has."""
+        return self.terms is None or self.terms.smooth
+
+    def is_searched(self, finite: bool) -> bool:
+        """Whether a line search serves: with contact, or in a static step of small strain.
+
+        Args:
+            finite: Whether the strain is finite.
+        """
+        if self.friction is not None or self.path is not None:
+            return False
+        return not self.is_smooth or (self.inertia is None and not finite)
 
     @property
     def advice(self) -> str:

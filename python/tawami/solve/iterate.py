@@ -73,15 +73,18 @@ class Iterate:
 
     def add(self, change: Array, of_factor: float = 0.0) -> None:
         """Go to the next iterate."""
-        self._before, self._change = self.coefficients, change
+        self._before, self._change = (self.coefficients, self._deviation), change
         self.coefficients = self.coefficients + change
         self.factor += of_factor
         if self._deviation is not None:
             self._deviation = self._deviation + change[: len(self._deviation)]
 
     def shorten(self, share: float) -> None:
-        """Take a share of the last change, in a static step at a given load."""
-        self.coefficients = self._before + share * self._change
+        """Take a share of the last change, in a step at a given load."""
+        coefficients, deviation = self._before
+        self.coefficients = coefficients + share * self._change
+        if deviation is not None:
+            self._deviation = deviation + share * self._change[: len(deviation)]
 
     def forces(
         self, internal: Array, external: Array, friction: Friction | None, border: Array | None

@@ -2,13 +2,16 @@
 
     g(t) = du . R_u - deps . R_q        at the increments + t (du, deps)
 
-Fields without a role do not count: in general their equations have no energy.
+Fields without a role do not count: in general their equations have no energy. The unknowns of terms on
+the border do: g has the work of their equations as well.
 
 A full Newton step has g(0) < 0 and g(1) near 0. The sign of R_q makes g the slope of the energy in an
 elastic body, whose energy is least in u and largest in eps_v. Near a limit load a search that asks for a
 smaller residual costs many iterations, so this one acts only where a step overshoots: g(1) has the
 other sign, is nearly as large as g(0), and the measure of convergence rose. It serves static steps of
-small strain without friction. Elsewhere it was not measured, or finds equilibria far away.
+small strain without friction of walls, and all steps with obstacles. Elsewhere it was not measured, or
+finds equilibria far away. Contact has kinks where patches open and close. Between them full steps may go
+to and fro without end, and the measure does not tell: there g(1) alone decides.
 """
 
 from __future__ import annotations
@@ -19,10 +22,18 @@ from typing import Any
 
 import numpy as np
 
+from tawami import _rust
 from tawami.base.arrays import Array
+from tawami.base.timing import tally
+from tawami.solve.iterate import Forces
+from tawami.solve.measures import Measured
+from tawami.solve.terms import Terms
 
-#: |g(1) / g(0)| from which a step overshoots, and |g(t) / g(0)| at which the search ends.
-OVERSHOT, REDUCED = 0.8, 0.5
+Evaluated = tuple[Forces, Measured]
+
+#: |g(1) / g(0)| from which a step overshoots, the same with contact, and |g(t) / g(0)| at which the
+#: search ends.
+OVERSHOT, KINKED, REDUCED = 0.8, 0.5, 0.5
 #: Largest number of evaluations, and the shortest step as a share of the full one.
 MOST, SHORTEST = 8, 0.05
 
@@ -35,11 +46,19 @@ class LineSearch:
         change: Change of all increments by a full step.
         residual: Forces out of balance at its beginning.
         signs: Sign of each coefficient in g: 1, -1 or 0.
+        terms: Terms on the border, which know the change of their own unknowns.
     """
 
-    def __init__(self, comm: Any, change: Array, residual: Array, signs: Array) -> None:
+    def __init__(
+        self,
+        comm: Any,
+        change: Array,
+        residual: Array,
+        signs: Array,
+        terms: Terms | None = None,
+    ) -> None:
         self._comm, self._change, self._residual = comm, change, residual
-        self._signs = signs
+        self._signs, self._terms = signs, terms
 
     @functools.cached_property
     def _weights(self) -> Array:
@@ -48,30 +67,64 @@ class LineSearch:
     @functools.cached_property
     def _start(self) -> float:
         """The work at the beginning; most steps never ask for it."""
-        return self._work(self._residual)
+        of_terms = 0.0 if self._terms is None else self._terms.first_work
+        return self._work(self._residual, of_terms)
 
-    def _work(self, residual: Array) -> float:
-        return float(self._comm.bcast(float(self._weights @ residual)))
+    def _work(self, residual: Array, of_terms: float) -> float:
+        return float(self._comm.bcast(float(self._weights @ residual) + of_terms))
 
-    def overshoots(self, residual: Array) -> bool:
-        """Whether the full step, which led to this residual, went too far."""
-        end = self._work(residual)
-        return bool(end * self._start < 0 and abs(end) > OVERSHOT * abs(self._start))
+    def _at_last_forces(self, residual: Array) -> float:
+        return self._work(residual, 0.0 if self._terms is None else self._terms.work)
 
-    def length(self, residual_at: Callable[[float], Array], residual: Array) -> float:
-        """Share of the step to take, by the secant method of Illinois; it was evaluated last.
+    def advance(
+        self, evaluate: Callable[[float], Evaluated], rose: Callable[[Measured], bool]
+    ) -> Evaluated:
+        """Forces and measures after a share of the step that neither inverts a particle nor overshoots.
 
         Args:
-            residual_at: Residual after a share of the step.
-            residual: Residual after the full step.
+            evaluate: Gives them after a share of the step; the last share is the one that is taken.
+            rose: Whether a measure is larger than that at the beginning.
+
+        Raises:
+            InvertedError: The shortest step turns a particle inside out.
+        """
+        share = 1.0
+        while True:
+            try:
+                forces, measured = evaluate(share)
+                break
+            except _rust.InvertedError:
+                share *= 0.5
+                if share < SHORTEST:
+                    raise
+        if share < 1 or not (self._is_kinked or rose(measured)):
+            return forces, measured
+        end, limit = self._at_last_forces(forces.residual), KINKED if self._is_kinked else OVERSHOT
+        if end * self._start >= 0 or abs(end) <= limit * abs(self._start):
+            return forces, measured
+        tally.line_searches += 1
+        return self._shortened(evaluate, end)
+
+    @property
+    def _is_kinked(self) -> bool:
+        """Whether the forces have kinks, as those of contact have."""
+        return self._terms is not None and not self._terms.smooth
+
+    def _shortened(self, evaluate: Callable[[float], Evaluated], end: float) -> Evaluated:
+        """Forces and measures at a length by the secant method of Illinois.
+
+        Args:
+            evaluate: As in :meth:`advance`.
+            end: The work after the full step.
         """
         other, at_other = 0.0, self._start
-        t, at_t = 1.0, self._work(residual)
+        t, at_t = 1.0, end
         for _ in range(MOST):
             newer = max((other * at_t - t * at_other) / (at_t - at_other), SHORTEST)
-            at_newer = self._work(residual_at(newer))
+            forces, measured = evaluate(newer)
+            at_newer = self._at_last_forces(forces.residual)
             if not np.isfinite(at_newer) or newer == t:
-                return newer
+                break
             if at_newer * at_t < 0:
                 other, at_other = t, at_t
             else:
@@ -79,4 +132,4 @@ class LineSearch:
             t, at_t = newer, at_newer
             if abs(at_t) <= REDUCED * abs(self._start):
                 break
-        return t
+        return forces, measured

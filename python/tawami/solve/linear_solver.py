@@ -130,15 +130,3 @@ class LinearSolver:
         ksp.solve(b, x)
         self.iterations = ksp.getIterationNumber()
         return bool(ksp.getConvergedReason() > 0)
-
-    def _is_symmetric(self, matrix: Any, probe: Array) -> bool:
-        """Whether a matrix is symmetric, by its products with a random vector."""
-        x, y = (self._handles[name] for name in ("x", "b"))
-        x.setArray(probe)
-        matrix.mult(x, y)
-        forward = y.copy()
-        matrix.multTranspose(x, y)
-        size = forward.norm()
-        y.axpy(-1.0, forward)
-        forward.destroy()
-        return bool(y.norm() <= 1e-12 * size)

@@ -38,6 +38,8 @@ History = list[Measured]
 STRAIN_FLOOR = 1e-7
 #: Forces and strains below these, relative to those of the motion of the body, are round-off.
 NO_FORCE, NO_STRAIN = 1e-14, 1e-10
+#: Share of NO_FORCE below which the residual of a body with forces on its border is round-off.
+SHARE = 1e-2
 #: Share of the diagonal times a field below which a residual of its equation is round-off.
 NO_RESIDUAL = 1e-7
 
@@ -66,13 +68,16 @@ def measured(momentum: float, volume: float, *others: float) -> Measured:
     return float(momentum), of_volume
 
 
-def forcing(history: History, tolerance: float) -> float:
+def forcing(history: History, tolerance: float, *, linear: bool = False) -> float:
     """Tolerance of the next linear solve.
 
-    It follows the rate of convergence (choice 2 of Eisenstat and Walker 1996), as far as Newton's own
+    That of a linear problem reaches Newton's own tolerance at once. Otherwise it
+    follows the rate of convergence (choice 2 of Eisenstat and Walker 1996), as far as Newton's own
     tolerance needs it.
     """
     now = worst(history[-1])
+    if linear:
+        return min(0.5 * tolerance / now, 1e-3)
     rate = now / worst(history[-2]) if len(history) > 1 else 1.0
     return min(max(0.1 * rate**2, min(0.1 * tolerance / now, 1e-3)), 1e-3)
 
@@ -140,8 +145,11 @@ class Measures:
         parts = [forces.internal, forces.external]
         parts += [part for part in (forces.border, forces.inertia) if part is not None]
         scale = max(self._at_start, *(norm(part[:n]) for part in parts))
-        at_rest = not forces.external.any() and self._is_at_rest(scale, coefficients[:n], equations)
-        momentum = 0.0 if at_rest or scale == 0 else norm(free[of_u]) / scale
+        residual = norm(free[of_u])
+        at_rest = not forces.external.any() and self._is_at_rest(
+            scale, residual, coefficients[:n], equations
+        )
+        momentum = 0.0 if at_rest or scale == 0 else residual / scale
         if equations.terms is not None:
             momentum = max(momentum, equations.terms.measure)
         volume = None
@@ -181,7 +189,7 @@ class Measures:
             measures[name] = residual / scale if scale > 0 else residual
         return measures
 
-    def _is_at_rest(self, scale: float, u: Array, equations: Equations) -> bool:
+    def _is_at_rest(self, scale: float, residual: float, u: Array, equations: Equations) -> bool:
         """Whether forces without a load are round-off.
 
         This holds for the forces of a body that supports move rigidly, or that moves freely, and for
@@ -199,8 +207,10 @@ class Measures:
         distance = 10 * min(distance, float(np.abs(u).max())) + grid.h
         (thickness,) = grid.space.thickness(np.array([grid.upper]))
         largest = NO_FORCE * self._responses.stiffest * distance * thickness * np.sqrt(len(u))
+        if equations.terms is not None and residual <= SHARE * largest:
+            scale = 0.0  # positions of border points have no more digits
         at_rest = ranks.same(self._comm, bool(scale <= largest))  # the same branch on all ranks
-        if at_rest and inertia is None:
+        if at_rest and inertia is None and scale > 0:
             return self._moves_rigidly(u, prescribed)
         return at_rest
 

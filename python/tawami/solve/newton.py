@@ -12,13 +12,14 @@ import numpy as np
 from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array
-from tawami.base.errors import CheckpointError, SingularError
+from tawami.base.errors import CheckpointError, SingularError, SupportError
 from tawami.base.files import reason
 from tawami.base.petsc import clean_up
 from tawami.base.timing import Stopwatch, tally
 from tawami.field.assembly import Assembly
 from tawami.field.reduction import Reduction
 from tawami.particles.responses import Responses
+from tawami.solve.choice import ChosenSolver
 from tawami.solve.diagnosis import Diagnosis
 from tawami.solve.direct import DirectSolver
 from tawami.solve.equations import Equations
@@ -28,7 +29,6 @@ from tawami.solve.iterate import Forces, Friction, Iterate
 from tawami.solve.line_search import LineSearch
 from tawami.solve.linear_solver import LinearSolver
 from tawami.solve.measures import History, Measured, Measures, diagonal_of, forcing, worst
-from tawami.solve.multigrid import MultigridSolver
 from tawami.solve.numerics import Numerics
 from tawami.solve.operators import Operators
 from tawami.solve.path import Path
@@ -79,6 +79,7 @@ class Newton:
         numerics: Numerical settings.
         stopwatch: Measures the time of each stage.
         elastic: Makes the responses of the same particles with elastic laws, for a diagnosis.
+        linear: Whether the residual is linear in the increments.
 
     Attributes:
         numerics: Numerical settings; its tolerance may change between steps.
@@ -91,7 +92,10 @@ class Newton:
         numerics: Numerics,
         stopwatch: Stopwatch,
         elastic: Callable[[], Responses],
+        *,
+        linear: bool = False,
     ) -> None:
+        self._linear = linear
         self._assembly, self._responses = assembly, responses
         self.numerics, self._stopwatch = numerics, stopwatch
         self._comm = assembly.layout.grid.comm
@@ -100,11 +104,12 @@ class Newton:
         self._operators = Operators(assembly, responses)
         self._diagnosis = Diagnosis(assembly, responses, self._scaling, elastic)
         self._solver: LinearSolver
-        if numerics.linear_solver == "multigrid":
-            self._solver = MultigridSolver(self._comm, stopwatch)
-        else:
+        if numerics.linear_solver == "direct":
             always = numerics.factorise == "always"
             self._solver = DirectSolver(self._comm, stopwatch, always=always)
+        else:
+            unsuited = self._operators.unsuited
+            self._solver = ChosenSolver(self._comm, stopwatch, numerics, unsuited)
         self._stored: Mapping[str, Any] | None = None
 
     def follow(self, earlier: Newton) -> None:
@@ -191,9 +196,7 @@ class Newton:
         search, most = None, self.numerics.max_iterations
         while True:
             try:
-                forces, measured = self._evaluate(iterate, equations)
-                if search is not None and worst(measured) > worst(history[-1]):
-                    forces, measured = self._shortened(search, iterate, equations, forces, measured)
+                forces, measured = self._reached(search, iterate, equations, history)
             except _rust.InvertedError as error:
                 if guess is None:
                     self._fail(history, f"Then {error}. {equations.advice}")
@@ -224,8 +227,8 @@ class Newton:
                 self._fail(history, advice or equations.advice)
             with reported():
                 change, of_factor = self._change(iterate, forces, equations, add_mass, history)
-            if equations.at_rest and not self._responses.form.strain.finite:
-                search = LineSearch(self._comm, change, forces.residual, self._signs)
+            if equations.is_searched(self._responses.form.strain.finite):
+                search = LineSearch(self._comm, change, forces.residual, self._signs, terms)
             iterate.add(change, of_factor)
             krylov.append(self._solver.iterations)
             self._stopwatch.lap()
@@ -238,27 +241,21 @@ class Newton:
             measured = self._measures.of(forces, iterate.coefficients, equations)
         return forces, measured
 
-    def _shortened(
-        self,
-        search: LineSearch,
-        iterate: Iterate,
-        equations: Equations,
-        forces: Forces,
-        measured: Measured,
+    def _reached(
+        self, search: LineSearch | None, iterate: Iterate, equations: Equations, history: History
     ) -> tuple[Forces, Measured]:
-        """Shorten the last change if it overshoots; forces and measures at the iterate then."""
-        if not search.overshoots(forces.residual):
-            return forces, measured
-        found = [(forces, measured)]
+        """Forces and measures at an iterate, or nearer to the last one if it went too far."""
 
-        def residual_at(share: float) -> Array:
-            iterate.shorten(share)
-            found.append(self._evaluate(iterate, equations))
-            return found[-1][0].residual
+        def evaluate(share: float) -> tuple[Forces, Measured]:
+            if share < 1:
+                iterate.shorten(share)
+                if equations.terms is not None:
+                    equations.terms.shorten(share)
+            return self._evaluate(iterate, equations)
 
-        search.length(residual_at, forces.residual)
-        tally.line_searches += 1
-        return found[-1]
+        if search is None:
+            return evaluate(1.0)
+        return search.advance(evaluate, lambda measured: worst(measured) > worst(history[-1]))
 
     def _change(
         self,
@@ -281,7 +278,8 @@ class Newton:
         self._measures.observe(tangent, reduction)
         tolerance = ON_PATH
         if equations.path is None and not (equations.terms and equations.terms.bordering):
-            tolerance = forcing(history, self.numerics.tolerance)
+            linear = self._linear and equations.is_smooth and equations.friction is None
+            tolerance = forcing(history, self.numerics.tolerance, linear=linear)
         singular: SingularError | None = None
         try:
             found = solver.solve(
@@ -305,7 +303,14 @@ class Newton:
             mine = reduction.restricted(right)[reduction.own]
             return self._on_all(reduction, solver.again(mine, tolerance))
 
-        change, of_factor = complete(equations, iterate.u, self._on_all(reduction, found), again)
+        try:
+            change, of_factor = complete(
+                equations, iterate.u, self._on_all(reduction, found), again
+            )
+        except SupportError as error:
+            if len(history) == 1:  # it was free when the step began
+                raise
+            self._fail(history, f"Then {error}. {equations.advice}")
         if not np.isfinite(of_factor):
             self._fail(history, "The loads do not move the control: choose another control")
         return change, of_factor

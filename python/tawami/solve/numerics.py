@@ -13,7 +13,10 @@ from tawami.base import checks
 from tawami.form.symbols import Assembly
 
 Factorise = Literal["when_it_pays", "always"]
-SolverName = Literal["direct", "multigrid"]
+SolverName = Literal["auto", "direct", "multigrid"]
+
+#: Number of unknowns from which 'auto' may take multigrid (`cases.costs.solvers`).
+SMALL = 30_000
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,8 @@ class Numerics:
             computes P^T K P. They agree up to round-off for sums of expressions up to degree 4.
         factorise: 'when_it_pays' uses a factorisation in later iterations and steps, 'always' factorises
             in each Newton iteration.
-        linear_solver: 'direct' (MUMPS) or 'multigrid' (MINRES or FGMRES).
+        linear_solver: 'direct' (MUMPS), 'multigrid' (GMRES with multigrid), or 'auto', which chooses by
+            size and cost (`tawami.solve.choice`).
 
     Raises:
         InputError: A value is out of its range.
@@ -37,7 +41,7 @@ class Numerics:
     max_iterations: int = 20
     assembly: Assembly = "points"
     factorise: Factorise = "when_it_pays"
-    linear_solver: SolverName = "direct"
+    linear_solver: SolverName = "auto"
 
     def __post_init__(self) -> None:
         checks.number("tolerance", self.tolerance, low=1e-14, high=0.1)

@@ -18,11 +18,14 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from tawami.base import ranks
 from tawami.field.assembly import Assembly
 from tawami.field.block import Block
 from tawami.particles.responses import Responses
 from tawami.solve.equations import Equations
 
+#: K/mu (nu = 0.475) beyond which multigrid takes many iterations without a field for the volume.
+LOCKING = 20.0
 #: K/mu up to which the operator of a form without a field for the volume counts.
 STIFFEST = 1e4
 
@@ -55,6 +58,20 @@ class Operators:
     def __init__(self, assembly: Assembly, responses: Responses) -> None:
         self._assembly, self._responses = assembly, responses
 
+    @property
+    def unsuited(self) -> str:
+        """Reason for which multigrid does not suit the form; empty if it does."""
+        kinematics, attachment = self._responses.form.kinematics, self._assembly.attachment
+        if kinematics.has_mean_stress:
+            if attachment.values.get("alpha", 1.0) == 0:
+                return "alpha = 0: the pair of spaces is unstable"
+            return ""
+        mu, bulk = (self._responses.constants[name] for name in ("mu", "K"))
+        ratio = ranks.largest(attachment.grid.comm, float((bulk / mu).max(initial=0.0)))
+        if ratio > LOCKING:
+            return f"K/mu up to {ratio:.3g} in a form without a field for the volume"
+        return ""
+
     def parts(self, equations: Equations) -> list[Part]:
         """The fields of a tangent in the order of the form; a collective call."""
         return list(self._parts(equations))
@@ -86,8 +103,8 @@ class Operators:
         if equations.inertia is not None:
             mass = equations.inertia.slope * equations.inertia.mass
             parts.append(sp.diags(np.pad(mass, (0, self._assembly.layout.size - len(mass)))))
-        if equations.terms is not None:
-            stiffness = equations.terms.stiffness
+        stiffness = None if equations.terms is None else equations.terms.stiffness
+        if stiffness is not None:
             parts.append((stiffness + stiffness.T) / 2)
         known = [part for part in parts if part is not None]
         return sp.csr_matrix(sum(known[1:], known[0])) if known else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
@@ -72,6 +73,9 @@ class Terms:
 
     def __init__(self, terms: Sequence[Term], comm: Any) -> None:
         self._terms, self._sum = terms, Sum(self, comm)
+        #: Stiffness of each term when they were last added, and their sum.
+        self._stiffnesses: list[sp.csr_matrix] = [None] * len(terms)
+        self.stiffness: sp.csr_matrix | None = None
 
     @property
     def prescribed(self) -> float:
@@ -95,6 +99,21 @@ class Terms:
         for term in self.bordering:
             term.restart()
 
+    def shorten(self, share: float) -> None:
+        """Take a share of the last change of the unknowns of their own."""
+        for term in self.bordering:
+            term.shorten(share)
+
+    @property
+    def first_work(self) -> float:
+        """Work of the residuals of their own equations on the last change, at its beginning."""
+        return sum(term.first_work for term in self.bordering)
+
+    @property
+    def work(self) -> float:
+        """The same at the last forces."""
+        return sum(term.work for term in self.bordering)
+
     def forces(self, coefficients: Array) -> Array:
         """Their sum, as `Term.forces`."""
         #: Of all that are no contact.
@@ -109,7 +128,9 @@ class Terms:
 
     def add_tangent(self, tangent: Any, reduction: Reduction) -> Any:
         """A reduced tangent with their stiffness."""
-        self.stiffness = _added([term.stiffness() for term in self._terms])
+        parts = [term.stiffness() for term in self._terms]
+        if not all(map(operator.is_, parts, self._stiffnesses)):
+            self._stiffnesses, self.stiffness = parts, _added(parts)
         return self._sum.of(tangent, self.stiffness, reduction)
 
     @property

@@ -1,0 +1,61 @@
+"""Impulses of supports on patches, and the work of their forces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.sparse as sp
+
+from tawami.base.arrays import Array, Mask
+from tawami.scene.held_border import HeldBorder
+
+
+class Impulses:
+    """The nearest velocities that obey supports on patches, as `Reduction.imposed` for the others.
+
+    With the means C over patches, patches x coefficients, velocities change by M^-1 C^T p, where p are
+    the impulses. Fixed coefficients stay.
+
+    Args:
+        held: The supports; those of fields are ignored.
+        mass: Mass of each displacement coefficient [kg per metre depth].
+        fixed: Whether other supports prescribe each of them.
+    """
+
+    def __init__(self, held: Sequence[HeldBorder], mass: Array, fixed: Mask) -> None:
+        self._chosen = [k for k, one in enumerate(held) if not one.support.is_field]
+        if not self._chosen:
+            return
+        n = len(mass)
+        self._means = sp.vstack([held[k].means[:, :n] for k in self._chosen]).tocsr()
+        inverse = np.divide(1.0, mass, out=np.zeros(n), where=(mass > 0) & ~fixed)
+        self._weighted = (sp.diags(inverse) @ self._means.T).tocsr()
+        matrix = (self._means @ self._weighted).toarray()
+        self._inverse = np.linalg.pinv(matrix, rcond=len(matrix) * np.finfo(float).eps)
+
+    def imposed(self, rates: Sequence[Array], values: Array) -> Array:
+        """Velocities after the impulses.
+
+        Args:
+            rates: Rate of the mean of each patch of each support [m/s]; none if all are at rest.
+            values: Velocities, or other rates, of the displacement coefficients.
+        """
+        if not self._chosen:
+            return values
+        prescribed = np.concatenate([rates[k] for k in self._chosen]) if rates else 0.0
+        impulse = self._inverse @ (prescribed - self._means @ values)
+        return np.asarray(values + self._weighted @ impulse)
+
+    def work(self, forces: Array, u: Array) -> float:
+        """Work of the supports, given the forces out of balance without them.
+
+        Args:
+            forces: On the displacement coefficients [N per metre depth]; the part that the supports
+                cannot exert does no work.
+            u: Increments of the displacement coefficients [m].
+        """
+        if not self._chosen:
+            return 0.0
+        multipliers = self._inverse @ (self._weighted.T @ forces)
+        return float(multipliers @ (self._means @ u))
