@@ -78,6 +78,7 @@ def test_a_system_that_multigrid_cannot_solve():
             {"linear_solver": "cg"},
             "linear_solver = 'cg': expected one of 'auto', 'direct', 'multigrid'",
         ),
+        ({"linear_solver": "iterative"}, "it is called 'multigrid' now; expected one of"),
         ({"factorise": "never"}, "factorise = 'never': expected 'when_it_pays' or 'always'"),
         ({"tolerance": 0.5}, "tolerance = 0.5: expected a finite number"),
     ],

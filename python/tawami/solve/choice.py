@@ -76,6 +76,21 @@ class ChosenSolver(LinearSolver):
         self._stalled = self._stalls > 1
         return self
 
+    def begin(self) -> None:
+        """See `LinearSolver.begin`."""
+        self._multigrid.begin()
+
+    def method(self, unknowns: int) -> str:
+        """See `LinearSolver.method`."""
+        if not self._auto:
+            return self._multigrid.method(unknowns)
+        direct, multigrid = (solver.method(unknowns) for solver in self._solvers)
+        if self._unsuited:
+            return f"{direct} (auto: {self._unsuited})"
+        if unknowns < SMALL:
+            return f"{direct} (auto: {unknowns} unknowns, fewer than {SMALL})"
+        return f"{multigrid} while it costs less than a factorisation (auto: {unknowns} unknowns)"
+
     def record(self) -> None:
         """See `LinearSolver.record`."""
         for solver in self._solvers:
@@ -83,8 +98,7 @@ class ChosenSolver(LinearSolver):
         self._matrix = None
 
     def state(self) -> dict[str, Any] | None:
-        """See `LinearSolver.state`. The operators of multigrid are made again by the next solve."""
-        self._multigrid.forget()
+        """See `LinearSolver.state`. Multigrid has none, since each step makes its own operators."""
         if self._last is self._multigrid:
             return {"spent": self._spent, "stalls": self._stalls}
         return self._direct.state()

@@ -28,7 +28,7 @@ from petsc4py import PETSc
 from tawami.base.arrays import Array
 from tawami.base.errors import SingularError
 from tawami.base.timing import Stopwatch
-from tawami.solve import failures
+from tawami.solve import failures, memory
 from tawami.solve.linear_solver import LinearSolver
 from tawami.solve.operators import Part
 
@@ -88,6 +88,11 @@ class DirectSolver(LinearSolver):
         self._matrix, self._factorised, self._records = None, None, False
         self.condition, self.symmetric, self.iterations = 1.0, True, 0
         return self
+
+    def method(self, unknowns: int) -> str:
+        """See `LinearSolver.method`."""
+        when = "always" if self._always else "when it pays"
+        return f"direct (LDL^T of symmetric tangents), factorised {when}"
 
     def record(self) -> None:
         """Copy each matrix that is factorised from now on, for :meth:`state`.
@@ -221,6 +226,9 @@ class DirectSolver(LinearSolver):
 
     def _analyse_next(self, matrix: Any, room: int) -> None:
         """Make a factor that the next factorisation analyses."""
+        size = matrix.getSize()[0]
+        need = memory.of_factors(size, symmetric=self.symmetric)
+        memory.check(matrix.comm.tompi4py(), "a factorisation", size, need, failures.ADVICE)
         self._handles.free("factor", "pc", "ksp")
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)
         ksp = self._handles["ksp"] = PETSc.KSP().create(matrix.comm)

@@ -48,6 +48,13 @@ class LinearSolver:
         """The solver of the same scene in other cells; None if nothing can be kept for it."""
         return None
 
+    def begin(self) -> None:
+        """Begin a step."""
+
+    def method(self, unknowns: int) -> str:
+        """The method for a tangent of this number of unknowns, in words, and the reason for it."""
+        raise NotImplementedError
+
     def record(self) -> None:
         """Record the state for :meth:`state` from now on, independently of earlier solves."""
 

@@ -77,7 +77,7 @@ def forcing(history: History, tolerance: float, *, linear: bool = False) -> floa
     """
     now = worst(history[-1])
     if linear:
-        return min(0.5 * tolerance / now, 1e-3)
+        return min(0.3 * tolerance / now, 1e-3)
     rate = now / worst(history[-2]) if len(history) > 1 else 1.0
     return min(max(0.1 * rate**2, min(0.1 * tolerance / now, 1e-3)), 1e-3)
 

@@ -15,6 +15,8 @@ from tawami.base.errors import SolverError
 FACTORS, UNSYMMETRIC = 300.0, 1.6
 #: Bytes that multigrid needs for each entry of the tangent, without those of the tangent.
 OPERATORS = 13.0
+#: Memory that is not checked [bytes].
+LITTLE = 1e8
 
 
 def of_factors(unknowns: int, *, symmetric: bool) -> float:
@@ -54,6 +56,8 @@ def check(comm: Any, method: str, unknowns: int, need: float, advice: str) -> No
     Raises:
         SolverError: It does not.
     """
+    if need < LITTLE:
+        return
     free = available(comm)
     if need > free:
         fits = int(unknowns * free / need)

@@ -36,6 +36,8 @@ LIMIT, RESTART = 200, 100
 STEPS, RATIO = 7, 12.0
 #: Growth of the number of iterations from which the operators are made again.
 GROWTH, MORE = 1.5, 5
+#: Tolerance for a second right-hand side, relative to that of the first.
+AGAIN = 1e-4
 #: Tolerance of the solve for the random vector, by which a singular tangent is noticed.
 LOW_TOLERANCE = 0.1
 PREFIX = "tawami_multigrid_"
@@ -59,6 +61,7 @@ class MultigridSolver(LinearSolver):
         self.symmetric = False  # GMRES makes no use of it
         self._tested, self._matrix, self.first = False, None, 0
         self._grids: list[Handles] = []
+        self._records = False
 
     def forget(self) -> None:
         """See `LinearSolver.forget`."""
@@ -70,6 +73,20 @@ class MultigridSolver(LinearSolver):
     def successor(self) -> LinearSolver:
         """This solver: its operators serve as long as the matrix is used."""
         return self
+
+    def record(self) -> None:
+        """See `LinearSolver.record`: each step then makes its own operators."""
+        self._records = True
+        self.forget()
+
+    def begin(self) -> None:
+        """See `LinearSolver.begin`."""
+        if self._records:
+            self.forget()
+
+    def method(self, unknowns: int) -> str:
+        """See `LinearSolver.method`."""
+        return "multigrid (GMRES)"
 
     def solve(
         self,
@@ -110,6 +127,10 @@ class MultigridSolver(LinearSolver):
             raise
         self.first = self.first or self.iterations
         return np.asarray(self._scale * self._handles["x"].array)
+
+    def again(self, right: Array, tolerance: float) -> Array:
+        """See `LinearSolver.again`; more digits, because the equations of a border cancel."""
+        return super().again(right, AGAIN * tolerance)
 
     def _probe(self, matrix: Any) -> Array:
         begin, end = matrix.getOwnershipRange()

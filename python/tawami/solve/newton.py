@@ -116,6 +116,10 @@ class Newton:
         """Keep the objects of an earlier solver that do not depend on values of the problem."""
         self._solver = earlier._solver.successor() or self._solver
 
+    def method(self, unknowns: int) -> str:
+        """The linear solver for a number of unknowns in words, and the reason for it."""
+        return self._solver.method(unknowns)
+
     # -- checkpoints -------------------------------------------------------------
 
     def record(self) -> None:
@@ -187,6 +191,7 @@ class Newton:
         """
         clean_up(self._comm)
         self._stopwatch.start()
+        self._solver.begin()
         self._measures.begin(self.internal if inertia is None else None, values)
         equations = Equations(reduction, external, inertia, friction, path, terms)
         if terms is not None:

@@ -51,16 +51,18 @@ class Numerics:
             "factorise": Factorise,
             "linear_solver": SolverName,
         }
+        renamed = {"iterative": "it is called 'multigrid' now; "}
         for name, possible in choices.items():
-            checks.choice(name, getattr(self, name), get_args(possible))
+            value = getattr(self, name)
+            checks.choice(name, value, get_args(possible), renamed.get(str(value), ""))
 
-    def line(self, ranks: int) -> str:
-        """The settings in words, for the header of a run on so many ranks."""
-        solver: str = self.linear_solver
-        if solver == "direct":
-            solver += (
-                f" (LDL^T of symmetric tangents), factorised {self.factorise.replace('_', ' ')}"
-            )
+    def line(self, solver: str, ranks: int) -> str:
+        """The settings in words, for the header of a run.
+
+        Args:
+            solver: The linear solver in words.
+            ranks: Number of ranks.
+        """
         return (
             f"Newton to {self.tolerance:g} in at most {self.max_iterations} iterations, "
             f"{solver}, assembly {self.assembly}, "
