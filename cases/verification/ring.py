@@ -143,13 +143,13 @@ def large(
     law, form = tawami.neo_hookean(K=K, mu=MU), "u_epsv_finite"
     scene, x, volume = build(n, 2.75, shift, law, gauss, form=form, volumes=volumes)
     scene.pressure("inner", P_MU * MU)
-    centre = np.array(shift) / n
-    inner = np.linalg.norm(scene.border.x - centre, axis=1) < (A + B) / 2
     solutions: list[tawami.Solution] = []
     tawami.ramp(scene, 1 / steps, each=solutions.append, stop="raise")
     R = np.linalg.norm(x, axis=1)
     mean = solutions[-1].stress[:, :3].mean(axis=1)
-    a = float(np.linalg.norm(scene.border.x[inner] - centre, axis=1).mean())
+    radii = np.linalg.norm(scene.border.x - np.array(shift) / n, axis=1)
+    outside = np.sqrt(B**2 + (2 * A) ** 2 - A**2)
+    a = float(radii[radii < (2 * A + outside) / 2].mean())
     found = errors(mean, exact_mean(R), volume, P_MU * MU)
     return Ring(
         "large", n, "Gauss" if gauss else "even", volumes, shift[0],

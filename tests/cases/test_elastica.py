@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
+import tawami
 from cases.verification.elastica import mpm, strip
 
 
@@ -57,3 +59,43 @@ def test_the_error_grows_with_the_number_of_resets_of_the_grid(large):
 def test_without_a_ghost_penalty_a_static_beam_stops_where_particles_enter_empty_cells():
     run = mpm.solve(10.0, n=2, k=0.0)
     assert "of the load, with the smallest step" in run.stopped
+
+
+def test_the_tip_under_a_small_pressure_is_that_of_a_straight_beam():
+    """-1/8 of p L^3/(Ebar I), and x of second order."""
+    assert strip.pressed_tip(0.01) == pytest.approx([0.0, -0.01 / 8], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("n", "steps", "most"), [(2, 5, 1.8), pytest.param(4, 10, 0.7, marks=pytest.mark.slow)]
+)
+def test_a_strip_bends_under_a_pressure_that_follows_its_sides(n, steps, most):
+    """Half of it presses on the top and half pulls at the bottom, which leaves no moment."""
+    load, D, L = 6.0, strip.D, strip.SLENDER * strip.D
+    h, rows = D / n, int(np.ceil(1.4 * L * n / D * 0.65))
+    grid = tawami.Grid(
+        MPI.COMM_WORLD, origin=(0, -D / 2 - rows * h), h=h, cells=(round(L / h) + 1, n + rows + 2)
+    )
+    body = tawami.box(grid, (0, -D / 2), (L, D / 2), per_axis=3)
+    law = tawami.linear_elastic(E=strip.E, nu=0.3)
+    scene = tawami.Scene(grid, body, law, form="u_epsv_finite", alpha=0.01)
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    p = load * strip.E / (1 - 0.3**2) * D**3 / 12 / L**3
+    scene.pressure("top", p / 2)
+    scene.pressure("bottom", -p / 2)
+    accepted = tawami.ramp(scene, 1 / steps)
+    assert accepted[-1].end == 1.0
+    assert np.mean([step.iterations for step in accepted]) < 6
+    # particles on the axis, extrapolated from the last two columns to the tip
+    start = scene.particles.x - scene.particles.displacement
+    columns = np.unique(np.round(start[:, 0], 9))[-2:]
+    of_columns = np.array(
+        [scene.particles.displacement[np.abs(start[:, 0] - x) < 1e-8].mean(axis=0) for x in columns]
+    )
+    share = (L - columns[0]) / (columns[1] - columns[0])
+    tip = of_columns[0] + share * (of_columns[1] - of_columns[0])
+    softer = strip.pressed_tip(load / (1 - 1 / (3 * n) ** 2))
+    error = 100 * np.linalg.norm(tip / L - softer)
+    print(f"n = {n}: error of the tip {error:.2f} % of the length")
+    assert error < most

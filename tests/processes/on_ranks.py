@@ -332,6 +332,38 @@ def inverted() -> dict[str, np.ndarray]:
     }
 
 
+def contact() -> dict[str, np.ndarray]:
+    """A disc that is pressed into a bed over several ranks and dragged along it."""
+    grid = tawami.Grid(COMM, origin=(0, 0), h=0.25, cells=(9, 6))
+    bed = tawami.box(grid, (0, 0), (2, 1.03), per_axis=2)
+    law = tawami.linear_elastic(E=1e6, nu=0.3)
+    scene = tawami.Scene(grid, bed, law, form="u_epsv_finite", ghost_penalty="on", tolerance=1e-11)
+    for side, component in (("bottom", "x"), ("bottom", "y"), ("left", "x")):
+        scene.fix(side, component)
+    shape = tawami.rigid_disc((0.8, 1.63), 0.6)
+    disc = scene.obstacle(shape, 0.3, "top", displacement=(0.01, -0.06))
+    tawami.ramp(scene, 0.5)
+    solution = scene.solve()
+    now = solution.contact(disc)
+    return {"contact force": now.force, "contact u": solution.u, "contact pressure": now.pressure}
+
+
+def stretched() -> dict[str, np.ndarray]:
+    """A block that is pulled over several ranks under a dead load, with a border that is divided."""
+    grid = tawami.Grid(COMM, origin=(0, 0), h=0.25, cells=(10, 5))
+    block = tawami.box(grid, (0, 0), (1, 1.03), per_axis=4)
+    rubber = tawami.neo_hookean(E=1e3, nu=0.3)
+    scene = tawami.Scene(grid, block, rubber, form="u_finite", ghost_penalty="on", tolerance=1e-11)
+    scene.fix("left", "x")
+    scene.fix("bottom", "y")
+    scene.fix("right", "x", 1.0)
+    scene.traction("top", (0.0, -10.0))
+    before = len(scene.border.x)
+    tawami.ramp(scene, 0.25)
+    count = [before, len(scene.border.x)]
+    return {"stretched points": np.array(count), "stretched border": scene.border.x}
+
+
 def few_cells() -> dict[str, np.ndarray]:
     """Two cells, of which some ranks have none; a load that is a function of the whole edge."""
     grid = tawami.Grid(COMM, origin=(0, 0), h=1.0, cells=(2, 1))
@@ -362,7 +394,7 @@ def output(folder: Path) -> dict[str, np.ndarray]:
 def results(folder: Path) -> dict[str, Any]:
     """Results of all scenes; files are written to the folder."""
     found = beams() | random_clouds() | fields() | nonlinear() | singular() | motion() | initial()
-    found |= construction() | border()
+    found |= construction() | border() | contact() | stretched()
     return found | errors() | inverted() | few_cells() | output(folder)
 
 

@@ -48,7 +48,7 @@ def several(request, tmp_path_factory) -> Found:
 
 @pytest.mark.parametrize("subject", [
     "beam", "cloud", "fields", "nonlinear", "fem", "singular", "motion", "construction", "initial",
-    "inverted", "few", "border",
+    "inverted", "few", "border", "contact", "stretched",
 ])  # fmt: skip
 def test_results_do_not_depend_on_the_number_of_ranks(alone, several, subject):
     names = [name for name in alone.results if name.startswith(subject)]
@@ -67,6 +67,8 @@ def tolerance(name: str) -> float:
         return 1e-12
     if name == "inverted floor":
         return 1e-6
+    if name.startswith(("contact", "stretched")):
+        return 1e-9
     locking = any(f" {form} " in name for form in ("u", "u_bbar")) or name.startswith("fem_q")
     return 1e-9 if locking and "deflection" not in name else 1e-10
 
@@ -76,6 +78,8 @@ def test_the_scenes_are_what_they_are_meant_to_be(alone, several):
         assert results["beam exact u_epsv points deflection"] == pytest.approx(0.0111, rel=0.1)
         assert results["singular"]
         assert results["times inverted"] > 0
+        assert np.abs(results["contact force"]).min() > 0
+        assert np.greater(*results["stretched points"][::-1])
         for path in ("points", "dolfinx"):
             krylov = list(results[f"nonlinear {path} krylov"])
             assert len(krylov) > 4

@@ -177,3 +177,54 @@ def test_a_motion_on_patches_resumes_to_the_bit(tmp_path):
     with pytest.raises(Killed):
         run(tmp_path / "killed", kill)
     assert run(tmp_path / "killed", kill) == whole
+
+
+OVERLAPPING = {
+    "part after all": ["left", lambda x, y: (x < 0.3) & (y > 0.37) & (y < 1.31)],
+    "all after part": [lambda x, y: (x < 0.3) & (y > 0.37) & (y < 1.31), "left"],
+    "two parts": [lambda x, y: (x == 0.13) & (y < 1.07), lambda x, y: (x == 0.13) & (y > 0.41)],
+}
+
+
+def overlapping(first, second, values=(0.0, 0.0), form="u_epsv"):
+    """A block whose left side is between two lines of the grid, held there by two supports."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(8, 8))
+    block = tawami.box(grid, (0.13, 0), (1.75, 1.62), per_axis=3)
+    law = tawami.linear_elastic(E=1e6, nu=0.3)
+    scene = tawami.Scene(grid, block, law, form=form, ghost_penalty="on")
+    scene.fix("bottom", "y")
+    scene.fix(first, "x", values[0])
+    scene.fix(second, "x", values[1])
+    scene.traction("right", (1e4, 0.0))
+    return scene
+
+
+@pytest.mark.parametrize("form", ["u_epsv", "u_epsv_finite"])
+@pytest.mark.parametrize("case", OVERLAPPING)
+def test_supports_that_overlap_and_agree_act_as_one(case, form):
+    """The stretch is that of plane strain under the traction, and the reaction balances it."""
+    two = overlapping(*OVERLAPPING[case], form=form)
+    solution = two.solve()
+    assert solution.reaction("left")[0] == pytest.approx(-1e4 * 1.62, rel=1e-5)
+    exact = 1e4 * 1.619 * (1 - 0.3**2) / 1e6
+    tip = solution.displacement((1.749, 0.8))[0]
+    assert tip == pytest.approx(exact, rel=2e-2 if "finite" in form else 1e-3)
+    one = overlapping("left", "left", form=form).solve()
+    assert tip == pytest.approx(one.displacement((1.749, 0.8))[0], rel=1e-3)
+
+
+def test_supports_that_overlap_and_differ_raise():
+    part = lambda x, y: (x < 0.3) & (y > 0.37) & (y < 1.31)  # noqa: E731
+    with pytest.raises(tawami.SupportError, match="differ by 0.001 m where they meet"):
+        overlapping("left", part, (0.0, 1e-3)).solve()
+
+
+def test_supports_side_by_side_may_differ():
+    def above(x, y):
+        return (x == 0.13) & (y > 0.81)
+
+    def below(x, y):
+        return (x == 0.13) & (y <= 0.81)
+
+    solution = overlapping(above, below, (0.0, 1e-4)).solve()
+    assert solution.reaction("left")[0] == pytest.approx(-1e4 * 1.62, rel=1e-6)

@@ -76,6 +76,27 @@ def curve(load: float, s: Array) -> Array:
     return np.asarray(solve_ivp(change, (0.0, 1.0), root, t_eval=s, rtol=1e-10, atol=1e-12).y)
 
 
+def pressed_tip(load: float) -> Array:
+    """Displacement (x, y) of the tip under a pressure that follows the side, divided by the length.
+
+    The part of the line beyond s carries a pressure p per length, whose moment at s is p/2 times the
+    square of the distance rho of the tip: Ebar I theta' = p rho^2/2. In a frame that turns with the
+    tip this is integrated from the tip, where rho = 0, to the root.
+
+    Args:
+        load: p L^3/(Ebar I).
+    """
+
+    def change(_s: float, state: Array) -> Array:
+        x, y, angle = state  # of a point, seen from the tip, and of the line there
+        return np.array([-np.cos(angle), -np.sin(angle), -load * (x**2 + y**2) / 2])
+
+    x, y, angle = solve_ivp(change, (0.0, 1.0), np.zeros(3), rtol=1e-10, atol=1e-12).y[:, -1]
+    # back to the frame of the root, which points along x
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([-(c * x + s * y) - 1, c * y - s * x])
+
+
 def mean_stress(load: float, nu: float, L: float, x: Array) -> Array:
     """Mean stress (1 + nu)/3 Ebar theta' y [Pa] of the elastica.
 

@@ -29,7 +29,7 @@ TawamiWarning             base of warnings about results that should not be trus
   RotationWarning         a nearly incompressible body that turns too far in a step
   SmallStrainWarning      displacement gradients too large for a form of small strain
   SofteningWarning        a material that softens: results depend on the grid
-  SupportWarning          a support that holds nothing any more
+  SupportWarning          a support that holds nothing any more, an obstacle that enters the body
   TangentWarning          a law without a tangent, whose differences take time
 ========================= ========================================================================
 
@@ -64,7 +64,7 @@ class EnergyWarning(TawamiWarning):
 
 
 class SupportWarning(TawamiWarning):
-    """A support that holds nothing any more."""
+    """A support that holds nothing any more, or an obstacle that enters the body."""
 
 
 class GeometryWarning(TawamiWarning):

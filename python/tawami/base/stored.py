@@ -42,19 +42,44 @@ def numbers(what: str, given: Any, length: int, below: float = math.inf) -> Indi
     return raw.astype(np.int64)
 
 
-def some_of(what: str, given: Any, count: int) -> Indices:
+def some_of(what: str, given: Any, count: int, *, repeated: bool = False) -> Indices:
     """Numbers of those of `count` things that are left, in ascending order.
+
+    Args:
+        what: The numbers, for messages.
+        given: What the checkpoint holds.
+        count: Number of things.
+        repeated: Numbers may occur several times.
 
     Raises:
         CheckpointError: Anything else.
     """
     left = numbers(what, given, _array(given).size, count)
-    if (np.diff(left) <= 0).any():
+    if (np.diff(left) < (0 if repeated else 1)).any():
         raise CheckpointError(
             f"{what} in the checkpoint is not in ascending order: expected the numbers of a run of the "
             "same script"
         )
     return left
+
+
+def check_count(what: str, stored: int, made: int, advice: str) -> None:
+    """Check that a script has made as many things as the run had.
+
+    Args:
+        what: The things, for the message.
+        stored: Their number when the run was stored.
+        made: Their number now.
+        advice: What is expected.
+
+    Raises:
+        CheckpointError: The numbers differ.
+    """
+    if stored != made:
+        raise CheckpointError(
+            f"the run had {stored} {what} when it was stored, and the script made {made}: expected "
+            f"{advice}"
+        )
 
 
 def _array(given: Any) -> npt.NDArray[Any]:

@@ -45,6 +45,11 @@ def suggestion(name: object) -> str:
     return "" if name is None else f"; did you mean '{name}'?"
 
 
+def position(x: Iterable[float]) -> str:
+    """Coordinates in parentheses, as "(0.5, 1)"."""
+    return f"({', '.join(f'{c:g}' for c in x)})"
+
+
 def size(number: int) -> str:
     """A number of bytes."""
     return f"{number / 1e6:.3g} MB" if number >= 1e6 else f"{number / 1e3:.3g} kB"

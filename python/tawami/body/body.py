@@ -13,6 +13,7 @@ from tawami.base import checks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.space import PLANE, Counts, Position
+from tawami.base.text import position
 from tawami.border.pieces import Border
 
 #: Share of a cell by which two bodies may overlap in it.
@@ -151,11 +152,10 @@ def _check_apart(
     worst = int(np.argmax(excess))
     if excess[worst] > ROUNDING:
         place = origin + h * (np.array(np.unravel_index(worst, cells, order="F")) + 0.5)
-        where = ", ".join(f"{coordinate:g}" for coordinate in place)
         raise InputError(
             f"Body + Body: they overlap by at least {size * np.maximum(excess, 0.0).sum():.3g} m2, most "
-            f"in the cell at ({where}) m: expected bodies side by side; subtract one from the other, as "
-            "polygons of shapely or as functions of level_set"
+            f"in the cell at {position(place)} m: expected bodies side by side; subtract one from the "
+            "other, as polygons of shapely or as functions of level_set"
         )
 
 

@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from tawami.base.arrays import Array, Indices
+from tawami.base.arrays import Array, Indices, of_components
 from tawami.border.patches import Patches
 from tawami.border.rigid import Pose, generators
 from tawami.border.shapes import Distance, Shape
@@ -328,7 +328,7 @@ def _turned(local: Distance, rotation: Array) -> Distance:
 def _on_patches(patches: Patches, points: Indices, vectors: Array) -> sp.csr_matrix:
     """Vectors at some points as rows of their patches, patches x points dim."""
     num, dim = vectors.shape
-    columns = dim * points[:, None] + np.arange(dim)
+    columns = of_components(points, dim)
     rows = np.repeat(patches.number[points], dim)
     entries = (vectors[points].ravel(), (rows, columns.ravel()))
     return sp.csr_matrix(entries, shape=(patches.count, num * dim))
@@ -337,7 +337,7 @@ def _on_patches(patches: Patches, points: Indices, vectors: Array) -> sp.csr_mat
 def _block_diagonal(points: Indices, blocks: Array, shape: tuple[int, ...]) -> sp.csr_matrix:
     """Blocks of some points as a matrix on all components."""
     num, dim = shape
-    index = dim * points[:, None] + np.arange(dim)
+    index = of_components(points, dim)
     rows, columns = np.broadcast_arrays(index[:, :, None], index[:, None, :])
     entries = (blocks.ravel(), (rows.ravel(), columns.ravel()))
     return sp.csr_matrix(entries, shape=(num * dim, num * dim))

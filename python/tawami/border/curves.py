@@ -127,6 +127,11 @@ def turned(vector: Array, angle: Array) -> Array:
     return np.stack([c * x - s * y, s * x + c * y], axis=1)
 
 
+def left(along: Array) -> Array:
+    """Vectors, n x 2, turned to the left by a right angle."""
+    return np.stack([-along[:, 1], along[:, 0]], axis=1)
+
+
 def spread(count: Indices) -> tuple[Indices, Indices]:
     """The numbers 0 to count - 1 for each count: which count each belongs to, and the number."""
     of = np.repeat(np.arange(len(count)), count)

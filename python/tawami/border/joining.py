@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from tawami.base.arrays import Array, Indices
-from tawami.border.curves import Curves
+from tawami.border.curves import Curves, left
 
 
 def free(curves: Curves, tolerance: float) -> tuple[Indices, Array, Array]:
@@ -79,14 +79,13 @@ def _share(curves: Curves, of: Indices, x: Array) -> Array:
     chord = (curves.end - curves.start)[of]
     length, phi = curves.chord[of], curves.half_angle[of]
     along = chord / length[:, None]
-    left = np.stack([-along[:, 1], along[:, 0]], axis=1)
     offset = x - curves.start[of]
     straight = (offset * along).sum(axis=1) / length
     bent = phi != 0
     if not bent.any():
         return np.asarray(straight)
     radius = 1 / np.where(bent, curves.curvature[of], 1.0)
-    x, y = ((offset * axis).sum(axis=1) for axis in (along, left))
+    x, y = ((offset * axis).sum(axis=1) for axis in (along, left(along)))
     # From the centre the tangent's angle to the chord, (2 s - 1) phi, is that of (-y, x) / radius.
     sign = np.sign(radius)
     angle = np.arctan2(sign * (x - length / 2), sign * (radius * np.cos(phi) - y))

@@ -13,7 +13,7 @@ from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.checks import shown
 from tawami.base.errors import InputError
 from tawami.border import chains, joining, rule, splitting
-from tawami.border.curves import SAME, Curves
+from tawami.border.curves import SAME, Curves, left
 from tawami.border.points import BorderPoints
 from tawami.grid.grid import ON_LINE, Grid
 
@@ -82,7 +82,7 @@ class Border(Curves):
         return BorderPoints(
             np.where(np.abs(x - inside) < ON_LINE * grid.h, inside, x),
             share * length[of],
-            np.stack([along[:, 1], -along[:, 0]], axis=1),
+            -left(along),
             parts.tag[of],
             self.names,
             chain[of],

@@ -10,6 +10,17 @@ import numpy as np
 from tawami.base.arrays import Array, Indices
 
 
+def transformed(area: Array, f: Array) -> Array:
+    """Outward normals times areas after a deformation (Nanson: n dA = cof(f) n0 dA0).
+
+    Args:
+        area: The same before, points x dim.
+        f: Deformation gradient at each point, points x dim x dim.
+    """
+    inverse = np.linalg.inv(f)
+    return np.asarray(np.linalg.det(f)[:, None] * np.einsum("pji,pj->pi", inverse, area))
+
+
 @dataclass(frozen=True)
 class BorderPoints:
     """Points on a border, which integrate over it; they have no mass and no stress.

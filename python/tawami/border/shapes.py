@@ -14,6 +14,8 @@ from tawami.base.checks import LEAST, array, number, shown
 from tawami.base.errors import InputError
 from tawami.base.optional import optional
 from tawami.base.space import lattice
+from tawami.base.text import position
+from tawami.border.curves import left
 from tawami.border.polyline import unclosed
 
 
@@ -39,6 +41,10 @@ class Shape(Protocol):
     def centre(self) -> Array:
         """The point about which it rotates [m]."""
 
+    @property
+    def width(self) -> float:
+        """Width at its narrowest place [m]; infinite if it is not known."""
+
     def evaluate(self, x: Array) -> Distance:
         """Distance of points [m], points x dim."""
 
@@ -54,6 +60,7 @@ class HalfPlane:
 
     centre: Array
     normal: Array
+    width = np.inf
 
     def evaluate(self, x: Array) -> Distance:
         """Distance of points [m], points x dim."""
@@ -73,6 +80,11 @@ class Disc:
 
     centre: Array
     radius: float
+
+    @property
+    def width(self) -> float:
+        """Its diameter [m]."""
+        return 2 * self.radius
 
     def evaluate(self, x: Array) -> Distance:
         """Distance of points [m], points x dim."""
@@ -98,6 +110,13 @@ class Polygon:
         double = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
         return np.asarray(double @ (a + b) / (3 * double.sum()))
 
+    @property
+    def width(self) -> float:
+        """Shortest of its sides and of the distances of a corner from other sides, plus 2 radii [m]."""
+        import shapely
+
+        return float(shapely.minimum_clearance(shapely.Polygon(self.corners))) + 2 * self.radius
+
     def evaluate(self, x: Array) -> Distance:
         """Distance of points [m], points x 2; beyond a corner, from the corner."""
         side, corner, offset = self._nearest(x)
@@ -119,8 +138,7 @@ class Polygon:
     def _normals(self) -> Array:
         """Outward unit normals of the sides, sides x 2."""
         to = np.roll(self.corners, -1, axis=0) - self.corners
-        normals = np.column_stack([to[:, 1], -to[:, 0]])
-        return np.asarray(normals / np.linalg.norm(to, axis=1)[:, None])
+        return np.asarray(-left(to) / np.linalg.norm(to, axis=1)[:, None])
 
     def _nearest(self, x: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_], Array]:
         """The nearest side of each point, whether an end of it is nearest, and the way from there."""
@@ -146,6 +164,7 @@ class Function:
     f: Callable[..., npt.ArrayLike]
     step: float
     centre: Array
+    width = np.inf
 
     def evaluate(self, x: Array) -> Distance:
         """Distance of points [m], points x dim.
@@ -194,10 +213,9 @@ class Function:
             )
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
-            at = ", ".join(f"{c:g}" for c in points[bad[0]])
             raise InputError(
-                f"the obstacle's distance is {values[bad[0]]} at ({at}) m: expected a finite number "
-                "everywhere"
+                f"the obstacle's distance is {values[bad[0]]} at {position(points[bad[0]])} m: "
+                "expected a finite number everywhere"
             )
         return values
 
@@ -212,10 +230,10 @@ class Function:
     def _check_slope(self, x: Array, size: Array) -> None:
         bad = np.flatnonzero(np.abs(size - 1) > 0.05)
         if len(bad):
-            at = ", ".join(f"{c:g}" for c in x[bad[0]])
             raise InputError(
-                f"the obstacle's distance has a gradient of length {size[bad[0]]:.3g} at ({at}) m: "
-                "expected a signed distance [m], whose gradient has the length 1, positive outside"
+                f"the obstacle's distance has a gradient of length {size[bad[0]]:.3g} at "
+                f"{position(x[bad[0]])} m: expected a signed distance [m], whose gradient has the "
+                "length 1, positive outside"
             )
 
 

@@ -18,8 +18,8 @@ import scipy.sparse as sp
 from tawami.base.arrays import Array, Indices
 from tawami.base.checks import choice
 from tawami.base.space import Space
+from tawami.border.curves import left
 from tawami.border.patches import Patches
-from tawami.border.rigid import generators
 
 #: Names of directions that follow the border.
 NORMAL, TANGENT = "normal", "tangent"
@@ -36,8 +36,7 @@ def directions(space: Space, components: Sequence[str], normals: Array) -> Array
     Raises:
         InputError: Another name.
     """
-    (turn,) = generators(space.dim)  # in the plane; a surface in space has two tangents
-    along = {NORMAL: normals, TANGENT: normals @ turn.T}
+    along = {NORMAL: normals, TANGENT: left(normals)}  # a surface in space has two tangents
     known = (*space.axes, *along)
     vectors = [
         along[name]

@@ -7,6 +7,8 @@ for linear fields, so that no force and no moment of a load is lost.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -14,6 +16,7 @@ from tawami import _rust
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import SupportError
 from tawami.base.space import lattice
+from tawami.base.text import position
 from tawami.grid.basis import Basis
 from tawami.grid.grid import Grid
 
@@ -55,6 +58,15 @@ class PointsInCells:
         """The functions of a basis at the points, points x functions."""
         numbers, values, _ = self.tabulated(basis)
         return self._matrix(basis, numbers, values)
+
+    def sums(self, basis: Basis, values: Array) -> Array:
+        """Sums over all points of the functions of a basis times values, functions x columns.
+
+        Args:
+            basis: The basis.
+            values: Values at the points, points x columns.
+        """
+        return _rust.nodal_sums(self.location, np.ones(len(self)), values, basis)
 
     def slopes(self, basis: Basis) -> list[sp.csr_matrix]:
         """Their derivatives along each axis [1/m], points x functions."""
@@ -118,11 +130,16 @@ class BorderInCells(PointsInCells):
 
 def _far_from_particles(grid: Grid, x: Array, lost: Mask, where: str) -> SupportError:
     """The error for points without particles near them."""
-    place = ", ".join(f"{c:g}" for c in x[lost][0])
     return SupportError(
         f"{where}: {lost.sum()} of {len(x)} points of the border are more than {REACH} cells from any "
-        f"particle, the first at ({place}) m: expected the border of the body's particles"
+        f"particle, the first at {position(x[lost][0])} m: expected the border of the body's particles"
     )
+
+
+@lru_cache
+def _around(dim: int) -> Indices:
+    """Steps to the cells in which one with particles is sought, cells x dim."""
+    return lattice([np.arange(-REACH, REACH + 1)] * dim)
 
 
 def _nearest(grid: Grid, active: Mask, scaled: Array) -> tuple[Indices, Mask]:
@@ -136,8 +153,7 @@ def _nearest(grid: Grid, active: Mask, scaled: Array) -> tuple[Indices, Mask]:
     most = np.array(grid.cells) - 1
     dim = grid.space.dim
     base = np.clip(np.floor(scaled), 0, most).astype(np.int64)
-    steps = lattice([np.arange(-REACH, REACH + 1)] * dim)
-    near = base[:, None] + steps
+    near = base[:, None] + _around(dim)
     inside = ((near >= 0) & (near <= most)).all(axis=2)
     held = inside & active[grid.cell_numbers(np.clip(near, 0, most))]
     outside = np.maximum(np.maximum(near - scaled[:, None], scaled[:, None] - near - 1), 0.0)

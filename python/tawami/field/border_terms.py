@@ -14,7 +14,7 @@ from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import InputError
-from tawami.base.text import meant, quoted
+from tawami.base.text import meant, position, quoted
 from tawami.border.points import BorderPoints
 from tawami.field.attachment import Attachment
 from tawami.field.border import BorderInCells
@@ -110,10 +110,9 @@ class BorderTerms:
             found[mine] = self._of_particles(name, mine)
         bad = np.flatnonzero(mine & ~np.isfinite(found))
         if len(bad) and not (name == "K" and self._form.kinematics.deviatoric):
-            place = ", ".join(f"{c:g}" for c in points.x[bad[0]])
             raise InputError(
-                f"form {self._form.name}: '{name}' is {found[bad[0]]:g} at the point ({place}) m of the "
-                "border: expected a finite number"
+                f"form {self._form.name}: '{name}' is {found[bad[0]]:g} at the point "
+                f"{position(points.x[bad[0]])} m of the border: expected a finite number"
             )
         return found
 

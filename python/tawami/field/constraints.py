@@ -14,6 +14,7 @@ from tawami import _rust
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import SupportError
 from tawami.base.space import Position, lattice, tensor_product
+from tawami.base.text import position
 from tawami.field.layout import Place
 from tawami.grid.basis import Basis, functions_on, values_1d
 from tawami.grid.edges import Profile, edge_functions, evaluate, locate_point
@@ -83,7 +84,7 @@ def held_edge(
         value: Value along the edge [m], or in the unit of the field.
         where: The support, for messages.
     """
-    axis, end = grid.edge(edge)
+    axis, _ = grid.edge(edge)
     along = 1 - axis
     used = functions_on(place.basis, grid.cells[along], touched)
     functions = edge_functions(grid, place.basis, edge)[used]
@@ -93,7 +94,7 @@ def held_edge(
     points, weights = _rust.gauss(POINTS)
     cell, t = np.repeat(touched, POINTS), np.tile(points, len(touched))
     position = grid.axis_positions(along, cell, t)
-    fixed = np.full_like(position, grid.upper[axis] if end else grid.origin[axis])
+    fixed = np.full_like(position, grid.line_of_edge(edge))
     x = np.stack([fixed, position] if axis == 0 else [position, fixed], axis=-1)
     values = values_1d(place.basis, grid.cells[along], cell, t)[:, used]
     weighted = sp.diags(np.tile(weights, len(touched))) @ values
@@ -129,7 +130,7 @@ def held_point(
         InputError: The point is outside the grid.
         SupportError: The body does not reach the point.
     """
-    where = f"hold(point=({', '.join(f'{x:g}' for x in point)}))"
+    where = f"hold(point={position(point)})"
     location = locate_point(grid, point, where)
     cell = np.unravel_index(int(location.cell[0]), grid.cells, order="F")
     xi = location.xi[0]

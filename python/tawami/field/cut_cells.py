@@ -27,8 +27,7 @@ def full_cells(grid: Grid, location: _rust.Location, volume: Array) -> Mask:
         location: Cells and positions of this rank's particles.
         volume: Their volumes [m2 per metre depth], in axisymmetry [m3].
     """
-    x = grid.in_metres(grid.cell_indices(location.cell.astype(np.int64)) + location.xi)
-    area = volume / grid.space.thickness(x)
+    area = volume / grid.space.thickness(grid.positions(location))
     sums = _rust.cell_sums(location, area, np.ones((len(area), 1)))
     held = ranks.sum_of(grid.comm, np.ascontiguousarray(sums))
     full: Mask = held >= (1 - ON_LINE) * grid.space.measure(grid.h)

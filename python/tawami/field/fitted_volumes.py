@@ -77,8 +77,7 @@ def corrections(
     scale = sp.diags(1 / (grid.h * thickness))
     divergence = [sp.diags(volume) @ slope for slope in particles.slopes(basis)]
     if grid.space.hoop:
-        cell = grid.cell_indices(particles.location.cell.astype(np.int64))
-        radius = grid.in_metres(cell + particles.location.xi)[:, 0]
+        radius = grid.positions(particles.location)[:, 0]
         divergence[0] = divergence[0] + sp.diags(volume / radius) @ particles.values(basis)
     rows = sp.hstack([one @ scale for one in divergence]).T.tocsr()  # A
 

@@ -12,7 +12,8 @@ from collections.abc import Callable
 import numpy as np
 import scipy.sparse as sp
 
-from tawami.base.arrays import Array
+from tawami.base.arrays import Array, of_components
+from tawami.border.points import transformed
 from tawami.field.border import BorderInCells
 from tawami.field.layout import Layout
 
@@ -54,9 +55,8 @@ class FollowerPressure:
         u = self._space.vectors(coefficients[: self._layout.num_displacement])[numbers]
         f = np.einsum("pfi,pfj->pij", u, gradients) + np.eye(self._space.dim)
         inverse = np.linalg.inv(f).transpose(0, 2, 1)
-        area = np.linalg.det(f)[:, None] * np.einsum("pij,pj->pi", inverse, self._area)
         moved = self._x + np.einsum("pf,pfi->pi", values, u)
-        return inverse, area, self._space.thickness(moved)
+        return inverse, transformed(self._area, f), self._space.thickness(moved)
 
     def forces(self, coefficients: Array) -> Array:
         """See `Term`."""
@@ -65,7 +65,7 @@ class FollowerPressure:
         on_points = -(self._pressure * self._thickness)[:, None] * self._now
         forces = np.zeros_like(coefficients)
         parts = values[:, :, None] * on_points[:, None]
-        places = self._space.dim * numbers[:, :, None] + np.arange(self._space.dim)
+        places = of_components(numbers, self._space.dim)
         np.add.at(forces, places, parts)
         return forces
 
@@ -78,8 +78,8 @@ class FollowerPressure:
         if self._space.hoop:
             by_u[:, :, 0] += 2 * np.pi * self._now[:, :, None] * values[:, None]
         local = np.einsum("p,pf,pijg->pfigj", self._pressure, values, by_u)
-        dim, size = self._space.dim, self._layout.size
-        of = (dim * numbers[:, :, None] + np.arange(dim)).reshape(len(numbers), -1)
+        size = self._layout.size
+        of = of_components(numbers, self._space.dim).reshape(len(numbers), -1)
         width = of.shape[1]
         rows, columns = np.repeat(of, width, axis=1), np.tile(of, width)
         entries = (local.ravel(), (rows.ravel(), columns.ravel()))

@@ -13,6 +13,7 @@ from tawami.base import checks
 from tawami.base.arrays import Array, Indices
 from tawami.base.errors import InputError
 from tawami.base.space import Counts
+from tawami.base.text import position
 from tawami.grid.basis import Basis
 from tawami.grid.grid import Edge, Grid
 
@@ -45,8 +46,7 @@ def evaluate(profile: Profile, points: Array, what: str) -> Array:
     if len(bad):
         first = bad[0]
         raise InputError(
-            f"{what}: {values[first]} at ({', '.join(f'{c:g}' for c in points[first])}): expected a "
-            "finite number"
+            f"{what}: {values[first]} at {position(points[first])}: expected a finite number"
         )
     return values
 

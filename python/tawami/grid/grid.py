@@ -17,7 +17,7 @@ from tawami.base.checks import choice, number, one_of, pair, point, room, shown,
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
 from tawami.base.space import SPACES, Counts, Position
-from tawami.base.text import meant
+from tawami.base.text import meant, position
 from tawami.fem import mesh
 
 Edge = Literal["left", "right", "bottom", "top"]
@@ -112,9 +112,9 @@ class Grid(Unique):
     def line(self) -> str:
         """The grid in words, for the header of a run."""
         cells = " x ".join(map(str, self.cells))
-        corners = (", ".join(f"{x:g}" for x in corner) for corner in (self.origin, self.upper))
         about = ", axisymmetric about x = 0" if self.space.hoop else ""
-        return f"{cells} cells of {self.h:g} m from ({next(corners)}) to ({next(corners)}){about}"
+        corners = f"from {position(self.origin)} to {position(self.upper)}"
+        return f"{cells} cells of {self.h:g} m {corners}{about}"
 
     def __repr__(self) -> str:
         cells = " x ".join(map(str, self.cells))
@@ -167,6 +167,25 @@ class Grid(Unique):
             )
         return EDGES.index(name) // 2, -(EDGES.index(name) % 2)
 
+    def line_of_edge(self, name: Edge) -> float:
+        """Coordinate [m] of an edge of the grid along its normal axis.
+
+        Raises:
+            InputError: No such edge.
+        """
+        axis, end = self.edge(name)
+        return self.upper[axis] if end else self.origin[axis]
+
+    def inwards(self, name: Edge, x: Array) -> Array:
+        """Distances [m] of positions from an edge of the grid, positive inside, points x dim.
+
+        Raises:
+            InputError: No such edge.
+        """
+        axis, end = self.edge(name)
+        distance = x[:, axis] - self.line_of_edge(name)
+        return -distance if end else distance
+
     def axis_positions(self, axis: int, cell: Any, t: Any) -> Array:
         """Coordinates [m] along an axis of positions `t` (0 to 1) in cells."""
         return np.asarray(self.origin[axis] + self.h * (np.asarray(cell) + np.asarray(t)))
@@ -191,6 +210,10 @@ class Grid(Unique):
     def in_metres(self, x: Array) -> Array:
         """Positions in cells from the origin, of shape (..., dim), in metres."""
         return self.origin + self.h * x
+
+    def positions(self, location: _rust.Location) -> Array:
+        """Positions [m] of points in cells, points x dim."""
+        return self.in_metres(self.cell_indices(location.cell.astype(np.int64)) + location.xi)
 
     def cell_at(self, x: Array) -> Indices:
         """Indices (i, j) of the cells that hold positions in cells, points x dim."""

@@ -118,9 +118,10 @@ class Action:
 
     def __init__(self, owner: Owner[Any], value: Any, factor: Factor) -> None:
         self._owner, self._made, self.released = owner, 0, False
+        values = self._checked(value)
         self.number = owner.next_number()
         self.terms: list[Term] = []
-        self._begin(self._checked(value), factor)
+        self._begin(values, factor)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self}{', released' if self.released else ''})"

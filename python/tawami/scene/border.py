@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -14,12 +14,13 @@ from tawami.base import checks, stored
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import CheckpointError, InputError
 from tawami.base.text import meant, quoted
+from tawami.border.curves import left
 from tawami.border.pieces import Border
 from tawami.border.points import BorderPoints
 from tawami.grid.grid import EDGES, ON_LINE, Edge, Grid
 from tawami.scene.domain import Domain
 from tawami.scene.model import Model
-from tawami.scene.moving_points import MovingPoints, moved
+from tawami.scene.moving_points import MovingPoints, halve, moved
 
 #: Gauss points on a piece of the border between two lines of the grid: where particles stay, three are
 #: exact; points that move to other places in their cells need five (noise of a pressure .5 and .14 %).
@@ -39,6 +40,18 @@ Part = (
 )
 
 
+class User(Protocol):
+    """One that has numbers at points of the border."""
+
+    def keep(self, kept: Mapping[MovingPoints, Indices]) -> None:
+        """Keep the numbers of points.
+
+        Args:
+            kept: For each part of the border the place that each point had before; several may be parts
+                of one.
+        """
+
+
 class SceneBorder:
     """The border of the body of a scene.
 
@@ -49,6 +62,7 @@ class SceneBorder:
     Attributes:
         points: All points; None for a body without a border.
         parts: Points that actions own.
+        users: Those that have numbers at the points.
     """
 
     def __init__(self, model: Model, particles: _rust.Particles) -> None:
@@ -61,6 +75,7 @@ class SceneBorder:
         self._left: Indices = np.zeros(0, dtype=np.int64)
         self._has_moved = False
         self.parts: list[MovingPoints] = []
+        self.users: list[User] = []
         border = model.border
         if border is not None:
             area = particles.volume / model.space.thickness(particles.x)
@@ -94,7 +109,8 @@ class SceneBorder:
         return f"SceneBorder({len(self.points)} points, {length:.6g} m: {', '.join(self.names)})"
 
     def part(self, what: str, where: Part, *, joined: bool = False) -> MovingPoints:
-        """Points of a part of the border, which are exact for this part at its present place.
+        """Points of a part of the border, which are exact for this part at its present place. Its owner
+        adds them to `parts`.
 
         Args:
             what: The call, for messages.
@@ -123,9 +139,7 @@ class SceneBorder:
                 f"{what}: no point of the border is in this part: expected some of it; the border has "
                 f"{quoted(self.names)}"
             )
-        made = MovingPoints(points, self._grid, what)
-        self.parts.append(made)
-        return made
+        return MovingPoints(points, self._grid, what)
 
     def _pieces(self, what: str, where: Part) -> Border:
         """The pieces of a part."""
@@ -145,10 +159,8 @@ class SceneBorder:
         if name in border.names:
             return np.asarray(border.tag == border.names.index(name))
         if name in EDGES:
-            axis, end = self._grid.edge(name)
-            line = self._grid.upper[axis] if end else self._grid.origin[axis]
-            ends = np.stack([border.start[:, axis], border.end[:, axis]])
-            along = (np.abs(ends - line) <= ON_LINE * self._grid.h).all(axis=0)
+            ends = [self._grid.inwards(name, x) for x in (border.start, border.end)]
+            along = (np.abs(ends) <= ON_LINE * self._grid.h).all(axis=0)
             mask: Mask = along & (border.curvature == 0)
             if mask.any():
                 return mask
@@ -189,22 +201,24 @@ class SceneBorder:
         found: dict[Edge, Mask] = {}
         assert self.points is not None
         for edge in EDGES:
-            length, mask = (
-                (float(points.length[points.edge(edge)].sum()) for points in (self.points, part)),
-                part.edge(edge),
-            )
-            all_of_it, covered = length
-            if covered > 0 and abs(covered - all_of_it) <= ON_LINE * self._grid.h:
+            mask = part.edge(edge)
+            covered = part.length[mask].sum()
+            whole = self.points.length[self.points.edge(edge)].sum()
+            if covered > 0 and abs(covered - whole) <= ON_LINE * self._grid.h:
                 found[edge] = mask
         return found
 
-    def keep(self, before: Domain, after: Domain) -> dict[MovingPoints, Mask]:
-        """Drop points where particles were removed.
+    def divide(self) -> None:
+        """Divide points and pieces where the border has been stretched."""
+        if self._ends is not None:
+            self._left = self._left[halve(self._ends, self._grid.h)]
+        kept = {points: points.divide() for points in self.all if points is not self._ends}
+        for user in self.users:
+            user.keep(kept)
 
-        Returns:
-            For each of the parts the mask of the points that remain.
-        """
-        kept = {points: points.remains(before, after) for points in self.all if len(points)}
+    def keep(self, before: Domain, after: Domain) -> None:
+        """Drop points where particles were removed."""
+        masks = {points: points.remains(before, after) for points in self.all if len(points)}
         if self.points is not None:
             assert self._pieces_at_lines is not None
             pieces = self._present if self._has_moved else self._pieces_at_lines[self._left]
@@ -212,10 +226,12 @@ class SceneBorder:
             left = middle.remains(before, after)
             self._left = self._left[left]
             if self._ends is not None:
-                kept[self._ends] = np.tile(left, 2)
-        for points, mask in kept.items():
-            points.keep(mask)
-        return kept
+                masks[self._ends] = np.tile(left, 2)
+        kept = {points: np.flatnonzero(mask) for points, mask in masks.items()}
+        for points, numbers in kept.items():
+            points.keep(numbers)
+        for user in self.users:
+            user.keep(kept)
 
     def moved(self, domain: Domain, u: Array) -> list[tuple[Array, Array]]:
         """Positions and areas of all points after a step, for :meth:`move`."""
@@ -240,14 +256,12 @@ class SceneBorder:
         Raises:
             CheckpointError: Other parts of the border.
         """
-        if len(state["points"]) != len(self.all):
-            raise CheckpointError(
-                f"the run had {len(state['points'])} parts of the border when it was stored, and the "
-                f"script made {len(self.all)}: expected the same loads and supports, made between two "
-                "phases"
-            )
+        stored.check_count(
+            "parts of the border", len(state["points"]), len(self.all),
+            "the same loads and supports, made between two phases",
+        )  # fmt: skip
         count = 0 if self._pieces_at_lines is None else len(self._pieces_at_lines.start)
-        left = stored.some_of("pieces of the border", state["left"], count)
+        left = stored.some_of("pieces of the border", state["left"], count, repeated=True)
         for points, given in zip(self.all, state["points"], strict=True):
             points.restore(given)
         if self._ends is not None and len(self._ends) != 2 * len(left):
@@ -274,9 +288,8 @@ def check_fits(grid: Grid, points: BorderPoints, x: Array, area: Array) -> None:
     axis = 1 if grid.space.hoop else 0  # the axis of rotation closes the border
     if np.abs(flux.sum(axis=0)[axis:]).max() > CLOSED * points.length.sum():
         return
-    middle = points.x.mean(
-        axis=0
-    )  # positions relative to it: round-off far from the origin cancels
+    # positions relative to the middle: round-off far from the origin cancels
+    middle = points.x.mean(axis=0)
     middle[:axis] = 0.0
     enclosed = ((points.x - middle) * flux).sum() / grid.space.dim
     centroid = ((points.x - middle) ** 2 * flux).sum(axis=0) / 2 / enclosed
@@ -325,7 +338,6 @@ def _ends(border: Border) -> BorderPoints:
 
 def _as_points(border: Border, x: Array, along: Array, of: Indices) -> BorderPoints:
     """Points of pieces, without lengths and chains; `along` are directions and `of` the pieces."""
-    normal = np.stack([along[:, 1], -along[:, 0]], axis=1)
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    normal = -left(along) / np.linalg.norm(along, axis=1)[:, None]
     one, number = np.ones(len(x)), np.zeros(len(x), dtype=np.int64)
     return BorderPoints(x, one, normal, border.tag[of], border.names, number, 0 * one)

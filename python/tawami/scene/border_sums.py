@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tawami.base.arrays import Array, Mask
+from tawami.base.arrays import Array, Indices
 from tawami.grid.edges import evaluate
 from tawami.scene.border import SceneBorder
 from tawami.scene.domain import Domain
@@ -45,11 +45,11 @@ class BorderSums(Mapping[str, Array]):
         points = None if self._points is None else self._points.now
         domain.assembly.set_border(points, domain.responses.values, self)
 
-    def keep(self, kept: Mapping[MovingPoints, Mask]) -> None:
-        """Keep the numbers of the points that remain after particles were removed."""
+    def keep(self, kept: Mapping[MovingPoints, Indices]) -> None:
+        """Keep the numbers of the points that remain, or of their parts; see `SceneBorder`."""
         if self._points is not None:
-            mask = kept[self._points]
-            self._given = {name: values[mask] for name, values in self._given.items()}
+            of = kept[self._points]
+            self._given = {name: values[of] for name, values in self._given.items()}
 
     def set(self, name: str, source: Any, what: str) -> None:
         """Take data or a parameter of the position at the points; others are those of the particles.

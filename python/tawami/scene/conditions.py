@@ -190,7 +190,9 @@ class Conditions:
                 f"a role: {quoted(known) or 'it has none'}"
             )
         points = now.border.part(f"flux({given})", where)
-        return now.loads.add_flux(points, given, field, value, amplitude)
+        flux = now.loads.add_flux(points, given, field, value, amplitude)
+        now.border.parts.append(points)
+        return flux
 
     def release(self, place: Edge | Sequence[float], component: str | None = None) -> None:
         """Remove supports that `fix`, `hold` or `wall` made, as their `release()` does.
@@ -246,7 +248,9 @@ class Conditions:
     ) -> Load:
         now, given = self.configuration, label(where)
         points = now.border.part(f"{kind.call}({given})", where)
-        return now.loads.add_on_border(kind, points, given, value, amplitude)
+        load = now.loads.add_on_border(kind, points, given, value, amplitude)
+        now.border.parts.append(points)
+        return load
 
     def load(
         self,

@@ -95,12 +95,12 @@ class Configuration:
         self.supports = Supports(model.grid, model.basis, own, self.border, self.activity)
         self.obstacles = Obstacles(self.border, self.activity)
         self.loads = Loads(model.grid, np.array(particles.volume), self.activity)
+        self.border.users += [self.supports, self.obstacles, self.border_sums]
         self.total = np.zeros(self.domain.layout.size)
         self.inputs = FormInputs(model, self.activity.time, self.border_sums)
         self.inputs.begin(model, self.domain)
         self.left, self.removed = list[tuple[int, tuple[float, float], float]](), np.zeros(2)
-        self.begun = self._coverage_checked = False
-        self.projected = 0.0
+        self.begun, self._coverage_checked, self.projected = False, False, 0.0
         self._travel, self._limits = mean_stress.Travel(), StrainLimits(small=not model.moves)
 
     def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
@@ -258,19 +258,18 @@ class Configuration:
     def _store(self, accepted: Accepted, moved: Moved | None, time: float) -> Outcome:
         """Store a step that the laws have committed, and move the particles."""
         self.begun = True
-        coefficients = accepted.step.coefficients
+        grid, coefficients = self.model.grid, accepted.step.coefficients
         if moved is None:
             coefficients = self.total = self.total + coefficients
             return self._outcome(accepted, coefficients)
-        grid = self.model.grid
         self.supports.follow(accepted.u, accepted.problem.reduction.points)
         projects = self._travel.must_project(self.domain, moved.particles)
         self.domain.particles.move_to(moved.particles)
         with left_edges.taken_over(self.domain, self.supports.all, accepted.forces):
             self.border.move(moved.border)
-        outcome = self._outcome(accepted, coefficients)
-        outside = placement.outside(grid, self.domain.particles.x)
-        particles, gone = placement.removed(grid, self.domain.particles, outside)
+        outcome, particles = self._outcome(accepted, coefficients), self.domain.particles
+        self.border.divide()
+        particles, gone = placement.removed(grid, particles, placement.outside(grid, particles.x))
         self.left += [(number, x, time) for number, x in gone]
         self._attach(*placement.migrated(grid, particles))
         with self.stopwatch("commit"):
@@ -280,6 +279,7 @@ class Configuration:
         return outcome
 
     def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:
+        self.obstacles.warn(self.domain, coefficients)
         arrays = quantities.of_body(self.model.grid.comm, self.domain.particles)
         return Outcome(accepted, coefficients, Reactions.of(accepted, self.supports), arrays)
 

@@ -6,16 +6,17 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from tawami.base.arrays import Array
+from tawami.base.arrays import Array, Mask
 from tawami.base.errors import SupportError, SupportWarning
 from tawami.base.warn import warn
 from tawami.field.constraints import Held, PointHeld
 from tawami.field.reduction import Reduction
 from tawami.scene import step_values
 from tawami.scene.action import Term
+from tawami.scene.agreement import others_hold
 from tawami.scene.contact import ActiveSet
 from tawami.scene.domain import Domain
-from tawami.scene.held_border import HeldBorder, check_agreement
+from tawami.scene.held_border import HeldBorder
 from tawami.scene.moving_points import MovingPoints
 from tawami.scene.support import Support
 from tawami.scene.supports import Supports
@@ -66,8 +67,10 @@ def constraints(
                 of = step_values.on_edge(domain, support, edge, cells, amount)
             held.append(of)
         if isinstance(support.place, MovingPoints) and support.weak.any():
-            border.append(_on_patches(domain, support, amount, start, fields))
-    check_agreement(border, supports.grid.h)
+            given = fields.amount if support.is_field and fields else amount
+            mine = support.weak & ~others_hold(support, border, given)
+            if mine.any():
+                border.append(_on_patches(domain, support, amount, start, fields, mine))
     fixed = np.zeros(layout.size, dtype=bool)
     for one in held:
         fixed[one.indices] = True
@@ -110,18 +113,19 @@ def _on_patches(
     amount: Callable[[Term], float],
     start: Array,
     fields: step_values.Fields | None,
+    chosen: Mask,
 ) -> HeldBorder:
     """A support on points of the border, held by tractions on patches."""
     if not support.is_field:
-        return HeldBorder(domain, support, step_values.at_points(support, amount), start)
+        return HeldBorder(domain, support, step_values.at_points(support, amount), start, chosen)
     assert isinstance(support.place, MovingPoints)
     place = domain.layout.fields[str(support.component)]
     values = support.place.cells(domain).values(place.basis)
     now = values @ start[place.slice]
     if fields is None:
-        return HeldBorder(domain, support, now, start)
+        return HeldBorder(domain, support, now, start, chosen)
     missing = step_values.at_points(support, fields.amount) - values @ fields.old[place.slice]
-    return HeldBorder(domain, support, now + fields.share * missing, start)
+    return HeldBorder(domain, support, now + fields.share * missing, start, chosen)
 
 
 def num_free(supports: Supports, domain: Domain) -> int:

@@ -155,10 +155,7 @@ def _replace(now: Configuration, after: Domain) -> None:
     now.inputs.repeat(before, now.moment(), gravity)
     forces = now.loads.at_start(before, first) - before.newton.internal(zero)
     if after.particles is not before.particles:
-        kept = now.border.keep(before, after)
-        now.supports.keep(kept)
-        now.obstacles.keep(kept)
-        now.border_sums.keep(kept)
+        now.border.keep(before, after)
     now.border_sums.attach(after)
     after.assembly.attachment.start = before.assembly.attachment.start
     now.inputs.repeat(after, now.moment(), gravity)

@@ -6,15 +6,13 @@ serve for all laws, forms and strain measures, and each pass leaves about a hund
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
 import scipy.sparse as sp
 
-from tawami.base.arrays import Array, of_components
-from tawami.base.errors import SupportError
+from tawami.base.arrays import Array, Mask, of_components
 from tawami.border.patches import patches
 from tawami.border.tied import Tied, means
 from tawami.field.constraints import PointHeld
@@ -32,8 +30,6 @@ SLOW, STIFFER, STIFFEST = 0.3, 10.0, 1e4
 ALIKE = 1e-6
 #: Displacement that is round-off [cells].
 ROUND_OFF_OF_GRID = 1e-13
-#: Distance of points that are the same [cells], and difference of values that is round-off.
-SAME, ROUND_OFF = 1e-6, 1e-9
 
 
 class HeldBorder:
@@ -45,14 +41,22 @@ class HeldBorder:
         values: Prescribed values at its points at the end of the step, counted as `before`: all of
             those at small strain, the increments where particles move.
         before: Coefficients at the start, which the values include.
+        chosen: Mask of the points that it holds; by default all that it holds by tractions.
     """
 
     smooth, implicit = True, False
 
-    def __init__(self, domain: Domain, support: Support, values: Array, before: Array) -> None:
+    def __init__(
+        self,
+        domain: Domain,
+        support: Support,
+        values: Array,
+        before: Array,
+        chosen: Mask | None = None,
+    ) -> None:
         assert isinstance(support.place, MovingPoints)
         self._support, self._domain = support, domain
-        self._weak = weak = np.flatnonzero(support.weak)
+        self._weak = weak = np.flatnonzero(support.weak if chosen is None else chosen)
         place, fields, h = support.place, domain.layout.fields, domain.model.grid.h
         field = fields[str(support.component)] if support.is_field else next(iter(fields.values()))
         cells = place.cells(domain)
@@ -87,6 +91,12 @@ class HeldBorder:
         """Positions of its points [m], points x dim."""
         assert isinstance(self._support.place, MovingPoints)
         return np.asarray(self._support.place.x[self._weak])
+
+    @property
+    def length(self) -> Array:
+        """Length of the border at each of its points [m]."""
+        assert isinstance(self._support.place, MovingPoints)
+        return np.asarray(self._support.place.length[self._weak])
 
     @property
     def support(self) -> Support:
@@ -194,30 +204,3 @@ class HeldBorder:
             )
             for mine, x in zip(parts, self.x[first], strict=True)
         ]
-
-
-def check_agreement(held: Sequence[HeldBorder], h: float) -> None:
-    """Check that supports do not prescribe different values of one component of one place.
-
-    Args:
-        held: The supports.
-        h: Side of a cell [m].
-
-    Raises:
-        SupportError: Two of them do.
-    """
-    pairs = combinations(held, 2)
-    alike = [(a, b) for a, b in pairs if a.support.component == b.support.component]
-    if alike:
-        from scipy.spatial import KDTree  # takes long to import
-    for one, other in alike:
-        distance, at = KDTree(one.x).query(other.x, distance_upper_bound=SAME * h)
-        both = np.flatnonzero(np.isfinite(distance))
-        change = np.abs(one.values[at[both]] - other.values[both])
-        size = max(one.prescribed, other.prescribed)
-        if change.max(initial=0.0) > ROUND_OFF * size:
-            raise SupportError(
-                f"{one.support} and {other.support} prescribe values of '{one.support.axis}' that "
-                f"differ by {change.max():.3g} {one.support.unit} where they meet: expected supports "
-                "that agree; change or release one"
-            )

@@ -115,9 +115,8 @@ class Traction(OnBorder):
 
     def on(self, domain: Domain, term: Term) -> Array:
         """Forces of the whole traction, functions x dim [N per metre depth]."""
-        functions = self.points.cells(domain).values(domain.layout.basis)
         forces = self.points.reference[:, None] * self.at_points(term)
-        return np.asarray(functions.T @ forces)
+        return self.points.cells(domain).sums(domain.layout.basis, forces)
 
 
 class Pressure(OnBorder):
@@ -135,10 +134,9 @@ class Pressure(OnBorder):
 
     def on(self, domain: Domain, term: Term) -> Array:
         """Forces of the whole pressure where the border is, functions x dim [N per metre depth]."""
-        functions = self.points.cells(domain).values(domain.layout.basis)
         thickness = self.points.space.thickness(self.points.x)
-        pressure = self.at_points(term)[:, 0] * thickness
-        return np.asarray(functions.T @ (-pressure[:, None] * self.points.area))
+        forces = -self.at_points(term) * thickness[:, None] * self.points.area
+        return self.points.cells(domain).sums(domain.layout.basis, forces)
 
 
 class Flux(OnBorder):
@@ -173,9 +171,8 @@ class Flux(OnBorder):
     def on(self, domain: Domain, term: Term) -> tuple[slice, Array]:
         """Coefficients of the field, and the integrals of the whole flux times their functions."""
         place = domain.layout.fields[self.field]
-        functions = self.points.cells(domain).values(place.basis)
-        flux = self.points.weight * self.at_points(term)[:, 0]
-        return place.slice, np.asarray(functions.T @ flux)
+        flux = self.points.weight[:, None] * self.at_points(term)
+        return place.slice, self.points.cells(domain).sums(place.basis, flux)[:, 0]
 
     def __str__(self) -> str:
         return f"{super().__str__()} of {self.field}"

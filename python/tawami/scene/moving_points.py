@@ -10,16 +10,24 @@ import numpy as np
 
 from tawami import _rust
 from tawami.base import stored
-from tawami.base.arrays import Array, Mask
+from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.space import Space
-from tawami.border.points import BorderPoints
+from tawami.border.curves import spread
+from tawami.border.points import BorderPoints, transformed
 from tawami.field.border import BorderInCells
 from tawami.grid.grid import ON_LINE, Edge, Grid
 from tawami.scene.domain import Domain
 
+#: Length of the border at a point beyond which it is divided [cells]. Gauss points of pieces as long as
+#: a cell begin with 0.28 at most, so that this takes a stretch of 1.4.
+LONGEST = 0.4
+
 
 class MovingPoints:
     """Points of a border that move with the body.
+
+    Where the body stretches, :meth:`divide` replaces points by several. Sums of areas, of weights of
+    dead loads, and of their moments stay.
 
     Args:
         points: The points at the start.
@@ -32,11 +40,12 @@ class MovingPoints:
         area: Outward normals times lengths in the plane of the grid [m], points x dim.
         reference: Weights when they were made [m2 per metre depth], which dead loads refer to.
         first: The points when they were made.
-        number: Number among these of each point that is left.
+        number: Number among these of each point, or of the one that it is a part of.
+        made: The points as they were when they were made, with parts of those that were divided.
     """
 
     def __init__(self, points: BorderPoints, grid: Grid, what: str = "border") -> None:
-        self.first, self._grid, self.what = points, grid, what
+        self.first, self.made, self._grid, self.what = points, points, grid, what
         self.number = np.arange(len(points))
         self.x = np.array(points.x)
         self.area = points.length[:, None] * points.normal
@@ -45,11 +54,6 @@ class MovingPoints:
 
     def __len__(self) -> int:
         return len(self.x)
-
-    @property
-    def made(self) -> BorderPoints:
-        """The points that are left as they were when they were made."""
-        return self.first[self.number]
 
     @property
     def space(self) -> Space:
@@ -100,27 +104,56 @@ class MovingPoints:
             edge: Name of the edge.
             tolerance: Distance that is ignored [cells].
         """
-        axis, end = self._grid.edge(edge)
-        inside = (
-            self._grid.upper[axis] - self.x[:, axis]
-            if end
-            else self.x[:, axis] - self._grid.origin[axis]
-        )
-        return np.asarray(inside <= tolerance * self._grid.h)
+        return np.asarray(self._grid.inwards(edge, self.x) <= tolerance * self._grid.h)
 
     def remains(self, before: Domain, after: Domain) -> Mask:
         """Mask of the points whose cells still hold particles after some were removed."""
         return np.asarray(after.active.ravel()[self.cells(before).location.cell])
 
-    def keep(self, kept: Mask) -> None:
-        """Keep some of the points."""
+    def keep(self, kept: Indices) -> None:
+        """Keep some of the points, given by their places in the arrays."""
         self.x, self.area, self.reference = self.x[kept], self.area[kept], self.reference[kept]
-        self.number, self._located = self.number[kept], None
+        self.number, self.made, self._located = self.number[kept], self.made[kept], None
+
+    def divide(self) -> Indices:
+        """Divide points on longer stretches of the border than `LONGEST` into equal parts.
+
+        The parts lie side by side along the tangent, around the point.
+
+        Returns:
+            The point that each one is now, or is a part of.
+        """
+        length, longest = self.length, LONGEST * self._grid.h
+        count = np.ceil(length / longest * (1 - 1e-9)).astype(np.int64)
+        of, place = spread(np.maximum(count, 1))
+        if len(of) == len(self):
+            return of
+        count = count[of]
+        share = np.where(count > 1, (place + 0.5) / count - 0.5, 0.0) * self._reach[of]
+        x = self.x[of] + share[:, None] * _along(self.area)[of]
+        made = self.made
+        start = made.x[of] + share[:, None] * _along(made.length[:, None] * made.normal)[of]
+        self.keep(of)
+        self.x, self.area, self.reference = x, self.area / count[:, None], self.reference / count
+        self.made = replace(
+            self.made, x=start, length=self.made.length / count,
+            along=self.made.along + share * made.length[of],
+        )  # fmt: skip
+        return of
+
+    @property
+    def _reach(self) -> Array:
+        """Share of the stretch around each point that does not cross an axis of rotation."""
+        if not self.space.hoop:
+            return np.ones(len(self))
+        half, radius = np.abs(self.area[:, 1]) / 2, np.maximum(self.x[:, 0], 0.0)
+        return np.divide(radius, half, out=np.ones_like(half), where=half > radius)
 
     def state(self) -> dict[str, Any]:
         """Positions and areas, for a checkpoint."""
         return {
-            "x": self.x, "area": self.area, "reference": self.reference, "number": self.number
+            "x": self.x, "area": self.area, "reference": self.reference, "number": self.number,
+            "start": self.made.x, "length": self.made.length, "along": self.made.along,
         }  # fmt: skip
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -130,18 +163,51 @@ class MovingPoints:
             CheckpointError: It was made with other points.
         """
         what, n = f"{self.what}: points of the border", len(self.first)
-        number = stored.some_of(what, state["number"], n)
+        number = stored.some_of(what, state["number"], n, repeated=True)
         shape = (len(number), self.space.dim)
-        x, area = (stored.values(f"{what}: {name}", state[name], shape) for name in ("x", "area"))
-        reference = stored.values(f"{what}: reference", state["reference"], shape[:1])
+        x, area, start = (
+            stored.values(f"{what}: {name}", state[name], shape) for name in ("x", "area", "start")
+        )
+        reference, length, along = (
+            stored.values(f"{what}: {name}", state[name], shape[:1])
+            for name in ("reference", "length", "along")
+        )
         self.x, self.area, self.reference, self.number = x, area, reference, number
+        self.made = replace(self.first[number], x=start, length=length, along=along)
         self._located = None
+
+
+def _along(area: Array) -> Array:
+    """Stretches of the border that areas stand for, in the direction of the way around the body."""
+    return np.stack([-area[:, 1], area[:, 0]], axis=1)
+
+
+def halve(ends: MovingPoints, longest: float) -> Indices:
+    """Divide straight pieces that are longer than a length [m] in the middle.
+
+    Args:
+        ends: Where they start, then where they end.
+        longest: The length.
+
+    Returns:
+        The piece that each one is now, or is a half of.
+    """
+    start, end = np.split(ends.x, 2)
+    count = 1 + (np.linalg.norm(end - start, axis=1) > longest)
+    of, place = spread(count)
+    if len(of) > len(count):
+        half, middle = count[of] == 2, ((start + end) / 2)[of]
+        first = np.where((half & (place == 1))[:, None], middle, start[of])
+        last = np.where((half & (place == 0))[:, None], middle, end[of])
+        ends.keep(np.concatenate([of, of + len(start)]))
+        ends.x = np.concatenate([first, last])
+    return of
 
 
 def moved(
     all_points: Sequence[MovingPoints], domain: Domain, u: Array
 ) -> list[tuple[Array, Array]]:
-    """Positions and areas of points after a step (Nanson: n dA = cof(F) n0 dA0).
+    """Positions and areas of points after a step.
 
     Points without particles near them, as after a body broke, stay where they are; loads and supports
     on them raise an error.
@@ -163,9 +229,8 @@ def moved(
     flat = np.ascontiguousarray(u).ravel()
     gradient = space.in_space(space.gradients(_rust.gradients(location, basis, flat)))
     f = gradient + np.eye(space.dim)
-    cofactor = np.linalg.det(f)[:, None, None] * np.linalg.inv(f).transpose(0, 2, 1)
     x, area = x.copy(), area.copy()
     x[near] += _rust.interpolate(location, basis, space.dim, flat)[near]
-    area[near] = np.einsum("nij,nj->ni", cofactor[near], area[near])
+    area[near] = transformed(area[near], f[near])
     ends = np.cumsum([len(p) for p in all_points])[:-1]
     return list(zip(np.split(x, ends), np.split(area, ends), strict=True))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from tawami.base.arrays import Array, Indices, Mask
+from tawami.base.arrays import Array, Indices, Mask, of_components
 from tawami.border.patches import Patches, patches
 from tawami.border.rigid import Pose
 from tawami.border.shapes import Shape
@@ -96,7 +96,7 @@ class BorderNear:
         self.points = np.flatnonzero(self.chosen[number])
         new_number = np.cumsum(self.chosen) - 1
         self.patches = Patches(new_number[number[self.points]], int(self.chosen.sum()))
-        rows = self._dim * self.points[:, None] + np.arange(self._dim)
+        rows = of_components(self.points, self._dim)
         self.at_points = self._at_all[rows.ravel()]
         incidence = self.patches.incidence
         together = (incidence.T @ incidence).astype(float)

@@ -219,9 +219,10 @@ class Obstacle(Action):
     def state(self) -> dict[str, Any]:
         """Pose, velocity, pressures, and the share of its values that it has."""
         return super().state() | {
-            "pose": self.pose.coordinates, "rates": list(self.rates), "pressure": self.pressure,
-            "groups": [] if self.groups is None else self.groups.number,
-            "traction": self.traction, "friction": self.friction, "changes": self._changes,
+            "pose": np.array(self.pose.coordinates), "rates": [*map(np.array, self.rates)],
+            "pressure": np.array(self.pressure), "traction": np.array(self.traction),
+            "groups": [] if self.groups is None else np.array(self.groups.number),
+            "friction": self.friction, "changes": self._changes,
             "speeds": [[speed.rates(0.0, 0.0)[0]] if rests(speed) or not speed.is_function else []
                        for speed in self._speeds],
         }  # fmt: skip

@@ -8,17 +8,17 @@ the penalty alone: below 5e-6 h times the largest pressure over mu.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from tawami.base.arrays import Array, Mask
-from tawami.base.errors import SupportError
+from tawami.base.errors import SingularError, SupportError
 from tawami.border.contact import OPEN, Contact, ContactForces, Multipliers
 from tawami.border.rigid import Pose
 from tawami.field.constraints import PointHeld
 from tawami.scene.contact_result import ContactResult
+from tawami.scene.contact_states import ContactStates
 from tawami.scene.domain import Domain
 from tawami.scene.near_border import BorderNear
 from tawami.scene.obstacle import Obstacle
@@ -30,8 +30,6 @@ from tawami.solve.bordered import Blocks
 SETTLED, ROUND_OFF = 1e-3, 1e-9
 #: Distance of patches that are evaluated from the start of a step on [cells].
 REACH = 1.0
-#: Evaluations in which friction may turn round only after a patch was taken as sticking.
-RETURNS = 10
 #: Distance at which a patch touches at the start of a static step, and at which the nearest patch does
 #: if no other touches [cells].
 TOUCHING, ALMOST = 1e-6, 0.1
@@ -112,8 +110,7 @@ class ObstacleContact:
     def restart(self) -> None:
         """See `Term`."""
         self.motion.restart()
-        self._linearised: ContactForces | None = None  # those of the last tangent
-        self._returns = 0
+        self._states = ContactStates()
 
     def forces(self, coefficients: Array) -> Array:
         """See `Term`: in dynamics with the factors of both ends of the step."""
@@ -123,7 +120,7 @@ class ObstacleContact:
             self._choose(reached)
         x = x[self._border.points]
         self.now: ContactForces = self._contact.evaluate(
-            x, pose, self._held, sticking=self._sticking
+            x, pose, self._held, sticking=self._states.sticking(len(x))
         )
         self._pulls = self._is_loose and bool(self._held.pressure.any())
         if self._pulls:  # otherwise nothing would bring it back
@@ -138,14 +135,6 @@ class ObstacleContact:
         is_held = self.motion.times is not None or not self.motion.free.any()
         return not is_held and bool((self.now.state == OPEN).all())
 
-    @property
-    def _sticking(self) -> bool | ContactForces:
-        """Patches to take as sticking, see `Contact.evaluate`."""
-        last = self._linearised
-        if last is None or self._returns >= RETURNS:
-            return last is None
-        return last if len(last.x) == len(self._border.points) else False
-
     def _forces_at_start(self) -> tuple[Array, Array]:
         """Forces at the start of the step: on all coefficients, and on the obstacle."""
         pose, x = self.motion.start, self._border.x[self._border.points]
@@ -157,16 +146,8 @@ class ObstacleContact:
         return self._border.on_all(on_points), -pose.resultant(x, on_points)
 
     def stiffness(self) -> sp.csr_matrix:
-        """See `Term`. Its entries are in the same places as long as no patch comes near.
-
-        While patches open and close, border points may be far from their places on the obstacle, whose
-        bends at the wrong places lead Newton's method astray.
-        """
-        last = self._linearised
-        if last is not None:
-            self._returns += self.now.exceeded
-        settled = last is not None and np.array_equal(last.state > OPEN, self.now.state > OPEN)
-        self.now = self._linearised = replace(self.now, bends=settled)
+        """See `Term`. Its entries are in the same places as long as no patch comes near."""
+        self.now = self._states.linearised(self.now)
         return self._border.on_coefficients(-self.motion.factor * self.now.derivative)
 
     def improve(self) -> bool:
@@ -300,7 +281,8 @@ class ObstacleContact:
             matrix: Stiffness of its free motions, with that of the body.
 
         Raises:
-            SupportError: One is free, as the obstacle does not touch the body.
+            SupportError: One is free, as the obstacle does not touch the body, or slides.
+            SingularError: The body gives way to it after the first iteration.
         """
         if self.motion.times is not None:
             return
@@ -315,10 +297,13 @@ class ObstacleContact:
         if sizes[-1] > UNHELD:
             return
         weakest = motions[int(np.argmax(np.abs(directions[-1])))]
-        state = "does not touch the body" if (self.now.state == OPEN).all() else "slides freely"
+        motion, away = self.obstacle.motions[weakest], bool((self.now.state == OPEN).all())
+        if not away and self._states.tangents > 1:
+            raise SingularError(f"{self.obstacle}: the body gives way to its motion '{motion}'")
+        state = "does not touch the body" if away else "slides freely"
         raise SupportError(
-            f"{self.obstacle}: nothing holds its motion '{self.obstacle.motions[weakest]}', as it "
-            f"{state}: expected an obstacle in contact, or free=... without this motion"
+            f"{self.obstacle}: nothing holds its motion '{motion}', as it {state}: expected an obstacle "
+            "in contact, or free=... without this motion"
         )
 
     @property

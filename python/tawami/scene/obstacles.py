@@ -8,14 +8,16 @@ from typing import Any
 import numpy as np
 
 from tawami.base import checks
-from tawami.base.arrays import Array, Mask
+from tawami.base.arrays import Array, Indices
 from tawami.base.errors import InputError
-from tawami.base.text import listed
-from tawami.border.shapes import Function
+from tawami.base.text import listed, position
+from tawami.border.patches import Patches
+from tawami.border.shapes import Function, Shape
 from tawami.scene import obstacle_inputs as inputs
 from tawami.scene.action import Owner, restored
 from tawami.scene.activity import Activity
 from tawami.scene.border import Part, SceneBorder, label
+from tawami.scene.depth import warn_of_deep, warn_of_small
 from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor, InTime
 from tawami.scene.moving_points import MovingPoints
@@ -39,7 +41,7 @@ class Obstacles(Owner[Obstacle]):
 
     def __init__(self, border: SceneBorder, activity: Activity) -> None:
         super().__init__(activity)
-        self._border = border
+        self._border, self._deep = border, set[Obstacle]()
 
     def add(
         self,
@@ -84,16 +86,14 @@ class Obstacles(Owner[Obstacle]):
         factor = Factor(what, amplitude, time=self.activity.time)
         speeds = inputs.speeds_of(what, velocity, space, self.activity.time)
         inputs.check_motions(what, space, speeds, moves, np.array(by), np.array(forces))
+        _check_place(what, made, part, domain, total)
+        warn_of_small(what, made, h)
         obstacle = Obstacle(
             self, part, given, name, made, mu, moves, masses, np.where(moves, forces, by), factor,
             speeds,
         )  # fmt: skip
-        try:
-            _check_place(obstacle, domain, total)
-        except InputError:
-            self._border.parts.remove(part)
-            raise
         self.all.append(obstacle)
+        self._border.parts.append(part)
         self.changed()
         return obstacle
 
@@ -139,17 +139,33 @@ class Obstacles(Owner[Obstacle]):
             found.append(contact)
         return found
 
-    def keep(self, kept: Mapping[MovingPoints, Mask]) -> None:
-        """Keep the points of the border that remain after particles were removed."""
+    def keep(self, kept: Mapping[MovingPoints, Indices]) -> None:
+        """Keep the points of the border that remain, or their parts; see `SceneBorder`."""
         for obstacle in self.all:
-            mask = kept[obstacle.place]
-            obstacle.pressure, obstacle.traction = obstacle.pressure[mask], obstacle.traction[mask]
-            obstacle.groups = None
+            of, groups = kept[obstacle.place], obstacle.groups
+            obstacle.pressure, obstacle.traction = obstacle.pressure[of], obstacle.traction[of]
+            if groups is not None:
+                whole = len(np.unique(of)) == len(groups.number)
+                obstacle.groups = Patches(groups.number[of], groups.count) if whole else None
 
     def apply(self, now: Moment) -> None:
         """The body is in equilibrium with the obstacles at this moment."""
         for obstacle in self.all:
             obstacle.apply(now)
+
+    def warn(self, domain: Domain, coefficients: Array) -> None:
+        """Warn, once for each obstacle, of particles deep inside it after a step; a call for all ranks.
+
+        Args:
+            domain: The particles.
+            coefficients: Of all fields since the start, where particles do not move.
+        """
+        model, n, border = domain.model, domain.layout.num_displacement, self._border.points
+        if border is None:
+            return
+        u = None if model.moves else model.space.vectors(coefficients[:n])
+        new = [obstacle for obstacle in self.all if obstacle not in self._deep]
+        self._deep.update(one for one in new if warn_of_deep(one, domain, border, u))
 
     @property
     def kinetic(self) -> float:
@@ -179,22 +195,23 @@ class Obstacles(Owner[Obstacle]):
         self.changed()
 
 
-def _check_place(obstacle: Obstacle, domain: Domain, total: Array) -> None:
+def _check_place(
+    what: str, shape: Shape, place: MovingPoints, domain: Domain, total: Array
+) -> None:
     """Check that an obstacle does not overlap the body, and that its distance is one.
 
     Raises:
         InputError: It does, or a function that gives it is no distance at the border.
     """
-    place, layout, h = obstacle.place, domain.layout, domain.model.grid.h
+    layout, h = domain.layout, domain.model.grid.h
     u = domain.model.space.vectors(total[: layout.num_displacement])
     x = place.x + place.cells(domain).values(layout.basis) @ u
-    if isinstance(obstacle.shape, Function):
-        obstacle.shape.check(x)
-    distance = obstacle.shape.evaluate(x).distance
+    if isinstance(shape, Function):
+        shape.check(x)
+    distance = shape.evaluate(x).distance
     worst = int(np.argmin(distance))
     if distance[worst] < -OVERLAP * h:
-        at = ", ".join(f"{c:g}" for c in x[worst])
         raise InputError(
-            f"{obstacle}: the body is {-distance[worst]:.3g} m inside it at ({at}) m: expected an "
-            f"obstacle that overlaps the body by at most h/10 = {OVERLAP * h:.3g} m"
+            f"{what}: the body is {-distance[worst]:.3g} m inside it at {position(x[worst])} m: "
+            f"expected an obstacle that overlaps the body by at most h/10 = {OVERLAP * h:.3g} m"
         )

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tawami.base.arrays import Array
+from tawami.border.curves import left
 from tawami.field.border import BorderInCells
 from tawami.scene.domain import Domain
 from tawami.scene.moving_points import MovingPoints
@@ -80,5 +81,4 @@ class Outline:
 
 def _sides(x: Array, area: Array) -> Array:
     """Straight sides through points, across their normals, points x 2 x dim."""
-    along = np.stack([-area[:, 1], area[:, 0]], axis=1)
-    return np.asarray(x[:, None] + ENDS[:, None] * along[:, None])
+    return np.asarray(x[:, None] + ENDS[:, None] * left(area)[:, None])

@@ -61,8 +61,6 @@ def reach(domain: Domain, edge: Edge) -> float:
     size.
     """
     grid, particles = domain.model.grid, domain.particles
-    axis, end = grid.edge(edge)
-    x, size = particles.x[:, axis], np.sqrt(domain.areas)
-    away = (grid.upper[axis] - x if end else x - grid.origin[axis]) - 0.75 * size
+    away = grid.inwards(edge, particles.x) - 0.75 * np.sqrt(domain.areas)
     nearest = -ranks.largest(grid.comm, -float(away.min(initial=np.inf)))
     return max(nearest, 0.0)

@@ -19,6 +19,7 @@ from tawami.base import units
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.space import PLANE
+from tawami.base.text import position
 
 Numbers = npt.NDArray[Any]
 Outside = Literal["stop", "nearest"]
@@ -204,7 +205,7 @@ class Scattered:
         if len(beyond) and self.outside == "stop":
             p = beyond[0]
             raise InputError(
-                f"{what}: particle {number[p]} at ({', '.join(f'{c:g}' for c in x[p])}) m and "
+                f"{what}: particle {number[p]} at {position(x[p])} m and "
                 f"{len(beyond) - 1} others are outside the points of {self.name}: expected points "
                 "around the body, or outside='nearest'"
             )

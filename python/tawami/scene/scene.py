@@ -369,7 +369,9 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         return StaticStep(self.configuration, self.configuration.moment()).problem().reduction
 
     def residual(self, coefficients: Array, *, dt: float | None = None) -> Array:
-        """The form's integrals over particles and cells, for every test function, before supports.
+        """The form's integrals over particles, cells and border, for every test function.
+
+        Loads, supports and obstacles are not included, nor their forces on the border.
 
         Args:
             coefficients: Increments of all fields one after the other, in the order of the form; each
@@ -384,7 +386,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         return self.configuration.domain.newton.internal(self._coefficients(coefficients))
 
     def tangent(self, coefficients: Array, *, dt: float | None = None) -> sp.csr_matrix:
-        """Derivative of :meth:`residual` as the form's tangent gives it, before supports."""
+        """Derivative of :meth:`residual` as the form's tangent gives it, without loads and supports."""
         self.configuration.activity.check_between_steps("tangent(...)")
         self.configuration.prepare(self.configuration.moment(), dt)
         coefficients, domain = self._coefficients(coefficients), self.configuration.domain

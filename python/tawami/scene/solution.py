@@ -88,9 +88,9 @@ class Solution(Elsewhere, Sealed, Unique):
         particles = outcome.particles
         now = scene.configuration
         #: The border of the body; None if it has none.
-        self.outline = None
+        self._outline = None
         if now.border.points is not None:
-            self.outline = Outline(now.border.points, now.domain, self.u)
+            self._outline = Outline(now.border.points, now.domain, self.u)
         #: Arrays of the particles by name, for quantities.
         self.arrays = Arrays(self._array)
         self.number = particles["number"]
@@ -240,7 +240,7 @@ class Solution(Elsewhere, Sealed, Unique):
         """
         return presentation.plot(
             self.arrays, self._model.grid, quantity, axes, moved=self._model.moves, deformed=deformed,
-            limits=limits, more=quantities.of_scene(self.scene), outline=self.outline,
+            limits=limits, more=quantities.of_scene(self.scene), outline=self._outline,
         )  # fmt: skip
 
     def to_pandas(self, *names: Given) -> Any:

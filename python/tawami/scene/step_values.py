@@ -91,10 +91,11 @@ def on_edge(
     return Held(indices, values, support.line)
 
 
-def at_points(support: Support, amount: Callable[[Term], float]) -> Array:
-    """Values at the points of a part of the border."""
-    assert isinstance(support.place, MovingPoints)
-    x = support.place.x
+def at_points(support: Support, amount: Callable[[Term], float], x: Array | None = None) -> Array:
+    """Values at the points of a part of the border, or at other positions."""
+    if x is None:
+        assert isinstance(support.place, MovingPoints)
+        x = support.place.x
     parts = (amount(term) * evaluate(term.values[0], x, f"{support}") for term in support.terms)
     return sum(parts, np.zeros(len(x)))
 

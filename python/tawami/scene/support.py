@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tawami.base import checks, stored
-from tawami.base.arrays import Array, Mask
+from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import InputError
 from tawami.border.tied import NORMAL, TANGENT, directions
 from tawami.grid.edges import Profile
@@ -136,8 +136,8 @@ class Support(Action):
             mask &= ~self.whole[edge]
         return mask
 
-    def keep(self, kept: Mask) -> None:
-        """Keep some of its points of the border; those of removed particles are lost."""
+    def keep(self, kept: Indices) -> None:
+        """Keep some of its points of the border; those of removed particles are lost, others divided."""
         self.held, self.missing = self.held[kept], self.missing[kept]
 
     def _checked(self, value: Any) -> tuple[Profile, ...]:
@@ -206,7 +206,8 @@ class Support(Action):
     def state(self) -> dict[str, Any]:
         """Position of a point, multipliers, and the share of its values that the body carries."""
         place = self.place if isinstance(self.place, tuple) else ()
-        return super().state() | {"place": place, "held": self.held, "missing": self.missing}
+        held, missing = np.array(self.held), np.array(self.missing)
+        return super().state() | {"place": place, "held": held, "missing": missing}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`state`.

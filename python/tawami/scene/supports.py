@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tawami.base import checks
-from tawami.base.arrays import Array, Mask
-from tawami.base.errors import CheckpointError, InputError, SupportError
+from tawami.base import checks, stored
+from tawami.base.arrays import Array, Indices, Mask
+from tawami.base.errors import InputError, SupportError
 from tawami.base.text import listed, quoted
 from tawami.field.constraints import PointHeld
 from tawami.form.fields import Field
@@ -148,6 +148,8 @@ class Supports(Owner[Support]):
         unit = self._fields[str(axis)].unit if is_field else "m"
         support = Support(self, place, given, axis, unit, value, factor, whole)
         self.all.append(support)
+        if isinstance(place, MovingPoints):
+            self.border.parts.append(place)
         return support
 
     def _component(self, component: str, more: Sequence[str] = ()) -> int | str:
@@ -231,8 +233,8 @@ class Supports(Owner[Support]):
                     "supports on particles that remain; release() it before. Nothing was changed"
                 )
 
-    def keep(self, kept: Mapping[MovingPoints, Mask]) -> None:
-        """Keep the points of the border that remain after particles were removed."""
+    def keep(self, kept: Mapping[MovingPoints, Indices]) -> None:
+        """Keep the points of the border that remain, or their parts; see `SceneBorder`."""
         for support in self.all:
             if isinstance(support.place, MovingPoints):
                 support.keep(kept[support.place])
@@ -308,11 +310,10 @@ class Supports(Owner[Support]):
         Raises:
             CheckpointError: The script has made others.
         """
-        if len(state["walls"]) != len(self.walls):
-            raise CheckpointError(
-                f"the run had {len(state['walls'])} walls when it was stored, and the script made "
-                f"{len(self.walls)}: expected walls to be added and released between two phases"
-            )
+        stored.check_count(
+            "walls", len(state["walls"]), len(self.walls),
+            "walls to be added and released between two phases",
+        )  # fmt: skip
         self.all = restored("support", self.all, state["supports"])
         for wall, values in zip(self.walls, state["walls"], strict=True):
             wall.restore(values)

@@ -15,7 +15,7 @@ from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.files import reason
 from tawami.base.space import PLANE
-from tawami.base.text import meant
+from tawami.base.text import meant, position
 from tawami.scene.scattered import AXES, Column, Outside, Scattered, check_plane, named, split
 
 
@@ -147,8 +147,8 @@ def _points(name: str, columns: Sequence[Column]) -> Array:
         raise InputError(f"table({name}) has {len(x)} points: expected three or more")
     points, count = np.unique(x, axis=0, return_counts=True)
     if (count > 1).any():
-        place = ", ".join(f"{c:g}" for c in points[count > 1][0])
         raise InputError(
-            f"table({name}) has {count.max()} rows for the point ({place}) m: expected one"
+            f"table({name}) has {count.max()} rows for the point "
+            f"{position(points[count > 1][0])} m: expected one"
         )
     return x

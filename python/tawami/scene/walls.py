@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami.base import checks
+from tawami.base.arrays import of_components
 from tawami.base.errors import InputError
 from tawami.field.constraints import Held
 from tawami.grid.basis import Basis
@@ -134,7 +135,8 @@ class Wall:
     def stored(self) -> dict[str, Any]:
         """Its states for a checkpoint."""
         state = self.state
-        return {"touching": state.touching, "slip": state.slip, "friction": self.friction}
+        touching, slip = np.array(state.touching), np.array(state.slip)
+        return {"touching": touching, "slip": slip, "friction": self.friction}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`stored`."""
@@ -163,8 +165,7 @@ class Wall:
         Args:
             fixed: Whether other supports prescribe each displacement coefficient.
         """
-        dim = self.grid.space.dim
-        mask: Mask = fixed[dim * self.functions[:, None] + np.arange(dim)]
+        mask: Mask = fixed[of_components(self.functions, self.grid.space.dim)]
         return mask
 
     def held(self, active: Mask, prescribed: Mask, start: Array, before: Array) -> list[Held]:

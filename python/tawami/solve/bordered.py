@@ -76,7 +76,8 @@ class Bordering(Protocol):
             matrix: D - C X.
 
         Raises:
-            SupportError: They cannot.
+            SupportError: They cannot, as nothing holds one of its unknowns.
+            SingularError: The body gives way to one of them.
         """
 
 

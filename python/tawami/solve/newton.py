@@ -12,7 +12,7 @@ import numpy as np
 from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array
-from tawami.base.errors import CheckpointError, SingularError, SupportError
+from tawami.base.errors import CheckpointError, SingularError
 from tawami.base.files import reason
 from tawami.base.petsc import clean_up
 from tawami.base.timing import Stopwatch, tally
@@ -312,9 +312,7 @@ class Newton:
             change, of_factor = complete(
                 equations, iterate.u, self._on_all(reduction, found), again
             )
-        except SupportError as error:
-            if len(history) == 1:  # it was free when the step began
-                raise
+        except SingularError as error:
             self._fail(history, f"Then {error}. {equations.advice}")
         if not np.isfinite(of_factor):
             self._fail(history, "The loads do not move the control: choose another control")

@@ -1,0 +1,72 @@
+"""Supports on patches that overlap: those that agree hold each place of the border once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from tawami.base.arrays import Array, Mask
+from tawami.base.errors import SupportError
+from tawami.scene import step_values
+from tawami.scene.action import Term
+from tawami.scene.held_border import HeldBorder
+from tawami.scene.moving_points import MovingPoints
+from tawami.scene.support import Support
+
+#: Difference of values that is round-off, relative to the largest.
+ROUND_OFF = 1e-9
+#: Share of the length of a point within which its place is surely the same part of the border: Gauss
+#: points lie at 0.396 of their length from the end of a piece at least.
+NEAR = 0.39
+#: Distance of two consecutive points relative to the mean of their lengths: 1.07 at most in Gauss rules.
+APART = 1.08
+
+
+def others_hold(
+    support: Support, others: Sequence[HeldBorder], amount: Callable[[Term], float]
+) -> Mask:
+    """Mask of the points of a support that others hold already in the same direction.
+
+    Args:
+        support: The support.
+        others: Those before it.
+        amount: Factor of each value.
+
+    Raises:
+        SupportError: Others prescribe another value there.
+    """
+    assert isinstance(support.place, MovingPoints)
+    x, found = support.place.x, np.zeros(len(support.place), dtype=bool)
+    for other in others:
+        if other.support.component != support.component:
+            continue
+        both = support.weak & _covered(x, other)
+        found |= both
+        if not both.any():
+            continue
+        one, two = (step_values.at_points(s, amount, x)[both] for s in (support, other.support))
+        change = float(np.abs(one - two).max(initial=0.0))
+        if change > ROUND_OFF * max(np.abs(one).max(initial=0.0), np.abs(two).max(initial=0.0)):
+            raise SupportError(
+                f"{other.support} and {support} prescribe values of '{support.axis}' that differ by "
+                f"{change:.3g} {support.unit} where they meet: expected supports that agree; change or "
+                "release one"
+            )
+    return found
+
+
+def _covered(x: Array, held: HeldBorder) -> Mask:
+    """Mask of positions on the part of the border that a support holds."""
+    from scipy.spatial import KDTree  # takes long to import
+
+    count = min(3, len(held.x))
+    distance, near = KDTree(held.x).query(x, k=[*range(1, count + 1)])
+    length, to = held.length[near], held.x[near] - x[:, None]
+    mask: Mask = distance[:, 0] <= NEAR * length[:, 0]
+    for a, b in combinations(range(count), 2):
+        between = (to[:, a] * to[:, b]).sum(axis=1) < 0
+        gap = np.linalg.norm(to[:, a] - to[:, b], axis=1)
+        mask |= between & (gap <= APART * (length[:, a] + length[:, b]) / 2)
+    return mask

@@ -1,0 +1,77 @@
+"""Obstacles that go through the border between its patches, as one that is smaller than a cell may."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tawami.base import ranks
+from tawami.base.arrays import Array
+from tawami.base.errors import SupportWarning
+from tawami.base.warn import warn
+from tawami.border.shapes import Shape
+from tawami.scene.domain import Domain
+from tawami.scene.moving_points import MovingPoints
+from tawami.scene.obstacle import Obstacle
+
+#: Depth in an obstacle that a particle may have [cells].
+DEEP = 0.3
+#: Difference of distances from points of the border that is round-off [cells].
+SAME = 1e-6
+
+
+def warn_of_small(what: str, shape: Shape, h: float) -> None:
+    """Warn of an obstacle that is narrower somewhere than a cell.
+
+    Args:
+        what: The obstacle, for messages.
+        shape: Its shape.
+        h: Side of a cell [m].
+
+    Warns:
+        SupportWarning: It is.
+    """
+    if shape.width < h * (1 - 1e-9):
+        warn(
+            f"{what}: its shape is {shape.width:.3g} m wide at its narrowest place, less than a cell: "
+            "it may enter the body between patches of the border, which are about as long as a cell. "
+            f"Expected {h:.3g} m at least: a finer grid, or a larger radius",
+            SupportWarning,
+        )
+
+
+def warn_of_deep(obstacle: Obstacle, domain: Domain, border: MovingPoints, u: Array | None) -> bool:
+    """Warn if a particle is deep inside an obstacle after a step; a call for all ranks.
+
+    Args:
+        obstacle: The obstacle.
+        domain: The particles. Those that are nearer to a part of the border that may not touch the
+            obstacle are left out.
+        border: All points of the border.
+        u: Displacement since the start where particles do not move, functions x dim.
+
+    Returns:
+        Whether one is.
+
+    Warns:
+        SupportWarning: One is deeper than 0.3 h.
+    """
+    at, grid = np.array(domain.particles.x), domain.model.grid
+    x = at if u is None else at + domain.at_particles(u)
+    distance = obstacle.shape.evaluate(obstacle.pose.to_local(x)).distance
+    deep = distance < -DEEP * grid.h
+    if deep.any() and len(obstacle.place) < len(border):
+        from scipy.spatial import KDTree  # takes long to import
+
+        nearest, own = (KDTree(p.x).query(at[deep])[0] for p in (border, obstacle.place))
+        deep[deep] = own <= nearest + SAME * grid.h
+    depth = ranks.largest(grid.comm, float(-np.min(distance[deep], initial=0.0)))
+    if depth <= DEEP * grid.h:
+        return False
+    warn(
+        f"{obstacle}: a particle of the body is {depth:.3g} m inside it after a step: contact acts on "
+        "means over patches of the border, about as long as a cell, and an obstacle or a corner that is "
+        f"not much larger enters between them. Expected at most 0.3 h = {DEEP * grid.h:.3g} m: a finer "
+        "grid, a rounder obstacle, or where=... with all of the border that it may touch",
+        SupportWarning,
+    )
+    return True
