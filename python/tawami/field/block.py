@@ -50,7 +50,6 @@ class Block:
         self.size, start = len(self.unknowns), int(of_field[: reduction.own.start].sum())
         self.own = slice(start, start + int(self.mine.sum()))
         self._held = reduction.fixed[place.slice]
-        self._made: list[ReducedMatrix] = []
 
     @property
     def num_own(self) -> int:
@@ -66,7 +65,7 @@ class Block:
         return False
 
     def assembled(self, kernel: Literal["elasticity", "mass"], data: Array) -> Any:
-        """A matrix of sums over the particles, which lives as long as this object.
+        """A matrix of sums over the particles.
 
         Args:
             kernel: 'elasticity' for 2 mu eps(u) : eps(w) + lambda tr eps(u) tr eps(w), or 'mass' for
@@ -87,8 +86,7 @@ class Block:
             kernels, nothing, [data], attachment.volume, zero, matrix.pattern, matrix.values
         )
         matrix.written()
-        self._made.append(matrix)  # whose arrays are those of the PETSc matrix
-        return matrix.summed()
+        return matrix.summed().copy()  # the other one ends with `matrix`
 
     def reduced(self, matrix: sp.csr_matrix) -> Any:
         """S^T A S of a matrix A on all coefficients of all fields."""

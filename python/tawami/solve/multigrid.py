@@ -63,7 +63,6 @@ class MultigridSolver(LinearSolver):
         self._tested, self._matrix, self.first = False, None, 0
         self.made = False
         self._grids: list[Handles] = []
-        self._parts: list[Part] = []
         self._records = False
 
     def forget(self) -> None:
@@ -71,7 +70,7 @@ class MultigridSolver(LinearSolver):
         super().forget()
         for handles in self._grids:
             handles.free()
-        self._grids, self._parts, self._matrix = [], [], None
+        self._grids, self._matrix = [], None
 
     def successor(self) -> LinearSolver:
         """This solver: its operators serve as long as the matrix is used."""
@@ -119,8 +118,7 @@ class MultigridSolver(LinearSolver):
                     matrix.comm.tompi4py(), "multigrid", size, memory.of_multigrid(matrix),
                     "Use fewer cells, or more ranks on computers with more memory",
                 )  # fmt: skip
-                self._parts = parts()
-                self._precondition(matrix, self._parts)
+                self._precondition(matrix, parts())
             self._handles["ksp"].setOperators(matrix, self._handles["parts"])
         try:
             with self._stopwatch("solve"):
