@@ -2,7 +2,8 @@
 
 Each row is a process of its own with one thread: processor time of one step without the making of the
 scene, peak memory, and iterations of the linear solver. The growth exponent is the slope of the time in
-the number of unknowns, in logarithms, between the coarsest and the finest grid of a solver.
+the number of unknowns, in logarithms, between the coarsest and the finest grid of a solver. A second
+table has the iterations of multigrid for a clamped beam by Poisson's ratio, tolerance and grid.
 
 python -m cases.costs.solvers
 python -m cases.costs.solvers --cells 32,64,128,256 --particles 800,51200
@@ -10,6 +11,7 @@ python -m cases.costs.solvers --cells 32,64,128,256 --particles 800,51200
 
 from __future__ import annotations
 
+import itertools
 import json
 import resource
 import subprocess
@@ -24,6 +26,7 @@ import tawami
 from cases.common.program import Program, numbers, progress
 from cases.common.table import as_csv, as_text
 from cases.costs.bench.timed import Steps, beam, pile
+from cases.verification.cantilever.mpm import build
 
 PROGRAM = Program("cases.costs.solvers", __doc__)
 WHOLE = numbers(int, lambda n: n > 0, "whole numbers separated by commas, such as 32,64")
@@ -31,7 +34,12 @@ PROGRAM.option("--cells", type=WHOLE, default="32,64,128,256", help="cells over 
 PROGRAM.option("--particles", type=WHOLE, default="800,51200", help="particles of the piles")
 PROGRAM.option("--steps", type=int, default=5, help="steps of a pile, of which the median is taken")
 
+#: Poisson's ratios, tolerances, and the finest grid of the second table.
+RATIOS, TOLERANCES, MOST = (0.0, 0.3, 0.4999, 0.499999), (1e-4, 1e-8), 128
+#: Tolerance of the solve of a linear problem, relative to that of Newton's method.
+OF_NEWTON = 0.3
 SOLVERS = ("direct", "multigrid", "auto")
+COUNTED = ("nu", "tolerance", "n", "iterations")
 COLUMNS = ("scene", "solver", "unknowns", "seconds", "MB", "newton", "iterations")
 
 
@@ -94,6 +102,26 @@ def rows_of(cells: Sequence[int], particles: Sequence[int], steps: int) -> Itera
             yield measured(kind, size, solver, steps)
 
 
+@dataclass(frozen=True)
+class Iterations:
+    """Iterations of multigrid to a tolerance of the linear system, on a grid of 2n x n cells."""
+
+    nu: float
+    tolerance: float
+    n: int
+    iterations: int
+
+
+def iterations(cells: Sequence[int]) -> Iterator[Iterations]:
+    """Iterations for the clamped beam, alpha = 0.01, which is solved once."""
+    for nu, tolerance, n in itertools.product(RATIOS, TOLERANCES, cells):
+        scene = build(
+            "u_epsv", "clamped", n, alpha=0.01, material=tawami.linear_elastic(E=3e6, nu=nu),
+            linear_solver="multigrid", tolerance=tolerance / OF_NEWTON,
+        )  # fmt: skip
+        yield Iterations(nu, tolerance, n, scene.solve().krylov[0])
+
+
 def exponent(rows: Sequence[Row]) -> float:
     """Slope of the time in the number of unknowns, in logarithms, from the first to the last row."""
     first, last = rows[0], rows[-1]
@@ -108,6 +136,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for solver in SOLVERS if len(options.cells) > 1 else ():
         mine = [r for r in rows if r.solver == solver and r.scene.startswith("beam")]
         print(f"growth exponent of the beam, {solver}: {exponent(mine):.2f}")
+    print(as_text(list(iterations([n for n in options.cells if n <= MOST])), COUNTED))
     PROGRAM.write("solvers.csv", as_csv(rows, COLUMNS))
     PROGRAM.list_results()
 

@@ -86,8 +86,7 @@ class Block:
             kernels, nothing, [data], attachment.volume, zero, matrix.pattern, matrix.values
         )
         matrix.written()
-        copy = matrix.summed().copy()  # the other one ends with `matrix`
-        return copy
+        return matrix.summed().copy()  # the other one ends with `matrix`
 
     def reduced(self, matrix: sp.csr_matrix) -> Any:
         """S^T A S of a matrix A on all coefficients of all fields."""

@@ -3,8 +3,9 @@
 Costs are counted in iterations of multigrid, not in seconds, so that a run repeats to the bit:
 
 - below `SMALL` unknowns, and where multigrid does not suit the form, the tangent is factorised;
-- otherwise multigrid solves. Once its iterations for tangents of the same unknowns have cost more than a
-  factorisation, which later tangents use as well, the tangent is factorised (`price`);
+- otherwise multigrid solves. Once its iterations for the same unknowns have cost as much as two
+  factorisations, some tangents are solved with a factorisation, which later ones use. Then the method
+  whose last solves cost less is taken;
 - where multigrid stalls, the direct solver takes over, with a warning.
 """
 
@@ -12,6 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from typing import Any
+
+import numpy as np
 
 from tawami.base.arrays import Array
 from tawami.base.errors import SolverWarning
@@ -26,14 +29,20 @@ from tawami.solve.operators import Part
 
 #: Iterations of multigrid that cost as much as a factorisation of 1e5 unknowns, and the exponent with
 #: which this number grows with the unknowns (`cases.costs.solvers`).
-FACTORISATION, EXPONENT = 45.0, 0.3
+FACTORISATION, EXPONENT = 36.0, 0.16
+#: Factor of this number without symmetry.
+UNSYMMETRIC = 1.3
+#: Iterations of multigrid that cost as much as one with an old factorisation.
+KEPT = 2.3
+#: Solves with a factorisation before its mean cost counts, and solves after which older ones count half.
+TRIAL, MEMORY = 4, 32
 #: Iterations that the operators of multigrid cost.
 SET_UP = 15
 
 
 def price(unknowns: int) -> float:
-    """Iterations of multigrid that cost as much as a factorisation and its use in later tangents."""
-    return float(2 * FACTORISATION * (unknowns / 1e5) ** EXPONENT)
+    """Iterations of multigrid that cost as much as a factorisation of a symmetric tangent."""
+    return float(FACTORISATION * (unknowns / 1e5) ** EXPONENT)
 
 
 class ChosenSolver(LinearSolver):
@@ -59,6 +68,8 @@ class ChosenSolver(LinearSolver):
         #: The matrix of the last solves, iterations of multigrid for it, and whether it stalled.
         self._matrix: Any = None
         self._spent, self._stalled, self._stalls = 0, False, 0
+        #: Cost and number of the last solves of each solver.
+        self._costs = np.zeros((2, 2))
 
     @property
     def _solvers(self) -> tuple[DirectSolver, MultigridSolver]:
@@ -100,11 +111,13 @@ class ChosenSolver(LinearSolver):
     def state(self) -> dict[str, Any] | None:
         """See `LinearSolver.state`. Multigrid has none, since each step makes its own operators."""
         if self._last is self._multigrid:
-            return {"spent": self._spent, "stalls": self._stalls}
-        return self._direct.state()
+            return {"spent": self._spent, "stalls": self._stalls, "costs": self._costs.copy()}
+        found = self._direct.state()
+        return None if found is None else found | {"costs": self._costs.copy()}
 
     def restore(self, state: Mapping[str, Any], matrix: Any) -> None:
         """See `LinearSolver.restore`."""
+        self._costs = np.array(state["costs"])
         if "spent" in state:
             self._matrix, self._spent = matrix, state["spent"]
             self._stalls, self._last = state["stalls"], self._multigrid
@@ -137,9 +150,13 @@ class ChosenSolver(LinearSolver):
                     SolverWarning,
                 )
             self._spent += self._multigrid.iterations
+            self._count(self._multigrid, SET_UP * self._multigrid.made + self._multigrid.iterations)
         if found is None:
             self._switch(self._direct)
             found = self._direct.solve(*arguments)
+            again = KEPT * self._direct.iterations
+            factor = 1.0 if self._direct.symmetric else UNSYMMETRIC
+            self._count(self._direct, again or factor * price(matrix.getSize()[0]))
         for name in ("symmetric", "condition", "weak", "iterations"):
             setattr(self, name, getattr(self._last, name))
         return found
@@ -159,6 +176,13 @@ class ChosenSolver(LinearSolver):
             self._last.forget()
         self._last = solver
 
+    def _count(self, solver: LinearSolver, cost: float) -> None:
+        """Count a solve."""
+        mine = self._costs[self._solvers.index(solver)]
+        mine += cost, 1
+        if mine[1] > MEMORY:
+            mine /= 2
+
     def _suits(self, matrix: Any) -> bool:
         """Whether multigrid solves the next tangent; the same on all ranks."""
         if self._stalled or (self._auto and self._unsuited):
@@ -168,7 +192,11 @@ class ChosenSolver(LinearSolver):
         unknowns = matrix.getSize()[0]
         if unknowns < SMALL:
             return False
-        if self._spent <= price(unknowns):
+        (_, tried), (cost, solves) = self._costs
+        cheaper = self._spent <= 2 * price(unknowns)
+        if tried >= TRIAL and solves:
+            cheaper = cost / solves <= self._costs[0, 0] / tried
+        if cheaper:
             return True
         need = memory.of_factors(unknowns, symmetric=self._direct.symmetric)
         return need > memory.available(self._comm)

@@ -54,12 +54,14 @@ class MultigridSolver(LinearSolver):
 
     Attributes:
         first: Iterations of the first solve with the present operators.
+        made: Whether the last solve made them.
     """
 
     def __init__(self, comm: Any, stopwatch: Stopwatch) -> None:
         super().__init__(comm, stopwatch)
         self.symmetric = False  # GMRES makes no use of it
         self._tested, self._matrix, self.first = False, None, 0
+        self.made = False
         self._grids: list[Handles] = []
         self._records = False
 
@@ -109,7 +111,8 @@ class MultigridSolver(LinearSolver):
             self._begin(matrix, scale)
             self._matrix, self.first = matrix, 0
         with self._stopwatch("factorise"):
-            if "ksp" not in self._handles:
+            self.made = "ksp" not in self._handles
+            if self.made:
                 size = matrix.getSize()[0]
                 memory.check(
                     matrix.comm.tompi4py(), "multigrid", size, memory.of_multigrid(matrix),
@@ -180,6 +183,8 @@ class MultigridSolver(LinearSolver):
         ksp.setType("gmres")
         ksp.setPCSide(PETSc.PC.Side.RIGHT)
         ksp.setGMRESRestart(RESTART)
+        # near a singular tangent, vectors that are not orthogonal let the residual grow
+        _set(ksp, {"ksp_gmres_cgs_refinement_type": "refine_ifneeded"})
         pc = handles["pc"] = ksp.getPC()
         if len(parts) == 1:
             self._cycle(pc, operators[0], parts[0])
