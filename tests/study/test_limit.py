@@ -1,4 +1,4 @@
-"""Limits of synthetic sequences: orders, noise, sequences without a limit, coverage of the uncertainty."""
+"""Limits of synthetic sequences: orders, noise, no limit, coverage of the uncertainty."""
 
 from __future__ import annotations
 

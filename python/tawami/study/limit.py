@@ -7,6 +7,7 @@ finest value as the limit and the spread of the finest three as the uncertainty.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -62,7 +63,7 @@ def limit_of(sizes: Sequence[float], values: Sequence[float]) -> Limit:
         sizes: Decreasing positive sizes.
         values: Value for each of them.
     """
-    steps = [b - a for a, b in zip(values, values[1:], strict=False)]
+    steps = [b - a for a, b in itertools.pairwise(values)]
     size = max(map(abs, values))
     if len(values) == 1:
         return Limit(values[0], 0.0)
@@ -112,7 +113,7 @@ def _remainder(sizes: Sequence[float], order: float, step: float) -> float:
 
 
 def _order(sizes: Sequence[float], steps: Sequence[float], noise: float) -> float | None:
-    """Observed order of three values; None if they go back and forth. 0 or less if they do not settle."""
+    """Observed order of three values: None if they go back and forth, 0 if they do not settle."""
     first, last = steps
     if abs(last) <= noise:
         return 2 * FASTEST
@@ -133,4 +134,4 @@ def _order(sizes: Sequence[float], steps: Sequence[float], noise: float) -> floa
 
 def _grows(steps: Sequence[float]) -> bool:
     """Whether each step is clearly larger than the one before."""
-    return all(abs(b) > 1.2 * abs(a) for a, b in zip(steps, steps[1:], strict=False))
+    return all(abs(b) > 1.2 * abs(a) for a, b in itertools.pairwise(steps))
