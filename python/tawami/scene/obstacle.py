@@ -50,8 +50,21 @@ class Obstacle(Action):
     """
 
     __slots__ = (
-        "_changes", "_speeds", "free", "friction", "given", "groups", "mass", "name", "place", "pose",
-        "offset", "pressure", "rates", "shape", "traction",
+        "_changes",
+        "_speeds",
+        "free",
+        "friction",
+        "given",
+        "groups",
+        "mass",
+        "name",
+        "offset",
+        "place",
+        "pose",
+        "pressure",
+        "rates",
+        "shape",
+        "traction",
     )  # fmt: skip
 
     def __init__(

@@ -76,12 +76,12 @@ class ObstacleContact:
         """Mean distances of patches that touch.
 
         That of a patch of a bent border is not zero when it touches. A new patch that lies where others
-        pushed before touches where it is: otherwise it would let go, and the force would drop.
+        pushed before touches where it is, unless it is inside the obstacle: otherwise it would lose contact, and the force would drop.
         """
         near, obstacle = self._border, self.obstacle
         if near.groups is obstacle.groups:
             return near.groups.means(near.weights, obstacle.offset)
-        return np.where(self._pressure > 0, gap, 0.0)
+        return np.where(self._pressure > 0, np.maximum(gap, 0.0), 0.0)
 
     def _choose(self, points: Mask) -> None:
         """Evaluate the patches of further points from now on."""
