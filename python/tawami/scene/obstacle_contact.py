@@ -61,14 +61,27 @@ class ObstacleContact:
         self._pressure = groups.means(weights, obstacle.pressure)
         self._traction = groups.means(weights, obstacle.traction)
         gap = groups.means(weights, self._border.distance)
-        # in dynamics what pushed such a patch out would give energy to the body
-        self._least = 0 * gap if motion.times is None else np.minimum(gap, 0.0)
+        self._least = self._offsets(gap)
+        if motion.times is not None:
+            # what pushed such a patch out would give energy to the body
+            self._least = np.minimum(gap, self._least)
         reach = REACH * self._border.h + np.abs(motion.unknown[: self._dim]).max(initial=0.0)
         pressed = (self._pressure > 0)[groups.number]
         self._choose((self._border.distance < reach) | pressed)
         self.at_start = self._forces_at_start()
         if motion.times is None:
             self._touch()
+
+    def _offsets(self, gap: Array) -> Array:
+        """Mean distances of patches that touch.
+
+        That of a patch of a bent border is not zero when it touches. A new patch that lies where others
+        pushed before touches where it is: otherwise it would let go, and the force would drop.
+        """
+        near, obstacle = self._border, self.obstacle
+        if near.groups is obstacle.groups:
+            return near.groups.means(near.weights, obstacle.offset)
+        return np.where(self._pressure > 0, gap, 0.0)
 
     def _choose(self, points: Mask) -> None:
         """Evaluate the patches of further points from now on."""
@@ -177,6 +190,7 @@ class ObstacleContact:
         obstacle.groups = self._border.groups
         pressure, traction = self.pressures
         obstacle.pressure, obstacle.traction = pressure, traction
+        obstacle.offset = np.where(pressure > 0, self._least[self._border.groups.number], 0.0)
         obstacle.pose = self.motion.pose
         obstacle.rates = self.motion.rates_at_end(self.at_start[1], self.now.resultant)
 
