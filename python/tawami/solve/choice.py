@@ -38,6 +38,8 @@ KEPT = 2.3
 TRIAL, MEMORY = 4, 32
 #: Iterations that the operators of multigrid cost.
 SET_UP = 15
+#: Attributes that a checkpoint stores.
+STATE = ("spent", "stalled", "stalls")
 
 
 def price(unknowns: int) -> float:
@@ -110,20 +112,21 @@ class ChosenSolver(LinearSolver):
 
     def state(self) -> dict[str, Any] | None:
         """See `LinearSolver.state`. Multigrid has none, since each step makes its own operators."""
-        if self._last is self._multigrid:
-            return {"spent": self._spent, "stalls": self._stalls, "costs": self._costs.copy()}
-        found = self._direct.state()
-        return None if found is None else found | {"costs": self._costs.copy()}
+        kept = self._direct.state() if self._last is self._direct else {}
+        if kept is None:
+            return None
+        mine = {name: getattr(self, f"_{name}") for name in STATE}
+        return mine | {"costs": self._costs.copy(), "kept": kept}
 
     def restore(self, state: Mapping[str, Any], matrix: Any) -> None:
         """See `LinearSolver.restore`."""
-        self._costs = np.array(state["costs"])
-        if "spent" in state:
-            self._matrix, self._spent = matrix, state["spent"]
-            self._stalls, self._last = state["stalls"], self._multigrid
+        for name in STATE:
+            setattr(self, f"_{name}", state[name])
+        self._matrix, self._costs = matrix, np.array(state["costs"])
+        if state["kept"]:
+            self._direct.restore(state["kept"], matrix)
         else:
-            self._direct.restore(state, matrix)
-            self._matrix, self._spent = matrix, 1 << 30
+            self._last = self._multigrid
 
     def solve(
         self,

@@ -127,7 +127,10 @@ class MultigridSolver(LinearSolver):
                 self._converge(self._scale * right, tolerance)
         except StalledError:
             self._multiply(matrix, 1 / self._scale)
-            raise
+            if self.made:
+                raise
+            self._matrix = None  # contact or inertia may have changed since the operators were made
+            return self.solve(matrix, scale, right, tolerance, parts)
         self.first = self.first or self.iterations
         return np.asarray(self._scale * self._handles["x"].array)
 

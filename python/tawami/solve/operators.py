@@ -62,6 +62,8 @@ class Operators:
     def unsuited(self) -> str:
         """Reason for which multigrid does not suit the form; empty if it does."""
         kinematics, attachment = self._responses.form.kinematics, self._assembly.attachment
+        if self._responses.form.own_fields:
+            return "fields that no law receives, whose coupling multigrid does not know"
         if kinematics.has_mean_stress:
             if attachment.values.get("alpha", 1.0) == 0:
                 return "alpha = 0: the pair of spaces is unstable"
