@@ -69,6 +69,8 @@ from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
 from tawami.scene.table import table
 from tawami.study import Series, Study, recommend
+from tawami.study.front import Trade
+from tawami.study.trade import trade
 
 __all__ = [
     "Body",
@@ -117,6 +119,7 @@ __all__ = [
     "TangentWarning",
     "TawamiError",
     "TawamiWarning",
+    "Trade",
     "box",
     "cam_clay",
     "check_form",
@@ -142,5 +145,6 @@ __all__ = [
     "run",
     "settle",
     "table",
+    "trade",
     "von_mises",
 ]

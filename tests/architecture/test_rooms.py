@@ -25,7 +25,8 @@ LEVELS = (
     ("scene",),
     ("motion", "check"),
     ("results",),
-    ("study", "command"),
+    ("study",),
+    ("command",),
 )
 LEVEL = {room: level for level, rooms in enumerate(LEVELS) for room in rooms}
 MODULES = {

@@ -16,7 +16,7 @@ from typing import Any
 from tawami._rust import __version__
 from tawami.base import checks
 from tawami.base.errors import FormError, InputError, TawamiError
-from tawami.command import new
+from tawami.command import new, trade
 from tawami.command.folders import run_folder
 from tawami.command.misuse import command_line, unrecognised
 from tawami.command.resume import resume
@@ -99,6 +99,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_resume(commands)
     _add_plot(commands)
     _add_new(commands)
+    _add_trade(commands)
     _add_form(commands)
     _add(commands, "info", _info, "versions, BLAS, threads, missing packages, a self test", (
         "Shows the versions, the loaded BLAS, threads, memory, MPI, the compiler of forms and the "
@@ -202,6 +203,18 @@ def _add_new(commands: Any) -> None:
         kind.add_argument(
             f"--{name}", dest="kind", action="store_const", const=name, default="statics", help=text
         )
+
+
+def _add_trade(commands: Any) -> None:
+    trade.add_arguments(_add(commands, "trade", trade.run, "speed against accuracy of a script", (
+        "Runs the function build of a script with the values of its knobs, and estimates the errors\n"
+        "without a reference. Prints a table and writes it with a picture to results/trade/SCRIPT.\n"
+        "Run again with a larger budget, the runs so far are kept."
+    ), epilog=(
+        "examples:\n"
+        "  tawami trade beam.py --quantity tip --budget 60s\n"
+        "  tawami trade beam.py --quantity tip --apply 0.5%"
+    )))  # fmt: skip
 
 
 def _add_form(commands: Any) -> None:

@@ -4,6 +4,8 @@ study = tawami.Study("beam", run, {"n": (4, 8, 16), "alpha": (0.01, 0.1)}, {"def
 table = study.run()
 print(table.in_words("deflection_m"))
 print(tawami.recommend(study, tolerance=0.01))
+
+`tawami.trade("beam.py", "tip", budget=60)` estimates errors without a reference.
 """
 
 from tawami.study.recommendation import recommend

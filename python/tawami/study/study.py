@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import os
 import sys
 from collections.abc import Mapping, Sequence
@@ -17,11 +16,12 @@ from mpi4py import MPI
 
 from tawami.base import checks
 from tawami.base.errors import InputError
-from tawami.base.files import append_line, atomic_file, unreadable
+from tawami.base.files import atomic_file
 from tawami.base.lock import hold
 from tawami.study import figure, process
 from tawami.study.row import COSTS, Row, error_of, text_of
-from tawami.study.series import Grid, Key, Knobs, Series, is_list, knob_values, setting_text
+from tawami.study.series import Grid, Key, Knobs, Series, is_list, knob_values
+from tawami.study.stored import store, stored_runs
 from tawami.study.table import Table
 
 #: Longest time limit of a run [s]: the longest wait that the system supports.
@@ -143,23 +143,8 @@ class Study:
         return reference
 
     def _runs(self) -> dict[Key, dict[str, Any]]:
-        """Stored runs by label, setting and fingerprint; lines that were cut off are left out."""
-        path, runs = self.path / "runs.jsonl", dict[Key, dict[str, Any]]()
-        if not os.path.lexists(path):
-            return runs
-        problem = unreadable(path)
-        if problem is not None:
-            raise InputError(
-                f"study '{self.name}': '{path}' cannot be read ({problem}): expected the runs that it "
-                "has stored; remove it to start again"
-            )
-        for line in path.read_text(errors="replace").splitlines():
-            try:
-                run = json.loads(line)
-                runs[run["label"], setting_text(run["knobs"]), run["fingerprint"]] = run
-            except (ValueError, TypeError, KeyError):
-                continue
-        return runs
+        """Stored runs by label, setting and fingerprint."""
+        return stored_runs(self.path, self.name)
 
     # -- running -----------------------------------------------------------------
 
@@ -219,7 +204,7 @@ class Study:
         for number, (series, setting) in enumerate(work):
             outcome = process.measure(process.name_of(series.run), setting, limit)
             head = {"label": series.label, "knobs": setting, "fingerprint": series.fingerprint}
-            append_line(folder / "runs.jsonl", json.dumps(head | outcome), sync=True)
+            store(folder, head | outcome)
             if not quiet:
                 left = (perf_counter() - start) / (number + 1) * (len(work) - number - 1)
                 said = outcome.get("failure") or f"{outcome['wall_s']:.3g} s"

@@ -1,0 +1,171 @@
+"""Limit of a quantity from runs with several knobs: no reference is needed.
+
+The knob with the largest effect is refined first: lines of runs along it are extrapolated, see
+`tawami.study.limit`, with each value of the other knobs. Errors that vanish with this knob, such as that
+of the particles or of a stabilisation that scales with h, do not count twice. The limits are then a
+sequence in each other knob.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from tawami.study.knobs import Knob
+from tawami.study.limit import Limit, limit_of, sizes_of
+from tawami.study.row import value_text
+
+#: Value of a quantity for the values of all knobs, in their order.
+Points = Mapping[tuple[Any, ...], float]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Limit of a quantity.
+
+    Attributes:
+        value: The limit, or the finest value without one.
+        uncertainty: The limit is expected within value +- uncertainty; infinite without a limit.
+        orders: Observed order of knobs that converge regularly.
+        remarks: Sentences about knobs that do not converge to one value.
+    """
+
+    value: float
+    uncertainty: float
+    orders: Mapping[str, float] = field(default_factory=dict)
+    remarks: Sequence[str] = ()
+
+    @property
+    def exists(self) -> bool:
+        """Whether there are signs of a limit."""
+        return math.isfinite(self.uncertainty)
+
+    @property
+    def scale(self) -> float:
+        """Number that errors are relative to."""
+        return abs(self.value) or 1.0
+
+
+def centre_of(knobs: Sequence[Knob]) -> tuple[Any, ...]:
+    """Defaults of all knobs."""
+    return tuple(knob.default for knob in knobs)
+
+
+def line(points: Points, knobs: Sequence[Knob], k: int, base: tuple[Any, ...]) -> dict[Any, float]:
+    """Values along a knob through a setting, from coarse to fine."""
+    places = {value: (*base[:k], value, *base[k + 1 :]) for value in knobs[k].values}
+    return {value: points[place] for value, place in places.items() if place in points}
+
+
+def leading(points: Points, knobs: Sequence[Knob]) -> int:
+    """Number of the refining knob with the largest effect at the defaults."""
+
+    def effect(k: int) -> float:
+        found = line(points, knobs, k, centre_of(knobs)).values()
+        return max(found) - min(found) if found else 0.0
+
+    return max((k for k, knob in enumerate(knobs) if knob.refines), key=effect)
+
+
+def estimate(name: str, knobs: Sequence[Knob], points: Points) -> Estimate:
+    """Estimate the limit of a quantity.
+
+    Args:
+        name: Of the quantity.
+        knobs: Knobs, of which at least one refines.
+        points: Values of the runs.
+    """
+    first, centre = leading(points, knobs), centre_of(knobs)
+    main_line = line(points, knobs, first, centre)
+    if len(main_line) < 2:
+        return Estimate(
+            next(iter(points.values())), math.inf, remarks=(_too_few(name, knobs[first]),)
+        )
+    main = _limit(main_line)
+    if not main.exists:
+        remark = _no_limit(name, knobs[first], main_line)
+        return Estimate(main.value, math.inf, remarks=(remark,))
+    orders = {} if main.order is None else {knobs[first].name: main.order}
+    value, uncertainty, remarks, moves = main.value, main.uncertainty, list[str](), list[float]()
+    for k, knob in enumerate(knobs):
+        if k == first:
+            continue
+        limits = _limits(points, knobs, first, k)
+        found = _other(name, knob, limits, main, line(points, knobs, k, centre))
+        moves.append(abs(found.value))
+        value, uncertainty = value + found.value, uncertainty + found.uncertainty
+        orders |= found.orders
+        remarks += found.remarks
+    uncertainty += sum(sorted(moves)[:-1])  # two knobs together: at most the smaller effect of both
+    return Estimate(value, uncertainty, orders, tuple(remarks))
+
+
+def _limit(found: Mapping[Any, float]) -> Limit:
+    return limit_of(sizes_of(list(found)), list(found.values()))
+
+
+def _limits(points: Points, knobs: Sequence[Knob], first: int, k: int) -> dict[Any, Limit]:
+    """Limits along the first knob for each value of knob k, where there are enough runs."""
+    centre, found = centre_of(knobs), dict[Any, Limit]()
+    for value in knobs[k].values:
+        along = line(points, knobs, first, (*centre[:k], value, *centre[k + 1 :]))
+        if len(along) > 2 or value == centre[k]:
+            limit = _limit(along)
+            if limit.exists:
+                found[value] = limit
+    return found
+
+
+def _other(
+    name: str, knob: Knob, limits: Mapping[Any, Limit], main: Limit, at_default: Mapping[Any, float]
+) -> Estimate:
+    """Effect of another knob on the limit: shift, uncertainty, order, remarks."""
+    values = {value: limit.value for value, limit in limits.items()}
+    if len(values) < 2 and knob.refines:  # only its effect at the defaults is known
+        rest = _limit(at_default) if at_default else main
+        if not rest.exists:
+            return Estimate(0.0, math.inf, remarks=(_no_limit(name, knob, at_default),))
+        here = at_default.get(knob.default, rest.value)
+        return Estimate(0.0, abs(rest.value - here) + rest.uncertainty)
+    if not knob.refines:
+        others = [
+            _another(name, knob, value, limit, main)
+            for value, limit in limits.items()
+            if abs(limit.value - main.value) > 2 * (limit.uncertainty + main.uncertainty)
+        ]
+        return Estimate(0.0, 0.0, remarks=tuple(others))
+    finest = list(limits.values())[-3:]
+    spread = max(limit.value for limit in finest) - min(limit.value for limit in finest)
+    known = max(limit.uncertainty for limit in finest)
+    if spread <= known:  # nothing but the uncertainty of the limits themselves
+        return Estimate(0.0, 0.0)
+    limit = _limit(values)
+    if not limit.exists and spread <= 3 * known:
+        return Estimate(0.0, spread)
+    if not limit.exists:
+        return Estimate(0.0, math.inf, remarks=(_no_limit(name, knob, values),))
+    orders = {} if limit.order is None else {knob.name: limit.order}
+    return Estimate(limit.value - main.value, limit.uncertainty, orders)
+
+
+def _no_limit(name: str, knob: Knob, found: Mapping[Any, float]) -> str:
+    sizes = list(found.items())
+    steps = ", ".join(f"{v:.5g} at {value_text(k)}" for k, v in sizes)
+    return (
+        f"'{name}' does not converge with '{knob.name}' ({steps}): the problem has no limit, or "
+        f"'{knob.name}' changes the problem instead of its accuracy."
+    )
+
+
+def _another(name: str, knob: Knob, value: Any, limit: Limit, main: Limit) -> str:
+    return (
+        f"'{name}' converges to {limit.value:.5g} with {knob.name} {value_text(value)}, and to "
+        f"{main.value:.5g} with {knob.name} {value_text(knob.default)}: "
+        f"'{knob.name}' changes the problem."
+    )
+
+
+def _too_few(name: str, knob: Knob) -> str:
+    return f"'{name}': fewer than two runs with other values of '{knob.name}': no error estimate."

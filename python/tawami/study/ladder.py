@@ -1,0 +1,228 @@
+"""A ladder of runs within a budget, cheapest first: the runs that an estimate of the limit needs."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from tawami.base.errors import InputError
+from tawami.base.lock import hold
+from tawami.base.text import meant, quoted
+from tawami.study import process
+from tawami.study.estimate import centre_of, leading
+from tawami.study.knobs import Knob
+from tawami.study.row import text_of
+from tawami.study.stored import store, stored_runs
+
+#: Time of a run that starts a process [s], and the ratio of times of two values of a refining knob,
+#: until they are measured.
+START, RATIO = 1.0, 4.0
+#: Failures without a success after which a ladder ends.
+HOPELESS = 3
+Setting = tuple[Any, ...]
+
+
+class Ladder:
+    """Runs of a function with knobs within a budget.
+
+    Args:
+        name: Of the trade, for messages and as the label of its runs.
+        run: Name of the function, see `process.name_of`.
+        fingerprint: Of the function; runs with another one are repeated.
+        knobs: Its knobs.
+        quantities: Names of quantities; empty for all numbers that it returns.
+        folder: Folder of the stored runs.
+        budget: Wall time of all runs together, including stored ones [s].
+
+    Attributes:
+        runs: Outcome of each setting that was run.
+        quantities: Names of quantities.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        run: str,
+        fingerprint: str,
+        knobs: Sequence[Knob],
+        quantities: Sequence[str],
+        folder: Path,
+        budget: float,
+    ) -> None:
+        self.name, self.knobs, self.folder, self.budget = name, knobs, folder, budget
+        self.quantities = list(quantities)
+        self.runs: dict[Setting, dict[str, Any]] = {}
+        self._run, self._fingerprint = run, fingerprint
+
+    def climb(self, *, quiet: bool) -> None:
+        """Run the settings that are not stored, cheapest first, until the budget is spent.
+
+        Raises:
+            InputError: Fewer than two runs succeeded, or a quantity is unknown or not a number.
+        """
+        lock = hold(self.folder, f"trade '{self.name}' in '{self.folder}'")
+        try:
+            self._load()
+            while (setting := self._next()) is not None:
+                self._measure(setting, quiet)
+        finally:
+            lock.release()
+        if len(self.succeeded) < 2:
+            raise InputError(self._too_few())
+
+    @property
+    def succeeded(self) -> dict[Setting, dict[str, Any]]:
+        """Runs that succeeded."""
+        return {setting: run for setting, run in self.runs.items() if "failure" not in run}
+
+    @property
+    def spent(self) -> float:
+        """Wall time of all runs [s]."""
+        return float(sum(run["spent_s"] for run in self.runs.values()))
+
+    def points(self, quantity: str) -> dict[Setting, float]:
+        """Value of a quantity in each run that succeeded."""
+        return {setting: run["values"][quantity] for setting, run in self.succeeded.items()}
+
+    def named(self, setting: Setting) -> dict[str, Any]:
+        """Setting as a mapping from names of knobs."""
+        return {knob.name: value for knob, value in zip(self.knobs, setting, strict=True)}
+
+    # -- order of runs -------------------------------------------------------------
+
+    def _next(self) -> Setting | None:
+        """The cheapest setting that is wanted and fits into the budget."""
+        left = self.budget - self.spent
+        failed = len(self.runs) - len(self.succeeded)
+        if left <= 0 or (failed >= HOPELESS and not self.succeeded):
+            return None
+        first = [s for s in self._star(centre_of(self.knobs)) if s not in self.runs]
+        cheap = [s for s in first if len(self.runs) < 2 or self._cost(s) <= left / 2]
+        wanted = cheap or [s for s in self._wanted() if s not in self.runs]
+        if not wanted:
+            return None
+        setting = min(wanted, key=lambda s: (self._cost(s), wanted.index(s)))
+        return setting if len(self.runs) < 2 or self._cost(setting) <= left else None
+
+    def _star(self, base: Setting) -> Iterator[Setting]:
+        """A setting, and those that differ from it in one knob."""
+        yield base
+        for k, knob in enumerate(self.knobs):
+            yield from ((*base[:k], v, *base[k + 1 :]) for v in knob.values if v != base[k])
+
+    def _wanted(self) -> list[Setting]:
+        """Lines along the knob with the largest effect, for each setting of the star."""
+        star = list(self._star(centre_of(self.knobs)))
+        wanted = dict.fromkeys(star)
+        for quantity in self.quantities:
+            k = leading(self.points(quantity), self.knobs)
+            for base in star:
+                wanted |= dict.fromkeys(
+                    (*base[:k], v, *base[k + 1 :]) for v in self.knobs[k].values
+                )
+        return list(wanted)
+
+    def _cost(self, setting: Setting) -> float:
+        """Expected wall time of a run with its process and repetitions [s]."""
+        ran, base = self.succeeded, centre_of(self.knobs)
+        known = {s: run["wall_s"] for s, run in ran.items()} or {base: 0.01}
+        start = min((r["spent_s"] - _repeated(r["wall_s"]) for r in ran.values()), default=START)
+        near = base if base in known else min(known, key=known.__getitem__)
+        wall = known[near]
+        for k, knob in enumerate(self.knobs):
+            times = self._times(known, k)
+            wall *= _time(knob, setting[k], times) / _time(knob, near[k], times)
+        return max(start, 0.0) + _repeated(wall)
+
+    def _times(self, known: Mapping[Setting, float], k: int) -> dict[int, float]:
+        """Measured times along a knob through the defaults, by the place of its value."""
+        base = centre_of(self.knobs)
+        places = {n: (*base[:k], v, *base[k + 1 :]) for n, v in enumerate(self.knobs[k].values)}
+        return {n: known[place] for n, place in places.items() if place in known}
+
+    # -- runs ------------------------------------------------------------------------
+
+    def _load(self) -> None:
+        for (label, _, fingerprint), run in stored_runs(self.folder, self.name).items():
+            setting = tuple(run["knobs"].get(knob.name) for knob in self.knobs)
+            known = all(v in knob.values for v, knob in zip(setting, self.knobs, strict=True))
+            own = label == self.name and fingerprint == self._fingerprint and known
+            if (
+                own
+                and "cut" not in run
+                and "spent_s" in run
+                and self.named(setting) == run["knobs"]
+            ):
+                self._take(setting, run)
+
+    def _measure(self, setting: Setting, quiet: bool) -> None:
+        begin, knobs = perf_counter(), self.named(setting)
+        outcome = process.measure(self._run, knobs, max(self.budget - self.spent, 0.1))
+        outcome["spent_s"] = perf_counter() - begin
+        head = {"label": self.name, "knobs": knobs, "fingerprint": self._fingerprint}
+        store(self.folder, head | outcome)
+        self._take(setting, outcome)
+        if not quiet:
+            said = outcome.get("failure") or f"{outcome['wall_s']:.3g} s"
+            print(f"{text_of(knobs)}: {said}", file=sys.stderr, flush=True)
+
+    def _take(self, setting: Setting, run: dict[str, Any]) -> None:
+        """Keep a run after a check of its quantities."""
+        if "failure" not in run:
+            values = run["values"]
+            if not self.quantities:
+                self.quantities = [q for q, v in values.items() if not isinstance(v, list)]
+            for quantity in self.quantities:
+                if quantity not in values:
+                    raise InputError(
+                        f"quantity '{quantity}' of '{self.name}': expected one of {quoted(values)}"
+                        f"{meant(quantity, values)}"
+                    )
+                if isinstance(values[quantity], list):
+                    raise InputError(
+                        f"quantity '{quantity}' of '{self.name}' is a list: expected a number"
+                    )
+            if not self.quantities:
+                raise InputError(
+                    f"'{self.name}' returns no number: expected a quantity, as a number"
+                )
+        self.runs[setting] = run
+
+    def _too_few(self) -> str:
+        failed = [run for run in self.runs.values() if "failure" in run]
+        failures = [run["failure"] for run in failed if "cut" not in run]
+        if failures:
+            return (
+                f"trade '{self.name}': {len(failures)} runs failed, the first with: {failures[0]}"
+            )
+        longest = max(run["spent_s"] for run in self.runs.values())
+        return (
+            f"budget = {self.budget:g} s is too small for two runs of '{self.name}', the longest of "
+            f"which took {longest:.2g} s: expected at least {math.ceil(4 * longest)} s"
+        )
+
+
+def _repeated(wall: float) -> float:
+    """Time of a run of this wall time with its repetitions [s]."""
+    return min(process.REPEATS * wall, wall + process.SHORT)
+
+
+def _time(knob: Knob, value: Any, known: Mapping[int, float]) -> float:
+    """Time for a value of a knob, relative to others; extrapolated with the last ratio known."""
+    place = knob.values.index(value)
+    if place in known:
+        return known[place]
+    ratio = RATIO if knob.refines else 1.0
+    if not known:
+        return float(ratio**place)
+    nearest = min(known, key=lambda n: abs(n - place))
+    others = sorted(known, key=lambda n: abs(n - place))[:2]
+    if len(others) == 2 and knob.refines:
+        a, b = sorted(others)
+        # short runs are mostly overhead: the ratio grows
+        ratio = max(known[b] / known[a], 1.0) ** (1 / (b - a)) * (1.5 if place > b else 1.0)
+    return float(known[nearest] * ratio ** (place - nearest))
