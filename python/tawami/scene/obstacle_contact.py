@@ -76,7 +76,8 @@ class ObstacleContact:
         """Mean distances of patches that touch.
 
         That of a patch of a bent border is not zero when it touches. A new patch that lies where others
-        pushed before touches where it is, unless it is inside the obstacle: otherwise it would lose contact, and the force would drop.
+        pushed before touches where it is, unless it is inside the obstacle. Otherwise it would lose
+        contact, and the force would drop.
         """
         near, obstacle = self._border, self.obstacle
         if near.groups is obstacle.groups:
