@@ -124,6 +124,18 @@ class MovingPoints:
         """
         return np.asarray(self._grid.inwards(edge, self.x) <= tolerance * self._grid.h)
 
+    def gap(self, edge: Edge) -> float:
+        """Distance from an edge of the grid [m] that the nearest place on the border has at least.
+
+        Stretches of the border count as straight, along the tangents at their points.
+        """
+        tangent = self._tangent
+        ends = [
+            self._grid.inwards(edge, self.x + away[:, None] * tangent)
+            for away in (self.stretch - self.length / 2, self.stretch + self.length / 2)
+        ]
+        return float(np.min(ends))
+
     @property
     def stretch(self) -> Array:
         """Distance from each point to the middle of the stretch that it integrates over [m]."""
