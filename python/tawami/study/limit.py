@@ -2,7 +2,9 @@
 
 Regular sequences are extrapolated with their observed order p, q(s) = q* + C s^p (Richardson, 1911;
 Roache, Annu. Rev. Fluid Mech. 29, 1997, for the observed order on unequal refinements). Others have the
-finest value as the limit and the spread of the finest three as the uncertainty.
+finest value as the limit and the spread of the finest three as the uncertainty. The uncertainty of a
+regular sequence is the largest of the last change of the extrapolated value, the effect of rounding the
+order to a whole number, and a part of the extrapolation.
 """
 
 from __future__ import annotations
@@ -104,7 +106,8 @@ def _limit(
         return Limit(values[-1] + beyond, max(abs(beyond), last), order)
     previous = values[-2] + _remainder(sizes[-3:-1], before, steps[-2])
     moved = abs(values[-1] + beyond - previous)
-    return Limit(values[-1] + beyond, max(moved, LEAST * abs(beyond)), order)
+    formal = _remainder(sizes[-2:], max(round(order), 1), steps[-1])
+    return Limit(values[-1] + beyond, max(moved, abs(formal - beyond), LEAST * abs(beyond)), order)
 
 
 def _remainder(sizes: Sequence[float], order: float, step: float) -> float:
