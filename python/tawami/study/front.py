@@ -127,7 +127,7 @@ class Trade:
     # -- words -----------------------------------------------------------------------
 
     def sentence(self) -> str:
-        """What a tolerance costs, what half the error costs, and what gains nothing."""
+        """Words for the cost of a tolerance and of half the error, and for knobs that gain nothing."""
         parts = [self._remarks()] if self._remarks() else []
         if self.converges:
             parts.append(self._costs())

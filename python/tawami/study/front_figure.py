@@ -14,8 +14,8 @@ from tawami.study.row import text_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Errors below this part of the largest are drawn at it.
-DEEPEST = 1e-8
+#: Errors below this part of the smallest bound are drawn at it.
+DEEPEST = 0.1
 
 
 @style.used()
@@ -49,7 +49,7 @@ def picture(trade: Trade, path: str | Path) -> None:
 
 def _errors(axes: Axes, trade: Trade) -> None:
     runs = trade.succeeded
-    least = DEEPEST * max(run.bound for run in runs) or DEEPEST
+    least = DEEPEST * min((run.bound for run in runs if run.bound > 0), default=1.0)
 
     def place(some: Sequence[Run]) -> tuple[list[float], list[float]]:
         return [run.wall_s for run in some], [max(run.bound, least) for run in some]

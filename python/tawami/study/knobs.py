@@ -62,6 +62,10 @@ def knobs_of(build: Run, declared: Mapping[str, Sequence[Any]] | None = None) ->
     """
     name = getattr(build, "__name__", checks.shown(build))
     parameters = inspect.signature(build).parameters
+    if declared is not None and not isinstance(declared, Mapping):
+        raise InputError(
+            f"knobs = {checks.shown(declared)}: expected a mapping from names of arguments to values"
+        )
     ranges = _annotated(build) | dict(declared or {})
     for parameter in parameters.values():
         if parameter.default is parameter.empty:

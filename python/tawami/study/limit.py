@@ -2,7 +2,9 @@
 
 Regular sequences are extrapolated with their observed order p, q(s) = q* + C s^p (Richardson, 1911;
 Roache, Annu. Rev. Fluid Mech. 29, 1997, for the observed order on unequal refinements). Others have the
-finest value as the limit and the spread of the finest three as the uncertainty.
+finest value as the limit and the spread of the finest three as the uncertainty. The uncertainty of a
+regular sequence is the largest of the last change of the extrapolated value, the effect of rounding the
+order to a whole number, and a part of the extrapolation.
 """
 
 from __future__ import annotations
@@ -17,6 +19,8 @@ from scipy.optimize import brentq
 
 #: Observed orders of a regular sequence; below the first one there is no sign of a limit.
 SLOWEST, FASTEST = 0.3, 8.0
+#: Largest difference of two observed orders of a regular sequence.
+APART = 1.5
 #: Changes below this part of the value are round-off.
 ROUND_OFF = 1e-11
 #: Part of the value that the error of the finest run may have.
@@ -93,18 +97,23 @@ def _limit(
             return Limit(values[-1], math.inf)
     if order is None and len(steps) > 2 and _grows(steps[-3:]):
         return Limit(values[-1], math.inf)
-    if order is None or not SLOWEST <= order <= FASTEST:
-        shrinks = all(abs(b) <= abs(a) / 2 for a, b in zip(steps[-3:], steps[-2:], strict=False))
+    before = orders[-2] if len(orders) > 1 else order
+    if order is None or before is None or not _regular(order, before):
+        shrinks = all(abs(b) <= abs(a) / 2 for a, b in itertools.pairwise(steps[-3:]))
         return Limit(values[-1], last if shrinks else max(values[-3:]) - min(values[-3:]))
     beyond = _remainder(sizes[-2:], order, steps[-1])
     if len(orders) == 1:
         return Limit(values[-1] + beyond, max(SINGLE * abs(beyond), 0.1 * last), order)
-    before = orders[-2]
-    if before is None or not SLOWEST <= before <= FASTEST:
-        return Limit(values[-1] + beyond, max(abs(beyond), last), order)
     previous = values[-2] + _remainder(sizes[-3:-1], before, steps[-2])
     moved = abs(values[-1] + beyond - previous)
-    return Limit(values[-1] + beyond, max(moved, LEAST * abs(beyond)), order)
+    formal = _remainder(sizes[-2:], max(round(order), 1), steps[-1])
+    return Limit(values[-1] + beyond, max(moved, abs(formal - beyond), LEAST * abs(beyond)), order)
+
+
+def _regular(order: float, before: float) -> bool:
+    """Whether two observed orders are possible and nearly the same."""
+    possible = min(order, before) >= SLOWEST and max(order, before) <= FASTEST
+    return possible and max(order, before) <= min(order, before) + APART
 
 
 def _remainder(sizes: Sequence[float], order: float, step: float) -> float:

@@ -1,0 +1,252 @@
+"""Trades: limits with several knobs, the order of runs, budgets, tables, wrong input."""
+
+from __future__ import annotations
+
+import csv
+import io
+from typing import Annotated
+
+import pytest
+
+import tawami
+from tawami.study import front_figure, process
+from tawami.study.estimate import estimate
+from tawami.study.knobs import Knob, applied, knobs_of
+
+H = (1 / 4, 1 / 8, 1 / 16, 1 / 32)
+
+
+# -- functions with knobs ----------------------------------------------------------
+
+
+def quadratic(
+    h: Annotated[float, H] = 1 / 8,
+    alpha: Annotated[float, (0.1, 0.03, 0.01)] = 0.03,
+    load: float = 2.0,
+):
+    """Converge to the load with h, faster with a small alpha; the effect of alpha vanishes with h."""
+    return {"tip": load + (0.3 + 10 * alpha) * h**2, "seconds": 0.002 / h}
+
+
+def singular(h: Annotated[float, H] = 1 / 8, n: Annotated[int, (2, 4, 8)] = 4):
+    return {"tip": 1 + h**-0.5 + 1 / n**2}
+
+
+def loaded(h: Annotated[float, H] = 1 / 8, load: Annotated[float, (1.0, 2.0, 4.0)] = 1.0):
+    return {"tip": load * (1 + h**2)}
+
+
+def forms(h: Annotated[float, H] = 1 / 8, form: Annotated[str, ("good", "other")] = "good"):
+    return {"tip": (1.0 if form == "good" else 1.5) + h**2}
+
+
+def fails_when_coarse(h: Annotated[float, H] = 1 / 16):
+    if h > 1 / 5:
+        raise tawami.InputError("h is too large")
+    return {"tip": 1 + h**2}
+
+
+def always_fails(h: Annotated[float, H] = 1 / 8):
+    raise tawami.InputError(f"no h = {h} is possible")
+
+
+def text(h: Annotated[float, H] = 1 / 8):
+    return {"tip": "long"}
+
+
+def profile(h: Annotated[float, H] = 1 / 8):
+    return {"tip": [h, h]}
+
+
+def no_knobs(h: float = 1 / 8):
+    return {"tip": h}
+
+
+def no_default(h: Annotated[float, H]):
+    return {"tip": h}
+
+
+def only_names(form: Annotated[str, ("u", "u_epsv")] = "u"):
+    return {"tip": 1.0}
+
+
+FUNCTIONS = {name: value for name, value in globals().items() if callable(value)}
+
+
+@pytest.fixture
+def runs(monkeypatch):
+    """Run functions here, with the times that they ask for; the knobs of the runs, in order."""
+    done = []
+
+    def measure(name, knobs, limit):
+        done.append(dict(knobs))
+        try:
+            values = process._plain(FUNCTIONS[name.partition(":")[2]](**knobs))
+        except tawami.InputError as error:
+            return {"failure": f"InputError: {error}"}
+        wall = values.pop("seconds", 0.01)
+        if wall > limit:
+            return {"failure": "took longer", "cut": True}
+        return {"values": values, "wall_s": wall, "peak_MB": 100.0}
+
+    monkeypatch.setattr(process, "measure", measure)
+    monkeypatch.setattr(front_figure, "picture", lambda *_: None)
+    return done
+
+
+def traded(function, tmp_path, budget=600.0, **options):
+    return tawami.trade(function, "tip", budget, folder=tmp_path, quiet=True, **options)
+
+
+# -- estimates ---------------------------------------------------------------------
+
+
+def test_an_error_that_vanishes_with_h_does_not_count_twice():
+    knobs = knobs_of(quadratic)
+    points = {(h, a): quadratic(h, a)["tip"] for h in knobs[0].values for a in knobs[1].values}
+    found = estimate("tip", knobs, points)
+    assert found.value == pytest.approx(2, abs=1e-9)
+    assert found.orders["h"] == pytest.approx(2)
+    assert found.remarks == ()
+
+
+def test_an_error_that_stays_is_extrapolated_too():
+    knobs = [Knob("h", H, 1 / 8), Knob("dt", (0.2, 0.1, 0.05, 0.025), 0.1)]
+    points = {(h, dt): 1 + h**2 + 0.01 * dt for h in H for dt in knobs[1].values}
+    found = estimate("tip", knobs, points)
+    assert abs(found.value - 1) <= found.uncertainty + 1e-12
+    assert found.uncertainty < 2e-3
+    assert found.orders == pytest.approx({"h": 2, "dt": 1})
+
+
+# -- trades ------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("runs")
+def test_errors_the_recommended_setting_and_the_files(tmp_path):
+    trade = traded(quadratic, tmp_path)
+    assert trade.converges
+    for run in trade.succeeded:
+        true = abs(run.values["tip"] - 2) / 2
+        assert abs(run.error - true) <= run.uncertainties["tip"] + 1e-12
+        assert run.bound <= 3 * true
+    chosen = trade.recommended()
+    assert abs(chosen.values["tip"] / 2 - 1) <= 0.01
+    assert trade.default.knobs == {"h": 1 / 8, "alpha": 0.03}
+    lines = str(trade).splitlines()
+    assert lines[0].split() == ["setting", "tip", "time", "memory"]
+    assert len(lines[: lines.index("")]) <= 1 + 8 + 1
+    assert "1 % costs" in trade.sentence()
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "quadratic.csv").read_text())))
+    assert len(rows) == len(trade.runs)
+    assert rows[0].keys() == {
+        "h", "alpha", "tip", "tip, error", "tip, uncertainty", "wall_s", "peak_MB", "failure"
+    }  # fmt: skip
+    with pytest.raises(tawami.InputError, match=r"no run of 'quadratic' is within 1e-07 %"):
+        trade.recommended(1e-9)
+
+
+def test_cheap_settings_run_first_and_stored_runs_are_not_repeated(tmp_path, runs):
+    first = traded(quadratic, tmp_path)
+    sizes = [run["h"] for run in runs if run["alpha"] == 0.03]
+    assert sizes[0] == 1 / 4
+    assert sizes[-1] == 1 / 32
+    before = len(runs)
+    assert traded(quadratic, tmp_path).runs == first.runs
+    assert len(runs) == before
+
+
+def test_a_larger_budget_continues(tmp_path, monkeypatch, runs):
+    clock = iter(range(10**6))
+    monkeypatch.setattr("tawami.study.ladder.perf_counter", lambda: float(next(clock)))
+    few = traded(quadratic, tmp_path, budget=4.5)  # each run takes a second of this clock
+    assert 2 <= len(few.runs) < 6
+    before = len(runs)
+    more = traded(quadratic, tmp_path, budget=100.0)
+    assert len(more.runs) == len(runs) > before
+    settings = [tuple(run.values()) for run in runs]
+    assert len(set(settings)) == len(settings)
+
+
+@pytest.mark.usefixtures("runs")
+def test_no_limit_is_reported(tmp_path):
+    trade = traded(singular, tmp_path)
+    assert not trade.converges
+    assert "'tip' does not converge with 'h'" in trade.sentence()
+    assert "no limit" in str(trade)
+    with pytest.raises(tawami.InputError, match="the problem has no limit, or 'h' changes the pro"):
+        trade.recommended()
+
+
+@pytest.mark.usefixtures("runs")
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (loaded, "'tip' does not converge with 'load'"),
+        (
+            forms,
+            "converges to 1.5 with form other, and to 1 with form good: 'form' changes the problem",
+        ),
+    ],
+)
+def test_a_knob_that_changes_the_problem_is_reported(tmp_path, function, message):
+    assert message in traded(function, tmp_path).sentence()
+
+
+@pytest.mark.usefixtures("runs")
+def test_runs_that_fail_are_shown(tmp_path):
+    trade = traded(fails_when_coarse, tmp_path)
+    assert trade.estimates["tip"].value == pytest.approx(1, abs=1e-9)
+    assert (
+        "1 of 4 runs failed, the first with h 0.25: InputError: h is too large" in trade.sentence()
+    )
+
+
+@pytest.mark.usefixtures("runs")
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (
+            no_knobs,
+            "no_knobs has no knobs: expected an argument with its values from coarse to fine",
+        ),
+        (no_default, "argument 'h' of no_default has no default"),
+        (only_names, "no knob of only_names refines"),
+        (text, "quantity 'tip' = 'long': expected real numbers"),
+        (profile, "quantity 'tip' of 'profile' is a list: expected a number"),
+        (always_fails, "3 runs failed, the first with: InputError: no h = "),
+    ],
+)
+def test_wrong_input(tmp_path, function, message):
+    with pytest.raises(tawami.InputError) as error:
+        traded(function, tmp_path)
+    assert message in str(error.value)
+
+
+@pytest.mark.usefixtures("runs")
+def test_a_budget_for_less_than_two_runs(tmp_path, monkeypatch):
+    clock = iter(range(10**6))
+    monkeypatch.setattr("tawami.study.ladder.perf_counter", lambda: float(next(clock)))
+    with pytest.raises(tawami.InputError, match=r"budget = 0.9 s is too small .* at least 4 s"):
+        traded(quadratic, tmp_path, budget=0.9)
+    assert len(traded(quadratic, tmp_path, budget=4.0).succeeded) >= 2  # the advice
+
+
+@pytest.mark.usefixtures("runs")
+def test_knobs_may_be_declared(tmp_path):
+    trade = traded(no_knobs, tmp_path, knobs={"h": [0.4, 0.2, 0.1]})
+    assert [knob.values for knob in trade.knobs] == [(0.4, 0.2, 1 / 8, 0.1)]
+    with pytest.raises(tawami.InputError, match=r"knob 'H': expected an argument of no_knobs"):
+        traded(no_knobs, tmp_path, knobs={"H": [0.4, 0.2]})
+
+
+def test_a_setting_is_applied_to_the_source():
+    source = (
+        "def build(h: Annotated[float, (1/2, 1/4)] = 1 / 2,  # é\n"
+        "          n=(\n    3\n), *, form='u', é=1):\n    return {}\n"
+    )
+    found = applied(source, "build", {"h": 0.25, "n": 4, "form": "u_epsv"})
+    assert found == (
+        "def build(h: Annotated[float, (1/2, 1/4)] = 0.25,  # é\n"
+        "          n=(\n    4\n), *, form='u_epsv', é=1):\n    return {}\n"
+    )
