@@ -67,6 +67,7 @@ extremes: setup
 
 bench: setup
 	$(PYTHON) -m cases.costs.bench $(if $(AGAINST),--against $(AGAINST))
+	$(if $(AGAINST),,$(PYTHON) -m cases.costs.solvers)
 
 trade: setup
 	$(PYTHON) -m cases.costs.trade

@@ -26,6 +26,19 @@ logging.disable(logging.INFO)  # FFCx reports every form that it compiles
 profiles.load()
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """The switch `--linear-solver NAME`: the solver of all scenes that do not name one."""
+    parser.addoption("--linear-solver", choices=("auto", "direct", "multigrid"))
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Set that solver; where multigrid stalls, the factorisation takes over."""
+    name = config.getoption("--linear-solver")
+    if name is not None:
+        tawami.Scene.__init__.__kwdefaults__["linear_solver"] = name
+        config.addinivalue_line("filterwarnings", "default::tawami.SolverWarning")
+
+
 @pytest.fixture(params=scenes.FORMS)
 def form(request: pytest.FixtureRequest) -> dict[str, Any]:
     """Options of each shipped form of small strain, with each of its stabilisations."""

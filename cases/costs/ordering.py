@@ -85,11 +85,11 @@ class Factorisation(direct.DirectSolver):
 def tangents(cells: Sequence[int], pile_cells: Sequence[int]) -> Iterator[tuple[str, Any, bool]]:
     """Name, scaled tangent and its symmetry of each scene."""
     for n in cells:
-        scene = beam(n)
+        scene = beam(n, linear_solver="direct")
         scene.solve()
         yield f"beam {n}", *last_tangent(scene.configuration.domain.newton)
     for n in pile_cells:
-        motion = pile(n // 10)
+        motion = pile(n // 10, linear_solver="direct")
         newton = motion.scene.configuration.domain.newton  # that of the cells before the step
         motion.step(1e-3)
         yield f"pile {n}", *last_tangent(newton)

@@ -36,6 +36,7 @@ SHORTER = {
     "bearing_capacity": ("--cells", "2"),
     "circular_footing": ("--cells", "8"),
     "ordering": ("--cells", "4,8,16,32,64"),
+    "solvers": ("--cells", "16,32,64", "--particles", "800,12800"),
 }
 
 

@@ -53,6 +53,8 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "collapse": ("Collapse", "showcase", ("pile",)),
     "projection": ("Nodal projection", "costs", ()),
     "ordering": ("Orderings of MUMPS", "costs", ()),
+    "contact": ("Steps into contact", "costs", ()),
+    "solvers": ("Linear solvers", "costs", ()),
     "writing": ("Writing results", "costs", ()),
 }
 #: Pages that can be downloaded as notebooks.

@@ -193,6 +193,10 @@ class Kernels:
     def __new__(
         cls, assembler: Assembler, rank: int, kernels: Sequence[tuple[Any, ...]]
     ) -> Kernels: ...
+    @staticmethod
+    def elasticity(assembler: Assembler, geometry: str) -> Kernels: ...  # data: mu, lambda
+    @staticmethod
+    def mass(assembler: Assembler) -> Kernels: ...  # data: c
 
 @final
 class Pattern:

@@ -15,6 +15,7 @@ mod kernel;
 mod matrix;
 mod pattern;
 mod point;
+mod reference;
 mod selection;
 
 use std::ops::Range;
@@ -30,6 +31,7 @@ pub use kernel::{Bilinear, Kernel, Kernels, Slot, State, TabulateTensor};
 pub use matrix::matrix;
 pub use pattern::{pattern, Pattern};
 pub use point::{Entries, Entry, Place, PointKernel, PointSlot};
+pub use reference::Reference;
 pub use selection::Selection;
 
 /// Most coefficients of all fields on a cell.

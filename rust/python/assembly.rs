@@ -14,7 +14,7 @@ use super::transfer::check_data;
 use super::{require, view, InputError};
 use crate::assembly::{
     self, Bilinear, Cells, Entries, Entry, Field, Kernel, Kernels, Pattern, Place, PointKernel,
-    PointSlot, Selection, Slot, State, TabulateTensor,
+    PointSlot, Reference, Selection, Slot, State, TabulateTensor,
 };
 use crate::grid::{Grid, Location};
 use crate::space::{Index, DIM, NODES, NODES_1D, VERTICES};
@@ -156,6 +156,18 @@ impl PyKernels {
         let plans = kernels.into_iter().map(plan).collect::<PyResult<_>>()?;
         Ok(Self { plans, rank, dofs })
     }
+
+    /// Elasticity in the first components of the fields: an array of particle data has mu and lambda.
+    #[staticmethod]
+    fn elasticity(py: Python, assembler: &PyAssembler, geometry: &str) -> PyResult<Self> {
+        Self::reference(py, assembler, Reference::Elasticity(geometry.parse()?))
+    }
+
+    /// `c q p` of the first component of the fields: an array of particle data has c.
+    #[staticmethod]
+    fn mass(py: Python, assembler: &PyAssembler) -> PyResult<Self> {
+        Self::reference(py, assembler, Reference::Mass)
+    }
 }
 
 /// Place and entries of a point kernel.
@@ -183,6 +195,26 @@ fn entries(
 }
 
 impl PyKernels {
+    /// A reference operator of rank 2.
+    fn reference(py: Python, assembler: &PyAssembler, of: Reference) -> PyResult<Self> {
+        let columns = (0..of.columns()).collect();
+        let mut slots = vec![Source::Data { array: 0, means: false, columns }];
+        slots.extend(of.reads_position().then_some(Source::Position));
+        let entries = of.entries().filter(|entries| entries.fit(&assembler.cells));
+        let Some(entries) = entries else {
+            return Err(PyRuntimeError::new_err("internal: an operator of other fields"));
+        };
+        let plan = Plan {
+            _owner: py.None(),
+            tabulate: of.kernel(),
+            slots,
+            constants: Vec::new(),
+            reads_position: false,
+            point: Some((Place::Particles, entries)),
+        };
+        Ok(Self { plans: vec![plan], rank: 2, dofs: assembler.cells.dofs() })
+    }
+
     /// The kernels one by one, with their arguments.
     fn each<'a>(
         &'a self,

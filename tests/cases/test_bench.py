@@ -8,7 +8,7 @@ import re
 import pytest
 
 import tawami
-from cases.costs import ordering
+from cases.costs import ordering, solvers
 from cases.costs.bench import __main__ as bench
 from cases.costs.bench import borders, compare
 
@@ -57,6 +57,16 @@ def test_every_ordering_is_measured(tmp_path):
     assert [row["ordering"] for row in rows] == 2 * list(ordering.ORDERINGS)
     assert {row["method"] for row in rows[4:]} == {"LU"}
     assert all(float(row["numeric_ms"]) > 0 for row in rows)
+
+
+def test_every_linear_solver_is_measured(tmp_path):
+    sizes = ["--cells", "2", "--particles", "800", "--steps", "1"]
+    solvers.main([*sizes, "--results", str(tmp_path)])
+    with (tmp_path / "solvers.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["solver"] for row in rows] == 2 * list(solvers.SOLVERS)
+    assert all(float(row["seconds"]) > 0 for row in rows)
+    assert {row["scene"] for row in rows} == {"beam 2", "pile 800"}
 
 
 def test_a_checkout_that_is_not_set_up(tmp_path):

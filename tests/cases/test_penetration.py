@@ -21,3 +21,12 @@ def test_the_mixed_form_comes_near_the_force_of_a_cylinder():
     assert not run.stopped
     assert run.force[-1] == pytest.approx(penetration.cylinder(run.depth), rel=0.1)
     assert run.penetration < 1e-6
+
+
+@pytest.mark.slow
+def test_a_pile_goes_as_deep_as_it_is_wide():
+    run = penetration.solve("u_epsv_finite", w=1.0)
+    assert not run.stopped
+    assert run.penetration < 0.01
+    deep = run.w > 0.2
+    assert run.force[deep] == pytest.approx(penetration.cylinder(run.w[deep]), rel=0.2)

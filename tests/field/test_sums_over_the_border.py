@@ -270,5 +270,6 @@ def test_a_removal_keeps_the_numbers_of_the_border_that_remains():
     base, top = (points.tag == SIDES.index(name) for name in ("bottom", "top"))
     u = np.array([solution.displacement(tuple(x))[1] for x in points.x[base]])
     carried = points.length[base] @ ((40 + 10 * points.x[base, 0]) * u)
-    assert carried == pytest.approx(-points.length[top].sum(), rel=1e-8)
+    # the point whose stretch is cut has moved a little and keeps its k
+    assert carried == pytest.approx(-points.length[top].sum(), rel=2e-5)
     assert points.length[top].sum() < 0.8 * WIDTH

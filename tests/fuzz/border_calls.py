@@ -95,6 +95,8 @@ CALLS: dict[str, Callable[[Sample], tuple[Any, ...]]] = {
         s.assembler.matrix, s.none[1], s.none[0], [s.data], s.volume, s.all, s.pattern, s.values,
     ),
     "Kernels": lambda s: (_rust.Kernels, s.assembler, 1, []),
+    "Kernels.elasticity": lambda s: (_rust.Kernels.elasticity, s.assembler, "plane_strain"),
+    "Kernels.mass": lambda s: (_rust.Kernels.mass, s.assembler),
     "Requests": lambda s: (_rust.Requests, s.wanted),
     "Stage": lambda s: (_rust.Stage, s.particles, s.location, [s.law], "mixed", False, BASIS),
     "Stage.evaluate": lambda s: (

@@ -111,8 +111,10 @@ def test_files_hold_the_whole_body_once(alone, several):
 def test_the_header_describes_the_whole_body_on_every_rank(alone, several):
     (header,) = alone.results["output header"]
     assert "particles     128, 120 bytes each" in header
-    expected = str(header).replace("1 rank", f"{several.number} ranks")
-    assert list(several.results["output header"]) == [expected] * several.number
+    # lines may break at other places
+    expected = " ".join(str(header).split()).replace("1 rank", f"{several.number} ranks")
+    found = [" ".join(str(one).split()) for one in several.results["output header"]]
+    assert found == [expected] * several.number
 
 
 # -- programs that end by an error ------------------------------------------------

@@ -281,10 +281,10 @@ def test_only_the_translation_along_the_axis_is_rigid(r):
     assert "axisymmetric about x = 0" in scene.header()
 
 
-def test_the_iterative_solver():
+def test_multigrid():
     direct, iterative = (
         stretch(ring(form="u_epsv", linear_solver=solver), 1e-3, 2e-3).stress
-        for solver in ("direct", "iterative")
+        for solver in ("direct", "multigrid")
     )
     np.testing.assert_allclose(iterative, direct, atol=1e-4)
 

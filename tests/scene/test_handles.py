@@ -209,7 +209,7 @@ def test_versions_tell_that_handles_have_changed():
     """Data that others keep for a set of loads or supports is valid while these numbers stay."""
     scene = block()
     loads, supports = scene.configuration.loads, scene.configuration.supports
-    weight, side, wall = scene.gravity((0.0, -G)), scene.fix("left", "x"), scene.wall("top")
+    weight, side, wall = scene.gravity((0.0, -G)), scene.fix("left", "x"), scene.wall("bottom")
     seen = [(loads.version, supports.version)]
     for act in (
         lambda: weight.change((0.0, 0.0)),

@@ -25,29 +25,35 @@ RHO, G = 2040.0, 9.81  # of the pile [kg/m3], [m/s2]
 WARM_UP = 5  # steps of the pile before the first that is measured
 
 
-def beam(n: int) -> Any:
-    """The cantilever of the paper as a scene, 2n x n cells with 2 x 2 particles each."""
+def beam(n: int, **options: Any) -> Any:
+    """The cantilever of the paper as a scene, 2n x n cells with 2 x 2 particles each.
+
+    Args:
+        n: Cells over the height.
+        options: Options of the scene.
+    """
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, -0.5), h=1 / n, cells=(2 * n, n))
     body = tawami.box(grid, (0.0, -0.5), (2.0, 0.5), per_axis=2)
     law = tawami.linear_elastic(E=3e6, nu=0.4999)
-    scene = tawami.Scene(grid, body, law, form="u_epsv", alpha=0.1)
+    scene = tawami.Scene(grid, body, law, form="u_epsv", alpha=0.1, **options)
     scene.fix("left", "x")
     scene.hold((0.0, 0.0), "y")
     scene.traction("right", (0.0, -1e3))
     return scene
 
 
-def pile(finer: int = 1) -> Any:
+def pile(finer: int = 1, **options: Any) -> Any:
     """The pile of `cases.showcase.collapse` in motion.
 
     Args:
         finer: Ratio of 1 cm to the cell size: 800 finer^2 particles.
+        options: Options of the scene.
     """
     cells = (80 * finer, 14 * finer)
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.01 / finer, cells=cells)
     body = tawami.box(grid, (0.0, 0.0), (0.2, 0.1), per_axis=2)
     rods = tawami.drucker_prager(tawami.linear_elastic(E=0.84e6, nu=0.3), phi=21.9)
-    scene = tawami.Scene(grid, body, rods, form="u_epsv_finite", density=RHO, alpha=0.01)
+    scene = tawami.Scene(grid, body, rods, form="u_epsv_finite", density=RHO, alpha=0.01, **options)
     scene.gravity((0.0, -G))
     scene.fix("left", "x")
     scene.fix("bottom", "x")

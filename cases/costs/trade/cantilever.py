@@ -46,7 +46,7 @@ GRIDS = [
     {"form": ("u_epsv_finite",), "alpha": (0.01,), "n": (4, 8), "particles": PARTICLES,
      "tolerance": (1e-2, 1e-4, 1e-6, 1e-8)},
     {"form": ("u_epsv",), "stabilisation": ("laplacian",), "alpha": (0.01,), "n": (32, 64),
-     "particles": ("2 x 2",), "linear_solver": ("direct", "iterative"),
+     "particles": ("2 x 2",), "linear_solver": ("direct", "multigrid"),
      "factorise": ("when_it_pays", "always"),
      "tolerance": (1e-4, 1e-6)},
     {"form": ("u_epsv",), "stabilisation": ("laplacian",), "alpha": (0.01,), "n": (32, 64, 128),

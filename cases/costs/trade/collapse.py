@@ -45,7 +45,7 @@ GRIDS = [
     MIXED | {"per_axis": (1, 2, 3, 4)},
     MIXED | {"tolerance": (1e-2, 1e-3, 1e-4, 1e-6, 1e-8)},
     MIXED | {"factorise": ("when_it_pays", "always")},
-    MIXED | {"linear_solver": ("direct", "iterative")},
+    MIXED | {"linear_solver": ("direct", "multigrid")},
     MIXED | {"ghost_penalty": ("off", "on")},
     MIXED | {"threads": (1, 2)},
 ]  # fmt: skip

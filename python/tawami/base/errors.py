@@ -107,6 +107,10 @@ class SofteningWarning(TawamiWarning):
     """A material that softens without a length scale: results depend on the grid."""
 
 
+class SolverWarning(TawamiWarning):
+    """A linear solver that does not converge, so that a more expensive one takes over."""
+
+
 class TangentWarning(TawamiWarning):
     """A law in NumPy that returns no tangent: its central differences take time."""
 

@@ -40,6 +40,13 @@ def largest(comm: Any, value: float) -> float:
     return value if comm.size == 1 else float(comm.allreduce(value, op=MPI.MAX))
 
 
+def least_of(comm: Any, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """The smallest of all ranks of each value, on every rank, in place."""
+    if comm.size > 1:
+        comm.Allreduce(MPI.IN_PLACE, values, op=MPI.MIN)
+    return values
+
+
 def allgathered(comm: Any, part: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """The arrays of all ranks one after the other, on every rank."""
     if comm.size == 1:

@@ -159,12 +159,15 @@ class Border(Curves):
         if tolerance is None:
             ends = np.concatenate([self.start, self.end])
             tolerance = ON_LINE * float(np.ptp(ends, axis=0).max())
-        of, low, high = joining.free(self, tolerance)
-        parts = self._parts(of, low, high, self.at(of, low), self.at(of, high))
+        parts = self.between(*joining.free(self, tolerance))
         some = np.unique(parts.tag)
         number = np.searchsorted(some, parts.tag).astype(np.int64)
         names = tuple(self.names[k] for k in some)
         return Border(parts.start, parts.end, parts.curvature, number, names)
+
+    def between(self, of: Indices, low: Array, high: Array) -> Border:
+        """Parts of the pieces `of` between two shares of their length."""
+        return self._parts(of, low, high, self.at(of, low), self.at(of, high))
 
     def __getitem__(self, chosen: Mask | Indices) -> Border:
         """Some of the pieces."""

@@ -144,6 +144,10 @@ class Assembly(ABC):
             f"border: expected a body with a border{parts}, as tawami.box(...) gives it"
         )
 
+    def penalty(self, data: Mapping[Rule, Array]) -> sp.csr_matrix | None:
+        """The ghost penalty on all coefficients, the same on every rank; None without one."""
+        return self._ghost.on_all(data)
+
     def integrate_with(self, volume: Array) -> None:
         """Replace the volumes of this rank's particles in all sums of the form."""
         self.attachment.volume = volume

@@ -47,7 +47,7 @@ class GhostPenalty:
             coefficients: Increments of all fields.
             data: Particle data of each rule.
         """
-        matrix, start = self._on_all(data), self._attachment.start
+        matrix, start = self.on_all(data), self._attachment.start
         if matrix is None:
             return forces
         fields = coefficients if start is None else start + coefficients
@@ -55,13 +55,13 @@ class GhostPenalty:
 
     def add_tangent(self, tangent: Any, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
         """A reduced tangent plus S^T G S, G the penalty; the same object as long as `tangent` is."""
-        penalty = self._on_all(data)
+        penalty = self.on_all(data)
         if penalty is None:
             return tangent
         with self._attachment.stopwatch("reduction"):
             return self._sum.of(tangent, penalty, reduction)
 
-    def _on_all(self, data: Mapping[Rule, Array]) -> sp.csr_matrix | None:
+    def on_all(self, data: Mapping[Rule, Array]) -> sp.csr_matrix | None:
         """G on all coefficients, the same on every rank; None without a penalty."""
         if not self._attachment.sides:
             return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,7 +12,32 @@ from tawami import _rust
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.petsc import Handles
 from tawami.field.attachment import Attachment
-from tawami.field.reduction import Reduction
+
+
+class Unknowns(Protocol):
+    """Unknowns of all fields, or of one: coefficients = S unknowns."""
+
+    @property
+    def selection(self) -> sp.csr_matrix:
+        """S, coefficients x unknowns."""
+
+    @property
+    def unknowns(self) -> Indices:
+        """Coefficient that each unknown is."""
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+
+    @property
+    def num_own(self) -> int:
+        """Number of unknowns whose rows belong to this rank."""
+
+    def same_unknowns(self, other: Any) -> bool:
+        """Whether others have the same S."""
+
+    def reached_by(self, cells: Any) -> Mask:
+        """Whether each coefficient belongs to a function with one of these cells in its support."""
 
 
 class ReducedMatrix:
@@ -35,9 +60,9 @@ class ReducedMatrix:
 
     def __init__(self, comm: Any) -> None:
         self._comm, self._petsc = comm, Handles(self, comm)
-        self.reduction: Reduction | None = None
+        self.reduction: Unknowns | None = None
 
-    def fit(self, assembler: _rust.Assembler, attachment: Attachment, reduction: Reduction) -> None:
+    def fit(self, assembler: _rust.Assembler, attachment: Attachment, reduction: Unknowns) -> None:
         """Make a new matrix if the unknowns, or the cells that couple them, are others.
 
         Cells and unknowns of all ranks are known on each of them, so that all ranks decide alike.
@@ -48,7 +73,7 @@ class ReducedMatrix:
         self.reduction = None
         selection, used = reduction.selection, np.arange(reduction.size)
         if self._comm.size > 1:
-            reached = attachment.layout.reached_by(attachment.location.active)
+            reached = reduction.reached_by(attachment.location.active)
             selection, used = _rows_of(selection, reached)
         pattern = assembler.pattern(as_arrays(selection, reduction.unknowns[used]))
         values = np.empty(len(pattern.columns))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import hashlib
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -94,6 +95,10 @@ class Reduction:
     def of_displacement(self) -> Mask:
         """Whether each unknown belongs to the displacement."""
         return np.asarray(self.unknowns < self.layout.num_displacement)
+
+    def reached_by(self, cells: Any) -> Mask:
+        """Whether each coefficient belongs to a function with one of these cells in its support."""
+        return self.layout.reached_by(cells)
 
     def of_field(self, name: str) -> Mask:
         """Whether each unknown belongs to a field."""

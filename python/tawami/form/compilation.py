@@ -67,6 +67,13 @@ class CompiledForm:
     used: frozenset[str]
 
     @property
+    def is_linear(self) -> bool:
+        """Whether the residual is linear in the fields if the laws are."""
+        slots = [slot for integral in self.tangent for slot in integral.slots]
+        known = all(slot.source != "fields" for slot in slots)
+        return known and not self.form.strain.finite and not self.border
+
+    @property
     def penalises(self) -> bool:
         """Whether the form has a ghost penalty."""
         return self.sides is not None

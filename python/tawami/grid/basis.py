@@ -13,6 +13,7 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
+from scipy.sparse.linalg import spsolve
 
 from tawami import _rust
 from tawami.base.arrays import Array, Indices
@@ -76,6 +77,23 @@ def extraction(basis: Basis, cells: Counts, degree: int) -> sp.csr_matrix:
     matrix = sp.csr_matrix((entries.ravel(), index), shape=(len(rows), int(np.prod(count))))
     matrix.eliminate_zeros()
     return matrix
+
+
+@functools.lru_cache(maxsize=64)
+def refinement(basis: Basis, n: int) -> sp.csr_matrix:
+    """Functions on a row of cells twice as long, in those on `n` cells (two-scale relation).
+
+    Its shape is fine functions x coarse functions. If n is odd, the last coarse cell reaches beyond the
+    row. Both are evaluated at the Greville points, which determine the coefficients.
+    """
+    points, coarse = greville_1d(basis, n), (n + 1) // 2
+    cell = np.minimum(points.astype(np.int64), n - 1)
+    fine = values_1d(basis, n, cell, points - cell)
+    cell = np.minimum((points / 2).astype(np.int64), coarse - 1)
+    matrix = spsolve(fine.tocsc(), values_1d(basis, coarse, cell, points / 2 - cell).tocsc())
+    matrix.data[np.abs(matrix.data) < 1e-12] = 0.0
+    matrix.eliminate_zeros()
+    return sp.csr_matrix(matrix)
 
 
 @functools.lru_cache(maxsize=2)

@@ -19,8 +19,9 @@ from tawami.border.pieces import Border
 from tawami.border.points import BorderPoints
 from tawami.grid.grid import EDGES, ON_LINE, Edge, Grid
 from tawami.scene.domain import Domain
+from tawami.scene.excavation import Excavation
 from tawami.scene.model import Model
-from tawami.scene.moving_points import MovingPoints, halve, moved
+from tawami.scene.moving_points import SAMPLES, MovingPoints, halve, moved
 
 #: Gauss points on a piece of the border between two lines of the grid: where particles stay, three are
 #: exact; points that move to other places in their cells need five (noise of a pressure .5 and .14 %).
@@ -70,9 +71,10 @@ class SceneBorder:
         self._count = MOVING if model.moves else STAYING
         self.points: MovingPoints | None = None
         self._ends: MovingPoints | None = None
-        #: Pieces between two lines of the grid at the start, and numbers of those that are left.
+        #: Pieces between two lines of the grid at the start; numbers of those that are left, and the
+        #: shares of the length between which they are.
         self._pieces_at_lines: Border | None = None
-        self._left: Indices = np.zeros(0, dtype=np.int64)
+        self._left, self._shares = np.zeros(0, dtype=np.int64), np.zeros((0, 2))
         self._has_moved = False
         self.parts: list[MovingPoints] = []
         self.users: list[User] = []
@@ -83,6 +85,7 @@ class SceneBorder:
             self.points = MovingPoints(border.points(self._grid, self._count), self._grid)
             self._pieces_at_lines = border.at_lines(self._grid)
             self._left = np.arange(len(self._pieces_at_lines.start))
+            self._shares = np.tile([0.0, 1.0], (len(self._left), 1))
             if model.moves:
                 self._ends = MovingPoints(_ends(self._pieces_at_lines), self._grid)
 
@@ -127,8 +130,10 @@ class SceneBorder:
                 "Body(x, volume, border=tawami.polyline(corners)), or a body of box, polygon, disc, "
                 "level_set or mesh"
             )
+        middle: Array | None = None
         if isinstance(where, np.ndarray):
-            points = self.points.now[self._mask(what, where)]
+            mask = self._mask(what, where)
+            points, middle = self.points.now[mask], self.points.stretch[mask]
         else:
             pieces = self._pieces(what, where)
             if joined:
@@ -139,7 +144,7 @@ class SceneBorder:
                 f"{what}: no point of the border is in this part: expected some of it; the border has "
                 f"{quoted(self.names)}"
             )
-        return MovingPoints(points, self._grid, what)
+        return MovingPoints(points, self._grid, what, middle)
 
     def _pieces(self, what: str, where: Part) -> Border:
         """The pieces of a part."""
@@ -187,9 +192,10 @@ class SceneBorder:
         assert self._given is not None
         assert self._pieces_at_lines is not None
         if self._ends is None or not self._has_moved:
-            if len(self._left) == len(self._pieces_at_lines.start):
+            whole = len(self._left) == len(self._pieces_at_lines.start)
+            if whole and (self._shares == (0.0, 1.0)).all():
                 return self._given
-            return self._pieces_at_lines[self._left]
+            return self._pieces_at_lines.between(self._left, *self._shares.T)
         start, end = np.split(self._ends.x, 2)
         tag = self._pieces_at_lines.tag[self._left]
         return Border(start, end, np.zeros(len(start)), tag, self._given.names)
@@ -211,27 +217,35 @@ class SceneBorder:
     def divide(self) -> None:
         """Divide points and pieces where the border has been stretched."""
         if self._ends is not None:
-            self._left = self._left[halve(self._ends, self._grid.h)]
+            of = halve(self._ends, self._grid.h)
+            self._left, self._shares = self._left[of], self._shares[of]
         kept = {points: points.divide() for points in self.all if points is not self._ends}
         for user in self.users:
             user.keep(kept)
 
-    def keep(self, before: Domain, after: Domain) -> None:
-        """Drop points where particles were removed."""
-        masks = {points: points.remains(before, after) for points in self.all if len(points)}
-        if self.points is not None:
-            assert self._pieces_at_lines is not None
-            pieces = self._present if self._has_moved else self._pieces_at_lines[self._left]
-            middle = MovingPoints(_middles(pieces), self._grid)
-            left = middle.remains(before, after)
-            self._left = self._left[left]
-            if self._ends is not None:
-                masks[self._ends] = np.tile(left, 2)
-        kept = {points: np.flatnonzero(mask) for points, mask in masks.items()}
-        for points, numbers in kept.items():
-            points.keep(numbers)
+    def excavate(self, excavation: Excavation) -> None:
+        """Drop the border where particles are removed; a call for all ranks."""
+        if self._pieces_at_lines is not None:
+            self._excavate_pieces(excavation, self._pieces_at_lines)
+        all_points = [points for points in self.all if points is not self._ends]
+        kept = {points: points.excavate(excavation) for points in all_points}
         for user in self.users:
             user.keep(kept)
+
+    def _excavate_pieces(self, excavation: Excavation, pieces: Border) -> None:
+        moved = self._ends is not None and self._has_moved
+        present = self._present if moved else pieces.between(self._left, *self._shares.T)
+        n = len(present.start)
+        each, samples = np.repeat(np.arange(n), SAMPLES), np.linspace(0.0, 1.0, SAMPLES)
+        x = present.at(each, np.tile(samples, n)).reshape(n, SAMPLES, -1)
+        of, low, high = excavation.parts(x)
+        left, (first, last) = self._left[of], self._shares[of].T
+        if self._ends is not None:
+            cut = present.between(of, low, high)
+            self._ends.keep(np.concatenate([of, of + n]))
+            self._ends.x = np.concatenate([cut.start, cut.end])
+        self._left = left
+        self._shares = first[:, None] + (last - first)[:, None] * np.stack([low, high], axis=1)
 
     def moved(self, domain: Domain, u: Array) -> list[tuple[Array, Array]]:
         """Positions and areas of all points after a step, for :meth:`move`."""
@@ -246,7 +260,7 @@ class SceneBorder:
     def state(self) -> dict[str, Any]:
         """Positions and areas of all points, for a checkpoint."""
         return {
-            "moved": self._has_moved, "left": self._left,
+            "moved": self._has_moved, "left": self._left, "shares": self._shares,
             "points": [points.state() for points in self.all],
         }  # fmt: skip
 
@@ -262,6 +276,7 @@ class SceneBorder:
         )  # fmt: skip
         count = 0 if self._pieces_at_lines is None else len(self._pieces_at_lines.start)
         left = stored.some_of("pieces of the border", state["left"], count, repeated=True)
+        shares = stored.values("shares of the pieces", state["shares"], (len(left), 2))
         for points, given in zip(self.all, state["points"], strict=True):
             points.restore(given)
         if self._ends is not None and len(self._ends) != 2 * len(left):
@@ -269,7 +284,7 @@ class SceneBorder:
                 f"the border has {len(left)} pieces in the checkpoint, and {len(self._ends)} ends: "
                 "expected two of each"
             )
-        self._has_moved, self._left = bool(state["moved"]), left
+        self._has_moved, self._left, self._shares = bool(state["moved"]), left, shares
 
 
 def check_fits(grid: Grid, points: BorderPoints, x: Array, area: Array) -> None:
@@ -322,22 +337,11 @@ def label(where: Part) -> str:
     return ", ".join(repr(name) for name in names)
 
 
-def _middles(border: Border) -> BorderPoints:
-    """The middles of pieces as points."""
-    n = len(border.start)
-    of, half = np.arange(n), np.full(n, 0.5)
-    return _as_points(border, border.at(of, half), border.direction(of, half), of)
-
-
 def _ends(border: Border) -> BorderPoints:
-    """The ends of pieces as points: first where they start, then where they end."""
+    """The ends of pieces as points without lengths and chains: where they start, then where they end."""
     x = np.concatenate([border.start, border.end])
     of = np.tile(np.arange(len(border.start)), 2)
-    return _as_points(border, x, (border.end - border.start)[of], of)
-
-
-def _as_points(border: Border, x: Array, along: Array, of: Indices) -> BorderPoints:
-    """Points of pieces, without lengths and chains; `along` are directions and `of` the pieces."""
+    along = (border.end - border.start)[of]
     normal = -left(along) / np.linalg.norm(along, axis=1)[:, None]
     one, number = np.ones(len(x)), np.zeros(len(x), dtype=np.int64)
     return BorderPoints(x, one, normal, border.tag[of], border.names, number, 0 * one)

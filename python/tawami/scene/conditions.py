@@ -13,7 +13,7 @@ from tawami.base.text import quoted
 from tawami.border.shapes import Shape
 from tawami.grid.edges import Profile
 from tawami.grid.grid import Edge
-from tawami.scene import selection
+from tawami.scene import selection, wall_gap
 from tawami.scene.border import Part, label
 from tawami.scene.configuration import Configuration
 from tawami.scene.factor import InTime
@@ -109,8 +109,15 @@ class Conditions:
 
         Raises:
             InputError: An unknown edge, a negative friction, or an edge that has a wall already.
+
+        Warns:
+            SupportWarning: The border of the body is away from the edge, now or in a step in which the
+                wall pushes it: a wall holds functions of the grid, which reach up to a cell far.
         """
-        return self.configuration.supports.wall(edge, friction, separates)
+        now = self.configuration
+        made = now.supports.wall(edge, friction, separates)
+        wall_gap.warn_of_new(made, now.border.points, moves=now.model.moves)
+        return made
 
     def obstacle(
         self,

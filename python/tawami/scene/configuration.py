@@ -30,6 +30,7 @@ from tawami.scene import (
     own_fields,
     quantities,
     strain_limit,
+    wall_gap,
 )
 from tawami.scene.activity import Activity
 from tawami.scene.border import SceneBorder
@@ -148,8 +149,8 @@ class Configuration:
         self, now: Moment, times: Times | None = None, *, begins: bool = False
     ) -> list[ObstacleContact]:
         """Contact with each obstacle in a step that ends at a moment; see `Obstacles.in_step`."""
-        gravity = self.loads.acceleration(now)
-        return self.obstacles.in_step(self.domain, self.before, now, gravity, times, begins=begins)
+        of = self.domain, self.before, now, self.loads.acceleration(now), times
+        return self.obstacles.in_step(*of, begins=begins)
 
     def terms(
         self,
@@ -213,8 +214,7 @@ class Configuration:
         with ranks.raise_together(self.model.grid.comm):
             self.domain.particles.check()
         self.domain.warn_of_partial_cells()
-        walls = [copy.deepcopy(wall.state) for wall in self.supports.walls]
-        committed = False
+        walls, committed = [copy.deepcopy(wall.state) for wall in self.supports.walls], False
         try:
             with leave_together():  # laws and other functions of the driver script are called here
                 self.prepare(kind.moment)
@@ -227,9 +227,9 @@ class Configuration:
             update = kind.accept(accepted)
             with signals.deferred():
                 with self.stopwatch("commit"), ranks.raise_together(self.model.grid.comm):
-                    fields = self.domain.layout.split(accepted.step.coefficients)
-                    dissipated = self.domain.stage.commit(*fields)
-                    own_fields.accept(self.domain, accepted.step.coefficients)
+                    layout, coefficients = self.domain.layout, accepted.step.coefficients
+                    dissipated = self.domain.stage.commit(*layout.split(coefficients))
+                    own_fields.accept(self.domain, coefficients)
                 committed = True
                 if accepted.problem.terms is not None:
                     accepted.problem.terms.accept()
@@ -257,8 +257,7 @@ class Configuration:
 
     def _store(self, accepted: Accepted, moved: Moved | None, time: float) -> Outcome:
         """Store a step that the laws have committed, and move the particles."""
-        self.begun = True
-        grid, coefficients = self.model.grid, accepted.step.coefficients
+        self.begun, grid, coefficients = True, self.model.grid, accepted.step.coefficients
         if moved is None:
             coefficients = self.total = self.total + coefficients
             return self._outcome(accepted, coefficients)
@@ -280,6 +279,7 @@ class Configuration:
 
     def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:
         self.obstacles.warn(self.domain, coefficients)
+        wall_gap.warn_of_distant(self.supports.walls, self.border.points, accepted.forces)
         arrays = quantities.of_body(self.model.grid.comm, self.domain.particles)
         return Outcome(accepted, coefficients, Reactions.of(accepted, self.supports), arrays)
 

@@ -21,6 +21,7 @@ from tawami.particles.assignment import Law
 from tawami.scene import selection
 from tawami.scene.configuration import Configuration
 from tawami.scene.domain import Domain
+from tawami.scene.excavation import Excavation
 from tawami.scene.model import Model, warn_of_locking, with_laws
 from tawami.scene.selection import Where
 
@@ -125,8 +126,9 @@ def _remove(now: Configuration, mask: Mask) -> Removed:
     kept, gone = placement.removed(model.grid, particles, mask)
     location = placement.located(model.grid, kept.x, moving=model.moves)
     after = Domain.attach(model, kept, location, now.numerics, now.stopwatch)
-    now.supports.check_reach(before, after)
-    now.loads.check_reach(before, after)
+    excavation = Excavation(comm, kept.x, particles.x[mask])
+    now.supports.check_reach(before, after, excavation)
+    now.loads.check_reach(excavation)
     sums = ranks.sum_of(
         comm,
         np.array(
@@ -139,7 +141,7 @@ def _remove(now: Configuration, mask: Mask) -> Removed:
             ]
         ),
     )
-    _replace(now, after)
+    _replace(now, after, excavation)
     time = now.activity.time if moving else np.nan
     now.left += [(number, x, time) for number, x in gone]
     now.removed = now.removed + sums[2:4]
@@ -148,14 +150,14 @@ def _remove(now: Configuration, mask: Mask) -> Removed:
     return Removed(numbers, volume, total, sums[4:], kinetic, elastic)
 
 
-def _replace(now: Configuration, after: Domain) -> None:
+def _replace(now: Configuration, after: Domain, excavation: Excavation | None = None) -> None:
     """Let a scene continue with other particles or laws; a call for all ranks."""
     before, zero, first = now.domain, np.zeros(after.layout.size), now.moment(0.0)
     gravity = now.loads.acceleration(now.moment())
     now.inputs.repeat(before, now.moment(), gravity)
     forces = now.loads.at_start(before, first) - before.newton.internal(zero)
-    if after.particles is not before.particles:
-        now.border.keep(before, after)
+    if excavation is not None:
+        now.border.excavate(excavation)
     now.border_sums.attach(after)
     after.assembly.attachment.start = before.assembly.attachment.start
     now.inputs.repeat(after, now.moment(), gravity)

@@ -35,7 +35,7 @@ def lines(now: Configuration, motion: str = "") -> dict[str, str]:
         "obstacles": now.obstacles.line,
         "loads": now.loads.line,
         "motion": motion,
-        "solver": now.numerics.line(now.model.grid.comm.size),
+        "solver": _solver(now),
         "not modelled": "; ".join(_not_modelled(now, motion)),
     }
     return {label: text for label, text in found.items() if text}
@@ -64,6 +64,11 @@ def _unknowns(now: Configuration) -> str:
     fields = ", ".join(f"{n} of {name}" for name, n in numbers.items())
     free = num_free(now.supports, now.domain)
     return f"{free}: {fields}, minus {sum(numbers.values()) - free} prescribed by supports"
+
+
+def _solver(now: Configuration) -> str:
+    method = now.domain.newton.method(num_free(now.supports, now.domain))
+    return now.numerics.line(method, now.model.grid.comm.size)
 
 
 def _models(now: Configuration, motion: str) -> Iterator[str]:

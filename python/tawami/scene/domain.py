@@ -103,7 +103,9 @@ class Domain:
 
         stage = _stage(model, particles, location, model.form.kinematics)
         responses = responses_of(stage)
-        newton = Newton(assembly, responses, numerics, stopwatch, elastic)
+        laws = all(material.name == "linear_elastic" for material in model.materials)
+        linear = laws and model.compiled.is_linear
+        newton = Newton(assembly, responses, numerics, stopwatch, elastic, linear=linear)
         if earlier is not None:
             assembly.follow(earlier.assembly)
             newton.follow(earlier.newton)

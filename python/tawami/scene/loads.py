@@ -18,6 +18,7 @@ from tawami.grid.grid import Grid
 from tawami.scene.action import Owner, Term, restored
 from tawami.scene.activity import Activity
 from tawami.scene.domain import Domain
+from tawami.scene.excavation import Excavation
 from tawami.scene.factor import Factor
 from tawami.scene.load import Flux, Forces, Load, OnBorder, Pressure, Traction, Weight
 from tawami.scene.moving_points import MovingPoints
@@ -184,8 +185,9 @@ class Loads(Owner[Load]):
                 found.append((load.points, np.asarray(sum(parts))))
         return found
 
-    def check_reach(self, before: Domain, after: Domain) -> None:
-        """Check that loads on the border still load something once particles were removed.
+    def check_reach(self, excavation: Excavation) -> None:
+        """Check that loads on the border still load something once particles were removed; a call for
+        all ranks.
 
         Raises:
             SupportError: One would not.
@@ -193,7 +195,7 @@ class Loads(Owner[Load]):
         for load in self.all:
             if load.released or not isinstance(load, OnBorder):
                 continue
-            if not load.points.remains(before, after).any():
+            if not load.points.remaining(excavation)[0].any():
                 raise SupportError(
                     f"{load} would load no particles after remove(...): expected loads on particles "
                     "that remain; release() it before. Nothing was changed"

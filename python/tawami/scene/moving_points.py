@@ -17,10 +17,13 @@ from tawami.border.points import BorderPoints, transformed
 from tawami.field.border import BorderInCells
 from tawami.grid.grid import ON_LINE, Edge, Grid
 from tawami.scene.domain import Domain
+from tawami.scene.excavation import Excavation
 
 #: Length of the border at a point beyond which it is divided [cells]. Gauss points of pieces as long as
 #: a cell begin with 0.28 at most, so that this takes a stretch of 1.4.
 LONGEST = 0.4
+#: Places on the stretch of the border around a point at which the nearest particle is sought.
+SAMPLES = 9
 
 
 class MovingPoints:
@@ -33,6 +36,7 @@ class MovingPoints:
         points: The points at the start.
         grid: The grid.
         what: Name of the part, for messages.
+        middle: As the attribute; by default chains are complete.
 
     Attributes:
         what: As given.
@@ -42,14 +46,23 @@ class MovingPoints:
         first: The points when they were made.
         number: Number among these of each point, or of the one that it is a part of.
         made: The points as they were when they were made, with parts of those that were divided.
+        middle: Distance along the border from each point to the middle of the stretch that it
+            integrates over, when it was made [m].
     """
 
-    def __init__(self, points: BorderPoints, grid: Grid, what: str = "border") -> None:
+    def __init__(
+        self,
+        points: BorderPoints,
+        grid: Grid,
+        what: str = "border",
+        middle: Array | None = None,
+    ) -> None:
         self.first, self.made, self._grid, self.what = points, points, grid, what
         self.number = np.arange(len(points))
         self.x = np.array(points.x)
         self.area = points.length[:, None] * points.normal
         self.reference = self.weight
+        self.middle = self.now.along - points.along if middle is None else middle
         self._located: tuple[Domain, BorderInCells] | None = None
 
     def __len__(self) -> int:
@@ -74,6 +87,11 @@ class MovingPoints:
     def normal(self) -> Array:
         """Outward unit normals, points x dim."""
         return np.asarray(self.area / self.length[:, None])
+
+    @property
+    def _tangent(self) -> Array:
+        """Unit vectors in the direction of the way around the body, points x dim."""
+        return _along(self.normal)
 
     @property
     def now(self) -> BorderPoints:
@@ -106,14 +124,71 @@ class MovingPoints:
         """
         return np.asarray(self._grid.inwards(edge, self.x) <= tolerance * self._grid.h)
 
-    def remains(self, before: Domain, after: Domain) -> Mask:
-        """Mask of the points whose cells still hold particles after some were removed."""
-        return np.asarray(after.active.ravel()[self.cells(before).location.cell])
+    def gap(self, edge: Edge) -> float:
+        """Distance from an edge of the grid [m] that the nearest place on the border has at least.
+
+        Stretches of the border count as straight, along the tangents at their points.
+        """
+        tangent = self._tangent
+        ends = [
+            self._grid.inwards(edge, self.x + away[:, None] * tangent)
+            for away in (self.stretch - self.length / 2, self.stretch + self.length / 2)
+        ]
+        return float(np.min(ends))
+
+    @property
+    def stretch(self) -> Array:
+        """Distance from each point to the middle of the stretch that it integrates over [m]."""
+        return np.asarray(self.middle * self.length / self.made.length)
+
+    def remaining(self, excavation: Excavation) -> tuple[Array, Array]:
+        """The part of the stretch around each point that remains where particles are removed; a call
+        for all ranks.
+
+        Returns:
+            Its share of the length, and the distance of its middle from that of the whole, as a share
+            of the length.
+        """
+        shares, length = np.linspace(-0.5, 0.5, SAMPLES), self.length[:, None]
+        away = self.stretch[:, None] + shares * length
+        of, low, high = excavation.parts(self.x[:, None] + away[..., None] * self._tangent[:, None])
+        share, moment = (
+            np.bincount(of, part, len(self)).astype(float)
+            for part in (high - low, (high**2 - low**2) / 2)
+        )
+        middle = np.divide(moment, share, out=np.full(len(self), 0.5), where=share > 0)
+        return share, middle - 0.5
+
+    def excavate(self, excavation: Excavation) -> Indices:
+        """Drop the border where particles are removed; a call for all ranks.
+
+        Points with a part of their stretch move to its middle.
+
+        Returns:
+            The places in the arrays of the points that remain.
+        """
+        share, middle = self.remaining(excavation)
+        kept = np.flatnonzero(share)
+        part, made = share[kept] < 1, self.made[kept]
+        now, start = (
+            np.where(part, distance[kept] + middle[kept] * length[kept], 0.0)
+            for distance, length in ((self.stretch, self.length), (self.middle, self.made.length))
+        )
+        self.keep(kept)
+        self.x = self.x + now[:, None] * self._tangent
+        x = made.x + start[:, None] * _along(made.normal)
+        thickness = self.space.thickness(x) / self.space.thickness(made.x)
+        self.middle = np.where(part, 0.0, self.middle)
+        share = share[kept]
+        self.area, self.reference = self.area * share[:, None], self.reference * share * thickness
+        self.made = replace(made, x=x, length=made.length * share, along=made.along + start)
+        return kept
 
     def keep(self, kept: Indices) -> None:
         """Keep some of the points, given by their places in the arrays."""
         self.x, self.area, self.reference = self.x[kept], self.area[kept], self.reference[kept]
-        self.number, self.made, self._located = self.number[kept], self.made[kept], None
+        self.number, self.made, self.middle = self.number[kept], self.made[kept], self.middle[kept]
+        self._located = None
 
     def divide(self) -> Indices:
         """Divide points on longer stretches of the border than `LONGEST` into equal parts.
@@ -154,6 +229,7 @@ class MovingPoints:
         return {
             "x": self.x, "area": self.area, "reference": self.reference, "number": self.number,
             "start": self.made.x, "length": self.made.length, "along": self.made.along,
+            "middle": self.middle,
         }  # fmt: skip
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -168,9 +244,9 @@ class MovingPoints:
         x, area, start = (
             stored.values(f"{what}: {name}", state[name], shape) for name in ("x", "area", "start")
         )
-        reference, length, along = (
+        reference, length, along, self.middle = (
             stored.values(f"{what}: {name}", state[name], shape[:1])
-            for name in ("reference", "length", "along")
+            for name in ("reference", "length", "along", "middle")
         )
         self.x, self.area, self.reference, self.number = x, area, reference, number
         self.made = replace(self.first[number], x=start, length=length, along=along)

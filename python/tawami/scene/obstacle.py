@@ -50,8 +50,21 @@ class Obstacle(Action):
     """
 
     __slots__ = (
-        "_changes", "_speeds", "free", "friction", "given", "groups", "mass", "name", "place", "pose",
-        "pressure", "rates", "shape", "traction",
+        "_changes",
+        "_speeds",
+        "free",
+        "friction",
+        "given",
+        "groups",
+        "mass",
+        "name",
+        "offset",
+        "place",
+        "pose",
+        "pressure",
+        "rates",
+        "shape",
+        "traction",
     )  # fmt: skip
 
     def __init__(
@@ -77,6 +90,7 @@ class Obstacle(Action):
         self.rates: tuple[Array, Array] = (np.where(free, first, 0.0), np.zeros(len(free)))
         dim = place.space.dim
         self.pressure, self.traction = np.zeros(len(place)), np.zeros((len(place), dim - 1))
+        self.offset = np.zeros(len(place))
         super().__init__(owner, value, factor)
 
     def __str__(self) -> str:
@@ -221,6 +235,7 @@ class Obstacle(Action):
         return super().state() | {
             "pose": np.array(self.pose.coordinates), "rates": [*map(np.array, self.rates)],
             "pressure": np.array(self.pressure), "traction": np.array(self.traction),
+            "offset": np.array(self.offset),
             "groups": [] if self.groups is None else np.array(self.groups.number),
             "friction": self.friction, "changes": self._changes,
             "speeds": [[speed.rates(0.0, 0.0)[0]] if rests(speed) or not speed.is_function else []
@@ -247,6 +262,7 @@ class Obstacle(Action):
         first, last = (stored.values(f"{self}: rates", one, motions) for one in state["rates"])
         pressure = stored.values(f"{self}: pressure", state["pressure"], (n,))
         traction = stored.values(f"{self}: traction", state["traction"], (n, dim - 1))
+        offset = stored.values(f"{self}: offset", state["offset"], (n,))
         groups = None
         if np.size(state["groups"]):
             number = stored.numbers(f"{self}: patches", state["groups"], n, n)
@@ -257,4 +273,5 @@ class Obstacle(Action):
                 )
         self.pose, self.rates = Pose.at(self.shape.centre).moved(pose), (first, last)
         self.pressure, self.traction, self.groups = pressure, traction, groups
+        self.offset = offset
         self.friction = checked_friction(f"{self}", state["friction"])

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from tawami.base.arrays import Array, Mask
-from tawami.base.errors import SingularError, SupportError
+from tawami.base.errors import SupportError
 from tawami.border.contact import OPEN, Contact, ContactForces, Multipliers
 from tawami.border.rigid import Pose
 from tawami.field.constraints import PointHeld
@@ -23,7 +23,7 @@ from tawami.scene.domain import Domain
 from tawami.scene.near_border import BorderNear
 from tawami.scene.obstacle import Obstacle
 from tawami.scene.obstacle_motion import ObstacleMotion
-from tawami.solve.bordered import Blocks
+from tawami.solve.bordered import Blocks, GivesWayError
 
 #: Penetration, relative to that of the penalty alone, below which no other pass is needed; and the
 #: penetration that is round-off [cells].
@@ -61,14 +61,28 @@ class ObstacleContact:
         self._pressure = groups.means(weights, obstacle.pressure)
         self._traction = groups.means(weights, obstacle.traction)
         gap = groups.means(weights, self._border.distance)
-        # in dynamics what pushed such a patch out would give energy to the body
-        self._least = 0 * gap if motion.times is None else np.minimum(gap, 0.0)
+        self._least = self._offsets(gap)
+        if motion.times is not None:
+            # what pushed such a patch out would give energy to the body
+            self._least = np.minimum(gap, self._least)
         reach = REACH * self._border.h + np.abs(motion.unknown[: self._dim]).max(initial=0.0)
         pressed = (self._pressure > 0)[groups.number]
         self._choose((self._border.distance < reach) | pressed)
         self.at_start = self._forces_at_start()
         if motion.times is None:
             self._touch()
+
+    def _offsets(self, gap: Array) -> Array:
+        """Mean distances of patches that touch.
+
+        That of a patch of a bent border is not zero when it touches. A new patch that lies where others
+        pushed before touches where it is, unless it is inside the obstacle. Otherwise it would lose
+        contact, and the force would drop.
+        """
+        near, obstacle = self._border, self.obstacle
+        if near.groups is obstacle.groups:
+            return near.groups.means(near.weights, obstacle.offset)
+        return np.where(self._pressure > 0, np.maximum(gap, 0.0), 0.0)
 
     def _choose(self, points: Mask) -> None:
         """Evaluate the patches of further points from now on."""
@@ -177,6 +191,7 @@ class ObstacleContact:
         obstacle.groups = self._border.groups
         pressure, traction = self.pressures
         obstacle.pressure, obstacle.traction = pressure, traction
+        obstacle.offset = np.where(pressure > 0, self._least[self._border.groups.number], 0.0)
         obstacle.pose = self.motion.pose
         obstacle.rates = self.motion.rates_at_end(self.at_start[1], self.now.resultant)
 
@@ -282,7 +297,7 @@ class ObstacleContact:
 
         Raises:
             SupportError: One is free, as the obstacle does not touch the body, or slides.
-            SingularError: The body gives way to it after the first iteration.
+            GivesWayError: The body gives way to it after the first iteration.
         """
         if self.motion.times is not None:
             return
@@ -299,7 +314,7 @@ class ObstacleContact:
         weakest = motions[int(np.argmax(np.abs(directions[-1])))]
         motion, away = self.obstacle.motions[weakest], bool((self.now.state == OPEN).all())
         if not away and self._states.tangents > 1:
-            raise SingularError(f"{self.obstacle}: the body gives way to its motion '{motion}'")
+            raise GivesWayError(f"{self.obstacle}: the body gives way to its motion '{motion}'")
         state = "does not touch the body" if away else "slides freely"
         raise SupportError(
             f"{self.obstacle}: nothing holds its motion '{motion}', as it {state}: expected an obstacle "

@@ -144,6 +144,7 @@ class Obstacles(Owner[Obstacle]):
         for obstacle in self.all:
             of, groups = kept[obstacle.place], obstacle.groups
             obstacle.pressure, obstacle.traction = obstacle.pressure[of], obstacle.traction[of]
+            obstacle.offset = obstacle.offset[of]
             if groups is not None:
                 whole = len(np.unique(of)) == len(groups.number)
                 obstacle.groups = Patches(groups.number[of], groups.count) if whole else None

@@ -105,7 +105,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         max_iterations: int = 20,
         assembly: Assembly = "points",
         factorise: Factorise = "when_it_pays",
-        linear_solver: SolverName = "direct",
+        linear_solver: SolverName = "auto",
         density: float | Sequence[float] | Mapping[str, float] | None = None,
         leaving: Literal["stop", "remove"] = "stop",
         volumes: Literal["own", "fitted"] = "own",

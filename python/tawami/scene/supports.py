@@ -19,6 +19,7 @@ from tawami.scene.action import Owner, restored
 from tawami.scene.activity import Activity
 from tawami.scene.border import Part, SceneBorder, label
 from tawami.scene.domain import Domain
+from tawami.scene.excavation import Excavation
 from tawami.scene.factor import Factor, InTime
 from tawami.scene.moving_points import MovingPoints
 from tawami.scene.points import is_in_body, reach
@@ -211,11 +212,12 @@ class Supports(Owner[Support]):
 
     # -- prescribed values in a step -----------------------------------------
 
-    def check_reach(self, before: Domain, after: Domain) -> None:
+    def check_reach(self, before: Domain, after: Domain, excavation: Excavation) -> None:
         """Check that supports still hold something once particles were removed; a call for all ranks.
 
         Args:
             before, after: The particles before and after.
+            excavation: Those that are removed.
 
         Raises:
             SupportError: One would hold no particles.
@@ -226,7 +228,7 @@ class Supports(Owner[Support]):
             elif isinstance(support.place, str):
                 lost = reach(after, support.place) > max(reach(before, support.place), 0.0)
             else:
-                lost = not support.place.remains(before, after).any()
+                lost = not support.place.remaining(excavation)[0].any()
             if lost:
                 raise SupportError(
                     f"{support} {support.axis} would hold no particles after remove(...): expected "

@@ -77,6 +77,7 @@ class Wall:
         functions: Displacement functions along it.
         state: Their states of contact.
         returns: Number of times that each came back to the wall or to rest in this step.
+        told: Whether a warning was issued that it acts at a distance from the border.
     """
 
     grid: Grid
@@ -88,6 +89,7 @@ class Wall:
     functions: npt.NDArray[np.int64] = field(init=False)
     state: Contact = field(init=False)
     returns: npt.NDArray[np.int64] = field(init=False)
+    told: bool = field(init=False, default=False)
 
     def __post_init__(self) -> None:
         self.functions = edge_functions(self.grid, self.basis, self.edge)
@@ -148,7 +150,7 @@ class Wall:
         self.returns = np.zeros(len(self.functions), dtype=np.int64)
 
     @property
-    def _axes(self) -> tuple[int, int, int]:
+    def axes(self) -> tuple[int, int, int]:
         """Axis across the wall, axis along it, and the sign of the direction into the grid."""
         axis, end = self.grid.edge(self.edge)
         return axis, 1 - axis, -1 if end else 1
@@ -156,7 +158,7 @@ class Wall:
     @property
     def stopped(self) -> npt.NDArray[np.int64]:
         """Coefficients that it stops from passing through."""
-        across, _, _ = self._axes
+        across, _, _ = self.axes
         return self.grid.space.dim * self.functions[self.state.touching] + across
 
     def prescribed(self, fixed: Mask) -> Mask:
@@ -177,7 +179,7 @@ class Wall:
             start: Coefficients at the start of the step, which the values include.
             before: Displacement coefficients since the body touched the wall.
         """
-        across, along, _ = self._axes
+        across, along, _ = self.axes
         touching, supports = self.state.touching, []
         for axis, mask in ((across, touching), (along, touching & (self.state.slip == 0))):
             chosen = self.functions[mask & ~prescribed[:, axis]]
@@ -189,7 +191,7 @@ class Wall:
 
     def friction_of(self, forces: Array, prescribed: Mask) -> Array:
         """Friction on the body (functions x dim) from the forces with which the wall would hold it."""
-        across, along, inward = self._axes
+        across, along, inward = self.axes
         friction = np.zeros_like(forces)
         sliding = self.state.touching & (self.state.slip != 0) & ~prescribed[:, along]
         f = self.functions[sliding]
@@ -210,7 +212,7 @@ class Wall:
             active: Whether each function has particles.
             prescribed: As :meth:`prescribed` gives it.
         """
-        across, along, inward = self._axes
+        across, along, inward = self.axes
         f, state, no_distance = self.functions, self.state, GAP * self.grid.h
         here, free_of_supports = active[f], ~prescribed
         push, moved = inward * forces[f, across], u[f, along]

@@ -16,6 +16,10 @@ from scipy.linalg import block_diag
 from tawami.base.arrays import Array
 
 
+class GivesWayError(Exception):
+    """The body gives way to an unknown of a term, as at a limit load."""
+
+
 @dataclass(frozen=True)
 class Blocks:
     """Derivatives of residuals.
@@ -77,7 +81,7 @@ class Bordering(Protocol):
 
         Raises:
             SupportError: They cannot, as nothing holds one of its unknowns.
-            SingularError: The body gives way to one of them.
+            GivesWayError: The body gives way to one of them.
         """
 
 

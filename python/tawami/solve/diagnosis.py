@@ -128,7 +128,7 @@ class Diagnosis:
                 lambda: self._scaling.factors(tangent, reduction),
                 np.zeros(reduction.num_own),
                 1e-3,
-                lambda: self._scaling.blocks(reduction),
+                list,
             )
         except (SingularError, SolverError):
             return False

@@ -28,8 +28,9 @@ from petsc4py import PETSc
 from tawami.base.arrays import Array
 from tawami.base.errors import SingularError
 from tawami.base.timing import Stopwatch
-from tawami.solve import failures
-from tawami.solve.linear_solver import Blocks, LinearSolver
+from tawami.solve import failures, memory
+from tawami.solve.linear_solver import LinearSolver
+from tawami.solve.operators import Part
 
 #: Iterations of FGMRES up to which the factorisation is kept for the next tangent.
 PAYS = 8
@@ -88,6 +89,11 @@ class DirectSolver(LinearSolver):
         self.condition, self.symmetric, self.iterations = 1.0, True, 0
         return self
 
+    def method(self, unknowns: int) -> str:
+        """See `LinearSolver.method`."""
+        when = "always" if self._always else "when it pays"
+        return f"direct (LDL^T of symmetric tangents), factorised {when}"
+
     def record(self) -> None:
         """Copy each matrix that is factorised from now on, for :meth:`state`.
 
@@ -133,7 +139,7 @@ class DirectSolver(LinearSolver):
         scale: Callable[[], Array],
         right: Array,
         tolerance: float,
-        blocks: Callable[[], Blocks],
+        parts: Callable[[], list[Part]],
     ) -> Array:
         """See `LinearSolver.solve`; direct if the tangent is factorised.
 
@@ -154,7 +160,7 @@ class DirectSolver(LinearSolver):
         """Solve by FGMRES with the present factorisation; None if it takes too many iterations."""
         with self._stopwatch("solve"):
             self._handles["ksp"].setConvergenceTest(_Pays(tolerance))
-            converged = self._fgmres(self._scale * right, tolerance, LIMIT)
+            converged = self._krylov(self._scale * right, tolerance, LIMIT)
             self._handles["ksp"].setConvergenceTest(None)
             if not converged:
                 return None
@@ -220,6 +226,9 @@ class DirectSolver(LinearSolver):
 
     def _analyse_next(self, matrix: Any, room: int) -> None:
         """Make a factor that the next factorisation analyses."""
+        size = matrix.getSize()[0]
+        need = memory.of_factors(size, symmetric=self.symmetric)
+        memory.check(matrix.comm.tompi4py(), "a factorisation", size, need, failures.ADVICE)
         self._handles.free("factor", "pc", "ksp")
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)
         ksp = self._handles["ksp"] = PETSc.KSP().create(matrix.comm)
@@ -256,6 +265,7 @@ class DirectSolver(LinearSolver):
         return float(x.norm())
 
     def _is_symmetric(self, matrix: Any, probe: Array) -> bool:
+        """Whether a matrix is symmetric, by its products with a random vector."""
         x, y = (self._handles[name] for name in ("x", "b"))
         x.setArray(probe)
         matrix.mult(x, y)

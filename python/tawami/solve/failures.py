@@ -19,7 +19,7 @@ TOO_LARGE = (-51, -52)
 #: PETSc's code of a failed allocation.
 PETSC_MEMORY = 55
 ADVICE = (
-    "Use linear_solver='iterative', which needs less memory, fewer cells, or more ranks on computers "
+    "Use linear_solver='multigrid', which needs less memory, fewer cells, or more ranks on computers "
     "with more memory"
 )
 
@@ -40,7 +40,7 @@ def of_mumps(code: int, detail: int, stage: str, unknowns: int) -> SolverError:
     if code in TOO_LARGE:
         return SolverError(f"{what}: it is too large for integers of 32 bits {found}. {ADVICE}")
     return SolverError(
-        f"{what} {found}: see 'Error diagnostics' in the MUMPS users' guide. linear_solver='iterative' "
+        f"{what} {found}: see 'Error diagnostics' in the MUMPS users' guide. linear_solver='multigrid' "
         "does not use MUMPS"
     )
 

@@ -2,36 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
-from tawami.base.arrays import Array, Mask
+from tawami.base.arrays import Array
 from tawami.base.errors import SingularError
 from tawami.base.petsc import Handles
 from tawami.base.timing import Stopwatch
+from tawami.solve.operators import Part
 
 #: Condition number from which the solution of a scaled system has no correct digit.
 SINGULAR = 1e14
-#: FGMRES iterations for a second right-hand side.
+#: Krylov iterations for a second right-hand side.
 MOST = 500
-
-
-@dataclass(frozen=True)
-class Blocks:
-    """Fields of this rank's unknowns.
-
-    Attributes:
-        displacement: Whether each unknown belongs to the displacement.
-        rigid: Values of the rigid motions at those that do, n x motions.
-        own: Whether each unknown belongs to each field without a role.
-    """
-
-    displacement: Mask
-    rigid: Array
-    own: Sequence[Mask] = ()
 
 
 class LinearSolver:
@@ -45,7 +30,7 @@ class LinearSolver:
         symmetric: Whether the solver knows the tangent to be symmetric.
         condition: Estimated condition number of a tangent, scaled.
         weak: This rank's entries of the direction in which that tangent is weakest, if known.
-        iterations: FGMRES iterations of the last solve; 0 if the tangent was factorised.
+        iterations: Krylov iterations of the last solve; 0 if the tangent was factorised.
     """
 
     def __init__(self, comm: Any, stopwatch: Stopwatch) -> None:
@@ -62,6 +47,13 @@ class LinearSolver:
     def successor(self) -> LinearSolver | None:
         """The solver of the same scene in other cells; None if nothing can be kept for it."""
         return None
+
+    def begin(self) -> None:
+        """Begin a step."""
+
+    def method(self, unknowns: int) -> str:
+        """The method for a tangent of this number of unknowns, in words, and the reason for it."""
+        raise NotImplementedError
 
     def record(self) -> None:
         """Record the state for :meth:`state` from now on, independently of earlier solves."""
@@ -85,7 +77,7 @@ class LinearSolver:
         scale: Callable[[], Array],
         right: Array,
         tolerance: float,
-        blocks: Callable[[], Blocks],
+        parts: Callable[[], list[Part]],
     ) -> Array:
         """Solve K x = r.
 
@@ -94,7 +86,7 @@ class LinearSolver:
             scale: Gives the factors S of the unknowns, if those of an older tangent do not serve.
             right: r.
             tolerance: Bound of |S (r - K x)| / |S r| if the solve is not direct.
-            blocks: Gives the fields of the unknowns.
+            parts: Gives the operators of the fields for a preconditioner.
 
         Raises:
             SingularError: The system cannot be solved, and nothing else is known. A caller asks
@@ -110,7 +102,7 @@ class LinearSolver:
         """
         iterations = self.iterations
         with self._stopwatch("solve"):
-            converged = self._fgmres(self._scale * right, tolerance, MOST)
+            converged = self._krylov(self._scale * right, tolerance, MOST)
             solution = np.asarray(self._scale * self._handles["x"].array)
         if not converged:
             raise SingularError(
@@ -137,8 +129,8 @@ class LinearSolver:
             vector.setArray(factors)
             matrix.diagonalScale(vector, vector)
 
-    def _fgmres(self, right: Array, tolerance: float, limit: int) -> bool:
-        """Solve the scaled system by FGMRES, into the vector x; False if it does not converge."""
+    def _krylov(self, right: Array, tolerance: float, limit: int) -> bool:
+        """Solve the scaled system by `ksp`, into the vector x; False if it does not converge."""
         ksp, x, b = (self._handles[name] for name in ("ksp", "x", "b"))
         ksp.setTolerances(rtol=tolerance, atol=0.0, max_it=limit)
         b.setArray(right)

@@ -68,13 +68,16 @@ def measured(momentum: float, volume: float, *others: float) -> Measured:
     return float(momentum), of_volume
 
 
-def forcing(history: History, tolerance: float) -> float:
+def forcing(history: History, tolerance: float, *, linear: bool = False) -> float:
     """Tolerance of the next linear solve.
 
-    It follows the rate of convergence (choice 2 of Eisenstat and Walker 1996), as far as Newton's own
+    That of a linear problem reaches Newton's own tolerance at once. Otherwise it
+    follows the rate of convergence (choice 2 of Eisenstat and Walker 1996), as far as Newton's own
     tolerance needs it.
     """
     now = worst(history[-1])
+    if linear:
+        return min(0.3 * tolerance / now, 1e-3)
     rate = now / worst(history[-2]) if len(history) > 1 else 1.0
     return min(max(0.1 * rate**2, min(0.1 * tolerance / now, 1e-3)), 1e-3)
 

@@ -19,17 +19,19 @@ from tawami.base.timing import Stopwatch, tally
 from tawami.field.assembly import Assembly
 from tawami.field.reduction import Reduction
 from tawami.particles.responses import Responses
+from tawami.solve.bordered import GivesWayError
+from tawami.solve.choice import ChosenSolver
 from tawami.solve.diagnosis import Diagnosis
 from tawami.solve.direct import DirectSolver
 from tawami.solve.equations import Equations
 from tawami.solve.failures import reported
 from tawami.solve.inertia import Inertia
 from tawami.solve.iterate import Forces, Friction, Iterate
-from tawami.solve.iterative import IterativeSolver
 from tawami.solve.line_search import LineSearch
 from tawami.solve.linear_solver import LinearSolver
 from tawami.solve.measures import History, Measured, Measures, diagonal_of, forcing, worst
 from tawami.solve.numerics import Numerics
+from tawami.solve.operators import Operators
 from tawami.solve.path import Path
 from tawami.solve.scaling import Scaling
 from tawami.solve.terms import Terms
@@ -78,6 +80,7 @@ class Newton:
         numerics: Numerical settings.
         stopwatch: Measures the time of each stage.
         elastic: Makes the responses of the same particles with elastic laws, for a diagnosis.
+        linear: Whether the residual is linear in the increments.
 
     Attributes:
         numerics: Numerical settings; its tolerance may change between steps.
@@ -90,24 +93,33 @@ class Newton:
         numerics: Numerics,
         stopwatch: Stopwatch,
         elastic: Callable[[], Responses],
+        *,
+        linear: bool = False,
     ) -> None:
+        self._linear = linear
         self._assembly, self._responses = assembly, responses
         self.numerics, self._stopwatch = numerics, stopwatch
         self._comm = assembly.layout.grid.comm
         self._measures = Measures(assembly, responses)
         self._scaling = Scaling(assembly.layout, responses)
+        self._operators = Operators(assembly, responses)
         self._diagnosis = Diagnosis(assembly, responses, self._scaling, elastic)
         self._solver: LinearSolver
-        if numerics.linear_solver == "iterative":
-            self._solver = IterativeSolver(self._comm, stopwatch)
-        else:
+        if numerics.linear_solver == "direct":
             always = numerics.factorise == "always"
             self._solver = DirectSolver(self._comm, stopwatch, always=always)
+        else:
+            unsuited = self._operators.unsuited
+            self._solver = ChosenSolver(self._comm, stopwatch, numerics, unsuited)
         self._stored: Mapping[str, Any] | None = None
 
     def follow(self, earlier: Newton) -> None:
         """Keep the objects of an earlier solver that do not depend on values of the problem."""
         self._solver = earlier._solver.successor() or self._solver
+
+    def method(self, unknowns: int) -> str:
+        """The linear solver for a number of unknowns in words, and the reason for it."""
+        return self._solver.method(unknowns)
 
     # -- checkpoints -------------------------------------------------------------
 
@@ -180,6 +192,7 @@ class Newton:
         """
         clean_up(self._comm)
         self._stopwatch.start()
+        self._solver.begin()
         self._measures.begin(self.internal if inertia is None else None, values)
         equations = Equations(reduction, external, inertia, friction, path, terms)
         if terms is not None:
@@ -271,7 +284,8 @@ class Newton:
         self._measures.observe(tangent, reduction)
         tolerance = ON_PATH
         if equations.path is None and not (equations.terms and equations.terms.bordering):
-            tolerance = forcing(history, self.numerics.tolerance)
+            linear = self._linear and equations.is_smooth and equations.friction is None
+            tolerance = forcing(history, self.numerics.tolerance, linear=linear)
         singular: SingularError | None = None
         try:
             found = solver.solve(
@@ -279,7 +293,7 @@ class Newton:
                 functools.partial(self._scaling.factors, tangent, reduction),
                 -reduction.restricted(forces.residual)[reduction.own],
                 tolerance,
-                functools.partial(self._scaling.blocks, reduction),
+                functools.partial(self._operators.parts, equations),
             )
         except SingularError as error:
             if not solver.singular:
@@ -299,7 +313,7 @@ class Newton:
             change, of_factor = complete(
                 equations, iterate.u, self._on_all(reduction, found), again
             )
-        except SingularError as error:
+        except GivesWayError as error:
             self._fail(history, f"Then {error}. {equations.advice}")
         if not np.isfinite(of_factor):
             self._fail(history, "The loads do not move the control: choose another control")

@@ -13,7 +13,10 @@ from tawami.base import checks
 from tawami.form.symbols import Assembly
 
 Factorise = Literal["when_it_pays", "always"]
-SolverName = Literal["direct", "iterative"]
+SolverName = Literal["auto", "direct", "multigrid"]
+
+#: Number of unknowns from which 'auto' may take multigrid (`cases.costs.solvers`).
+SMALL = 30_000
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,8 @@ class Numerics:
             computes P^T K P. They agree up to round-off for sums of expressions up to degree 4.
         factorise: 'when_it_pays' uses a factorisation in later iterations and steps, 'always' factorises
             in each Newton iteration.
-        linear_solver: 'direct' (MUMPS) or 'iterative' (FGMRES, with multigrid for the displacement).
+        linear_solver: 'direct' (MUMPS), 'multigrid' (GMRES with multigrid), or 'auto', which chooses by
+            size and cost (`tawami.solve.choice`).
 
     Raises:
         InputError: A value is out of its range.
@@ -37,7 +41,7 @@ class Numerics:
     max_iterations: int = 20
     assembly: Assembly = "points"
     factorise: Factorise = "when_it_pays"
-    linear_solver: SolverName = "direct"
+    linear_solver: SolverName = "auto"
 
     def __post_init__(self) -> None:
         checks.number("tolerance", self.tolerance, low=1e-14, high=0.1)
@@ -47,16 +51,18 @@ class Numerics:
             "factorise": Factorise,
             "linear_solver": SolverName,
         }
+        renamed = {"iterative": "it is called 'multigrid' now; "}
         for name, possible in choices.items():
-            checks.choice(name, getattr(self, name), get_args(possible))
+            value = getattr(self, name)
+            checks.choice(name, value, get_args(possible), renamed.get(str(value), ""))
 
-    def line(self, ranks: int) -> str:
-        """The settings in words, for the header of a run on so many ranks."""
-        solver: str = self.linear_solver
-        if solver == "direct":
-            solver += (
-                f" (LDL^T of symmetric tangents), factorised {self.factorise.replace('_', ' ')}"
-            )
+    def line(self, solver: str, ranks: int) -> str:
+        """The settings in words, for the header of a run.
+
+        Args:
+            solver: The linear solver in words.
+            ranks: Number of ranks.
+        """
         return (
             f"Newton to {self.tolerance:g} in at most {self.max_iterations} iterations, "
             f"{solver}, assembly {self.assembly}, "

@@ -13,9 +13,7 @@ from tawami.base.arrays import Array, Indices
 from tawami.base.petsc import rows_of
 from tawami.field.layout import Layout
 from tawami.field.reduction import Reduction
-from tawami.field.rigid import rigid_motions
 from tawami.particles.responses import Responses
-from tawami.solve.linear_solver import Blocks
 
 #: Share of the area of a cell below which the volume of a function counts as zero: far below that of a
 #: particle on the edge of the function, whose stiffness the assembly computes to round-off.
@@ -98,12 +96,3 @@ class Scaling:
         # in a cell with little of the body the stabilisation is larger than that volume
         size = np.maximum(mu_i * np.maximum(squares, least), to_field**2 * np.abs(diagonal))
         return np.asarray(to_field / np.sqrt(size))
-
-    def blocks(self, reduction: Reduction) -> Blocks:
-        """Fields of this rank's unknowns, with the rigid motions at the Greville points."""
-        own = reduction.unknowns[reduction.own]
-        of_u = own < self._layout.num_displacement
-        grid = self._layout.grid
-        points = self._layout.greville - grid.origin
-        fields = [self._layout.fields[name].holds(own) for name in self._responses.form.own_fields]
-        return Blocks(of_u, rigid_motions(points, grid.space)[own[of_u]], fields)

@@ -68,13 +68,14 @@ class Terms:
 
     Attributes:
         stuck: Message if the multipliers do not settle.
+        stiffness: That of the last tangent, on all coefficients.
     """
 
     def __init__(self, terms: Sequence[Term], comm: Any) -> None:
         self._terms, self._sum = terms, Sum(self, comm)
         #: Stiffness of each term when they were last added, and their sum.
         self._stiffnesses: list[sp.csr_matrix] = [None] * len(terms)
-        self._stiffness: sp.csr_matrix | None = None
+        self.stiffness: sp.csr_matrix | None = None
 
     @property
     def prescribed(self) -> float:
@@ -129,8 +130,8 @@ class Terms:
         """A reduced tangent with their stiffness."""
         parts = [term.stiffness() for term in self._terms]
         if not all(map(operator.is_, parts, self._stiffnesses)):
-            self._stiffnesses, self._stiffness = parts, _added(parts)
-        return self._sum.of(tangent, self._stiffness, reduction)
+            self._stiffnesses, self.stiffness = parts, _added(parts)
+        return self._sum.of(tangent, self.stiffness, reduction)
 
     @property
     def bordering(self) -> list[Bordering]:

@@ -1,0 +1,311 @@
+"""The scaled linear systems of a step by GMRES with multigrid.
+
+GMRES takes the fields one after the other, with the coupling to those before: a block-triangular
+preconditioner (Elman, Silvester, Wathen 2014, chapter 4).
+
+displacement   a V-cycle for the elastic operator F of `operators`. The grids have cells of side h, 2h,
+               4h, ...; functions of each are sums of those of the next finer one (two-scale relation),
+               and their matrices are P^T F P. A sweep of Gauss and Seidel smooths forwards before, and
+               backwards after the coarser grids
+volume         steps of Chebyshev's iteration for S = M + (mu/K) M + alpha h^2 L
+other fields   a V-cycle for their part of the tangent
+
+The operators are those of the elastic body. They serve later tangents of the same unknowns until the
+number of iterations grows. GMRES takes 2/3 of the iterations of MINRES with one preconditioner for each
+field, for symmetric tangents too, and its vectors little memory beside the matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from tawami.base.arrays import Array
+from tawami.base.petsc import Handles
+from tawami.base.timing import Stopwatch
+from tawami.solve import memory
+from tawami.solve.linear_solver import LinearSolver
+from tawami.solve.operators import Part
+
+#: Iterations at which GMRES stops, and after which it restarts.
+LIMIT, RESTART = 200, 100
+#: Steps of Chebyshev's iteration, and the ratio of the eigenvalues that it damps.
+STEPS, RATIO = 7, 12.0
+#: Growth of the number of iterations from which the operators are made again.
+GROWTH, MORE = 1.5, 5
+#: Tolerance for a second right-hand side, relative to that of the first.
+AGAIN = 1e-4
+#: Tolerance of the solve for the random vector, by which a singular tangent is noticed.
+LOW_TOLERANCE = 0.1
+PREFIX = "tawami_multigrid_"
+
+
+class StalledError(Exception):
+    """GMRES does not converge."""
+
+
+class MultigridSolver(LinearSolver):
+    """Solver of the tangents of one scene by GMRES, always to the tolerance.
+
+    Its `condition` belongs to the first tangent.
+
+    Attributes:
+        first: Iterations of the first solve with the present operators.
+        made: Whether the last solve made them.
+    """
+
+    def __init__(self, comm: Any, stopwatch: Stopwatch) -> None:
+        super().__init__(comm, stopwatch)
+        self.symmetric = False  # GMRES makes no use of it
+        self._tested, self._matrix, self.first = False, None, 0
+        self.made = False
+        self._grids: list[Handles] = []
+        self._records = False
+
+    def forget(self) -> None:
+        """See `LinearSolver.forget`."""
+        super().forget()
+        for handles in self._grids:
+            handles.free()
+        self._grids, self._matrix = [], None
+
+    def successor(self) -> LinearSolver:
+        """This solver: its operators serve as long as the matrix is used."""
+        return self
+
+    def record(self) -> None:
+        """See `LinearSolver.record`: each step then makes its own operators."""
+        self._records = True
+        self.forget()
+
+    def begin(self) -> None:
+        """See `LinearSolver.begin`."""
+        if self._records:
+            self.forget()
+
+    def method(self, unknowns: int) -> str:
+        """See `LinearSolver.method`."""
+        return "multigrid (GMRES)"
+
+    def solve(
+        self,
+        matrix: Any,
+        scale: Callable[[], Array],
+        right: Array,
+        tolerance: float,
+        parts: Callable[[], list[Part]],
+    ) -> Array:
+        """See `LinearSolver.solve`.
+
+        Raises:
+            StalledError: GMRES did not converge, or the tangent is singular. The matrix
+                is as it was.
+        """
+        pays = self.iterations <= GROWTH * self.first + MORE
+        if self._matrix is matrix and pays:
+            self._multiply(matrix, self._scale)
+        else:
+            self._begin(matrix, scale)
+            self._matrix, self.first = matrix, 0
+        with self._stopwatch("factorise"):
+            self.made = "ksp" not in self._handles
+            if self.made:
+                size = matrix.getSize()[0]
+                memory.check(
+                    matrix.comm.tompi4py(), "multigrid", size, memory.of_multigrid(matrix),
+                    "Use fewer cells, or more ranks on computers with more memory",
+                )  # fmt: skip
+                self._precondition(matrix, parts())
+            self._handles["ksp"].setOperators(matrix, self._handles["parts"])
+        try:
+            with self._stopwatch("solve"):
+                if not self._tested:
+                    self._test(matrix)
+                self._converge(self._scale * right, tolerance)
+        except StalledError:
+            self._multiply(matrix, 1 / self._scale)
+            if self.made:
+                raise
+            self._matrix = None  # contact or inertia may have changed since the operators were made
+            return self.solve(matrix, scale, right, tolerance, parts)
+        self.first = self.first or self.iterations
+        return np.asarray(self._scale * self._handles["x"].array)
+
+    def again(self, right: Array, tolerance: float) -> Array:
+        """See `LinearSolver.again`; more digits, because the equations of a border cancel."""
+        return super().again(right, AGAIN * tolerance)
+
+    def _probe(self, matrix: Any) -> Array:
+        begin, end = matrix.getOwnershipRange()
+        size = matrix.getSize()[0]
+        return np.asarray(np.random.default_rng(0).standard_normal(size)[begin:end])
+
+    def _test(self, matrix: Any) -> None:
+        """Estimate the condition number from a random right-hand side; raise an error if singular."""
+        self._converge(self._probe(matrix), LOW_TOLERANCE)
+        norm, size = matrix.norm(PETSc.NormType.FROBENIUS), matrix.getSize()[0]
+        self.condition = float(norm / np.sqrt(size) * self._handles["x"].norm())
+        self._tested = True
+        if self.singular:
+            raise StalledError(
+                "the tangent is singular (condition number of the scaled matrix: about "
+                f"{self.condition:.1e}, from a random vector)"
+            )
+
+    def _converge(self, right: Array, tolerance: float) -> None:
+        if not self._krylov(right, tolerance, LIMIT):
+            residual = self._handles["ksp"].buildResidual()
+            reached = residual.norm() / self._handles["b"].norm()
+            residual.destroy()
+            raise StalledError(
+                f"multigrid stalls: GMRES reached {reached:.1e} of the right-hand side in "
+                f"{self.iterations} iterations where {tolerance:.1e} was expected"
+            )
+
+    def _precondition(self, matrix: Any, parts: list[Part]) -> None:
+        """Make the operators of all fields, and GMRES."""
+        handles, comm = self._handles, matrix.comm
+        handles.free("ksp", "pc", "parts")
+        start = matrix.getOwnershipRange()[0]
+        numbers = [(start + np.flatnonzero(p.block.mine)).astype(PETSc.IntType) for p in parts]
+        places = [PETSc.IS().createGeneral(mine, comm) for mine in numbers]
+        operators = [self._operator(matrix, *part) for part in zip(parts, places, strict=True)]
+        handles["parts"] = operators[0]
+        if len(parts) > 1:
+            rows: list[list[Any]] = [[None] * len(parts) for _ in parts]
+            for k, operator in enumerate(operators):
+                rows[k][k] = operator
+                for j in range(k):
+                    rows[k][j] = matrix.createSubMatrix(places[k], places[j])
+            handles["parts"] = PETSc.Mat().createNest(rows, comm=comm)
+        ksp = handles["ksp"] = PETSc.KSP().create(comm)
+        ksp.setOperators(matrix, handles["parts"])
+        ksp.setType("gmres")
+        ksp.setPCSide(PETSc.PC.Side.RIGHT)
+        ksp.setGMRESRestart(RESTART)
+        # near a singular tangent, vectors that are not orthogonal let the residual grow
+        _set(ksp, {"ksp_gmres_cgs_refinement_type": "refine_ifneeded"})
+        pc = handles["pc"] = ksp.getPC()
+        if len(parts) == 1:
+            self._cycle(pc, operators[0], parts[0])
+        else:
+            pc.setType("fieldsplit")
+            pc.setFieldSplitType(PETSc.PC.CompositeType.MULTIPLICATIVE)
+            pc.setFieldSplitIS(*zip((part.name for part in parts), places, strict=True))
+            pc.setUp()
+            for solver, operator, part in zip(
+                pc.getFieldSplitSubKSP(), operators, parts, strict=True
+            ):
+                if part.volume:
+                    self._chebyshev(solver, operator)
+                else:
+                    solver.setType("preonly")
+                    inner = solver.getPC()
+                    self._cycle(inner, operator, part)
+                    inner.destroy()
+                solver.destroy()
+        pc.setReusePreconditioner(True)
+        for place in places:
+            place.destroy()
+
+    def _operator(self, matrix: Any, part: Part, place: Any) -> Any:
+        """Scaled operator of a field, of the sign of its part of the tangent."""
+        scale = self._scale[part.block.mine]
+        if part.operator is None or part.volume:
+            own = matrix.createSubMatrix(place, place)
+        if part.operator is None:
+            return own
+        operator = part.operator
+        vector = operator.createVecLeft()
+        if part.volume:  # of unit diagonal, as its coupling with the displacement
+            diagonal = operator.getDiagonal()
+            scale = 1 / np.sqrt(np.maximum(diagonal.array, np.finfo(float).tiny))
+            diagonal.destroy()
+        vector.setArray(scale)
+        operator.diagonalScale(vector, vector)
+        vector.destroy()
+        if part.volume:
+            operator.axpy(-1.0, own)
+            own.destroy()
+            operator.scale(-1.0)
+        return operator
+
+    def _chebyshev(self, solver: Any, operator: Any) -> None:
+        """Solve by Chebyshev's iteration with Jacobi's preconditioner."""
+        solver.setType("chebyshev")
+        solver.setNormType(PETSc.KSP.NormType.NONE)
+        solver.setTolerances(max_it=STEPS)
+        inner = solver.getPC()
+        inner.setType("jacobi")
+        inner.destroy()
+        largest = _largest(operator)
+        _set(solver, {"ksp_chebyshev_eigenvalues": f"{largest / RATIO},{largest}"})
+        solver.setUp()
+
+    def _cycle(self, pc: Any, operator: Any, part: Part) -> None:
+        """Make a V-cycle of a preconditioner."""
+        handles = Handles(self, operator.comm.tompi4py())
+        self._grids.append(handles)
+        steps = part.block.prolongations()
+        operators = [operator]
+        for k, step in enumerate(steps):
+            handles[f"prolongation {k}"] = step
+            if k == 0:
+                vector = operator.createVecLeft()
+                vector.setArray(1 / self._scale[part.block.mine])
+                step.diagonalScale(vector, None)
+                vector.destroy()
+            operators.append(operators[-1].PtAP(step))
+            handles[f"operator {k + 1}"] = operators[-1]
+        pc.setType("mg")
+        pc.setMGLevels(len(operators))
+        for level, matrix in enumerate(reversed(operators)):
+            if level == 0:
+                coarse = pc.getMGCoarseSolve()
+                coarse.setOperators(matrix)
+                coarse.setType("preonly")
+                _set(coarse, {"pc_type": "redundant"})
+                coarse.destroy()
+                continue
+            pc.setMGInterpolation(level, steps[len(operators) - 1 - level])
+            for smoother, sweep in (
+                (pc.getMGSmootherDown(level), "forward"),
+                (pc.getMGSmootherUp(level), "backward"),
+            ):
+                smoother.setOperators(matrix)
+                smoother.setType("richardson")
+                smoother.setNormType(PETSc.KSP.NormType.NONE)
+                smoother.setTolerances(max_it=1)
+                _set(smoother, {"pc_type": "sor", f"pc_sor_local_{sweep}": None})
+                smoother.destroy()
+        pc.setUp()
+
+
+def _largest(matrix: Any) -> float:
+    """Bound of the eigenvalues of D^-1 A, D the diagonal of A: its largest row sum."""
+    from tawami.base import ranks
+    from tawami.base.petsc import rows_of
+
+    diagonal = matrix.getDiagonal()
+    rows = rows_of(matrix)
+    sums = np.asarray(abs(rows).sum(axis=1)).ravel() / np.abs(diagonal.array)
+    diagonal.destroy()
+    return ranks.largest(matrix.comm.tompi4py(), float(sums.max(initial=0.0)))
+
+
+_numbers = iter(range(1 << 60))
+
+
+def _set(solver: Any, options: dict[str, str | None]) -> None:
+    """Set options that have no function in petsc4py."""
+    prefix = f"{PREFIX}{next(_numbers)}_"
+    database = PETSc.Options(prefix)
+    for name, value in options.items():
+        database[name] = value
+    solver.setOptionsPrefix(prefix)
+    solver.setFromOptions()
+    for name in options:
+        database.delValue(name)
