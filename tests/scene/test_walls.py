@@ -132,7 +132,7 @@ def test_wrong_walls_are_rejected():
     with pytest.raises(tawami.InputError, match="there is one already"):
         scene.wall("bottom")
     with pytest.raises(
-        tawami.InputError, match="friction = -1: expected a finite number of at least 0"
+        tawami.InputError, match="friction = -1: expected a number of at least 0, or numpy.inf"
     ):
         scene.wall("top", -1)
     with pytest.raises(tawami.InputError, match="edge 'floor': expected 'left'"):

@@ -45,7 +45,12 @@ def checked_friction(what: str, friction: Any) -> float:
         InputError: Anything else.
     """
     mu = checks.real(f"{what}: friction", friction)
-    return mu if mu == np.inf else checks.number(f"{what}: friction", friction, low=0.0)
+    if not mu >= 0:
+        raise InputError(
+            f"{what}: friction = {checks.shown(friction)}: expected a number of at least 0, or numpy.inf "
+            "for a surface without sliding"
+        )
+    return mu
 
 
 @dataclass

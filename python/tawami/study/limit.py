@@ -25,7 +25,8 @@ APART = 1.5
 ROUND_OFF = 1e-11
 #: Part of the value that the error of the finest run may have.
 FARTHEST = 0.5
-#: Part of the extrapolation that is always uncertain, and with three values only.
+#: Part of the extrapolation that is always uncertain, and with three values only, of which no second
+#: order confirms the first.
 LEAST, SINGLE = 0.3, 0.5
 
 
@@ -103,7 +104,7 @@ def _limit(
         return Limit(values[-1], last if shrinks else max(values[-3:]) - min(values[-3:]))
     beyond = _remainder(sizes[-2:], order, steps[-1])
     if len(orders) == 1:
-        return Limit(values[-1] + beyond, max(SINGLE * abs(beyond), 0.1 * last), order)
+        return Limit(values[-1] + beyond, max(SINGLE * abs(beyond), last / 3), order)
     previous = values[-2] + _remainder(sizes[-3:-1], before, steps[-2])
     moved = abs(values[-1] + beyond - previous)
     formal = _remainder(sizes[-2:], max(round(order), 1), steps[-1])
