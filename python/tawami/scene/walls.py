@@ -47,8 +47,8 @@ def checked_friction(what: str, friction: Any) -> float:
     mu = checks.real(f"{what}: friction", friction)
     if not mu >= 0:
         raise InputError(
-            f"{what}: friction = {checks.shown(friction)}: expected a number of at least 0, or numpy.inf "
-            "for a surface without sliding"
+            f"{what}: friction = {checks.shown(friction)}: expected a number of at least 0, or "
+            "numpy.inf for a surface without sliding"
         )
     return mu
 
