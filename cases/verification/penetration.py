@@ -21,8 +21,8 @@ Without a mixed form or B-bar the ground locks, and the force is too large. The 
 without friction, and the steps are static. Contact acts on means over patches of the border, about as
 long as a cell, so that it starts when the tip is h^2/(3 B) deep.
 
-With four cells over B the mixed form reaches 1.9 B, where the ground below ends soon, and B-bar ends at
-0.7 B. Beyond 0.7 B the force of the mixed form varies by a tenth, as patches of the border are replaced.
+With four cells over B the mixed form reaches 2 B (--depth 2) and B-bar ends before 1 B. Beyond 0.7 B the
+force of the mixed form jumps by up to 0.9 s_u B, as patches of the border are replaced.
 
 python -m cases.verification.penetration
 """
