@@ -11,7 +11,7 @@ Costs are counted in iterations of multigrid, not in seconds, so that a run repe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -22,10 +22,9 @@ from tawami.base.timing import Stopwatch
 from tawami.base.warn import warn
 from tawami.solve import memory
 from tawami.solve.direct import DirectSolver
-from tawami.solve.linear_solver import LinearSolver
+from tawami.solve.linear_solver import LinearSolver, System
 from tawami.solve.multigrid import MultigridSolver, StalledError
 from tawami.solve.numerics import SMALL, Numerics
-from tawami.solve.operators import Part
 
 #: Iterations of multigrid that cost as much as a factorisation of 1e5 unknowns, and the exponent with
 #: which this number grows with the unknowns (`cases.costs.solvers`).
@@ -128,22 +127,15 @@ class ChosenSolver(LinearSolver):
         else:
             self._last = self._multigrid
 
-    def solve(
-        self,
-        matrix: Any,
-        scale: Callable[[], Array],
-        right: Array,
-        tolerance: float,
-        parts: Callable[[], list[Part]],
-    ) -> Array:
+    def solve(self, system: System) -> Array:
         """See `LinearSolver.solve`."""
+        matrix, found = system.matrix, None
         if matrix is not self._matrix:
             self._matrix, self._spent = matrix, SET_UP
-        found, arguments = None, (matrix, scale, right, tolerance, parts)
         if self._suits(matrix):
             self._switch(self._multigrid)
             try:
-                found = self._multigrid.solve(*arguments)
+                found = self._multigrid.solve(system)
             except StalledError as stalled:
                 self._stalled, self._stalls = True, self._stalls + 1
                 warn(
@@ -156,7 +148,7 @@ class ChosenSolver(LinearSolver):
             self._count(self._multigrid, SET_UP * self._multigrid.made + self._multigrid.iterations)
         if found is None:
             self._switch(self._direct)
-            found = self._direct.solve(*arguments)
+            found = self._direct.solve(system)
             again = KEPT * self._direct.iterations
             factor = 1.0 if self._direct.symmetric else UNSYMMETRIC
             self._count(self._direct, again or factor * price(matrix.getSize()[0]))

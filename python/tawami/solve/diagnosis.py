@@ -17,7 +17,7 @@ from tawami.field.reduction import Reduction
 from tawami.particles.responses import Responses
 from tawami.solve.direct import DirectSolver
 from tawami.solve.equations import Equations
-from tawami.solve.linear_solver import LinearSolver
+from tawami.solve.linear_solver import LinearSolver, System
 from tawami.solve.measures import History, text
 from tawami.solve.scaling import Scaling
 
@@ -124,11 +124,13 @@ class Diagnosis:
         solver = DirectSolver(self._comm, Stopwatch(), always=True)
         try:
             solver.solve(
-                tangent,
-                lambda: self._scaling.factors(tangent, reduction),
-                np.zeros(reduction.num_own),
-                1e-3,
-                list,
+                System(
+                    tangent,
+                    lambda: self._scaling.factors(tangent, reduction),
+                    np.zeros(reduction.num_own),
+                    1e-3,
+                    list,
+                )
             )
         except (SingularError, SolverError):
             return False

@@ -29,8 +29,7 @@ from tawami.base.arrays import Array
 from tawami.base.errors import SingularError
 from tawami.base.timing import Stopwatch
 from tawami.solve import failures, memory
-from tawami.solve.linear_solver import LinearSolver
-from tawami.solve.operators import Part
+from tawami.solve.linear_solver import LinearSolver, System
 
 #: Iterations of FGMRES up to which the factorisation is kept for the next tangent.
 PAYS = 8
@@ -133,27 +132,21 @@ class DirectSolver(LinearSolver):
         matrix.setValuesCSR(start, columns, values)
         matrix.assemble()
 
-    def solve(
-        self,
-        matrix: Any,
-        scale: Callable[[], Array],
-        right: Array,
-        tolerance: float,
-        parts: Callable[[], list[Part]],
-    ) -> Array:
+    def solve(self, system: System) -> Array:
         """See `LinearSolver.solve`; direct if the tangent is factorised.
 
         Raises:
             SingularError: The tangent is singular, and so is its neighbour, or it holds NaN.
             SolverError: Memory ran out, or MUMPS failed for a reason other than a singular matrix.
         """
+        matrix, right = system.matrix, system.right
         if not self._always and self._matrix is matrix and self.iterations <= PAYS:
             self._multiply(matrix, self._scale)
-            solution = self._iterate(right, tolerance)
+            solution = self._iterate(right, system.tolerance)
             if solution is not None:
                 return solution
             self._multiply(matrix, 1 / self._scale)
-        self._begin(matrix, scale)
+        self._begin(matrix, system.scale)
         return self._direct(matrix, right)
 
     def _iterate(self, right: Array, tolerance: float) -> Array | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,25 @@ from tawami.solve.operators import Part
 SINGULAR = 1e14
 #: Krylov iterations for a second right-hand side.
 MOST = 500
+
+
+@dataclass(frozen=True)
+class System:
+    """A linear system K x = r.
+
+    Attributes:
+        matrix: Reduced tangent K; it is scaled in place.
+        scale: Gives the factors S of the unknowns, if those of an older tangent do not serve.
+        right: r.
+        tolerance: Bound of |S (r - K x)| / |S r| if the solve is not direct.
+        parts: Gives the operators of the fields for a preconditioner.
+    """
+
+    matrix: Any
+    scale: Callable[[], Array]
+    right: Array
+    tolerance: float
+    parts: Callable[[], list[Part]]
 
 
 class LinearSolver:
@@ -71,22 +91,8 @@ class LinearSolver:
         """Whether the solution of that tangent has no correct digit."""
         return not self.condition < SINGULAR
 
-    def solve(
-        self,
-        matrix: Any,
-        scale: Callable[[], Array],
-        right: Array,
-        tolerance: float,
-        parts: Callable[[], list[Part]],
-    ) -> Array:
-        """Solve K x = r.
-
-        Args:
-            matrix: Reduced tangent K; it is scaled in place.
-            scale: Gives the factors S of the unknowns, if those of an older tangent do not serve.
-            right: r.
-            tolerance: Bound of |S (r - K x)| / |S r| if the solve is not direct.
-            parts: Gives the operators of the fields for a preconditioner.
+    def solve(self, system: System) -> Array:
+        """Solve a system.
 
         Raises:
             SingularError: The system cannot be solved, and nothing else is known. A caller asks

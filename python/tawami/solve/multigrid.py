@@ -17,17 +17,17 @@ field, for symmetric tangents too, and its vectors little memory beside the matr
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
 
+from tawami.base import ranks
 from tawami.base.arrays import Array
-from tawami.base.petsc import Handles
+from tawami.base.petsc import Handles, rows_of
 from tawami.base.timing import Stopwatch
 from tawami.solve import memory
-from tawami.solve.linear_solver import LinearSolver
+from tawami.solve.linear_solver import LinearSolver, System
 from tawami.solve.operators import Part
 
 #: Iterations at which GMRES stops, and after which it restarts.
@@ -90,25 +90,19 @@ class MultigridSolver(LinearSolver):
         """See `LinearSolver.method`."""
         return "multigrid (GMRES)"
 
-    def solve(
-        self,
-        matrix: Any,
-        scale: Callable[[], Array],
-        right: Array,
-        tolerance: float,
-        parts: Callable[[], list[Part]],
-    ) -> Array:
+    def solve(self, system: System) -> Array:
         """See `LinearSolver.solve`.
 
         Raises:
             StalledError: GMRES did not converge, or the tangent is singular. The matrix
                 is as it was.
         """
+        matrix = system.matrix
         pays = self.iterations <= GROWTH * self.first + MORE
         if self._matrix is matrix and pays:
             self._multiply(matrix, self._scale)
         else:
-            self._begin(matrix, scale)
+            self._begin(matrix, system.scale)
             self._matrix, self.first = matrix, 0
         with self._stopwatch("factorise"):
             self.made = "ksp" not in self._handles
@@ -118,19 +112,19 @@ class MultigridSolver(LinearSolver):
                     matrix.comm.tompi4py(), "multigrid", size, memory.of_multigrid(matrix),
                     "Use fewer cells, or more ranks on computers with more memory",
                 )  # fmt: skip
-                self._precondition(matrix, parts())
+                self._precondition(matrix, system.parts())
             self._handles["ksp"].setOperators(matrix, self._handles["parts"])
         try:
             with self._stopwatch("solve"):
                 if not self._tested:
                     self._test(matrix)
-                self._converge(self._scale * right, tolerance)
+                self._converge(self._scale * system.right, system.tolerance)
         except StalledError:
             self._multiply(matrix, 1 / self._scale)
             if self.made:
                 raise
             self._matrix = None  # contact or inertia may have changed since the operators were made
-            return self.solve(matrix, scale, right, tolerance, parts)
+            return self.solve(system)
         self.first = self.first or self.iterations
         return np.asarray(self._scale * self._handles["x"].array)
 
@@ -286,9 +280,6 @@ class MultigridSolver(LinearSolver):
 
 def _largest(matrix: Any) -> float:
     """Bound of the eigenvalues of D^-1 A, D the diagonal of A: its largest row sum."""
-    from tawami.base import ranks
-    from tawami.base.petsc import rows_of
-
     diagonal = matrix.getDiagonal()
     rows = rows_of(matrix)
     sums = np.asarray(abs(rows).sum(axis=1)).ravel() / np.abs(diagonal.array)

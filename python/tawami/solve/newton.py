@@ -28,7 +28,7 @@ from tawami.solve.failures import reported
 from tawami.solve.inertia import Inertia
 from tawami.solve.iterate import Forces, Friction, Iterate
 from tawami.solve.line_search import LineSearch
-from tawami.solve.linear_solver import LinearSolver
+from tawami.solve.linear_solver import LinearSolver, System
 from tawami.solve.measures import History, Measured, Measures, diagonal_of, forcing, worst
 from tawami.solve.numerics import Numerics
 from tawami.solve.operators import Operators
@@ -286,15 +286,16 @@ class Newton:
         if equations.path is None and not (equations.terms and equations.terms.bordering):
             linear = self._linear and equations.is_smooth and equations.friction is None
             tolerance = forcing(history, self.numerics.tolerance, linear=linear)
+        system = System(
+            tangent,
+            functools.partial(self._scaling.factors, tangent, reduction),
+            -reduction.restricted(forces.residual)[reduction.own],
+            tolerance,
+            functools.partial(self._operators.parts, equations),
+        )
         singular: SingularError | None = None
         try:
-            found = solver.solve(
-                tangent,
-                functools.partial(self._scaling.factors, tangent, reduction),
-                -reduction.restricted(forces.residual)[reduction.own],
-                tolerance,
-                functools.partial(self._operators.parts, equations),
-            )
+            found = solver.solve(system)
         except SingularError as error:
             if not solver.singular:
                 raise
