@@ -207,12 +207,13 @@ class Measures:
         distance = 10 * min(distance, float(np.abs(u).max())) + grid.h
         (thickness,) = grid.space.thickness(np.array([grid.upper]))
         largest = NO_FORCE * self._responses.stiffest * distance * thickness * np.sqrt(len(u))
-        if equations.terms is not None and residual <= SHARE * largest:
-            scale = 0.0  # positions of border points have no more digits
-        at_rest = ranks.same(self._comm, bool(scale <= largest))  # the same branch on all ranks
-        if at_rest and inertia is None and scale > 0:
+        # positions of border points have no more digits
+        round_off = equations.terms is not None and residual <= SHARE * largest
+        # the same branch on all ranks
+        small, round_off = ranks.same(self._comm, (bool(scale <= largest), bool(round_off)))
+        if small and not round_off and inertia is None:
             return self._moves_rigidly(u, prescribed)
-        return at_rest
+        return small or round_off
 
     def _moves_rigidly(self, u: Array, prescribed: float) -> bool:
         """Whether strains are round-off compared with the displacement that is prescribed.
