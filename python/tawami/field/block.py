@@ -113,9 +113,8 @@ class Block:
             held = of_held >= HELD * np.asarray(whole.sum(axis=0)).ravel()
             rows = whole[unknowns].tocsc()
             used = np.flatnonzero((np.diff(rows.indptr) > 0) & ~held)
-            first = rows.indices[
-                rows.indptr[used]
-            ]  # a coarse unknown belongs to a rank of its part
+            # a coarse unknown belongs to a rank of its part
+            first = rows.indices[rows.indptr[used]]
             order = np.argsort(owner[first], kind="stable")
             used, mine = used[order], np.flatnonzero(owner == self._comm.rank)
             if len(used) >= len(unknowns):

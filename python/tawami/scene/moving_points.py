@@ -12,7 +12,7 @@ from tawami import _rust
 from tawami.base import stored
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.space import Space
-from tawami.border.curves import spread
+from tawami.border.curves import left, spread
 from tawami.border.points import BorderPoints, transformed
 from tawami.field.border import BorderInCells
 from tawami.grid.grid import ON_LINE, Edge, Grid
@@ -91,7 +91,7 @@ class MovingPoints:
     @property
     def _tangent(self) -> Array:
         """Unit vectors in the direction of the way around the body, points x dim."""
-        return _along(self.normal)
+        return left(self.normal)
 
     @property
     def now(self) -> BorderPoints:
@@ -176,7 +176,7 @@ class MovingPoints:
         )
         self.keep(kept)
         self.x = self.x + now[:, None] * self._tangent
-        x = made.x + start[:, None] * _along(made.normal)
+        x = made.x + start[:, None] * left(made.normal)
         thickness = self.space.thickness(x) / self.space.thickness(made.x)
         self.middle = np.where(part, 0.0, self.middle)
         share = share[kept]
@@ -205,9 +205,9 @@ class MovingPoints:
             return of
         count = count[of]
         share = np.where(count > 1, (place + 0.5) / count - 0.5, 0.0) * self._reach[of]
-        x = self.x[of] + share[:, None] * _along(self.area)[of]
+        x = self.x[of] + share[:, None] * left(self.area)[of]
         made = self.made
-        start = made.x[of] + share[:, None] * _along(made.length[:, None] * made.normal)[of]
+        start = made.x[of] + share[:, None] * left(made.length[:, None] * made.normal)[of]
         self.keep(of)
         self.x, self.area, self.reference = x, self.area / count[:, None], self.reference / count
         self.made = replace(
@@ -251,11 +251,6 @@ class MovingPoints:
         self.x, self.area, self.reference, self.number = x, area, reference, number
         self.made = replace(self.first[number], x=start, length=length, along=along)
         self._located = None
-
-
-def _along(area: Array) -> Array:
-    """Stretches of the border that areas stand for, in the direction of the way around the body."""
-    return np.stack([-area[:, 1], area[:, 0]], axis=1)
 
 
 def halve(ends: MovingPoints, longest: float) -> Indices:

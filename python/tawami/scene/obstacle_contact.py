@@ -70,7 +70,7 @@ class ObstacleContact:
         self._choose((self._border.distance < reach) | pressed)
         self.at_start = self._forces_at_start()
         if motion.times is None:
-            self._touch()
+            self._touch(gap)
 
     def _offsets(self, gap: Array) -> Array:
         """Mean distances of patches that touch.
@@ -93,13 +93,12 @@ class ObstacleContact:
             near.penalty[near.chosen], near.start[near.points], self._least[near.chosen],
         )  # fmt: skip
 
-    def _touch(self) -> None:
+    def _touch(self, gap: Array) -> None:
         """Let patches that touch in statics push from the first evaluation on.
 
         If none does, the nearest does that is almost there, as at the apex of a curved border.
         """
         near, h = self._border, self._border.h
-        gap = near.groups.means(near.weights, near.distance)
         nearest = float(gap.min())
         reach = max(nearest, 0.0) if nearest < ALMOST * h and not self._pressure.any() else 0.0
         new = (np.abs(gap) < reach + TOUCHING * h) & (self._pressure == 0)
