@@ -25,7 +25,7 @@ from cases.common.table import as_csv, as_text
 PROGRAM = Program("cases.costs.contact", __doc__)
 PROGRAM.option("--factor", type=float, default=1.0, help="factor of the steps")
 
-TOP, WIDTH = 0.9, 2.0  # of the block [m]
+TOP, WIDTH, E = 0.9, 2.0, 1e6  # of the block [m], [Pa]
 RADII, SIZES, FRICTION, NU = (0.3, 1.0, 4.0), (0.25, 0.125), (0.0, 0.3), (0.3, 0.4999)
 STEPS, BESIDE, GAPS = (0.01, 0.05), (0.0, 0.4), (0.0, 0.37)  # [m], [h], [h]
 COLUMNS = ("form", "runs", "failed", "iterations", "most")
@@ -42,17 +42,30 @@ class Row:
     most: int
 
 
+def block(form: str, nu: float, h: float, gap: float) -> tawami.Scene:
+    """A block on a held base.
+
+    Args:
+        form: Weak form.
+        nu: Poisson's ratio.
+        h: Side of a cell [m].
+        gap: Height of the base above the edge of the grid [h].
+    """
+    grid = tawami.Grid(
+        MPI.COMM_WORLD, origin=(-0.5, 0.0), h=h, cells=(round(3 / h), round(1.5 / h))
+    )
+    body = tawami.box(grid, (0.0, gap * h), (WIDTH, TOP), per_axis=3)
+    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=E, nu=nu), form=form)
+    scene.fix("bottom", "x")
+    scene.fix("bottom", "y")
+    return scene
+
+
 def pressed(
     form: str, gap: float, radius: float, h: float, mu: float, nu: float, step: float, beside: float
 ) -> list[int]:
     """Newton iterations of both steps."""
-    grid = tawami.Grid(
-        MPI.COMM_WORLD, origin=(-0.5, 0.0), h=h, cells=(round(3 / h), round(1.5 / h))
-    )
-    block = tawami.box(grid, (0.0, gap * h), (WIDTH, TOP), per_axis=3)
-    scene = tawami.Scene(grid, block, tawami.linear_elastic(E=1e6, nu=nu), form=form)
-    scene.fix("bottom", "x")
-    scene.fix("bottom", "y")
+    scene = block(form, nu, h, gap)
     shape = tawami.rigid_disc((WIDTH / 2 + beside * h, TOP + radius), radius)
     disc = scene.obstacle(shape, mu, displacement=(0.0, -step))
     found = [scene.solve().iterations]

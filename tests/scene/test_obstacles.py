@@ -8,6 +8,7 @@ from mpi4py import MPI
 from pressed import HALF, Pressed
 
 import tawami
+from cases.costs.contact import block
 
 E, NU, HEIGHT = 1e6, 0.3, 0.9
 M = E * (1 - NU) / ((1 + NU) * (1 - 2 * NU))
@@ -80,16 +81,6 @@ def test_friction_of_cattaneo_and_mindlin():
     assert width == pytest.approx(HALF * np.sqrt(1 - share), rel=0.08)
     assert 0.3 < share < 0.5
     assert pressed.solution.iterations <= 10
-
-
-def block(form, nu, h, base):
-    """A block of 2 x .9 m on a held base, which lies on the edge of the grid or above it."""
-    grid = tawami.Grid(MPI.COMM_WORLD, origin=(-0.5, 0), h=h, cells=(round(3 / h), round(1.5 / h)))
-    body = tawami.box(grid, (0.0, base * h), (2.0, HEIGHT), per_axis=3)
-    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=E, nu=nu), form=form)
-    scene.fix("bottom", "x")
-    scene.fix("bottom", "y")
-    return scene
 
 
 @pytest.mark.parametrize(

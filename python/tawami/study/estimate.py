@@ -53,9 +53,14 @@ def centre_of(knobs: Sequence[Knob]) -> tuple[Any, ...]:
     return tuple(knob.default for knob in knobs)
 
 
+def replaced(setting: tuple[Any, ...], k: int, value: Any) -> tuple[Any, ...]:
+    """A setting with another value of knob k."""
+    return (*setting[:k], value, *setting[k + 1 :])
+
+
 def line(points: Points, knobs: Sequence[Knob], k: int, base: tuple[Any, ...]) -> dict[Any, float]:
     """Values along a knob through a setting, from coarse to fine."""
-    places = {value: (*base[:k], value, *base[k + 1 :]) for value in knobs[k].values}
+    places = {value: replaced(base, k, value) for value in knobs[k].values}
     return {value: points[place] for value, place in places.items() if place in points}
 
 
@@ -110,7 +115,7 @@ def _limits(points: Points, knobs: Sequence[Knob], first: int, k: int) -> dict[A
     """Limits along the first knob for each value of knob k, where there are enough runs."""
     centre, found = centre_of(knobs), dict[Any, Limit]()
     for value in knobs[k].values:
-        along = line(points, knobs, first, (*centre[:k], value, *centre[k + 1 :]))
+        along = line(points, knobs, first, replaced(centre, k, value))
         if len(along) > 2 or value == centre[k]:
             limit = _limit(along)
             if limit.exists:

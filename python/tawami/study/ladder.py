@@ -13,7 +13,7 @@ from tawami.base.errors import InputError
 from tawami.base.lock import hold
 from tawami.base.text import meant, quoted
 from tawami.study import process
-from tawami.study.estimate import centre_of, leading
+from tawami.study.estimate import centre_of, leading, replaced
 from tawami.study.knobs import Knob
 from tawami.study.row import text_of
 from tawami.study.stored import store, stored_runs
@@ -112,7 +112,7 @@ class Ladder:
         """A setting, and those that differ from it in one knob."""
         yield base
         for k, knob in enumerate(self.knobs):
-            yield from ((*base[:k], v, *base[k + 1 :]) for v in knob.values if v != base[k])
+            yield from (replaced(base, k, v) for v in knob.values if v != base[k])
 
     def _wanted(self) -> list[Setting]:
         """Lines along the knob with the largest effect, for each setting of the star."""
@@ -121,9 +121,7 @@ class Ladder:
         for quantity in self.quantities:
             k = leading(self.points(quantity), self.knobs)
             for base in star:
-                wanted |= dict.fromkeys(
-                    (*base[:k], v, *base[k + 1 :]) for v in self.knobs[k].values
-                )
+                wanted |= dict.fromkeys(replaced(base, k, v) for v in self.knobs[k].values)
         return list(wanted)
 
     def _cost(self, setting: Setting) -> float:
@@ -141,7 +139,7 @@ class Ladder:
     def _times(self, known: Mapping[Setting, float], k: int) -> dict[int, float]:
         """Measured times along a knob through the defaults, by the place of its value."""
         base = centre_of(self.knobs)
-        places = {n: (*base[:k], v, *base[k + 1 :]) for n, v in enumerate(self.knobs[k].values)}
+        places = {n: replaced(base, k, v) for n, v in enumerate(self.knobs[k].values)}
         return {n: known[place] for n, place in places.items() if place in known}
 
     # -- runs ------------------------------------------------------------------------
