@@ -29,11 +29,12 @@ COMM = MPI.COMM_WORLD
 
 
 def beams() -> dict[str, float | np.ndarray]:
-    """The cantilever by every form, support and assembly."""
+    """The cantilever by every form and support, and by every form and assembly."""
     found: dict[str, float | np.ndarray] = {}
     for support in ("paper", "exact", "clamped"):
         for method, alpha in (("u", None), ("u_bbar", None), ("u_epsv", 0.1), ("u_p", 0.1)):
-            for path in ("points", "dolfinx"):
+            paths = ("points", "dolfinx") if support == "paper" else ("points",)
+            for path in paths:
                 row, solution = mpm.solve(method, support, 4, alpha, assembly=path)
                 name = f"beam {support} {method} {path}"
                 found[f"{name} deflection"] = row.deflection_m
@@ -55,7 +56,7 @@ def random_clouds() -> dict[str, np.ndarray]:
     found = {}
     for name, options in FORMS.items():
         for basis in BASES:
-            for path in ("points", "dolfinx"):
+            for path in ("points", "dolfinx") if basis == BASES[0] else ("points",):
                 grid, random = grid_of((6, 5)), np.random.default_rng(0)
                 x = grid.origin + grid.h * np.array([3.0, 2.5]) * random.random((40, 2))
                 body = tawami.Body(x, random.uniform(0.01, 0.1, len(x)))
