@@ -59,11 +59,11 @@ def prandtl(phi: float, c: float = C) -> float:
     return float(c * (np.exp(np.pi * tan) * passive - 1) / tan)
 
 
-def davis(phi: float, psi: float) -> float:
+def davis(phi: float, psi: float, c: float = C) -> float:
     """Low estimate of the traction at collapse with psi < phi [Pa]; Prandtl's for psi = phi."""
     of_phi, of_psi = np.radians(phi), np.radians(psi)
     r = np.cos(of_psi) * np.cos(of_phi) / (1 - np.sin(of_psi) * np.sin(of_phi))
-    return prandtl(float(np.degrees(np.arctan(r * np.tan(of_phi)))), float(r) * C)
+    return prandtl(float(np.degrees(np.arctan(r * np.tan(of_phi)))), float(r) * c)
 
 
 def dilatancies(phi: float) -> list[float]:
