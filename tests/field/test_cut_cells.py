@@ -14,7 +14,7 @@ from tawami.field.cut_cells import partially_filled, sides
 from tawami.form import vector
 from tawami.form.form import Form
 
-GHOST = {"form": "u_epsv", "ghost_penalty": "on", "k": 0.5}
+GHOST = {"form": "u_epsv", "ghost_penalty": "on", "k": 0.5, "k_v": 0.5}
 WITHOUT = {"form": "u_epsv", "ghost_penalty": "off"}
 
 
