@@ -31,6 +31,7 @@ Near nu = 0.5 the ground locks without a mixed form or B-bar, and the force is t
 
 The pile is a rigid obstacle without friction, and the steps are static. Contact acts on means over
 patches of the border, about as long as a cell, so that it starts when the tip is h^2/(3 B) deep.
+
 python -m cases.verification.penetration
 """
 
