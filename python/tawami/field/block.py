@@ -50,6 +50,7 @@ class Block:
         self.size, start = len(self.unknowns), int(of_field[: reduction.own.start].sum())
         self.own = slice(start, start + int(self.mine.sum()))
         self._held = reduction.fixed[place.slice]
+        self._matrices: list[ReducedMatrix] = []
 
     @property
     def num_own(self) -> int:
@@ -65,7 +66,7 @@ class Block:
         return False
 
     def assembled(self, kernel: Literal["elasticity", "mass"], data: Array) -> Any:
-        """A matrix of sums over the particles.
+        """A matrix of sums over the particles, which lives as long as this block.
 
         Args:
             kernel: 'elasticity' for 2 mu eps(u) : eps(w) + lambda tr eps(u) tr eps(w), or 'mass' for
@@ -80,13 +81,14 @@ class Block:
         else:
             kernels = _rust.Kernels.mass(assembler)
         matrix = ReducedMatrix(self._comm)
+        self._matrices.append(matrix)
         matrix.fit(assembler, attachment, self)
         nothing, zero = _rust.Kernels(assembler, 1, []), np.zeros(self.selection.shape[0])
         assembler.matrix(
             kernels, nothing, [data], attachment.volume, zero, matrix.pattern, matrix.values
         )
         matrix.written()
-        return matrix.summed().copy()  # the other one ends with `matrix`
+        return matrix.summed()
 
     def reduced(self, matrix: sp.csr_matrix) -> Any:
         """S^T A S of a matrix A on all coefficients of all fields."""

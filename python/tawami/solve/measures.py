@@ -40,6 +40,9 @@ STRAIN_FLOOR = 1e-7
 NO_FORCE, NO_STRAIN = 1e-14, 1e-10
 #: Share of NO_FORCE below which the residual of a body with forces on its border is round-off.
 SHARE = 1e-2
+#: Bound of the measures after the solve of a linear problem: the solutions of all linear solvers then
+#: agree to 1e-9.
+LINEAR = 1e-8
 #: Share of the diagonal times a field below which a residual of its equation is round-off.
 NO_RESIDUAL = 1e-7
 
@@ -71,13 +74,13 @@ def measured(momentum: float, volume: float, *others: float) -> Measured:
 def forcing(history: History, tolerance: float, *, linear: bool = False) -> float:
     """Tolerance of the next linear solve.
 
-    That of a linear problem reaches Newton's own tolerance at once. Otherwise it
+    That of a linear problem reaches Newton's own tolerance at once, and at least `LINEAR`. Otherwise it
     follows the rate of convergence (choice 2 of Eisenstat and Walker 1996), as far as Newton's own
     tolerance needs it.
     """
     now = worst(history[-1])
     if linear:
-        return min(0.3 * tolerance / now, 1e-3)
+        return min(0.3 * min(tolerance, LINEAR) / now, 1e-3)
     rate = now / worst(history[-2]) if len(history) > 1 else 1.0
     return min(max(0.1 * rate**2, min(0.1 * tolerance / now, 1e-3)), 1e-3)
 
