@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 from tawami.study.knobs import Knob
 from tawami.study.limit import Limit, limit_of, sizes_of
-from tawami.study.row import value_text
+from tawami.study.row import shortened, value_text
 
 T = TypeVar("T")
 #: Value of a quantity for the values of all knobs, in their order.
@@ -210,7 +210,7 @@ def _fails(name: str, knob: Knob, finer: tuple[Any, str]) -> str:
     value, message = finer
     return (
         f"'{name}' does not converge with '{knob.name}': runs with {value_text(value)} and finer fail "
-        f"({message})."
+        f"({shortened(message)})."
     )
 
 

@@ -23,7 +23,7 @@ from tawami.solve.memory import available
 from tawami.study import process
 from tawami.study.estimate import centre_of, leading, replaced
 from tawami.study.knobs import Knob
-from tawami.study.row import text_of
+from tawami.study.row import shortened, text_of
 from tawami.study.stored import store, stored_runs
 
 #: Time of a run that starts a process [s], and the ratio of times of two values of a refining knob,
@@ -243,7 +243,7 @@ class Ladder:
         if failures:
             return (
                 f"trade '{self.name}': no limit is found, as {len(failures)} runs failed, the first "
-                f"with: {failures[0]}"
+                f"with: {shortened(failures[0])}"
             )
         longest = max(run["spent_s"] for run in self.runs.values())
         return (

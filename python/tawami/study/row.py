@@ -38,6 +38,11 @@ def value_text(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
+def shortened(message: str, most: int = 160) -> str:
+    """Beginning of a message."""
+    return message if len(message) <= most else f"{message[:most].rstrip()} ..."
+
+
 @dataclass(frozen=True)
 class Row:
     """One run.
