@@ -2,8 +2,8 @@
 
 A block of cells full of particles for each rank, solved once by multigrid, on 1, 2, 4 and 8 ranks (which
 share the processors of this machine). A holder is an attribute, or a path of attributes, from the scene.
-The table has the largest holders of the last run, in bytes on the rank with most. `growth` is the ratio of
-the last run to the first: about 1 where a rank holds its own part, and the number of ranks where it
+The table has the largest holders of the last run, in bytes on the rank with most. `growth` is the ratio
+of the last run to the first: about 1 where a rank holds its own part, and the number of ranks where it
 holds what is as long as the grid or the body.
 
 python -m cases.costs.memory_per_rank
@@ -104,7 +104,10 @@ def _parts(value: Any) -> Iterator[tuple[str, Any]]:
         yield from (("[]", part) for part in value)
     elif isinstance(value, FunctionType):
         cells = value.__closure__ or ()
-        yield from zip((f".{n}" for n in value.__code__.co_freevars), (c.cell_contents for c in cells))
+        yield from (
+            (f".{n}", c.cell_contents)
+            for n, c in zip(value.__code__.co_freevars, cells, strict=True)
+        )
     elif isinstance(value, MethodType):
         yield ".__self__", value.__self__
     elif isinstance(value, functools.partial):
@@ -112,9 +115,11 @@ def _parts(value: Any) -> Iterator[tuple[str, Any]]:
     elif hasattr(value, "cache_info"):
         yield from (("", part) for part in gc.get_referents(value) if isinstance(part, dict))
     else:
-        yield from ((f".{name}", part) for name, part in vars(value).items()) if hasattr(
-            value, "__dict__"
-        ) else ()
+        yield from (
+            ((f".{name}", part) for name, part in vars(value).items())
+            if hasattr(value, "__dict__")
+            else ()
+        )
         for kind in type(value).__mro__:
             for name in getattr(kind, "__slots__", ()):
                 if hasattr(value, name):
@@ -169,7 +174,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print("ranks  resident MB  arrays MB  of these growing MB")
     first = runs[0]["holders"]
     for ranks, run in zip(options.ranks, runs, strict=True):
-        growing = [row for row in rows_of(first, run["holders"]) if row.growth > 1 + 0.5 * (ranks - 1)]
+        growing = [
+            row for row in rows_of(first, run["holders"]) if row.growth > 1 + 0.5 * (ranks - 1)
+        ]
         sizes = (run["resident"], run["total"], sum(row.bytes for row in growing))
         print(f"{ranks:5}  " + "  ".join(f"{size / 1e6:11.2f}" for size in sizes))
     rows = rows_of(first, runs[-1]["holders"])

@@ -115,14 +115,14 @@ pub fn pattern(cells: &Cells, location: &Location, selection: &Selection) -> Opt
         // the components of a function have the same row: it is made once
         let (mut row, mut of_support) = (Vec::new(), None);
         for (k, &c) in unknowns.iter().enumerate() {
-            let support = support(c as usize);
-            if of_support != Some(support) {
+            let support = (c >= 0).then(|| support(c as usize));
+            if support.is_none() || of_support != support {
                 row.clear();
-                for field in &fields {
+                for (field, support) in fields.iter().flat_map(|f| support.map(|s| (f, s))) {
                     field.sharing(&active, support, selection, &mut row);
                 }
                 sort(&mut row);
-                of_support = Some(support);
+                of_support = support;
             }
             let start = columns.len();
             columns.extend_from_slice(&row);

@@ -92,7 +92,7 @@ def fields() -> dict[str, np.ndarray]:
         scene.fix("bottom", "y")
         solution = scene.solve()
         found[f"fields {theta} {path} u"] = solution.u
-        found[f"fields {theta} {path} all"] = scene.configuration.total
+        found[f"fields {theta} {path} all"] = solution.coefficients
         found[f"fields {theta} {path} measure"] = np.array(solution.history[0][2])
     return found
 

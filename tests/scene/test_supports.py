@@ -17,7 +17,7 @@ import tawami
 from tawami import _rust
 from tawami.base.errors import SupportError
 from tawami.field import constraints
-from tawami.field.layout import Place
+from tawami.field.coefficients import Place
 from tawami.field.reduction import Reduction
 from tawami.grid import edges
 from tawami.grid.basis import values_1d

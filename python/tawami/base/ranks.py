@@ -67,8 +67,19 @@ def exchanged(comm: Any, rows: npt.NDArray[Any], to: npt.NDArray[Any]) -> npt.ND
         rows: Rows of this rank.
         to: Rank to which each of them is sent.
     """
-    parts = comm.alltoall([rows[to == rank] for rank in range(comm.size)])
-    return np.concatenate(parts)
+    return np.concatenate(parts_to(comm, rows, to))
+
+
+def parts_to(comm: Any, values: npt.NDArray[Any], to: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
+    """The values that each rank sends to this one.
+
+    Args:
+        comm: Communicator.
+        values: Values of this rank.
+        to: Rank to which each of them is sent.
+    """
+    parts: list[npt.NDArray[Any]] = comm.alltoall([values[to == rank] for rank in range(comm.size)])
+    return parts
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""The sum of a reduced tangent and a sparse matrix that is the same on every rank."""
+"""The sum of a reduced tangent and a sparse matrix."""
 
 from __future__ import annotations
 
@@ -29,17 +29,20 @@ class Sum:
         self._matrix: sp.csr_matrix | None = None
         self._rows: sp.csr_matrix | None = None
 
-    def of(self, tangent: Any, matrix: sp.csr_matrix, reduction: Reduction) -> Any:
+    def of(
+        self, tangent: Any, matrix: sp.csr_matrix, reduction: Reduction, *, of_grid: bool = False
+    ) -> Any:
         """The sum: the same object as long as the tangent is the same and the matrix has its pattern.
 
         Args:
             tangent: A reduced tangent.
-            matrix: A, the same on every rank. If its values change it must be another object.
+            matrix: A, or the part of this rank. If its values change it must be another object.
             reduction: S.
+            of_grid: Whether it is A, on coefficients of the whole grid.
         """
         known, same = self._petsc, self._tangent is tangent
         if not same or self._matrix is not matrix:
-            rows = reduction.reduced(matrix)
+            rows = (reduction.of_grid if of_grid else reduction.of_window)(matrix)
             differs = not (same and _same_places(self._rows, rows))
             same = not ranks.any_of(self._comm, np.array([differs]))[0]
             self._rows = rows

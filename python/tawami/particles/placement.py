@@ -38,14 +38,14 @@ def outside(grid: Grid, x: Array) -> Mask:
 def distributed(
     grid: Grid, body: _rust.Particles, *, moving: bool
 ) -> tuple[_rust.Particles, _rust.Location]:
-    """The particles in this rank's cells, from a body that every rank has.
+    """The particles in this rank's cells, from a body that every rank has, in cells of its window.
 
     Raises:
         InputError: Particles are outside the grid, or the body is not the same on all ranks.
     """
     location = located(grid, body.x, moving=moving)
     if grid.comm.size == 1:
-        return body, location
+        return body, grid.window.place(location)
     parts = (body.x, body.volume, body.material)
     digest = hashlib.sha1(b"".join(part.tobytes() for part in parts)).digest()
     if len(set(grid.comm.allgather(digest))) > 1:
@@ -53,8 +53,8 @@ def distributed(
             "the body is not the same on all ranks: expected the same positions, volumes and "
             "materials on each. Give random numbers a seed, or make it on one rank and bcast it"
         )
-    mine = np.flatnonzero(grid.rank_of_cell[location.cell] == grid.comm.rank).astype(np.uint32)
-    return body.select(mine), location.select(mine)
+    mine = np.flatnonzero(grid.window.owns(location)).astype(np.uint32)
+    return body.select(mine), grid.window.place(location.select(mine))
 
 
 def columns(particles: _rust.Particles) -> list[tuple[str, int]]:
@@ -104,15 +104,19 @@ def scattered(
 
 
 def migrated(grid: Grid, particles: _rust.Particles) -> tuple[_rust.Particles, _rust.Location]:
-    """Move particles to the rank of their cell, in the order of their numbers."""
+    """Move particles to the rank of their cell, in the order of their numbers.
+
+    Returns:
+        The particles of this rank, and their cells in its window.
+    """
     comm = grid.comm
     while True:
         location = located(grid, particles.x, moving=True)
         if comm.size == 1:
-            return particles, location
-        rank = grid.rank_of_cell[location.cell]
+            return particles, grid.window.place(location)
+        rank = grid.ranks_of(location.cell.astype(np.int64))
         if not ranks.any_of(comm, np.array([(rank != comm.rank).any()]))[0]:
-            return particles, location
+            return particles, grid.window.place(location)
         particles = particles.of_rows(ranks.exchanged(comm, particles.rows(), rank))
         particles = particles.select(np.argsort(particles.number).astype(np.uint32))
 

@@ -32,7 +32,7 @@ class BorderNear:
 
     Attributes:
         h: Side of a cell [m].
-        n, size: Number of coefficients of the displacement, and of all fields.
+        n, size: Number of coefficients of the displacement in the whole grid, and of all fields.
         x: Positions of all points at the start [m], points x dim.
         start: The same in the frame of the obstacle.
         distance: Their distances from it [m].
@@ -58,7 +58,7 @@ class BorderNear:
         groups: Patches | None = None,
     ) -> None:
         self.h, self._dim = domain.model.grid.h, domain.model.space.dim
-        self.n, self.size = domain.layout.num_displacement, domain.layout.size
+        self.n, self.size = domain.layout.num_displacement_of_grid, domain.layout.size_of_grid
         cells = place.cells(domain)
         self._numbers, self._values, _ = cells.tabulated(domain.layout.basis)
         self.x = place.x
@@ -67,7 +67,7 @@ class BorderNear:
         self.groups = self._grouped(place, groups)
         weight = place.weight
         self.weights = np.maximum(weight, 1e-12 * weight.max())  # 0 on an axis of symmetry
-        shear = domain.moduli_of_cells[1][cells.location.cell]
+        shear = domain.moduli_at(cells)[1]
         self.penalty = PENALTY / self.h * self.groups.means(self.weights, shear)
         self.distance = shape.evaluate(self.start).distance
         self.chosen = np.zeros(self.groups.count, dtype=bool)

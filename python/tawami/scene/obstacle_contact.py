@@ -44,7 +44,8 @@ class ObstacleContact:
         domain: The particles at its start.
         obstacle: The obstacle.
         motion: Its motion in the step.
-        before: Displacement coefficients since the start where particles do not move, else 0.
+        before: Displacement coefficients of the whole grid since the start where particles do not move,
+            else 0.
     """
 
     smooth, implicit, first_work = False, True, 0.0
@@ -229,7 +230,7 @@ class ObstacleContact:
         """Work on body and obstacle from outside, dissipation by friction, and loss by impact.
 
         Args:
-            u: Increments of the displacement.
+            u: Increments of the displacement, in the whole grid.
         """
         q, free, resultant = self.motion.unknown, self.motion.free, self.now.resultant
         external = float(self.motion.force[free] @ q[free] - resultant[~free] @ q[~free])

@@ -19,10 +19,13 @@ ENDS = np.array([-0.5, 0.5])
 class Outline:
     """The border of a body as it is now: one side for each of its points, as long as the point counts.
 
+    Making it is a call for all ranks.
+
     Args:
         points: All points of the border.
         domain: The particles at the end of the step.
-        u: Coefficients of the displacement since the start, where particles do not move.
+        u: Coefficients of the displacement in the whole grid since the start, where particles do not
+            move.
 
     Attributes:
         x: Positions of the points, at small strain those at the start [m].
@@ -33,8 +36,12 @@ class Outline:
     def __init__(self, points: MovingPoints, domain: Domain, u: Array) -> None:
         self._made, self.x, self.area = points.made, points.x, points.area
         self.part = self._made.tag
-        vectors = u.reshape(-1, domain.model.space.dim)
-        self._static = None if domain.model.moves else (domain, vectors)
+        #: The points in the cells, and the displacement, where particles do not move.
+        self._static: tuple[BorderInCells, Array] | None = None
+        if not domain.model.moves:
+            cells = BorderInCells(domain.model.grid, domain.active, self.x, self._made.normal)
+            self._static = cells, u.reshape(-1, domain.model.space.dim)
+        self._basis = domain.layout.basis
 
     def sides(self, deformed: float = 1.0) -> Array:
         """Ends of the sides with enlarged displacements [m], points x 2 x dim.
@@ -53,10 +60,7 @@ class Outline:
     def _displacements(self, start: Array) -> Array:
         if self._static is None:
             return _sides(self.x, self.area) - start
-        domain, u = self._static
-        normal = self._made.normal
-        cells = BorderInCells(domain.model.grid, domain.active, self.x, normal)
-        basis = domain.layout.basis
+        (cells, u), basis = self._static, self._basis
         gradient = np.stack([slope @ u for slope in cells.slopes(basis)], axis=2)
         offset = np.einsum("nij,nkj->nki", gradient, start - self.x[:, None])
         return np.asarray((cells.values(basis) @ u)[:, None] + offset)

@@ -45,33 +45,40 @@ def _check_known(place: str, edges_held: Collection[str], names: Collection[str]
 
 def divided(reduction: Reduction, forces: Array) -> tuple[Array, Array]:
     """Forces of supports: those of edges and walls on all displacement coefficients, and the multipliers
-    of points, which carry as much as possible.
+    of points, which carry as much as possible; a call for all ranks.
 
     Args:
         reduction: The supports.
         forces: Of all supports on the displacement coefficients [N per metre depth].
     """
-    fixed, points, rest = reduction.fixed[: len(forces)], reduction.points, forces
-    multipliers = np.zeros(len(points))
+    layout, points = reduction.layout, reduction.points
+    fixed, rest, multipliers = reduction.fixed[: len(forces)], forces, np.zeros(len(points))
     if points:
-        weights = np.zeros((len(forces), len(points)))
+        some = np.unique(np.concatenate([point.indices for point in points]))
+        weights = np.zeros((len(some), len(points)))
         for k, point in enumerate(points):
-            weights[point.indices, k] = point.weights
-        multipliers = np.linalg.lstsq(weights[~fixed], forces[~fixed], rcond=None)[0]
-        rest = forces - weights @ multipliers
+            weights[np.searchsorted(some, point.indices), k] = point.weights
+        loose = layout.at(fixed.astype(float), some) == 0
+        carried = layout.at(forces, some)[loose]
+        multipliers = np.linalg.lstsq(weights[loose], carried, rcond=None)[0]
+        place, rest = layout.places(some), forces.copy()
+        rest[place[place >= 0]] -= (weights @ multipliers)[place >= 0]
     return np.where(fixed, rest, 0.0), multipliers
 
 
 def work(reduction: Reduction, forces: Array, u: Array) -> float:
     """Work of forces of supports on increments of the displacement [J per metre depth].
 
+    A call for all ranks.
+
     Args:
         reduction: The supports.
         forces, u: On all displacement coefficients [N per metre depth], [m].
     """
     held, multipliers = divided(reduction, forces)
-    moved = [point.weights @ u[point.indices] for point in reduction.points]
-    return float(held @ u + multipliers @ np.array(moved))
+    layout = reduction.layout
+    moved = [point.weights @ layout.at(u, point.indices) for point in reduction.points]
+    return layout.dot(held, u) + float(multipliers @ np.array(moved))
 
 
 @dataclass(frozen=True)
@@ -95,7 +102,7 @@ class Reactions:
     its length.
 
     Attributes:
-        on_edges: Of edges and walls, functions x dim [N per metre depth].
+        on_edges: Of edges and walls, functions of the whole grid x dim [N per metre depth].
         at_points: Of points.
         on_border: Of patches of the border [N per metre depth], by the names of its parts.
         on_obstacles: Contact with obstacles.
@@ -112,7 +119,7 @@ class Reactions:
 
     @classmethod
     def of(cls, accepted: Accepted, supports: Supports) -> Reactions:
-        """Points by their multipliers, the rest to edges and walls.
+        """Points by their multipliers, the rest to edges and walls; a call for all ranks.
 
         Args:
             accepted: The step.
@@ -127,7 +134,8 @@ class Reactions:
             assert not isinstance(support.component, str)
             places = (support.given, support.place, point.place)
             at_points.append(AtPoint(places, support.component, float(force)))
-        on_edges = held.reshape(accepted.u.shape) + accepted.friction
+        layout, friction = reduction.layout, accepted.friction
+        on_edges = layout.whole(held + friction.ravel()).reshape(-1, friction.shape[1])
         on_border = [
             part
             for held in accepted.problem.supports

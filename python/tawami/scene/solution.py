@@ -76,9 +76,9 @@ class Solution(Elsewhere, Sealed, Unique):
         self.scene: Any = scene
         self._model = scene.configuration.model
         layout, step = outcome.accepted.problem.reduction.layout, outcome.accepted.step
-        self.coefficients = outcome.coefficients
-        self.u, self._volumetric = layout.split(outcome.coefficients)
-        self._active = layout.active[: layout.num_displacement].astype(float)
+        self.coefficients = layout.whole(outcome.coefficients)
+        self.u, self._volumetric = layout.split_of_grid(self.coefficients)
+        self._active = layout.whole(layout.active[: layout.num_displacement].astype(float))
         self.unknowns, self.iterations = outcome.accepted.problem.reduction.size, step.iterations
         self.load, self.history = outcome.accepted.load, step.history
         self.krylov = tuple(step.krylov)

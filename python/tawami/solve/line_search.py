@@ -18,13 +18,14 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from tawami import _rust
+from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.base.timing import tally
+from tawami.field.layout import Layout
 from tawami.solve.iterate import Forces
 from tawami.solve.measures import Measured
 from tawami.solve.terms import Terms
@@ -42,7 +43,7 @@ class LineSearch:
     """The work of the unbalance along one change of the increments.
 
     Args:
-        comm: Communicator; all ranks get the same bits.
+        layout: Places of the coefficients.
         change: Change of all increments by a full step.
         residual: Forces out of balance at its beginning.
         signs: Sign of each coefficient in g: 1, -1 or 0.
@@ -51,13 +52,13 @@ class LineSearch:
 
     def __init__(
         self,
-        comm: Any,
+        layout: Layout,
         change: Array,
         residual: Array,
         signs: Array,
         terms: Terms | None = None,
     ) -> None:
-        self._comm, self._change, self._residual = comm, change, residual
+        self._layout, self._change, self._residual = layout, change, residual
         self._signs, self._terms = signs, terms
 
     @functools.cached_property
@@ -71,7 +72,8 @@ class LineSearch:
         return self._work(self._residual, of_terms)
 
     def _work(self, residual: Array, of_terms: float) -> float:
-        return float(self._comm.bcast(float(self._weights @ residual) + of_terms))
+        work = self._layout.dot(self._weights, residual) + of_terms
+        return ranks.same(self._layout.grid.comm, work)
 
     def _at_last_forces(self, residual: Array) -> float:
         return self._work(residual, 0.0 if self._terms is None else self._terms.work)

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 
 from tawami.base.arrays import Array
 from tawami.base.places import Added
+from tawami.field.layout import Layout
 from tawami.field.reduction import Reduction
 from tawami.field.sum import Sum
 from tawami.solve.bordered import Bordering, Elimination
@@ -22,7 +23,10 @@ PASSES = 20
 
 
 class Term(Protocol):
-    """Forces of one action on the border; the same on every rank."""
+    """Forces of one action on the border.
+
+    They are the same on every rank: coefficients are all those of the whole grid.
+    """
 
     @property
     def prescribed(self) -> float:
@@ -66,15 +70,16 @@ class Terms:
 
     Args:
         terms: The actions.
-        comm: Communicator.
+        layout: Places of the coefficients.
 
     Attributes:
         stuck: Message if the multipliers do not settle.
-        stiffness: That of the last tangent, on all coefficients.
+        stiffness: That of the last tangent, on all coefficients of the whole grid.
     """
 
-    def __init__(self, terms: Sequence[Term], comm: Any) -> None:
-        self._terms, self._sum, self._added = terms, Sum(self, comm), Added()
+    def __init__(self, terms: Sequence[Term], layout: Layout) -> None:
+        self._terms, self._layout, self._added = terms, layout, Added()
+        self._sum = Sum(self, layout.grid.comm)
         #: Stiffness of each term when they were last added, and their sum.
         self._stiffnesses: list[sp.csr_matrix] = [None] * len(terms)
         self.stiffness: sp.csr_matrix | None = None
@@ -91,10 +96,11 @@ class Terms:
 
     def begin(self, diagonal: Callable[[], Array], inertia: Inertia | None) -> None:
         """Start a step; see `Term.begin`."""
-        of_mass = None if inertia is None else inertia.slope * inertia.mass
+        whole = self._layout.whole
+        of_mass = None if inertia is None else whole(inertia.slope * inertia.mass)
         self._passes, self.stuck = 0, ""
         for term in self._terms:
-            term.begin(diagonal, of_mass)
+            term.begin(lambda: whole(diagonal()), of_mass)
 
     def restart(self) -> None:
         """Go back to the first guess of the unknowns of their own."""
@@ -117,12 +123,17 @@ class Terms:
         return sum(term.work for term in self.bordering)
 
     def forces(self, coefficients: Array) -> Array:
-        """Their sum, as `Term.forces`."""
+        """Their sum, on the coefficients of the window; a collective call.
+
+        Args:
+            coefficients: Increments of all fields, in the window.
+        """
+        in_grid = self._layout.whole(coefficients)
         #: Of all that are no contact.
         self.loads = np.zeros_like(coefficients)
         total = np.zeros_like(coefficients)
         for term in self._terms:
-            forces = term.forces(coefficients)
+            forces = self._layout.part(term.forces(in_grid))
             total += forces
             if not term.implicit:
                 self.loads += forces
@@ -133,7 +144,7 @@ class Terms:
         parts = [term.stiffness() for term in self._terms]
         if not all(map(operator.is_, parts, self._stiffnesses)):
             self._stiffnesses, self.stiffness = parts, self._added.of(parts)
-        return self._sum.of(tangent, self.stiffness, reduction)
+        return self._sum.of(tangent, self.stiffness, reduction, of_grid=True)
 
     @functools.cached_property
     def bordering(self) -> list[Bordering]:
@@ -149,10 +160,12 @@ class Terms:
         """The elimination of their own unknowns; None if there are none.
 
         Args:
-            solve: As in `Elimination`.
+            solve: As in `Elimination`, with coefficients of the window.
         """
-        terms = self.bordering
-        return Elimination(terms, solve) if terms else None
+        terms, layout = self.bordering, self._layout
+        if not terms:
+            return None
+        return Elimination(terms, lambda right: layout.whole(solve(layout.part(right))))
 
     def improve(self) -> bool:
         """Improve all multipliers; whether another solve is needed."""
