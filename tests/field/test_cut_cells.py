@@ -100,7 +100,7 @@ def test_partly_filled_cells_are_beside_empty_ones():
     assert np.argwhere(partly).tolist() == [[2, 3], [2, 4], [3, 3]]  # not those at the grid's end
     grid = tawami.Grid(MPI.COMM_SELF, origin=(0, 0), h=1.0, cells=active.shape[::-1])
     assert len(list(sides(grid.window, active))) == 6
-    assert not list(sides(np.ones((3, 3), dtype=bool)))
+    assert not list(sides(grid.window, np.ones((4, 5), dtype=bool)))
 
 
 @pytest.mark.parametrize(

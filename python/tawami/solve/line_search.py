@@ -22,10 +22,8 @@ from collections.abc import Callable
 import numpy as np
 
 from tawami import _rust
-from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.base.timing import tally
-from tawami.field.layout import Layout
 from tawami.solve.iterate import Forces
 from tawami.solve.measures import Measured
 from tawami.solve.terms import Terms
@@ -43,7 +41,7 @@ class LineSearch:
     """The work of the unbalance along one change of the increments.
 
     Args:
-        layout: Places of the coefficients.
+        dot: Scalar product of vectors of coefficients, the same on all ranks.
         change: Change of all increments by a full step.
         residual: Forces out of balance at its beginning.
         signs: Sign of each coefficient in g: 1, -1 or 0.
@@ -52,13 +50,13 @@ class LineSearch:
 
     def __init__(
         self,
-        layout: Layout,
+        dot: Callable[[Array, Array], float],
         change: Array,
         residual: Array,
         signs: Array,
         terms: Terms | None = None,
     ) -> None:
-        self._layout, self._change, self._residual = layout, change, residual
+        self._dot, self._change, self._residual = dot, change, residual
         self._signs, self._terms = signs, terms
 
     @functools.cached_property
@@ -72,8 +70,7 @@ class LineSearch:
         return self._work(self._residual, of_terms)
 
     def _work(self, residual: Array, of_terms: float) -> float:
-        work = self._layout.dot(self._weights, residual) + of_terms
-        return ranks.same(self._layout.grid.comm, work)
+        return self._dot(self._weights, residual) + of_terms
 
     def _at_last_forces(self, residual: Array) -> float:
         return self._work(residual, 0.0 if self._terms is None else self._terms.work)
