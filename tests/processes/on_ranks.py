@@ -365,6 +365,36 @@ def stretched() -> dict[str, np.ndarray]:
     return {"stretched points": np.array(count), "stretched border": scene.border.x}
 
 
+def wide() -> dict[str, np.ndarray]:
+    """A body over ranks that know a part of the grid each: multigrid, ghost penalty, supports off its
+    lines, and then a motion along walls.
+    """
+    grid = tawami.Grid(COMM, origin=(0, 0), h=0.25, cells=(27, 6))
+    corners = [(0.1, 0.07), (5.8, 0.1), (5.9, 1.3), (3.0, 1.45), (0.05, 1.2)]
+    body = tawami.polygon(grid, corners, per_axis=2)
+    law = tawami.linear_elastic(E=1e6, nu=0.4)
+    of = {"ghost_penalty": "on", "linear_solver": "multigrid", "tolerance": 1e-11}
+    scene = tawami.Scene(grid, body, law, **of)
+    scene.fix("4", "x")
+    scene.fix("4", "y")
+    scene.hold((3.0, 0.7), "x", 1e-3)
+    scene.pressure("2", 1e3)
+    solution = scene.solve()
+    box = tawami.box(grid, (0, 0), (5, 0.5), per_axis=2)
+    scene = tawami.Scene(grid, box, law, form="u_finite", density=1e3, tolerance=1e-11)
+    scene.wall("bottom", 0.2)
+    scene.wall("left")
+    scene.gravity((0, -9.81))
+    scene.hold((2.0, 0.3), "x", velocity=0.2)
+    motion = tawami.Dynamics(scene)
+    for _ in range(2):
+        last = motion.step(0.004)
+    return {
+        "wide u": solution.u, "wide force": solution.reaction("4"), "wide x": last.x,
+        "wide wall": last.reaction("bottom"), "wide krylov": np.array(solution.krylov),
+    }  # fmt: skip
+
+
 def few_cells() -> dict[str, np.ndarray]:
     """Two cells, of which some ranks have none; a load that is a function of the whole edge."""
     grid = tawami.Grid(COMM, origin=(0, 0), h=1.0, cells=(2, 1))
@@ -395,7 +425,7 @@ def output(folder: Path) -> dict[str, np.ndarray]:
 def results(folder: Path) -> dict[str, Any]:
     """Results of all scenes; files are written to the folder."""
     found = beams() | random_clouds() | fields() | nonlinear() | singular() | motion() | initial()
-    found |= construction() | border() | contact() | stretched()
+    found |= construction() | border() | contact() | stretched() | wide()
     return found | errors() | inverted() | few_cells() | output(folder)
 
 
