@@ -391,7 +391,7 @@ def wide() -> dict[str, np.ndarray]:
         last = motion.step(0.004)
     return {
         "wide u": solution.u, "wide force": solution.reaction("4"), "wide x": last.x,
-        "wide wall": last.reaction("bottom"), "wide krylov": np.array(solution.krylov),
+        "wide wall": last.reaction("bottom"), "krylov wide": np.array(solution.krylov),
     }  # fmt: skip
 
 

@@ -7,6 +7,7 @@ for linear fields, so that no force and no moment of a load is lost.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from functools import lru_cache
 
@@ -146,10 +147,14 @@ class BorderInCells(PointsInCells):
         Returns:
             Functions of the window x columns.
         """
-        own = np.flatnonzero(self.own)
-        xi, once = np.asarray(self.location.xi)[own], np.ones(len(own))
-        location = self.grid.window.rust.place(self.here[own].astype(np.uint32), xi)
-        return functions.sums(location, once, np.ascontiguousarray(values[own]), basis)
+        mine = np.ascontiguousarray(values[self.own])
+        return functions.sums(self.of_rank, np.ones(len(mine)), mine, basis)
+
+    @functools.cached_property
+    def of_rank(self) -> _rust.Location:
+        """The points in cells of this rank, in its window."""
+        cell = self.here[self.own].astype(np.uint32)
+        return self.grid.window.rust.place(cell, np.asarray(self.location.xi)[self.own])
 
 
 def _far_from_particles(grid: Grid, x: Array, lost: Mask, where: str) -> SupportError:

@@ -15,6 +15,7 @@ from tawami.base import ranks
 from tawami.base.arrays import Array, Indices, Mask, of_components
 from tawami.base.exchange import Exchange
 from tawami.field.functions import ActiveFunctions
+from tawami.field.owned import Owned
 from tawami.form.fields import Field
 from tawami.grid.basis import Basis
 from tawami.grid.grid import Grid
@@ -177,18 +178,23 @@ class Coefficients:
         mine = (number >= 0) & np.isin(number, self.functions.cells.astype(np.int64))
         return ranks.any_of(self.grid.comm, mine)
 
+    def owned(self, values: Array) -> Owned:
+        """Values of coefficients, or of those of the displacement, each on the rank that owns it."""
+        of_displacement = len(values) == self.num_displacement
+        size = list(self.of_grid.values())[0 if of_displacement else -1].stop
+        if self.grid.comm.size == 1:
+            return Owned(self.grid.comm, None, values, size)
+        own = np.flatnonzero(self.own[: len(values)])
+        number = self.in_grid[own]
+        order = np.argsort(number)
+        return Owned(self.grid.comm, number[order], values[own[order]], size)
+
     def whole(self, values: Array) -> Array:
         """Coefficients of the whole grid, or those of the displacement, from those of the window.
 
         A collective call.
         """
-        if self.grid.comm.size == 1:
-            return values
-        of_displacement = len(values) == self.num_displacement
-        last = list(self.of_grid.values())[0 if of_displacement else -1]
-        found, own = np.zeros(last.stop), self.own[: len(values)]
-        found[self.in_grid[: len(values)][own]] = values[own]
-        return ranks.sum_of(self.grid.comm, found)
+        return self.owned(values).whole
 
     def part(self, in_grid: Array) -> Array:
         """Coefficients of the window, or those of the displacement, from those of the whole grid."""

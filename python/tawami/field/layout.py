@@ -207,12 +207,6 @@ class Layout(Coefficients):
         volumetric = None if self.volumetric is None else coefficients[self.volumetric.slice]
         return coefficients[: self.num_displacement], volumetric
 
-    def split_of_grid(self, coefficients: Array) -> tuple[Array, Array | None]:
-        """The same of coefficients of the whole grid."""
-        names = [name for name, place in self.fields.items() if place is self.volumetric]
-        of_volume = coefficients[self.of_grid[names[0]].slice] if names else None
-        return coefficients[: self.num_displacement_of_grid], of_volume
-
     def name_of(self, coefficient: int) -> str:
         """Name of the field of a coefficient."""
         return next(name for name, field in self.fields.items() if coefficient < field.stop)

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from tawami.base import checks
-from tawami.base.arrays import Array
+from tawami.base.arrays import Array, of_components
 from tawami.base.errors import InputError
 from tawami.base.text import quoted
+from tawami.field.owned import Owned
 from tawami.field.reduction import Reduction
 from tawami.grid import edges
 from tawami.grid.grid import EDGES, Edge
@@ -102,7 +103,7 @@ class Reactions:
     its length.
 
     Attributes:
-        on_edges: Of edges and walls, functions of the whole grid x dim [N per metre depth].
+        on_edges: Of edges and walls, on the displacement coefficients [N per metre depth].
         at_points: Of points.
         on_border: Of patches of the border [N per metre depth], by the names of its parts.
         on_obstacles: Contact with obstacles.
@@ -110,7 +111,7 @@ class Reactions:
         names: Parts of the border with supports, each with the edges of the grid that it is held on.
     """
 
-    on_edges: Array
+    on_edges: Owned
     at_points: Sequence[AtPoint] = field(default_factory=list)
     on_border: Sequence[tuple[str, Array]] = ()
     on_obstacles: Sequence[ContactResult] = ()
@@ -135,7 +136,7 @@ class Reactions:
             places = (support.given, support.place, point.place)
             at_points.append(AtPoint(places, support.component, float(force)))
         layout, friction = reduction.layout, accepted.friction
-        on_edges = layout.whole(held + friction.ravel()).reshape(-1, friction.shape[1])
+        on_edges = layout.owned(held + friction.ravel())
         on_border = [
             part
             for held in accepted.problem.supports
@@ -159,7 +160,7 @@ class Reactions:
         )
 
     def at(self, model: Model, place: str | Sequence[float] | Obstacle) -> Array:
-        """Force (x, y) [N per metre depth] of a support; see `Solution.reaction`."""
+        """Force (x, y) [N per metre depth] of a support, a call for all ranks; see `Solution`."""
         force, found = np.zeros(model.space.dim), False
         if isinstance(place, Obstacle) or any(place == one.name for one in self.on_obstacles):
             return -self.contact(place).force
@@ -170,7 +171,8 @@ class Reactions:
                 on_edges.add(checks.choice("reaction(...)", place, EDGES))
             for edge in sorted(on_edges):
                 functions = edges.edge_functions(model.grid, model.basis, edge)
-                force = force + self.on_edges[functions].sum(axis=0)
+                places = of_components(functions, model.space.dim)
+                force = force + self.on_edges.at(places).sum(axis=0)
             parts = [part for name, part in self.on_border if name == place]
             return np.asarray(sum(parts, force))
         place = checks.point("reaction(...)", place)

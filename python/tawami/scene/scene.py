@@ -363,7 +363,10 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         Raises:
             InputError: Not the coefficients of all fields.
         """
-        return self.configuration.domain.layout.split_of_grid(self._coefficients(coefficients))
+        given, layout = self._coefficients(coefficients), self.configuration.domain.layout
+        names = [name for name, place in layout.fields.items() if place is layout.volumetric]
+        volumetric = given[layout.of_grid[names[0]].slice] if names else None
+        return given[: layout.num_displacement_of_grid], volumetric
 
     def reduction(self) -> Reduction:
         """Unknowns that the supports leave free: coefficients = selection @ unknowns + offset."""

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks, html
+from tawami.base.arrays import of_components
 from tawami.base.errors import InputError, NotModelledError
 from tawami.base.process import Unique
 from tawami.base.sealed import Sealed
@@ -49,9 +50,6 @@ class Solution(Elsewhere, Sealed, Unique):
 
     Attributes:
         scene: The scene.
-        coefficients: Of all fields, one after the other, as `u`.
-        u: Coefficients of the displacement [m], two per function, x fastest: since the start, and of
-            the last step where strains are finite.
         unknowns: Number of reduced unknowns.
         load: Share of the new loads and displacements that it is in equilibrium with; NaN in dynamics.
         iterations: Newton iterations of the last step.
@@ -68,7 +66,6 @@ class Solution(Elsewhere, Sealed, Unique):
             Frobenius norm over the square root of its size, times that of its inverse as random
             vectors show it.
         symmetric: Whether that tangent was symmetric.
-        on_edges: Forces of edges and walls on the body, functions x 2 [N per metre depth].
     """
 
     def __init__(self, scene: Solved, outcome: Outcome) -> None:
@@ -76,21 +73,19 @@ class Solution(Elsewhere, Sealed, Unique):
         self.scene: Any = scene
         self._model = scene.configuration.model
         layout, step = outcome.accepted.problem.reduction.layout, outcome.accepted.step
-        self.coefficients = layout.whole(outcome.coefficients)
-        self.u, self._volumetric = layout.split_of_grid(self.coefficients)
-        self._active = layout.whole(layout.active[: layout.num_displacement].astype(float))
+        self._coefficients, self._of_grid = layout.owned(outcome.coefficients), layout.of_grid
+        self._active = layout.owned(layout.active.astype(float))
         self.unknowns, self.iterations = outcome.accepted.problem.reduction.size, step.iterations
         self.load, self.history = outcome.accepted.load, step.history
         self.krylov = tuple(step.krylov)
         self.condition, self.symmetric = step.condition, step.symmetric
         self._reactions = outcome.reactions
-        self.on_edges = outcome.reactions.on_edges
         particles = outcome.particles
         now = scene.configuration
         #: The border of the body; None if it has none.
         self._outline = None
         if now.border.points is not None:
-            self._outline = Outline(now.border.points, now.domain, self.u)
+            self._outline = Outline(now.border.points, now.domain, outcome.coefficients)
         #: Arrays of the particles by name, for quantities.
         self.arrays = Arrays(self._array)
         self.number = particles["number"]
@@ -109,13 +104,39 @@ class Solution(Elsewhere, Sealed, Unique):
         )
 
     @property
+    def coefficients(self) -> Array:
+        """Coefficients of all fields, one after the other, as `u`; gathered from the ranks when they are
+        first read.
+        """
+        return self._coefficients.whole
+
+    @property
+    def u(self) -> Array:
+        """Coefficients of the displacement [m], two per function, x fastest: since the start, and of the
+        last step where strains are finite; gathered as `coefficients`.
+        """
+        return self.coefficients[next(iter(self._of_grid.values())).slice]
+
+    @property
+    def on_edges(self) -> Array:
+        """Forces of edges and walls on the body, functions x 2 [N per metre depth]; gathered as
+        `coefficients`.
+        """
+        return self._reactions.on_edges.whole.reshape(-1, self._model.space.dim)
+
+    @property
     def volumetric(self) -> Array:
         """Coefficients of eps_v, or of p [Pa].
 
         Raises:
             InputError: The form has neither.
         """
-        return self._of_form("volumetric", self._volumetric, "has_mean_stress")
+        volumetric = [
+            self.coefficients[self._of_grid[name].slice]
+            for name, field in self._model.form.fields.items()
+            if field.role in ("volumetric_strain", "pressure")
+        ]
+        return self._of_form("volumetric", next(iter(volumetric), None), "has_mean_stress")
 
     @property
     def eps_v(self) -> Array:
@@ -181,7 +202,7 @@ class Solution(Elsewhere, Sealed, Unique):
         return np.asarray(self.stress[:, :3].mean(axis=1))
 
     def displacement(self, point: Sequence[float]) -> Array:
-        """Displacement (u_x, u_y) [m] of the grid at a point.
+        """Displacement (u_x, u_y) [m] of the grid at a point; a call for all ranks.
 
         At small strain it is the displacement since the start. At finite strain, where the grid is reset
         after each step, it is the increment of the last step only: `displacement_of_particles` has the
@@ -196,18 +217,14 @@ class Solution(Elsewhere, Sealed, Unique):
         """
         what = f"displacement({checks.shown(point)})"
         location = edges.locate_point(self._model.grid, point, what)
-        fields = np.column_stack([self.u, self._active])
-        value, share = (
-            np.asarray(
-                _rust.interpolate(location, self._model.basis, self._model.space.dim, field)[0]
-            )
-            for field in np.ascontiguousarray(fields.T)
-        )
+        functions, shares, _ = _rust.functions_at(location, self._model.basis)
+        places = of_components(functions[0], self._model.space.dim)
+        value, share = (shares[0] @ of.at(places) for of in (self._coefficients, self._active))
         reached = float(share.min())
         if reached < LEAST_SHARE:
             distance = np.linalg.norm(self.x - np.asarray(point), axis=1).min(initial=np.inf)
             raise outside(what, float(distance))
-        return value if reached > 1 - ROUND_OFF else value / reached
+        return np.asarray(value if reached > 1 - ROUND_OFF else value / reached)
 
     # -- in a notebook -------------------------------------------------------
 
