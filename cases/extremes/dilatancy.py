@@ -1,7 +1,7 @@
 """Dilatant soil up to nu = 0.4999, and steps so large that Newton's method needs its line search.
 
-The force at which the block of `cases.verification.dilatancy` flows is one of strength and not of elasticity:
-with psi = phi it does not depend on nu. One step and ten steps end at the same force.
+The force at which the block of `cases.verification.dilatancy` flows is one of strength and not of
+elasticity: it does not depend on nu. One step and ten steps end at the same force.
 """
 
 from __future__ import annotations

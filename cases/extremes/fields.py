@@ -1,7 +1,7 @@
 """Extra fields: consolidation over many orders of permeability and time, and a heated wall.
 
-Terzaghi's degree of consolidation depends on c_v t/H^2 only. The first step after loading is the limit of an
-undrained body, of which the water carries the load: p = q.
+Terzaghi's degree of consolidation depends on c_v t/H^2 only. In the first step after loading the body
+is undrained, and the water carries the load: p = q.
 """
 
 from __future__ import annotations

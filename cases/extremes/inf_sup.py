@@ -6,7 +6,7 @@ beta^2 is the smallest singular value, except the 0 of a constant pressure, of S
 
 All sums are over the particles. A is divided by mu, q is p/mu, and M is the mass matrix of q, so
 that beta is a number without units. The blocks are taken from tangents of `u_epsv` at two values of
-alpha; the field of this form is eps_v = p/K. The ghost penalty is off: it would add to the norms A and M.
+alpha; the field of this form is eps_v = p/K. The ghost penalty is off: it would add to A and M.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A block on a rigid obstacle: force balance, Coulomb's law and positions in the cells.
 
-The force on the obstacle is the weight of the block, and on an incline the block slides if the friction is
-less than the slope.
+The force on the obstacle is the weight of the block, and on an incline the block slides if the friction
+is less than the slope.
 """
 
 from __future__ import annotations
