@@ -59,7 +59,10 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
 }
 #: Pages that can be downloaded as notebooks.
 TUTORIALS = ("start", "slope", "collapse", "edit_a_form", "add_a_law", "cam_clay", "ranks")
-TRADE = ("cantilever", "cook", "collapse", "self_weight", "spinning_disc")
+TRADE = (
+    "cantilever", "cook", "ring", "consolidation", "penetration", "collapse", "self_weight",
+    "spinning_disc",
+)  # fmt: skip
 LINK = re.compile(r"https?://[^\s)>\"'`]+")
 #: Elements of HTML that a browser loads with the page.
 LOADED = re.compile(
@@ -267,7 +270,7 @@ def _trade() -> str:
         words = text.partition("\n")[2].strip()
         title = CASES[name][0]
         picture = f"![{title}: errors over wall time](trade/{name}.png)"
-        sections.append(f"## {title}\n\n{picture}\n\n{_paragraphs(words)}")
+        sections.append(f"### {title}\n\n{picture}\n\n{words}")
     return "\n\n".join(sections)
 
 
@@ -283,10 +286,6 @@ def _extremes() -> str:
     limits = (folder / "limits.txt").read_text()
     behind = f":::{{dropdown}} The limits of each series\n```text\n{limits}```\n:::"
     return "\n".join(table) + f"\n\n{behind}"
-
-
-def _paragraphs(words: str) -> str:
-    return "\n\n".join(messages.plain(part) for part in words.split("\n\n"))
 
 
 def _compatibility() -> str:

@@ -27,8 +27,9 @@ CASES = (
     cantilever, cook, ring, consolidation, penetration, collapse, self_weight, spinning_disc,
 )  # fmt: skip
 STUDIES = {case.STUDY.name: case.STUDY for case in CASES}
-#: Folder of the results that come with the repository.
+#: Folder of the results that come with the repository, and of results of other codes.
 SHIPPED = Path(__file__).parent
+PEERS = SHIPPED / "peers"
 
 PROGRAM = Program("cases.costs.trade", __doc__, files=False)
 PROGRAM.option("studies", nargs="*", help=f"among {', '.join(STUDIES)}; all by default")
@@ -55,6 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         else:
             study = STUDIES[name]
             study.path = Path(options.results) / name
+            peers = PEERS / f"{name}.csv"
+            study.peers = peers if peers.exists() else None
             table = study.run(sample=options.sample)
             with atomic_file(study.path / f"{name}.md") as part:
                 part.write_text(in_words(table))
