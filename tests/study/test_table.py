@@ -54,11 +54,11 @@ def test_the_verdict_has_a_row_for_each_knob():
     assert verdict(table).splitlines() == [
         "| change | error of x | time |  |",
         "| --- | --- | --- | --- |",
-        "| n 1 → 2 | x 0.1 | x 2 | buys accuracy |",
-        "| form a → b | x 2 | x 3 | only costs |",
-        "| slow 0 → 1 | x 1 | x 2 | only costs |",
+        "| n 1 → 2 | x 0.1 | x 2 | reduces the error |",
+        "| form a → b | x 2 | x 3 | only costs time |",
+        "| slow 0 → 1 | x 1 | x 2 | only costs time |",
         "",
-        "Accuracy is bought by n 1 → 2. Only time is spent on form a → b and slow 0 → 1.",
+        "The error is reduced by n 1 → 2. More time without more accuracy: form a → b and slow 0 → 1.",
     ]
 
 

@@ -39,7 +39,7 @@ PROGRAM.option("--words", action="store_true", help="print the shipped results, 
 
 
 def in_words(table: Table) -> str:
-    """What buys accuracy and what only costs time."""
+    """Table and sentences about changes that reduce the error or only cost time."""
     return f"# {table.name}\n\n{verdict(table)}\n"
 
 

@@ -1,4 +1,4 @@
-"""What buys accuracy and what only costs time in a study: a table of five rows, and two sentences."""
+"""Changes of a study that reduce the error or only cost time: five rows and two sentences."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tawami.study.table import Table
 
 #: Rows of the table, and the largest number of rows of one kind.
 ROWS, MOST = 5, 3
-BUYS, COSTS, NEUTRAL = "buys accuracy", "only costs", "no effect"
+REDUCES, COSTS, NEUTRAL = "reduces the error", "only costs time", "no effect"
 
 
 @dataclass(frozen=True)
@@ -29,9 +29,9 @@ class Effect:
 
     @property
     def kind(self) -> str:
-        """Whether the change buys accuracy, only costs time, or has no effect."""
+        """Whether the change reduces the error, only costs time, or has no effect."""
         if self.change.error * NOISE < 1:
-            return BUYS
+            return REDUCES
         return COSTS if self.change.cost > NOISE else NEUTRAL
 
     @property
@@ -43,7 +43,7 @@ class Effect:
 
 
 def effects(table: Table) -> list[Effect]:
-    """The largest effect of each knob, of which at most five: first those that buy accuracy."""
+    """The largest effect of each knob, of which at most five: first those that reduce the error."""
     strongest: dict[str, Effect] = {}
     for changes in zip(*(table.changes(q) for q in table.quantities), strict=True):
         one = changes[0]
@@ -58,17 +58,19 @@ def effects(table: Table) -> list[Effect]:
         if known is None or _weight(effect) > _weight(known):
             strongest[one.knob] = effect
     ordered = sorted(strongest.values(), key=_weight, reverse=True)
-    first = [e for kind in (BUYS, COSTS) for e in [e for e in ordered if e.kind == kind][:MOST]]
+    first = [e for kind in (REDUCES, COSTS) for e in [e for e in ordered if e.kind == kind][:MOST]]
     rest = [e for e in ordered if e not in first]
     chosen = [*first, *rest][:ROWS]
-    return [effect for kind in (BUYS, COSTS, NEUTRAL) for effect in chosen if effect.kind == kind]
+    return [
+        effect for kind in (REDUCES, COSTS, NEUTRAL) for effect in chosen if effect.kind == kind
+    ]
 
 
 def _weight(effect: Effect) -> tuple[int, float]:
     """Order of effects: accuracy, cost, none; larger ones first."""
     kind, change = effect.kind, effect.change
-    size = -np.log(change.error) if kind == BUYS else np.log(change.cost)
-    return (NEUTRAL, COSTS, BUYS).index(kind), float(size)
+    size = -np.log(change.error) if kind == REDUCES else np.log(change.cost)
+    return (NEUTRAL, COSTS, REDUCES).index(kind), float(size)
 
 
 def as_markdown(table: Table) -> str:
@@ -84,18 +86,20 @@ def as_markdown(table: Table) -> str:
 
 
 def sentences(table: Table) -> str:
-    """Two sentences: the knobs that buy accuracy, and those that only cost time."""
+    """Two sentences: changes that reduce the error, and those that only cost time."""
     found = effects(table)
-    bought = _listed([e.text for e in found if e.kind == BUYS])
+    bought = _listed([e.text for e in found if e.kind == REDUCES])
     wasted = _listed([e.text for e in found if e.kind == COSTS])
-    first = f"Accuracy is bought by {bought}." if bought else "No change buys accuracy."
-    second = f"Only time is spent on {wasted}." if wasted else "No change only costs time."
+    first = f"The error is reduced by {bought}." if bought else "No change reduces the error."
+    second = (
+        f"More time without more accuracy: {wasted}." if wasted else "No change only costs time."
+    )
     failed = f" {len(table.failed)} of {len(table.rows)} runs failed." if table.failed else ""
     return f"{first} {second}{failed}"
 
 
 def verdict(table: Table) -> str:
-    """What buys accuracy and what only costs time: a table of five rows, and two sentences."""
+    """Tell which changes reduce the error and which only cost time: five rows and two sentences."""
     return f"{as_markdown(table)}\n\n{sentences(table)}"
 
 
