@@ -100,6 +100,6 @@ def _at_points(
         domain.model.space.gradients(_rust.gradients(location, layout.basis, u))
     )
     found[cells.own, :dim] = _rust.interpolate(location, layout.basis, dim, u)
-    found[cells.own, dim:] = gradients.reshape(len(location), -1)
+    found[cells.own, dim:] = gradients.reshape(len(location), dim**2)
     ranks.sum_of(grid.comm, found)
     return found[:, :dim], found[:, dim:].reshape(-1, dim, dim)
