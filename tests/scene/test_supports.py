@@ -31,7 +31,7 @@ def _place(basis):
 @pytest.mark.parametrize("point", [(-1.0, 1.25), (-1.0, 1.0), (-0.63, 1.87), (1.0, 2.0)])
 @pytest.mark.parametrize("value", [0.0, 3e-3])
 def test_a_held_point_equals_a_lagrange_multiplier(basis, point, value):
-    scene = beam(basis=basis)
+    scene = beam(basis=basis, tolerance=1e-12)
     scene.fix("left", "x", 1e-3)
     scene.hold(point, "y", value)
     scene.hold((0.3, 0.9), "y", -value)

@@ -96,8 +96,65 @@ def test_the_solution_is_that_of_the_direct_solver(options):
     assert np.abs(found.u - direct.u).max() < 1e-9 * np.abs(direct.u).max()
 
 
-def test_a_linear_problem_is_solved_once():
-    assert solved(16).iterations == 1
+def test_a_linear_problem_is_solved_once_to_the_same_answer():
+    found, direct = (solved(16, linear_solver=name) for name in ("multigrid", "direct"))
+    assert found.iterations == 1
+    assert np.abs(found.u - direct.u).max() < 1e-9 * np.abs(direct.u).max()
+
+
+def heated(solver: str) -> tawami.Solution:
+    """A wall that is heated from above."""
+    scene = square("u_epsv_theta", solver, E=3e10, density=2400.0)
+    for name, value in (("expansion", 1e-5), ("conductivity", 2.0), ("capacity", 900.0)):
+        scene.data(name, value)
+    scene.fix("top", "theta", 100.0)
+    return scene.solve(until=1e4)
+
+
+def drained(solver: str) -> tawami.Solution:
+    """Soil under a load, shortly after it: the pore pressure bears most of it."""
+    scene = square("u_epsv_pw", solver, E=1e7)
+    scene.data("kappa", 1e-12)
+    scene.fix("top", "p_w", 0.0)
+    scene.load(scene.particles.x[:, 0] > 0.5, (0.0, -1e3))
+    return scene.solve(until=10.0)
+
+
+def cracked(solver: str) -> tawami.Solution:
+    """A plate with a crack across half of it."""
+    scene = square("u_epsv_damage", solver, E=1e9)
+    for name, value in (("G_c", 100.0), ("l", 1 / 8)):
+        scene.data(name, value)
+    x, y = scene.particles.x.T
+    scene.data("H", np.where((abs(y - 0.5) < 1 / 16) & (x < 0.5), 1e3 * 100.0 * 4, 0.0))
+    scene.fix("top", "y", 1e-4)
+    return scene.solve()
+
+
+def square(form: str, solver: str, E: float, **options) -> tawami.Scene:
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=1 / 16, cells=(16, 16))
+    body = tawami.box(grid, (0.0, 0.0), (1.0, 1.0))
+    law = tawami.linear_elastic(E=E, nu=0.3)
+    scene = tawami.Scene(
+        grid, body, law, form=form, linear_solver=solver, tolerance=1e-10, **options
+    )
+    for edge, component in (("left", "x"), ("bottom", "x"), ("bottom", "y")):
+        scene.fix(edge, component)
+    return scene
+
+
+@pytest.mark.parametrize(("solve", "most"), [(heated, 45), (drained, 60), (cracked, 90)])
+def test_fields_of_the_users_have_blocks_of_their_own(solve, most):
+    found, direct = solve("multigrid"), solve("direct")
+    assert 0 < min(found.krylov) <= max(found.krylov) <= most
+    assert np.abs(found.u - direct.u).max() < 1e-8 * np.abs(direct.u).max()
+
+
+def test_a_form_that_multigrid_does_not_suit_is_factorised():
+    with pytest.warns(tawami.SolverWarning, match="alpha = 0: the pair of spaces is unstable"):
+        assert solved(8, alpha=0.0).krylov == (0,)
+    with pytest.warns(tawami.SolverWarning, match="without a field for the volume"):
+        assert solved(8, form="u").krylov == (0,)
 
 
 def block(**options) -> tawami.Scene:
@@ -110,6 +167,7 @@ def block(**options) -> tawami.Scene:
     return scene
 
 
+@pytest.mark.direct
 def test_the_solver_is_chosen_by_the_number_of_unknowns(monkeypatch):
     scene = block()
     assert f"fewer than {numerics.SMALL}" in scene.header()
@@ -122,6 +180,7 @@ def test_the_solver_is_chosen_by_the_number_of_unknowns(monkeypatch):
     assert block(alpha=0.0).solve().krylov == (0,)
 
 
+@pytest.mark.direct
 def test_a_factorisation_follows_once_it_would_have_been_cheaper(monkeypatch):
     monkeypatch.setattr(choice, "SMALL", 10)
     monkeypatch.setattr(choice, "FACTORISATION", 100.0)

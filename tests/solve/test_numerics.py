@@ -46,6 +46,7 @@ def test_fgmres_iterations_of_the_mixed_form_are_bounded():
     assert max(most(n, nu) for n in (8, 32) for nu in (0.3, 0.4999, 0.4999999)) < 60
 
 
+@pytest.mark.direct
 def test_a_factorisation_in_every_iteration_gives_the_same_solution():
     seldom, always = (pushed(factorise=when).solve() for when in ("when_it_pays", "always"))
     assert always.krylov == (0,) * always.iterations

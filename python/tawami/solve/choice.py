@@ -2,7 +2,8 @@
 
 Costs are counted in iterations of multigrid, not in seconds, so that a run repeats to the bit:
 
-- below `SMALL` unknowns, and where multigrid does not suit the form, the tangent is factorised;
+- below `SMALL` unknowns, and where multigrid does not suit the form, the tangent is factorised. A scene
+  that names multigrid has it for every size, and a warning where it does not suit;
 - otherwise multigrid solves. Once its iterations for the same unknowns have cost as much as two
   factorisations, some tangents are solved with a factorisation, which later ones use. Then the method
   whose last solves cost less is taken;
@@ -25,6 +26,7 @@ from tawami.solve.direct import DirectSolver
 from tawami.solve.linear_solver import LinearSolver, System
 from tawami.solve.multigrid import MultigridSolver, StalledError
 from tawami.solve.numerics import SMALL, Numerics
+from tawami.solve.operators import LOCKING
 
 #: Iterations of multigrid that cost as much as a factorisation of 1e5 unknowns, and the exponent with
 #: which this number grows with the unknowns (`cases.costs.solvers`).
@@ -60,7 +62,7 @@ class ChosenSolver(LinearSolver):
         self, comm: Any, stopwatch: Stopwatch, numerics: Numerics, unsuited: str = ""
     ) -> None:
         super().__init__(comm, stopwatch)
-        self._comm, self._unsuited = comm, unsuited
+        self._comm, self._unsuited, self._warned = comm, unsuited, False
         self._auto = numerics.linear_solver == "auto"
         always = numerics.factorise == "always"
         self._direct = DirectSolver(comm, stopwatch, always=always)
@@ -94,11 +96,11 @@ class ChosenSolver(LinearSolver):
 
     def method(self, unknowns: int) -> str:
         """See `LinearSolver.method`."""
-        if not self._auto:
-            return self._multigrid.method(unknowns)
         direct, multigrid = (solver.method(unknowns) for solver in self._solvers)
         if self._unsuited:
-            return f"{direct} (auto: {self._unsuited})"
+            return f"{direct} ({'auto' if self._auto else 'multigrid'}: {self._unsuited})"
+        if not self._auto:
+            return multigrid
         if unknowns < SMALL:
             return f"{direct} (auto: {unknowns} unknowns, fewer than {SMALL})"
         return f"{multigrid} while it costs less than a factorisation (auto: {unknowns} unknowns)"
@@ -171,6 +173,17 @@ class ChosenSolver(LinearSolver):
             self._last.forget()
         self._last = solver
 
+    def _warn(self) -> None:
+        """Warn once if multigrid was asked for and does not suit the form."""
+        if not (self._auto or self._warned):
+            warn(
+                f"multigrid does not suit this form ({self._unsuited}); a factorisation by MUMPS solves "
+                "it. Expected: a form with a field for the volume and alpha > 0, or K/mu up to "
+                f"{LOCKING:g}. linear_solver='direct' gives no warning",
+                SolverWarning,
+            )
+        self._warned = True
+
     def _count(self, solver: LinearSolver, cost: float) -> None:
         """Count a solve."""
         mine = self._costs[self._solvers.index(solver)]
@@ -180,7 +193,10 @@ class ChosenSolver(LinearSolver):
 
     def _suits(self, matrix: Any) -> bool:
         """Whether multigrid solves the next tangent; the same on all ranks."""
-        if self._stalled or (self._auto and self._unsuited):
+        if self._unsuited:
+            self._warn()
+            return False
+        if self._stalled:
             return False
         if not self._auto:
             return True
