@@ -185,7 +185,7 @@ def test_a_factorisation_follows_once_it_would_have_been_cheaper(monkeypatch):
     monkeypatch.setattr(choice, "SMALL", 10)
     monkeypatch.setattr(choice, "FACTORISATION", 100.0)
     scene, krylov = block(), []
-    for k in range(6):
+    for k in range(9):
         scene.traction("right", (0.0, -1e-3 * (k + 1)))
         krylov += scene.solve().krylov
     assert krylov[0] > 5

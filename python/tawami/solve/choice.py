@@ -4,9 +4,10 @@ Costs are counted in iterations of multigrid, not in seconds, so that a run repe
 
 - below `SMALL` unknowns, and where multigrid does not suit the form, the tangent is factorised. A scene
   that names multigrid has it for every size, and a warning where it does not suit;
-- otherwise multigrid solves. Once its iterations for the same unknowns have cost as much as two
+- otherwise multigrid solves. Once its iterations for the same unknowns have cost as much as three
   factorisations, some tangents are solved with a factorisation, which later ones use. Then the method
-  whose last solves cost less is taken;
+  whose last solves cost less is taken, and multigrid at once where it costs less than a solve with an
+  old factorisation;
 - where multigrid stalls, the direct solver takes over, with a warning.
 """
 
@@ -38,9 +39,12 @@ KEPT = 2.3
 #: Solves with a factorisation before its mean cost counts, and solves after which older ones count half.
 TRIAL, MEMORY = 4, 32
 #: Iterations that the operators of multigrid cost.
-SET_UP = 15
+SET_UP = 18
+#: Factorisations that the iterations for the same unknowns may cost before one is tried: the functions
+#: of a moving body change after a few steps, and its factorisation would not be kept for long.
+PATIENCE = 3
 #: Attributes that a checkpoint stores.
-STATE = ("spent", "stalled", "stalls")
+STATE = ("spent", "stalled", "stalls", "kept_cost")
 
 
 def price(unknowns: int) -> float:
@@ -71,6 +75,8 @@ class ChosenSolver(LinearSolver):
         #: The matrix of the last solves, iterations of multigrid for it, and whether it stalled.
         self._matrix: Any = None
         self._spent, self._stalled, self._stalls = 0, False, 0
+        #: Cost of the last solve with an old factorisation; 0 before the first.
+        self._kept_cost = 0.0
         #: Cost and number of the last solves of each solver.
         self._costs = np.zeros((2, 2))
 
@@ -152,6 +158,7 @@ class ChosenSolver(LinearSolver):
             self._switch(self._direct)
             found = self._direct.solve(system)
             again = KEPT * self._direct.iterations
+            self._kept_cost = again or self._kept_cost
             factor = 1.0 if self._direct.symmetric else UNSYMMETRIC
             self._count(self._direct, again or factor * price(matrix.getSize()[0]))
         for name in ("symmetric", "condition", "weak", "iterations"):
@@ -204,9 +211,12 @@ class ChosenSolver(LinearSolver):
         if unknowns < SMALL:
             return False
         (_, tried), (cost, solves) = self._costs
-        cheaper = self._spent <= 2 * price(unknowns)
-        if tried >= TRIAL and solves:
-            cheaper = cost / solves <= self._costs[0, 0] / tried
+        cheaper = self._spent <= PATIENCE * price(unknowns)
+        if tried and solves:
+            mine = cost / solves
+            cheaper = mine <= self._kept_cost or (
+                mine <= self._costs[0, 0] / tried if tried >= TRIAL else cheaper
+            )
         if cheaper:
             return True
         need = memory.of_factors(unknowns, symmetric=self._direct.symmetric)

@@ -251,7 +251,7 @@ class MultigridSolver(LinearSolver):
             size = np.maximum(diagonal.array, np.finfo(float).tiny)
             diagonal.destroy()
             _scale(part.mass, np.sqrt(0.5 * np.abs(coupling) / size))
-            own.axpy(sign, part.mass)
+            own.axpy(sign, part.mass, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
         return own
 
     def _chebyshev(self, solver: Any, operator: Any) -> None:

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from petsc4py import PETSc
 
 from tawami.base import ranks
 from tawami.base.arrays import Array
@@ -105,9 +106,9 @@ class Operators:
             if self._is_elastic:
                 moduli = np.ascontiguousarray(np.column_stack([mu, lame]))
                 operator = block.assembled("elasticity", moduli)
-                for rows in self._added(equations, block):
+                for rows, structure in self._added(equations, block):
                     extra = aij(attachment.grid.comm, rows, block.num_own)
-                    operator.axpy(1.0, extra)
+                    operator.axpy(1.0, extra, structure)
                     extra.destroy()
             yield Part(name, block, operator)
 
@@ -127,16 +128,20 @@ class Operators:
         share = 2 * weighted / np.maximum(plain, np.finfo(float).tiny)
         return Part(name, block, mass=masses[1], share=share)
 
-    def _added(self, equations: Equations, block: Block) -> Iterator[sp.csr_matrix]:
-        """Rows of stiffness of the displacement beside that of the particles."""
-        layout = self._assembly.layout
-        penalty = self._assembly.penalty(self._responses.data)
-        if penalty is not None:
-            yield block.of_window(penalty)
+    def _added(
+        self, equations: Equations, block: Block
+    ) -> Iterator[tuple[sp.csr_matrix, PETSc.Mat.Structure]]:
+        """Rows of stiffness of the displacement beside that of the particles, and their pattern."""
+        layout, structure = self._assembly.layout, PETSc.Mat.Structure
         if equations.inertia is not None:
             mass = equations.inertia.slope * equations.inertia.mass
             mine = np.where(layout.own, np.pad(mass, (0, layout.size - len(mass))), 0.0)
-            yield block.of_window(sp.diags(mine).tocsr())
+            rows = block.of_window(sp.diags(mine).tocsr())
+            yield rows, structure.SUBSET_NONZERO_PATTERN
+        penalty = self._assembly.penalty(self._responses.data)
+        if penalty is not None:
+            yield block.of_window(penalty), structure.DIFFERENT_NONZERO_PATTERN
         stiffness = None if equations.terms is None else equations.terms.stiffness
         if stiffness is not None:
-            yield block.of_grid(((stiffness + stiffness.T) / 2).tocsr())
+            rows = block.of_grid(((stiffness + stiffness.T) / 2).tocsr())
+            yield rows, structure.DIFFERENT_NONZERO_PATTERN
