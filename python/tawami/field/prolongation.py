@@ -64,6 +64,11 @@ def prolongations(comm: Any, basis: Basis, components: int, level: Level) -> Ite
         level, size = step.coarse, coarse
 
 
+def coarser(cells: Sequence[int]) -> tuple[int, ...]:
+    """Size of the next coarser grid."""
+    return tuple((n + 1) // 2 for n in cells)
+
+
 def _total(comm: Any, count: int) -> int:
     return int(ranks.sum_of(comm, np.array([count]))[0])
 
@@ -74,7 +79,7 @@ class _Step:
     def __init__(self, comm: Any, basis: Basis, components: int, fine: Level) -> None:
         self._comm, self._components = comm, components
         self._along = [refinement(basis, n) for n in fine.cells]
-        cells = [(n + 1) // 2 for n in fine.cells]
+        cells = coarser(fine.cells)
         self._fine = [_rust.basis_len(basis, n) for n in fine.cells]
         self._shape = [_rust.basis_len(basis, n) for n in cells]
         rows, numbers, values = self._rows(fine.unknowns)

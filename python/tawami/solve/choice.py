@@ -59,18 +59,24 @@ class ChosenSolver(LinearSolver):
         comm: Communicator.
         stopwatch: Measures the time of each stage.
         numerics: Numerical settings: 'auto', or 'multigrid' for tangents of every size.
+        cells: Number of cells along each axis of the grid.
         unsuited: Reason for which multigrid does not suit the form; empty if it does.
     """
 
     def __init__(
-        self, comm: Any, stopwatch: Stopwatch, numerics: Numerics, unsuited: str = ""
+        self,
+        comm: Any,
+        stopwatch: Stopwatch,
+        numerics: Numerics,
+        cells: tuple[int, ...],
+        unsuited: str = "",
     ) -> None:
         super().__init__(comm, stopwatch)
         self._comm, self._unsuited, self._warned = comm, unsuited, False
         self._auto = numerics.linear_solver == "auto"
         always = numerics.factorise == "always"
         self._direct = DirectSolver(comm, stopwatch, always=always)
-        self._multigrid = MultigridSolver(comm, stopwatch)
+        self._multigrid = MultigridSolver(comm, stopwatch, cells)
         self._last: LinearSolver = self._direct
         #: The matrix of the last solves, iterations of multigrid for it, and whether it stalled.
         self._matrix: Any = None

@@ -18,7 +18,7 @@ from tawami.particles.responses import Responses
 from tawami.solve.direct import DirectSolver
 from tawami.solve.equations import Equations
 from tawami.solve.linear_solver import LinearSolver, System
-from tawami.solve.measures import History, text
+from tawami.solve.measures import History, out_of_reach, text
 from tawami.solve.scaling import Scaling
 
 #: K/mu from which forms without a field for the volume lose all digits.
@@ -155,6 +155,10 @@ class Diagnosis:
             "some functions of the grid get no stiffness from the particles. Support every part of the "
             f"body; {'; '.join(advice)}"
         )
+
+    def advice(self, history: History) -> str:
+        """Advice on what keeps the measures from the tolerance; empty if that is not known."""
+        return self.material() or out_of_reach(history)
 
     def material(self) -> str:
         """Advice on materials that cost all digits; empty if there is none. A collective call."""

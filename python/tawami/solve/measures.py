@@ -43,6 +43,8 @@ SHARE = 1e-2
 #: Bound of the measures after the solve of a linear problem: the solutions of all linear solvers then
 #: agree to 1e-9.
 LINEAR = 1e-8
+#: Measures that may be round-off, and the number of them that do not decrease then.
+ROUND_OFF, STAYS = 1e-9, 5
 #: Share of the diagonal times a field below which a residual of its equation is round-off.
 NO_RESIDUAL = 1e-7
 
@@ -78,6 +80,18 @@ def forcing(history: History, tolerance: float, *, linear: bool = False) -> floa
         return min(0.3 * min(tolerance, LINEAR) / now, 1e-3)
     rate = now / worst(history[-2]) if len(history) > 1 else 1.0
     return min(max(0.1 * rate**2, min(0.1 * tolerance / now, 1e-3)), 1e-3)
+
+
+def out_of_reach(history: History) -> str:
+    """Advice if the last measures are round-off; empty if they are larger, or decrease."""
+    last = [worst(measures) for measures in history[-STAYS:]]
+    if len(last) < STAYS or not max(last) < min(ROUND_OFF, 10 * last[-1]):
+        return ""
+    expected = 10.0 ** math.ceil(math.log10(2 * max(last)))
+    return (
+        f"The measures stay at {max(last):.1e}, which is the round-off of this problem: expected a "
+        f"tolerance of {expected:g} or more"
+    )
 
 
 def diagonal_of(tangent: Any, reduction: Reduction) -> Array:

@@ -28,9 +28,11 @@ from petsc4py import PETSc
 
 from tawami.base import ranks
 from tawami.base.arrays import Array
-from tawami.base.petsc import Handles, rows_of
+from tawami.base.petsc import Handles
 from tawami.base.timing import Stopwatch
+from tawami.field.prolongation import coarser
 from tawami.solve import memory
+from tawami.solve.blocks import coupling_of, row_sum, scale, set_options
 from tawami.solve.linear_solver import LinearSolver, System
 from tawami.solve.numerics import SMALL
 from tawami.solve.operators import Part
@@ -46,7 +48,6 @@ AGAIN = 1e-4
 #: Tolerance of the solve for a random vector, by which a singular tangent is noticed: less than the
 #: share of one mode in a random vector of `SMALL` unknowns.
 LOW_TOLERANCE = 1e-3
-PREFIX = "tawami_multigrid_"
 
 
 class StalledError(Exception):
@@ -58,14 +59,19 @@ class MultigridSolver(LinearSolver):
 
     Its `condition` belongs to the first tangent.
 
+    Args:
+        comm: Communicator.
+        stopwatch: Measures the time of each stage.
+        cells: Number of cells along each axis of the grid.
+
     Attributes:
         first: Iterations of the first solve with the present operators.
         made: Whether the last solve made them.
     """
 
-    def __init__(self, comm: Any, stopwatch: Stopwatch) -> None:
+    def __init__(self, comm: Any, stopwatch: Stopwatch, cells: tuple[int, ...]) -> None:
         super().__init__(comm, stopwatch)
-        self.symmetric = False  # GMRES makes no use of it
+        self._cells, self.symmetric = cells, False  # GMRES makes no use of it
         self._tested, self._matrix, self.first = False, None, 0
         self.made = False
         self._grids: list[Handles] = []
@@ -95,7 +101,9 @@ class MultigridSolver(LinearSolver):
 
     def method(self, unknowns: int) -> str:
         """See `LinearSolver.method`."""
-        return "multigrid (GMRES)"
+        sizes = [self._cells, coarser(self._cells), coarser(coarser(self._cells))]
+        grids = ", ".join(" x ".join(map(str, size)) for size in dict.fromkeys(sizes))
+        return f"multigrid (GMRES, grids of {grids} cells and coarser)"
 
     def solve(self, system: System) -> Array:
         """See `LinearSolver.solve`.
@@ -209,7 +217,7 @@ class MultigridSolver(LinearSolver):
         ksp.setType("gmres")
         ksp.setPCSide(PETSc.PC.Side.RIGHT)
         # near a singular tangent, vectors that are not orthogonal let the residual grow
-        _set(ksp, {"ksp_gmres_cgs_refinement_type": "refine_ifneeded"})
+        set_options(ksp, {"ksp_gmres_cgs_refinement_type": "refine_ifneeded"})
         pc = handles["pc"] = ksp.getPC()
         if len(parts) == 1:
             self._cycle(pc, operators[0], parts[0])
@@ -236,21 +244,21 @@ class MultigridSolver(LinearSolver):
     def _operator(self, matrix: Any, part: Part, place: Any, of_u: Any) -> Any:
         """Scaled operator of a field; `of_u` are the places of the displacement."""
         if part.operator is not None:
-            _scale(part.operator, self._scale[part.block.mine])
+            scale(part.operator, self._scale[part.block.mine])
             return part.operator
         own = matrix.createSubMatrix(place, place)
         if part.mass is None:
             return own
         coupling: Any = -1.0  # of the volume, by its scaling
         if not part.volume:
-            coupling = part.share * _coupling(matrix, place, of_u)
+            coupling = part.share * coupling_of(matrix, place, of_u)
         total = np.array([np.sum(coupling)])
         sign = float(np.sign(ranks.sum_of(matrix.comm.tompi4py(), total)[0]))
         if sign != 0:
             diagonal = part.mass.getDiagonal()
             size = np.maximum(diagonal.array, np.finfo(float).tiny)
             diagonal.destroy()
-            _scale(part.mass, np.sqrt(0.5 * np.abs(coupling) / size))
+            scale(part.mass, np.sqrt(0.5 * np.abs(coupling) / size))
             own.axpy(sign, part.mass, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
         return own
 
@@ -262,8 +270,8 @@ class MultigridSolver(LinearSolver):
         inner = solver.getPC()
         inner.setType("jacobi")
         inner.destroy()
-        largest = _largest(operator)
-        _set(solver, {"ksp_chebyshev_eigenvalues": f"{largest / RATIO},{largest}"})
+        largest = row_sum(operator)
+        set_options(solver, {"ksp_chebyshev_eigenvalues": f"{largest / RATIO},{largest}"})
         solver.setUp()
 
     def _cycle(self, pc: Any, operator: Any, part: Part) -> None:
@@ -289,7 +297,7 @@ class MultigridSolver(LinearSolver):
                 coarse = pc.getMGCoarseSolve()
                 coarse.setOperators(matrix)
                 coarse.setType("preonly")
-                _set(coarse, {"pc_type": "redundant"})
+                set_options(coarse, {"pc_type": "redundant"})
                 coarse.destroy()
                 continue
             pc.setMGInterpolation(level, steps[len(operators) - 1 - level])
@@ -298,49 +306,6 @@ class MultigridSolver(LinearSolver):
             smoother.setType("richardson")
             smoother.setNormType(PETSc.KSP.NormType.NONE)
             smoother.setTolerances(max_it=1)
-            _set(smoother, {"pc_type": "sor", "pc_sor_local_symmetric": None})
+            set_options(smoother, {"pc_type": "sor", "pc_sor_local_symmetric": None})
             smoother.destroy()
         pc.setUp()
-
-
-def _largest(matrix: Any) -> float:
-    """Bound of the eigenvalues of D^-1 A, D the diagonal of A: its largest row sum."""
-    diagonal = matrix.getDiagonal()
-    rows = rows_of(matrix)
-    sums = np.asarray(abs(rows).sum(axis=1)).ravel() / np.abs(diagonal.array)
-    diagonal.destroy()
-    return ranks.largest(matrix.comm.tompi4py(), float(sums.max(initial=0.0)))
-
-
-def _scale(matrix: Any, factors: Array) -> None:
-    """Multiply rows and columns of a matrix by factors."""
-    vector = matrix.createVecLeft()
-    vector.setArray(factors)
-    matrix.diagonalScale(vector, vector)
-    vector.destroy()
-
-
-def _coupling(matrix: Any, place: Any, of_u: Any) -> Array:
-    """Diagonal of -K_fu K_uf: what the displacement adds to a field once it is eliminated."""
-    forward, back = matrix.createSubMatrix(place, of_u), matrix.createSubMatrix(of_u, place)
-    transposed = PETSc.Mat()
-    back.transpose(transposed)
-    products = rows_of(forward).multiply(rows_of(transposed))
-    for used in (forward, back, transposed):
-        used.destroy()
-    return -np.asarray(products.sum(axis=1)).ravel()
-
-
-_numbers = iter(range(1 << 60))
-
-
-def _set(solver: Any, options: dict[str, str | None]) -> None:
-    """Set options that have no function in petsc4py."""
-    prefix = f"{PREFIX}{next(_numbers)}_"
-    database = PETSc.Options(prefix)
-    for name, value in options.items():
-        database[name] = value
-    solver.setOptionsPrefix(prefix)
-    solver.setFromOptions()
-    for name in options:
-        database.delValue(name)

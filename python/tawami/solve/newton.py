@@ -108,8 +108,8 @@ class Newton:
             always = numerics.factorise == "always"
             self._solver = DirectSolver(self._comm, stopwatch, always=always)
         else:
-            unsuited = self._operators.unsuited
-            self._solver = ChosenSolver(self._comm, stopwatch, numerics, unsuited)
+            cells, unsuited = assembly.layout.grid.cells, self._operators.unsuited
+            self._solver = ChosenSolver(self._comm, stopwatch, numerics, cells, unsuited)
         self._stored: Mapping[str, Any] | None = None
 
     def follow(self, earlier: Newton) -> None:
@@ -228,7 +228,7 @@ class Newton:
                     self._solver.condition, self._solver.symmetric, iterate.factor,
                 )  # fmt: skip
             if len(history) > most:
-                advice = self._diagnosis.material()
+                advice = self._diagnosis.advice(history)
                 self._fail(history, advice or equations.advice)
             with reported():
                 change, of_factor = self._change(iterate, forces, equations, add_mass, history)
