@@ -243,7 +243,10 @@ def test_coefficients_of_another_length_are_rejected():
 
 
 def test_many_solves_free_their_factorisations():
-    """Memory after 30 more solves of 32 x 16 cells: a factorisation takes about 20 MB."""
+    """Memory after 30 more solves of 32 x 16 cells: their factorisations would take about 600 MB.
+
+    Python frees scenes late, because they refer to themselves.
+    """
     code = """
 import logging, resource; logging.disable(logging.INFO)
 from cases.verification.cantilever import mpm
@@ -255,7 +258,7 @@ for k in range(40):
 print(peak() - before)
 """
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert float(run.stdout.splitlines()[-1]) < 60  # MPI may print lines before
+    assert float(run.stdout.splitlines()[-1]) < 150  # MPI may print lines before
 
 
 def test_a_support_may_be_given_twice():
