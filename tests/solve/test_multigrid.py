@@ -89,6 +89,26 @@ def test_iterations_with_slivers_and_a_contrast(contrast, sliver, most):
     assert np.abs(found.u - direct.u).max() < 1e-7 * np.abs(direct.u).max()
 
 
+@pytest.mark.parametrize("cells", [(20, 20), (1, 1), (33, 17)])
+def test_the_body_may_have_two_parts_or_one_cell(cells):
+    """Two columns three cells apart; their parts of a coarse function have unknowns of their own."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=1.0, cells=cells)
+    body = tawami.box(grid, (0.0, 0.0), (min(2.0, cells[0]), cells[1]))
+    if cells[0] > 5:
+        body += tawami.box(grid, (5.0, 0.0), grid.upper)
+    solutions = []
+    for solver in ("multigrid", "direct"):
+        law = tawami.linear_elastic(E=1e3, nu=0.4999)
+        scene = tawami.Scene(grid, body, law, alpha=0.01, linear_solver=solver)
+        scene.fix("bottom", "x")
+        scene.fix("bottom", "y")
+        scene.load(body.x[:, 1] > cells[1] / 2, (1e-3, -1e-3))
+        solutions.append(scene.solve())
+    found, direct = solutions
+    assert 0 < max(found.krylov) <= 42
+    assert np.abs(found.u - direct.u).max() < 1e-9 * np.abs(direct.u).max()
+
+
 @pytest.mark.parametrize("options", [{"stabilisation": "residual_based"}, {"ghost_penalty": "on"}])
 def test_the_solution_is_that_of_the_direct_solver(options):
     options = {"alpha": 0.03, "tolerance": 1e-12, **options}

@@ -102,6 +102,9 @@ class Block(Unknowns):
             return np.asarray(layout.in_grid[place.start + coefficients] - there.start)
 
         cells = self._attachment.grid.cells
-        level = Level(cells, in_field(self.coefficients), in_field(self._held))
+        unknowns = in_field(self.coefficients)
+        if place.start == 0:  # parts are those of the displacement
+            unknowns = unknowns + layout.parts[1][self.coefficients] * (there.stop - there.start)
+        level = Level(cells, unknowns, in_field(self._held))
         comm = self._attachment.grid.comm
         return list(prolongations(comm, place.basis, place.components, level))

@@ -31,7 +31,8 @@ class Level:
 
     Attributes:
         cells: Number of cells along each axis.
-        unknowns: Its unknowns, by the numbers of the coefficients in the field.
+        unknowns: Its unknowns, by the numbers of the coefficients in the field, plus the part of the
+            body times the number of all coefficients: each part has functions of its own.
         held: Its held coefficients.
     """
 
@@ -82,6 +83,7 @@ class _Step:
         cells = coarser(fine.cells)
         self._fine = [_rust.basis_len(basis, n) for n in fine.cells]
         self._shape = [_rust.basis_len(basis, n) for n in cells]
+        self._size = components * int(np.prod(self._shape))
         rows, numbers, values = self._rows(fine.unknowns)
         reached, column = np.unique(numbers, return_inverse=True)
         owner = self._owners(reached, fine.held)
@@ -100,6 +102,7 @@ class _Step:
 
     def _rows(self, coefficients: Indices) -> tuple[Indices, Indices, Array]:
         """Coarse coefficients in which fine ones lie: places of the fine ones, numbers, and values."""
+        part, coefficients = np.divmod(coefficients, self._components * int(np.prod(self._fine)))
         function, component = np.divmod(coefficients, self._components)
         at = np.unravel_index(function, self._fine, order="F")
         number = np.zeros((len(function), 1), dtype=np.int64)
@@ -114,7 +117,7 @@ class _Step:
             value = (value[:, None, :] * weights[index][:, :, None]).reshape(number.shape)
         row, column = np.nonzero(value)
         number = self._components * number[row, column] + component[row]
-        return row, number, value[row, column]
+        return row, number + self._size * part[row], value[row, column]
 
     def _owners(self, reached: Indices, held: Indices) -> Indices:
         """Rank that owns each coarse coefficient with a part on unknowns of this rank; -1 if held."""
@@ -125,15 +128,15 @@ class _Step:
         asked = self._sent(reached)
         told, shares = self._sent(on_held), self._sent(on_held, sums)
         every = np.unique(np.concatenate([*asked, *told]))
-        first = np.full(len(every), comm.size)
-        of_held = np.zeros(len(every))
+        first, shared = np.full(len(every), comm.size), np.unique(every % self._size)
+        of_held = np.zeros(len(shared))
         for rank in reversed(range(comm.size)):
             first[np.searchsorted(every, asked[rank])] = rank
         for numbers, share in zip(told, shares, strict=True):
-            of_held[np.searchsorted(every, numbers)] += share
-        is_held = of_held >= HELD * self._totals(every)
-        self._held = every[is_held]
-        answer = np.where(is_held, -1, first)
+            of_held[np.searchsorted(shared, numbers)] += share
+        is_held = of_held >= HELD * self._totals(shared)
+        self._held = shared[is_held]
+        answer = np.where(is_held[np.searchsorted(shared, every % self._size)], -1, first)
         answers = comm.alltoall([answer[np.searchsorted(every, numbers)] for numbers in asked])
         return self._together(reached, answers)
 
@@ -160,11 +163,15 @@ class _Step:
     def _sent(self, numbers: Indices, values: Any = None) -> list[Any]:
         """Numbers, or values of them, that the ranks send to those that the numbers determine."""
         given = numbers if values is None else values
-        return ranks.parts_to(self._comm, given, numbers % self._comm.size)
+        return ranks.parts_to(self._comm, given, self._rank_of(numbers))
+
+    def _rank_of(self, numbers: Indices) -> Indices:
+        """Rank that learns what others know of a coarse function; the same for all parts of the body."""
+        return np.asarray(numbers % self._size % self._comm.size)
 
     def _together(self, numbers: Indices, answers: Sequence[Indices]) -> Indices:
         """The answers to all that this rank has sent, in its order."""
-        to, found = numbers % self._comm.size, np.empty(len(numbers), dtype=np.int64)
+        to, found = self._rank_of(numbers), np.empty(len(numbers), dtype=np.int64)
         for rank, answer in enumerate(answers):
             found[to == rank] = answer
         return found
