@@ -7,8 +7,6 @@ At small strain it is a dead load. In axisymmetry dA contains 2 pi (r + u_r).
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import scipy.sparse as sp
 
@@ -38,9 +36,6 @@ class FollowerPressure:
         self._layout, self._space = layout, layout.grid.space
         self._x, self._area, self._pressure = x, area, pressure
         self._tabulated = cells.tabulated(layout.basis)
-
-    def begin(self, diagonal: Callable[[], Array], inertia: Array | None) -> None:
-        """See `Term`."""
 
     def improve(self) -> bool:
         """See `Term`: there are no multipliers."""

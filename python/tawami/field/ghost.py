@@ -37,7 +37,7 @@ class GhostPenalty:
         self._matrix: sp.csr_matrix | None = None
         #: Values of the constants and of the particle data in it.
         self._read = np.zeros(0)
-        self._sum = Sum(self, attachment.grid.comm)
+        self._sum = Sum(attachment.grid.comm)
 
     def add_forces(self, forces: Array, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
         """Forces on all coefficients with those of the penalty.

@@ -120,6 +120,20 @@ class Unknowns:
         shape = (self.num_own, self.size)
         return sp.coo_matrix((product.data[mine], places), shape=shape).tocsr()
 
+    def of_constraints(self, gradients: sp.csr_matrix) -> sp.csr_matrix:
+        """B S, constraints x unknowns of all ranks; a collective call.
+
+        Args:
+            gradients: B, on coefficients of the grid, the same on every rank.
+        """
+        if self._comm.size == 1:
+            return sp.csr_matrix(gradients @ self.selection)
+        some = np.unique(gradients.indices)
+        s, numbers = self._rows_at(some)
+        found = (gradients[:, some] @ s).tocoo()
+        shape = (gradients.shape[0], self.size)
+        return sp.csr_matrix((found.data, (found.row, numbers[found.col])), shape=shape)
+
     def _rows_at(self, in_grid: Indices) -> tuple[sp.csr_matrix, Indices]:
         """Rows of S of some coefficients of the whole grid, and the numbers of its columns."""
         place = self._places_of(in_grid)

@@ -267,6 +267,8 @@ class NewmarkStep:
         last = problem.terms.loads[:n]
         of_supports = sum((layout.part(one.on_body)[:n] for one in problem.supports), np.zeros(n))
         followers = 0.5 * layout.dot(self._followers[:n] + last - of_supports, u)
+        if not any(one.prescribed for one in problem.supports):
+            return followers
         # those of supports at the start of the step balance the others, as a was made to obey them
         first = self._internal + np.pad(self._masses * start.a.ravel(), (0, len(self._first) - n))
         first = (first - self._first - self._followers)[:n]

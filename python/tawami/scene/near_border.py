@@ -11,9 +11,10 @@ from tawami.border.patches import Patches, patches
 from tawami.border.rigid import Pose
 from tawami.border.shapes import Shape
 from tawami.scene.domain import Domain
-from tawami.scene.held_border import PENALTY
 from tawami.scene.moving_points import MovingPoints
 
+#: Penalty of a patch per cell, in shear moduli.
+PENALTY = 200.0
 #: Lengths of patches that stay, unless they were made so [cells].
 SHORTEST, LONGEST = 0.7, 2.2
 

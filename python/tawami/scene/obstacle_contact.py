@@ -7,8 +7,6 @@ the penalty alone: below 5e-6 h times the largest pressure over mu.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import scipy.sparse as sp
 
@@ -116,10 +114,6 @@ class ObstacleContact:
     def prescribed(self) -> float:
         """The largest displacement that the obstacle prescribes in this step [m]."""
         return float(np.abs(self.motion.change[: self._dim]).max(initial=0.0))
-
-    def begin(self, diagonal: Callable[[], Array], inertia: Array | None) -> None:
-        """See `Term`."""
-        self.restart()
 
     def restart(self) -> None:
         """See `Term`."""

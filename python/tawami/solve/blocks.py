@@ -12,6 +12,8 @@ from tawami.base.arrays import Array
 from tawami.base.petsc import rows_of
 
 PREFIX = "tawami_multigrid_"
+#: Penalty of the constraints in the scaled operators.
+AUGMENTED = 4.0
 
 
 def row_sum(matrix: Any) -> float:
@@ -55,3 +57,27 @@ def set_options(solver: Any, options: dict[str, str | None]) -> None:
     solver.setFromOptions()
     for name in options:
         database.delValue(name)
+
+
+def constrained(matrix: Any, operators: list[Any], places: list[Any]) -> Any:
+    """Stiffen the operators of the fields by a penalty on the constraints.
+
+    Args:
+        matrix: Scaled matrix, whose rows of constraints B have the norm 1.
+        operators: Scaled operators of the fields.
+        places: Unknowns of the fields, then the multipliers.
+
+    Returns:
+        Approximate Schur complement of the multipliers with the penalty, -B (F + penalty)^-1 B^T.
+    """
+    last = places[-1]
+    for operator, place in zip(operators, places, strict=False):
+        columns, rows = (matrix.createSubMatrix(*two) for two in ((place, last), (last, place)))
+        penalty = columns.matMult(rows)
+        operator.axpy(AUGMENTED, penalty)
+        for used in (columns, rows, penalty):
+            used.destroy()
+    schur = matrix.createSubMatrix(last, last)
+    schur.zeroEntries()
+    schur.shift(-1 / AUGMENTED)
+    return schur

@@ -95,7 +95,7 @@ class Diagnosis:
         """
         reduction, condition = equations.reduction, solver.condition
         size = "infinite" if np.isinf(condition) else f"about {condition:.1e}"
-        weak = solver.weak if len(solver.weak) == reduction.num_own else np.empty(0)
+        weak = solver.weak[: reduction.num_own]
         cells = ", ".join(self._weakest_cells(reduction, weak)) if error is None else ""
         what = str(error) if error is not None else (
             f"the tangent is singular (condition number of the scaled matrix: {size}; from its "

@@ -13,6 +13,8 @@ volume         steps of Chebyshev's iteration for S = M/2 + (mu/K) M + alpha h^2
 other fields   a V-cycle for their part of the tangent, and what the displacement adds once it is
                eliminated, -K_fu F^-1 K_uf: a mass matrix with the diagonal of -K_fu K_uf, where the
                body is stiffer by its bulk modulus (the fixed-stress split of a pore pressure)
+multipliers    of constraints: division by their diagonal. The operators of the fields have the
+               constraints as a penalty (augmented Lagrangian preconditioner)
 
 The operators are those of the elastic body. They serve later tangents of the same unknowns until the
 number of iterations grows. GMRES takes 2/3 of the iterations of MINRES with one preconditioner for each
@@ -21,6 +23,7 @@ field, for symmetric tangents too, and its vectors little memory beside the matr
 
 from __future__ import annotations
 
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -32,7 +35,7 @@ from tawami.base.petsc import Handles
 from tawami.base.timing import Stopwatch
 from tawami.field.prolongation import coarser
 from tawami.solve import memory
-from tawami.solve.blocks import coupling_of, row_sum, scale, set_options
+from tawami.solve.blocks import constrained, coupling_of, row_sum, scale, set_options
 from tawami.solve.linear_solver import LinearSolver, System
 from tawami.solve.numerics import SMALL
 from tawami.solve.operators import Part
@@ -198,15 +201,20 @@ class MultigridSolver(LinearSolver):
         handles, comm, self._parts = self._handles, matrix.comm, parts
         handles.free("ksp", "pc", "parts")
         start = matrix.getOwnershipRange()[0]
-        numbers = [(start + np.flatnonzero(p.block.mine)).astype(PETSc.IntType) for p in parts]
-        places = [PETSc.IS().createGeneral(mine, comm) for mine in numbers]
+        numbers = [start + np.flatnonzero(part.block.mine) for part in parts]
+        if matrix.getSize()[0] > sum(part.block.size for part in parts):
+            own = np.arange(*matrix.getOwnershipRange())
+            numbers.append(np.setdiff1d(own, np.concatenate(numbers)))
+        places = [PETSc.IS().createGeneral(mine.astype(PETSc.IntType), comm) for mine in numbers]
         operators = [
             self._operator(matrix, part, place, places[0])
-            for part, place in zip(parts, places, strict=True)
+            for part, place in zip(parts, places, strict=False)
         ]
+        if len(places) > len(parts):
+            operators.append(constrained(matrix, operators, places))
         handles["parts"] = operators[0]
-        if len(parts) > 1:
-            rows: list[list[Any]] = [[None] * len(parts) for _ in parts]
+        if len(places) > 1:
+            rows: list[list[Any]] = [[None] * len(places) for _ in places]
             for k, operator in enumerate(operators):
                 rows[k][k] = operator
                 for j in range(k):
@@ -219,22 +227,24 @@ class MultigridSolver(LinearSolver):
         # near a singular tangent, vectors that are not orthogonal let the residual grow
         set_options(ksp, {"ksp_gmres_cgs_refinement_type": "refine_ifneeded"})
         pc = handles["pc"] = ksp.getPC()
-        if len(parts) == 1:
+        if len(places) == 1:
             self._cycle(pc, operators[0], parts[0])
         else:
             pc.setType("fieldsplit")
             pc.setFieldSplitType(PETSc.PC.CompositeType.MULTIPLICATIVE)
-            pc.setFieldSplitIS(*zip((part.name for part in parts), places, strict=True))
+            names = [*(part.name for part in parts), "multipliers"]
+            pc.setFieldSplitIS(*zip(names, places, strict=False))
             pc.setUp()
-            for solver, operator, part in zip(
-                pc.getFieldSplitSubKSP(), operators, parts, strict=True
-            ):
-                if part.volume:
+            for solver, operator, part in zip_longest(pc.getFieldSplitSubKSP(), operators, parts):
+                if part is not None and part.volume:
                     self._chebyshev(solver, operator)
                 else:
                     solver.setType("preonly")
                     inner = solver.getPC()
-                    self._cycle(inner, operator, part)
+                    if part is None:
+                        inner.setType("jacobi")
+                    else:
+                        self._cycle(inner, operator, part)
                     inner.destroy()
                 solver.destroy()
         pc.setReusePreconditioner(True)
@@ -244,7 +254,7 @@ class MultigridSolver(LinearSolver):
     def _operator(self, matrix: Any, part: Part, place: Any, of_u: Any) -> Any:
         """Scaled operator of a field; `of_u` are the places of the displacement."""
         if part.operator is not None:
-            scale(part.operator, self._scale[part.block.mine])
+            scale(part.operator, self._scale[: len(part.block.mine)][part.block.mine])
             return part.operator
         own = matrix.createSubMatrix(place, place)
         if part.mass is None:
@@ -284,7 +294,7 @@ class MultigridSolver(LinearSolver):
             handles[f"prolongation {k}"] = step
             if k == 0:
                 vector = operator.createVecLeft()
-                vector.setArray(1 / self._scale[part.block.mine])
+                vector.setArray(1 / self._scale[: len(part.block.mine)][part.block.mine])
                 step.diagonalScale(vector, None)
                 vector.destroy()
             operators.append(operators[-1].PtAP(step))
