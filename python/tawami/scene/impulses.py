@@ -35,10 +35,10 @@ class Impulses:
         mass, fixed = layout.whole(mass), layout.whole(fixed.astype(float)) > 0
         n = len(mass)
         self._means = sp.vstack([held[k].means[:, :n] for k in self._chosen]).tocsr()
-        inverse = np.divide(1.0, mass, out=np.zeros(n), where=(mass > 0) & ~fixed)
+        self._loose = (mass > 0) & ~fixed
+        inverse = np.divide(1.0, mass, out=np.zeros(n), where=self._loose)
         self._weighted = (sp.diags(inverse) @ self._means.T).tocsr()
-        matrix = (self._means @ self._weighted).toarray()
-        self._inverse = np.linalg.pinv(matrix, rcond=len(matrix) * np.finfo(float).eps)
+        self._inverse = _inverse(self._means @ self._weighted)
 
     def imposed(self, rates: Sequence[Array], values: Array) -> Array:
         """Velocities after the impulses.
@@ -58,11 +58,18 @@ class Impulses:
 
         Args:
             forces: On the displacement coefficients [N per metre depth]; the part that the supports
-                cannot exert does no work.
+                cannot exert does no work. Theirs is the nearest by least squares: the inverse mass as
+                a weight would let functions with little mass decide.
             u: Increments of the displacement coefficients [m].
         """
         if not self._chosen:
             return 0.0
-        whole = self._layout.whole
-        multipliers = self._inverse @ (self._weighted.T @ whole(forces))
+        whole, loose = self._layout.whole, self._means @ sp.diags(self._loose.astype(float))
+        multipliers = _inverse(loose @ loose.T) @ (loose @ whole(forces))
         return float(multipliers @ (self._means @ whole(u)))
+
+
+def _inverse(matrix: sp.spmatrix) -> Array:
+    """Pseudo-inverse of a symmetric matrix: patches that others hold too have no forces."""
+    dense = matrix.toarray()
+    return np.asarray(np.linalg.pinv(dense, rcond=len(dense) * np.finfo(float).eps))
