@@ -15,6 +15,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from tawami.base.arrays import Array, Mask, of_components
+from tawami.base.errors import SupportWarning
+from tawami.base.warn import warn
 from tawami.border.patches import patches
 from tawami.border.tied import means
 from tawami.field.constraints import PointHeld
@@ -24,6 +26,9 @@ from tawami.scene.support import Support
 
 #: Error of a held displacement that is round-off, relative to the largest displacement, and [cells].
 ALIKE, ROUND_OFF = 1e-10, 1e-13
+#: Distance of a point from the place that the mean of its patch prescribes, above which the body does
+#: not follow its border [cells].
+BENT = 0.2
 
 
 class HeldBorder:
@@ -75,8 +80,31 @@ class HeldBorder:
         #: Derivative of the residual by all coefficients.
         self.gradient = sp.diags(areas) @ self.means
         self._areas, self._before = areas, before
+        self._check_bent()
         self._change = np.zeros(len(areas))
         self._tractions = self._held = self._groups.means(self._weights, support.held[weak])
+
+    def _check_bent(self) -> None:
+        """Warn, once, of a border whose points have moved far from the means of their patches."""
+        support, place = self._support, self._support.place
+        assert isinstance(place, MovingPoints)
+        if support.told or not isinstance(support.component, int) or not support.is_uniform:
+            return
+        moved = (place.x - place.made.x)[self._weak, support.component]
+        means = self._groups.means(self._weights, moved)
+        h = self._domain.model.grid.h
+        bent = float(np.abs(moved - means[self._groups.number]).max(initial=0.0)) / h
+        if bent <= BENT:
+            return
+        support.told = True
+        if self._domain.model.grid.comm.rank == 0:
+            warn(
+                f"{support}: the border bends by {bent:.2g} h within its patches, because the particles "
+                "near it leave functions of the grid with little stiffness; the body does not follow "
+                "the support there. Expected more particles per cell (per_axis=...), volumes='fitted' "
+                "and ghost_penalty='on'",
+                SupportWarning,
+            )
 
     @property
     def x(self) -> Array:

@@ -38,7 +38,7 @@ class Support(Action):
         component: Number of the component of the displacement, 'normal', 'tangent', or name of a field.
         unit: Unit of its values.
         held: Tractions that held each other point in the last step [Pa], as multipliers.
-        told: Whether a warning was issued that it holds nothing.
+        told: Whether a warning was issued that it does not hold what it should.
     """
 
     __slots__ = ("_whole", "component", "given", "held", "place", "told", "unit")
@@ -174,6 +174,11 @@ class Support(Action):
         self.terms.clear()  # a support that moved by a velocity does not move back
         self._begin(*changed)
         return None
+
+    @property
+    def is_uniform(self) -> bool:
+        """Whether it prescribes the same value everywhere."""
+        return not any(callable(value) for term in self.terms for value in term.values)
 
     @property
     def has_velocity(self) -> bool:
