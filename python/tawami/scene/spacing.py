@@ -18,6 +18,8 @@ from tawami.scene.domain import Domain
 #: Distance up to which the error of a uniform stress stays below about 10 % [cells]: with volumes of the
 #: particles themselves, and with fitted ones.
 OWN, FITTED = 0.7, 0.9
+#: Growth of a distance that is no stretch: a body may have few particles from the start.
+GROWN = 1.2
 #: Share of the body that may be farther apart.
 SHARE = 0.05
 #: Steps of the reduction of a lattice.
@@ -54,8 +56,9 @@ def warned(domain: Domain) -> bool:
     if np.sqrt(largest) * (1 + dim * most) <= limit * h:
         return False
     f = gradient + np.eye(dim)
-    found = spacings(f, np.sqrt(areas)) / h
-    volume = particles.volume
+    sizes, volume = np.sqrt(areas) / h, particles.volume
+    found = spacings(f, sizes)
+    found[found < GROWN * sizes] = 0.0
     apart, whole = ranks.sum_of(
         model.grid.comm, np.array([volume[found > limit].sum(), volume.sum()])
     )
