@@ -166,8 +166,7 @@ class Configuration:
             obstacles: Contact with obstacles.
         """
         found: list[Term] = [*self.loads.following(self.domain, now), *supports, *obstacles]
-        layout = self.domain.layout
-        return Terms(found, layout, supports, obstacles) if found else None
+        return Terms(found, self.domain.layout, supports, obstacles) if found else None
 
     def external(self, now: Moment | None = None) -> Array:
         """External forces on all coefficients [N per metre depth], under all loads by default."""
