@@ -29,9 +29,10 @@ parameters = {
         "usual": 1.0,
         "maximum": {"residual_based": 0.14},
         "unit": "-",
+        "stabilises": True,
     },
-    "k": {"default": 0.003, "minimum": 0.0, "unit": "-"},
-    "k_v": {"default": 0.03, "minimum": 0.0, "unit": "-"},
+    "k": {"default": 0.003, "minimum": 0.0, "unit": "-", "stabilises": True},
+    "k_v": {"default": 0.03, "minimum": 0.0, "unit": "-", "stabilises": True},
 }
 options = {
     "stabilisation": ("laplacian", "residual_based", "projection"),

@@ -111,7 +111,8 @@ class MovingPoints:
             SupportError: A point has no particles near it.
         """
         if self._located is None or self._located[0] is not domain:
-            made = BorderInCells(self._grid, domain.active, self.x, self.normal, self.what)
+            grid = domain.model.grid
+            made = BorderInCells(grid, domain.active, self.x, self.normal, self.what)
             self._located = domain, made
         return self._located[1]
 

@@ -22,6 +22,8 @@ from tawami.scene import presentation, quantities
 from tawami.scene.absent import Elsewhere
 from tawami.scene.configuration import Configuration
 from tawami.scene.contact_result import ContactResult
+from tawami.scene.error import ErrorEstimate, estimate
+from tawami.scene.goal import Goal
 from tawami.scene.obstacle import Obstacle
 from tawami.scene.outcome import Outcome
 from tawami.scene.outline import Outline
@@ -225,6 +227,20 @@ class Solution(Elsewhere, Sealed, Unique):
             distance = np.linalg.norm(self.x - np.asarray(point), axis=1).min(initial=np.inf)
             raise outside(what, float(distance))
         return np.asarray(value if reached > 1 - ROUND_OFF else value / reached)
+
+    def error(self, goal: Goal) -> ErrorEstimate:
+        """Estimate the error of a quantity and its sources; a call for all ranks.
+
+        Args:
+            goal: The quantity, as `tawami.Goal.displacement((2, 0), "y")`.
+
+        Raises:
+            InputError: No such quantity, a point outside the body, a body without a border, or a scene
+                that has changed since.
+            NotModelledError: A solution in motion or at finite strain, or a scene with walls, contact,
+                more fields, flow in several steps, ...
+        """
+        return estimate(self.scene.configuration, goal, self.coefficients, self.load)
 
     # -- in a notebook -------------------------------------------------------
 
