@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -16,11 +16,11 @@ from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.base.timing import Stopwatch
+from tawami.field.border import PointsInCells
 from tawami.field.layout import Layout
 from tawami.form.compilation import compile_form
 from tawami.form.form import Form
-from tawami.grid.basis import refinement
-from tawami.grid.grid import Grid
+from tawami.grid.basis import Basis, refinement
 from tawami.particles import assignment, placement
 from tawami.scene.configuration import Configuration
 from tawami.scene.constraints import constraints
@@ -72,7 +72,8 @@ class Level:
         body: Its particles.
 
     Attributes:
-        domain: The particles.
+        body: As given.
+        domain: Its particles.
         external: Forces of the loads on all coefficients [N per metre depth].
         on_patches: Supports that no coefficient of an edge or a point expresses.
         reduction: Unknowns that the supports leave free, of the coefficients since the start.
@@ -86,6 +87,7 @@ class Level:
         if model.form.kinematics.has_eps_v:
             mine.add_eps_v()
         mine.add_strain(False, model.grid.geometry)
+        self.body = body
         self.domain = Domain.attach(model, mine, location, now.numerics, Stopwatch())
         attachment, known = self.domain.assembly.attachment, now.domain.assembly.attachment.values
         shared = {n: v for n, v in known.items() if n in attachment.values and n != "h"}
@@ -151,6 +153,23 @@ class Level:
         normal = (a.T @ a + REGULAR * sp.eye(a.shape[1])).tocsc()
         return np.asarray(offset + self.reduction.expanded(splu(normal).solve(a.T @ b)))
 
+    def with_volume(self, form: Form, u: Array) -> Array:
+        """All coefficients of a form with a field for the volume, given those of the displacement: the
+        volumetric strain as its mean around each function.
+        """
+        domain, basis = self.domain, cast(Basis, form.fields[str(form.volume_field)].basis)
+        location, grid = domain.location, domain.model.grid
+        if domain.model.form.kinematics.volume_at_centre:
+            location = grid.rust.place(location.cell, np.full_like(np.asarray(location.xi), 0.5))
+        vectors = grid.space.vectors(u)
+        slopes = PointsInCells(grid, location).slopes(domain.layout.basis)
+        strain = sum(slope @ along for slope, along in zip(slopes, vectors.T, strict=True))
+        columns = np.column_stack([strain, np.ones(len(strain))])
+        sums, volume = domain.sums(domain.particles.volume, columns, basis).T
+        return np.concatenate(
+            [u, np.divide(sums, volume, out=np.zeros_like(sums), where=volume > 0)]
+        )
+
 
 def prolongation(layout: Layout) -> sp.csr_matrix:
     """Coefficients of a layout from those of cells twice as large (two-scale relation)."""
@@ -160,9 +179,3 @@ def prolongation(layout: Layout) -> sp.csr_matrix:
         whole = functools.reduce(lambda inner, outer: sp.kron(outer, inner, format="csr"), along)
         blocks.append(sp.kron(whole, sp.eye(place.components), format="csr"))
     return sp.block_diag(blocks, format="csr")
-
-
-def coarser(grid: Grid) -> Grid:
-    """The grid with cells twice as large, which reaches beyond this one where its size is odd."""
-    cells = [(n + 1) // 2 for n in grid.cells]
-    return Grid(grid.comm, origin=grid.origin, h=2 * grid.h, cells=cells, geometry=grid.geometry)
