@@ -25,9 +25,9 @@ IRREGULAR, SLOWEST, FASTEST, SMOOTH = 0.5, 2.0, 64.0, 16.0
 class Ladder:
     """Dual solutions for a quantity on three grids.
 
-    The dual solution on cells of h/2, h and 2h gives the error e', e and e_2 of the computed value without
-    what these grids do not resolve. e' - e is the part of the error of the grid that h/2 resolves; with
-    ratio = (e - e_2)/(e' - e) the whole is (e' - e) ratio/(ratio - 1) (Richardson).
+    Those on cells of h/2, h and 2h give the errors e', e and e_2 of the computed value, without the parts
+    that these grids do not resolve. With ratio = (e - e_2)/(e' - e) the error of the grid is
+    (e' - e) ratio/(ratio - 1) (Richardson).
 
     Args:
         now: The scene.
