@@ -36,13 +36,21 @@ def outside(grid: Grid, x: Array) -> Mask:
 
 
 def distributed(
-    grid: Grid, body: _rust.Particles, *, moving: bool
+    grid: Grid, body: _rust.Particles, *, moving: bool, whole: bool = True
 ) -> tuple[_rust.Particles, _rust.Location]:
-    """The particles in this rank's cells, from a body that every rank has.
+    """The particles in this rank's cells; a collective call.
+
+    Args:
+        grid: The grid.
+        body: Particles of the body.
+        moving: As of `located`.
+        whole: Whether every rank has all of them; else each is on one rank.
 
     Raises:
-        InputError: Particles are outside the grid, or the body is not the same on all ranks.
+        InputError: Particles are outside the grid, or a whole body is not the same on all ranks.
     """
+    if not whole:
+        return migrated(grid, body, moving=moving)
     location = located(grid, body.x, moving=moving)
     if grid.comm.size == 1:
         return body, location
@@ -51,7 +59,9 @@ def distributed(
     if len(set(grid.comm.allgather(digest))) > 1:
         raise InputError(
             "the body is not the same on all ranks: expected the same positions, volumes and "
-            "materials on each. Give random numbers a seed, or make it on one rank and bcast it"
+            "materials on each. Give random numbers a seed, or make it on one rank and bcast it; to "
+            "move or choose particles of box(...) and other shapes, whose ranks have a part each, use "
+            "dataclasses.replace(body, x=...) or body[mask]"
         )
     mine = np.flatnonzero(grid.rank_of_cell[location.cell] == grid.comm.rank).astype(np.uint32)
     return body.select(mine), location.select(mine)
@@ -103,11 +113,26 @@ def scattered(
     return (particles if particles.assign(mine) else mine), location
 
 
-def migrated(grid: Grid, particles: _rust.Particles) -> tuple[_rust.Particles, _rust.Location]:
-    """Move particles to the rank of their cell, in the order of their numbers."""
+def numbered(particles: _rust.Particles, number: npt.NDArray[Any]) -> _rust.Particles:
+    """The same particles with other numbers."""
+    names, widths = zip(*columns(particles), strict=True)
+    rows = particles.rows()
+    rows[:, sum(widths[: names.index("number")])] = number
+    return particles.of_rows(rows)
+
+
+def migrated(
+    grid: Grid, particles: _rust.Particles, *, moving: bool = True
+) -> tuple[_rust.Particles, _rust.Location]:
+    """Move particles to the rank of their cell, in the order of their numbers; a collective call.
+
+    Raises:
+        InputError: Particles are outside the grid.
+    """
     comm = grid.comm
     while True:
-        location = located(grid, particles.x, moving=True)
+        with ranks.raise_together(comm):
+            location = located(grid, particles.x, moving=moving)
         if comm.size == 1:
             return particles, location
         rank = grid.rank_of_cell[location.cell]

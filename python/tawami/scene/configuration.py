@@ -64,7 +64,7 @@ class Configuration:
 
     Args:
         model: Grid, form and laws of the scene.
-        particles: The particles of the whole body, on every rank.
+        particles: The particles of the body that the driver script has on this rank.
         numerics: Numerical settings of a step.
 
     Attributes:
@@ -83,19 +83,21 @@ class Configuration:
 
     def __init__(self, model: Model, particles: _rust.Particles, numerics: Numerics) -> None:
         self.model, self.numerics, self.stopwatch = model, numerics, Stopwatch()
-        mine, location = placement.distributed(model.grid, particles, moving=model.moves)
+        mine, location = placement.distributed(
+            model.grid, particles, moving=model.moves, whole=model.part is None
+        )
         if model.form.kinematics.has_eps_v:
             mine.add_eps_v()
         mine.add_strain(model.moves, model.grid.geometry)
         own_fields.carry(model.form, mine, model.space.dim)
-        self.border = SceneBorder(model, particles)
+        self.border = SceneBorder(model, mine)
         self.border_sums = BorderSums(model, self.border, lambda: self.total)
         self._attach(mine, location)
         self.activity = Activity()
         own = model.form.own_fields
         self.supports = Supports(model.grid, model.basis, own, self.border, self.activity)
         self.obstacles = Obstacles(self.border, self.activity)
-        self.loads = Loads(model.grid, np.array(particles.volume), self.activity)
+        self.loads = Loads(model.grid, self.activity)
         self.border.users += [self.supports, self.obstacles, self.border_sums]
         self.total = np.zeros(self.domain.layout.size)
         self.inputs = FormInputs(model, self.activity.time, self.border_sums)

@@ -73,8 +73,7 @@ class Construction:
         """
         now = self.configuration
         now.activity.check_between_steps("remove(...)")
-        chosen = selection.numbers(now.domain, "remove(...): where", where)
-        return _remove(now, np.isin(now.domain.particles.number, chosen))
+        return _remove(now, selection.present(now.domain, "remove(...): where", where))
 
     def change_material(self, where: Where, material: Law) -> None:
         """Replace the material law of particles.
@@ -97,10 +96,9 @@ class Construction:
         """
         now = self.configuration
         now.activity.check_between_steps("change_material(...)")
-        chosen = selection.numbers(now.domain, "change_material(...): where", where)
-        mask = np.isin(now.domain.particles.number, chosen)
+        mask = selection.present(now.domain, "change_material(...): where", where)
         _check_any(now, "change_material(...)", mask)
-        _change_material(now, mask, material, int(chosen[0]))
+        _change_material(now, mask, material)
 
 
 def _check_any(now: Configuration, what: str, mask: Mask) -> None:
@@ -171,9 +169,11 @@ def _replace(now: Configuration, after: Domain, excavation: Excavation | None = 
     now.loads.changed()
 
 
-def _change_material(now: Configuration, mask: Mask, material: Law, number: int) -> None:
-    """Replace the law of particles of this rank, given a mask and a number of one of all ranks."""
+def _change_material(now: Configuration, mask: Mask, material: Law) -> None:
+    """Replace the law of particles of this rank, given a mask."""
     model, particles = now.model, now.domain.particles
+    mine = particles.number[mask].min(initial=np.iinfo(np.uint32).max)
+    number = int(ranks.least_of(model.grid.comm, np.array([mine]))[0])
     if not isinstance(material, Law):
         raise InputError(
             f"change_material(...): material = {checks.shown(material)}: expected a material as "

@@ -22,6 +22,7 @@ from tawami.base.space import Space
 from tawami.base.warn import warn
 from tawami.body import rings
 from tawami.body.body import Body
+from tawami.body.part import Part
 from tawami.border.pieces import Border
 from tawami.field import fitted_volumes
 from tawami.form.compilation import CompiledForm, check_used, compile_form
@@ -29,7 +30,7 @@ from tawami.form.form import Form
 from tawami.form.symbols import Assembly
 from tawami.grid.basis import BASES, Basis
 from tawami.grid.grid import Grid
-from tawami.particles import assignment
+from tawami.particles import assignment, placement
 from tawami.particles.assignment import Law
 from tawami.scene.parameters import by_kind, check_names
 
@@ -65,6 +66,8 @@ class Model:
         names: Name of the group of each material; empty if the body has no names.
         leaving: 'stop' or 'remove', for particles that leave the grid.
         num_particles: Particles of the body, on all ranks.
+        part: The part of the body that the driver script has on this rank, whose order arrays of the
+            script have; None if it has the whole body.
         fits: Whether the form integrates with volumes that fit the border of the body.
         border: The border of the body; None if it has none.
     """
@@ -83,6 +86,7 @@ class Model:
     names: tuple[str, ...]
     leaving: Leaving
     num_particles: int
+    part: Part | None
     fits: bool
     border: Border | None
 
@@ -90,6 +94,20 @@ class Model:
     def space(self) -> Space:
         """Everything that follows from the dimension."""
         return self.grid.space
+
+    @property
+    def along_body(self) -> int:
+        """Length of the arrays of a driver script: the particles of its body on this rank."""
+        return self.num_particles if self.part is None else len(self.part.number)
+
+    def of_script(self, rows: npt.NDArray[Any], number: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Rows of some particles, from an array of a driver script; a collective call.
+
+        Args:
+            rows: Row of each particle of the body of the script.
+            number: Numbers of the particles.
+        """
+        return rows[number] if self.part is None else self.part.at(rows, number)
 
     @property
     def moves(self) -> bool:
@@ -182,7 +200,8 @@ def build(
     assembly: Assembly,
     parameters: Mapping[str, Any],
 ) -> tuple[Model, _rust.Particles]:
-    """The model of a scene and the particles of its whole body; the arguments are those of `Scene`.
+    """The model of a scene and the particles of its body on this rank; the arguments are those of
+    `Scene`.
 
     Raises:
         InputError, FormError: As `Scene`.
@@ -201,11 +220,11 @@ def build(
     values, options = loaded.settings(numbers, static=density is None, others=KEYWORDS)
     for message in [] if grid.comm.rank else loaded.unusual(values):
         warn(message, ParameterWarning)
-    particles, laws = _particles(grid, body, material, material_of, loaded)
+    with ranks.raise_together(grid.comm):
+        particles, laws = _particles(grid, body, material, material_of, loaded)
     materials = assignment.materials_of(laws)
     densities = assignment.densities(density, len(materials), body.names)
-    ratios = np.array([m.bulk_modulus / m.shear_modulus for m in materials])[particles.material]
-    warn_of_locking(grid, loaded, float(ratios.max()), int(ratios.argmax()))
+    _warn_of_locking_first(grid, loaded, materials, particles)
     compiled = _compiled(grid, loaded, options, assembly, laws, in_space)
     check_names(loaded, in_space, materials)
     if "rho" in compiled.used and densities is None:
@@ -213,14 +232,16 @@ def build(
             f"form {loaded.name} reads the density rho: expected Scene(..., density=...) [kg/m3]"
         )
     check_used(compiled, options, parameters)
-    _check_plastic_volume(compiled, laws, particles)
+    with ranks.raise_together(grid.comm):
+        _check_plastic_volume(compiled, laws, particles)
     fixed = "options of the form are fixed when a scene is made: Scene(..., stabilisation=...)"
     changing = {*in_time, *in_space}
     used = {n: value for n, value in values.items() if n in compiled.used and n not in changing}
     model = Model(
         grid, loaded, compiled, basis, values,
         used, in_time, in_space, Settings(options, fixed),
-        laws, densities, _names(body, len(materials)), leaving, len(particles),
+        laws, densities, _names(body, len(materials)), leaving,
+        len(particles) if body.part is None else body.part.total, body.part,
         fitted_volumes.chosen(volumes, body.border),
         body.border,
     )  # fmt: skip
@@ -292,11 +313,20 @@ def _particles(
     material_of: npt.ArrayLike | None,
     form: Form,
 ) -> tuple[_rust.Particles, list[Law]]:
-    """All particles of the body with their materials and history variables."""
+    """The particles of the body on this rank with their materials and history variables."""
     x, volume = checks.array("x", body.x, 2), checks.array("volume", body.volume, 1)
     volume = rings.volumes(grid, x, volume)
     assigned = assignment.assigned(material, material_of, body, len(x))
-    particles = _rust.Particles(x, volume, assigned.number)
+    if body.part is None or not body.part.total:
+        particles = _rust.Particles(x, volume, assigned.number)
+    else:  # a rank may have none
+        some = _rust.Particles(
+            np.concatenate([x, np.zeros((1, grid.space.dim))]),
+            np.append(volume, 1.0),
+            np.append(assigned.number, np.uint32(0)),
+        )
+        particles = some.select(np.arange(len(x), dtype=np.uint32))
+        particles = placement.numbered(particles, body.part.number)
     materials = assignment.materials_of(assigned.laws)
     particles.check_materials(materials, form.kinematics.name, form.strain.finite)
     particles.add_history(materials)
@@ -326,6 +356,16 @@ def _check_plastic_volume(
             f"volume, and form {form.name} has no term for that: expected eps_p in its volume equation, "
             "as - sum_p(K * eps_p, q) in 'u_epsv'"
         )
+
+
+def _warn_of_locking_first(
+    grid: Grid, form: Form, materials: Sequence[_rust.Material], particles: _rust.Particles
+) -> None:
+    """Warn of the first of the particles that lock most; a call for all ranks."""
+    ratios = np.array([m.bulk_modulus / m.shear_modulus for m in materials])[particles.material]
+    most = ranks.largest(grid.comm, float(ratios.max(initial=0.0)))
+    number = particles.number[ratios == most].min(initial=np.iinfo(np.uint32).max)
+    warn_of_locking(grid, form, most, int(ranks.least_of(grid.comm, np.array([number]))[0]))
 
 
 def warn_of_locking(grid: Grid, form: Form, ratio: float, number: int) -> None:
