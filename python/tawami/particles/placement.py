@@ -36,7 +36,7 @@ def outside(grid: Grid, x: Array) -> Mask:
 
 
 def distributed(
-    grid: Grid, body: _rust.Particles, *, moving: bool, whole: bool = True
+    grid: Grid, body: _rust.Particles, moving: bool, *, whole: bool = True
 ) -> tuple[_rust.Particles, _rust.Location]:
     """The particles in this rank's cells; a collective call.
 
@@ -109,7 +109,7 @@ def scattered(
             "only, or has another width. Expected the same form, laws and motion"
         )
     everything = particles.of_rows(np.hstack([arrays[name] for name in wanted]))
-    mine, location = distributed(grid, everything, moving=moving)
+    mine, location = distributed(grid, everything, moving)
     return (particles if particles.assign(mine) else mine), location
 
 

@@ -83,9 +83,8 @@ class Configuration:
 
     def __init__(self, model: Model, particles: _rust.Particles, numerics: Numerics) -> None:
         self.model, self.numerics, self.stopwatch = model, numerics, Stopwatch()
-        mine, location = placement.distributed(
-            model.grid, particles, moving=model.moves, whole=model.part is None
-        )
+        whole = model.part is None
+        mine, location = placement.distributed(model.grid, particles, model.moves, whole=whole)
         if model.form.kinematics.has_eps_v:
             mine.add_eps_v()
         mine.add_strain(model.moves, model.grid.geometry)
@@ -282,7 +281,7 @@ class Configuration:
     def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:
         self.obstacles.warn(self.domain, coefficients)
         wall_gap.warn_of_distant(self.supports.walls, self.border.points, accepted.forces)
-        arrays = quantities.of_body(self.model.grid.comm, self.domain.particles)
+        arrays = quantities.copies(self.domain.particles)
         return Outcome(accepted, coefficients, Reactions.of(accepted, self.supports), arrays)
 
     # -- checkpoints ---------------------------------------------------------

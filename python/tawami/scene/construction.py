@@ -18,11 +18,11 @@ from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import InputError
 from tawami.particles import assignment, placement
 from tawami.particles.assignment import Law
-from tawami.scene import selection
+from tawami.scene import locking, selection
 from tawami.scene.configuration import Configuration
 from tawami.scene.domain import Domain
 from tawami.scene.excavation import Excavation
-from tawami.scene.model import Model, warn_of_locking, with_laws
+from tawami.scene.model import Model, with_laws
 from tawami.scene.selection import Where
 
 #: Share of the internal forces below which what is out of balance is round-off.
@@ -184,7 +184,7 @@ def _change_material(now: Configuration, mask: Mask, material: Law) -> None:
     changed = _with_numbers(model, particles, numbers, mask, new)
     other = with_laws(model, changed, laws, of, now.numerics.assembly)
     after = Domain.attach(other, changed, now.domain.location, now.numerics, now.stopwatch)
-    warn_of_locking(model.grid, model.form, new.bulk_modulus / new.shear_modulus, number)
+    locking.warn_of(model.grid, model.form, new.bulk_modulus / new.shear_modulus, number)
     _replace(now, after)
     now.activity.statics += 1
 

@@ -14,13 +14,12 @@ import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks, ranks
-from tawami.base.errors import CheckpointError, InputError, LockingWarning, ParameterWarning
+from tawami.base.errors import CheckpointError, InputError, ParameterWarning
 from tawami.base.identity import text
 from tawami.base.meaning import meaning
 from tawami.base.sealed import Settings
 from tawami.base.space import Space
 from tawami.base.warn import warn
-from tawami.body import rings
 from tawami.body.body import Body
 from tawami.body.part import Part
 from tawami.border.pieces import Border
@@ -30,15 +29,13 @@ from tawami.form.form import Form
 from tawami.form.symbols import Assembly
 from tawami.grid.basis import BASES, Basis
 from tawami.grid.grid import Grid
-from tawami.particles import assignment, placement
+from tawami.particles import assignment, making
 from tawami.particles.assignment import Law
+from tawami.scene import locking
 from tawami.scene.parameters import by_kind, check_names
 
 Array = npt.NDArray[np.float64]
 Leaving = Literal["stop", "remove"]
-#: K/mu from which displacement-only forms lock: nu = 0.49. At 0.495 the mean stress of the cantilever
-#: has 4 times the error that it has at 0.3, at 0.49995 70 times (`python -m cases.extremes`).
-LOCKS = 50.0
 
 #: Arguments of `Scene` that are not parameters of the form.
 KEYWORDS = (
@@ -221,10 +218,10 @@ def build(
     for message in [] if grid.comm.rank else loaded.unusual(values):
         warn(message, ParameterWarning)
     with ranks.raise_together(grid.comm):
-        particles, laws = _particles(grid, body, material, material_of, loaded)
+        particles, laws = making.particles(grid, body, material, material_of, loaded)
     materials = assignment.materials_of(laws)
     densities = assignment.densities(density, len(materials), body.names)
-    _warn_of_locking_first(grid, loaded, materials, particles)
+    locking.warn_of_first(grid, loaded, materials, particles)
     compiled = _compiled(grid, loaded, options, assembly, laws, in_space)
     check_names(loaded, in_space, materials)
     if "rho" in compiled.used and densities is None:
@@ -306,33 +303,6 @@ def _names(body: Body, materials: int) -> tuple[str, ...]:
     return tuple(body.names) if len(body.names) == materials else ()
 
 
-def _particles(
-    grid: Grid,
-    body: Body,
-    material: assignment.Given,
-    material_of: npt.ArrayLike | None,
-    form: Form,
-) -> tuple[_rust.Particles, list[Law]]:
-    """The particles of the body on this rank with their materials and history variables."""
-    x, volume = checks.array("x", body.x, 2), checks.array("volume", body.volume, 1)
-    volume = rings.volumes(grid, x, volume)
-    assigned = assignment.assigned(material, material_of, body, len(x))
-    if body.part is None or not body.part.total:
-        particles = _rust.Particles(x, volume, assigned.number)
-    else:  # a rank may have none
-        some = _rust.Particles(
-            np.concatenate([x, np.zeros((1, grid.space.dim))]),
-            np.append(volume, 1.0),
-            np.append(assigned.number, np.uint32(0)),
-        )
-        particles = some.select(np.arange(len(x), dtype=np.uint32))
-        particles = placement.numbered(particles, body.part.number)
-    materials = assignment.materials_of(assigned.laws)
-    particles.check_materials(materials, form.kinematics.name, form.strain.finite)
-    particles.add_history(materials)
-    return particles, assigned.laws
-
-
 def _check_plastic_volume(
     compiled: CompiledForm,
     laws: Sequence[Law],
@@ -356,32 +326,3 @@ def _check_plastic_volume(
             f"volume, and form {form.name} has no term for that: expected eps_p in its volume equation, "
             "as - sum_p(K * eps_p, q) in 'u_epsv'"
         )
-
-
-def _warn_of_locking_first(
-    grid: Grid, form: Form, materials: Sequence[_rust.Material], particles: _rust.Particles
-) -> None:
-    """Warn of the first of the particles that lock most; a call for all ranks."""
-    ratios = np.array([m.bulk_modulus / m.shear_modulus for m in materials])[particles.material]
-    most = ranks.largest(grid.comm, float(ratios.max(initial=0.0)))
-    number = particles.number[ratios == most].min(initial=np.iinfo(np.uint32).max)
-    warn_of_locking(grid, form, most, int(ranks.least_of(grid.comm, np.array([number]))[0]))
-
-
-def warn_of_locking(grid: Grid, form: Form, ratio: float, number: int) -> None:
-    """Warn of a nearly incompressible material in a form without a field for the volume.
-
-    Args:
-        grid: The grid.
-        form: The form.
-        ratio: Largest K/mu of a particle.
-        number: Of this particle.
-    """
-    if not form.kinematics.locks or grid.comm.rank or ratio < LOCKS:
-        return
-    warn(
-        f"form {form.name} has no field for the volume, and K/mu = {ratio:.3g} at particle {number}: it "
-        f"locks, and its mean stress is useless where K/mu is large. Expected K/mu below {LOCKS:g} "
-        "(nu < 0.49); use form 'u_epsv' or 'u_epsv_finite'",
-        LockingWarning,
-    )

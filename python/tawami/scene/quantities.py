@@ -7,7 +7,7 @@ does not model gives an error that says how to model it; an unknown name gives t
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
@@ -235,10 +235,37 @@ def array_of(particles: _rust.Particles, name: str) -> npt.NDArray[Any]:
     return np.asarray(getattr(particles, name))
 
 
-def of_body(comm: Any, particles: _rust.Particles) -> dict[str, npt.NDArray[Any]]:
-    """All arrays of the particles of the body, in the order of the numbers; a call for all ranks."""
-    in_order = placement.in_order(comm, particles.number)
-    return {name: in_order(array_of(particles, name)) for name in arrays_of(particles)}
+def copies(particles: _rust.Particles) -> dict[str, npt.NDArray[Any]]:
+    """Copies of all arrays of the particles of this rank."""
+    return {name: np.array(array_of(particles, name)) for name in arrays_of(particles)}
+
+
+class Gathered(Mapping[str, npt.NDArray[Any]]):
+    """Arrays of the particles of all ranks, in the order of the numbers; reading one is a call for all
+    ranks, which gathers it.
+
+    Args:
+        comm: Communicator.
+        own: The arrays of this rank, `number` among them.
+    """
+
+    def __init__(self, comm: Any, own: Mapping[str, npt.NDArray[Any]]) -> None:
+        self._comm, self.own = comm, own
+        self._in_order: Callable[[npt.ArrayLike], Any] | None = None
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        if self._comm.size == 1:
+            return self.own[name]
+        if self._in_order is None:
+            self._in_order = placement.in_order(self._comm, self.own["number"])
+        found: npt.NDArray[Any] = self._in_order(self.own[name])
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.own)
+
+    def __len__(self) -> int:
+        return len(self.own)
 
 
 def local_arrays(subject: Subject) -> Arrays:
