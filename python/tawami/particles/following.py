@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array, Indices
 from tawami.base.meaning import ALIKE, ROUND_OFF
-from tawami.particles.placement import in_order
+from tawami.base.shared_file import Rows, by_number
+from tawami.particles import placement
 
 Numbers = npt.NDArray[np.integer[Any]]
 #: Multiples of these numbers, modulo 1, are spread evenly: the weights of a fingerprint.
@@ -33,6 +35,20 @@ def fingerprint(comm: Any, number: Numbers, values: Array, size: float) -> float
     own = [(weights * columns + 2 * np.abs(columns)).sum(), columns.size]
     total, count = ranks.sum_of(comm, np.array(own, dtype=float))
     return float(total + count * ROUND_OFF * size / ALIKE)
+
+
+def fingerprints(
+    comm: Any, particles: _rust.Particles, sizes: Mapping[str, float]
+) -> dict[str, float]:
+    """Fingerprints of all arrays of the particles by name; a collective call.
+
+    Args:
+        comm: Communicator.
+        particles: The particles of this rank.
+        sizes: Sizes of their values by name, 1 by default.
+    """
+    found = placement.arrays(particles).items()
+    return {n: fingerprint(comm, particles.number, a, sizes.get(n, 1.0)) for n, a in found}
 
 
 class OfParticles:
@@ -83,13 +99,16 @@ class OfParticles:
     def state(self) -> dict[str, Any]:
         """All of them in the order of the numbers, for a checkpoint."""
         own = self._own
-        gathered = in_order(self._comm, self.number[own])
-        return {"number": gathered(self.number[own]), "values": gathered(self.values[own])}
+        sort = by_number(self._comm, self.number[own])
+        return {"number": sort(self.number[own]), "values": sort(self.values[own])}
 
     @classmethod
     def of_state(cls, comm: Any, state: Mapping[str, Any]) -> OfParticles:
         """The reverse of :meth:`state`."""
-        return cls(comm, state["number"], state["values"], everywhere=True)
+        number, values = state["number"], state["values"]
+        if isinstance(number, Rows):
+            return cls(comm, number.own, values.own, everywhere=False)
+        return cls(comm, number, values, everywhere=True)
 
     def identity(self) -> float:
         """A number that other values hardly share."""

@@ -13,6 +13,7 @@ from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array, Mask
 from tawami.base.errors import CheckpointError, InputError
+from tawami.base.shared_file import Rows, by_number
 from tawami.grid.grid import Grid
 
 #: Least distance of moving particles from the sides of their cell [cells]. A single particle on a side
@@ -82,18 +83,24 @@ def in_order(comm: Any, number: npt.NDArray[Any]) -> Callable[[npt.ArrayLike], A
     return lambda values: ranks.allgathered(comm, np.asarray(values))[order]
 
 
-def gathered(grid: Grid, particles: _rust.Particles) -> dict[str, Array]:
-    """Arrays of the particles of all ranks by name, in the order of their numbers, on every rank."""
-    rows = in_order(grid.comm, particles.number)(particles.rows())
+def arrays(particles: _rust.Particles) -> dict[str, Array]:
+    """Arrays of the particles of this rank by name, each particles x components."""
     names, widths = zip(*columns(particles), strict=True)
-    parts = np.split(rows, np.cumsum(widths)[:-1], axis=1)
+    parts = np.split(particles.rows(), np.cumsum(widths)[:-1], axis=1)
     return dict(zip(names, map(np.ascontiguousarray, parts), strict=True))
 
 
-def scattered(
-    grid: Grid, particles: _rust.Particles, arrays: Mapping[str, Array], *, moving: bool
+def stored(comm: Any, particles: _rust.Particles) -> dict[str, Rows]:
+    """Arrays of the particles of all ranks by name, in the order of their numbers, in equal blocks."""
+    sort = by_number(comm, particles.number)
+    return {name: sort(values) for name, values in arrays(particles).items()}
+
+
+def restored(
+    grid: Grid, particles: _rust.Particles, given: Mapping[str, Rows | Array], *, moving: bool
 ) -> tuple[_rust.Particles, _rust.Location]:
-    """The particles of this rank from gathered arrays, the reverse of :func:`gathered`.
+    """The particles of this rank, the reverse of :func:`stored`; arrays that are whole are those of all
+    ranks.
 
     The result is `particles` itself, with these values, if the particles of this rank are the same.
 
@@ -101,15 +108,17 @@ def scattered(
         CheckpointError: The arrays are not those of the particles.
     """
     wanted = dict(columns(particles))
-    found = {name: array.shape[1] for name, array in arrays.items()}
+    found = {name: array.shape[1] for name, array in given.items()}
     if wanted != found:
         differ = sorted(set(wanted.items()) ^ set(found.items()))
         raise CheckpointError(
             f"its particles have other arrays than those of the scene: {differ[0][0]} is in one of them "
             "only, or has another width. Expected the same form, laws and motion"
         )
-    everything = particles.of_rows(np.hstack([arrays[name] for name in wanted]))
-    mine, location = distributed(grid, everything, moving)
+    whole = not isinstance(given["x"], Rows)
+    parts = (given[name] for name in wanted)
+    rows = np.hstack([part.own if isinstance(part, Rows) else part for part in parts])
+    mine, location = distributed(grid, particles.of_rows(rows), moving, whole=whole)
     return (particles if particles.assign(mine) else mine), location
 
 

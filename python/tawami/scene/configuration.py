@@ -17,11 +17,11 @@ import numpy.typing as npt
 from tawami import _rust
 from tawami.base import checks, ranks, signals
 from tawami.base.errors import CheckpointError
-from tawami.base.meaning import fingerprint
 from tawami.base.process import check_process
 from tawami.base.program import leave_together
 from tawami.base.timing import Stopwatch
 from tawami.particles import placement
+from tawami.particles.following import fingerprints
 from tawami.scene import (
     coverage,
     fitting,
@@ -290,11 +290,8 @@ class Configuration:
         """Facts that identify it, for checkpoints; a call for all ranks."""
         grid = self.model.grid
         sizes = {"stress": self.domain.responses.stiffest} | dict.fromkeys(LENGTHS, grid.h)
-        arrays = placement.gathered(grid, self.domain.particles)
-        particles = {
-            f"'{name}' of the particles at its start": fingerprint(values, sizes.get(name, 1.0))
-            for name, values in arrays.items()
-        }
+        found = fingerprints(grid.comm, self.domain.particles, sizes)
+        particles = {f"'{name}' of the particles at its start": one for name, one in found.items()}
         facts = {
             "tolerance": self.numerics.tolerance,
             "supports": self.supports.identity(),
@@ -306,7 +303,7 @@ class Configuration:
     def state(self) -> dict[str, Any]:
         """State that passes from one step to the next, of all ranks; a call for all ranks."""
         return {
-            "particles": placement.gathered(self.model.grid, self.domain.particles),
+            "particles": placement.stored(self.model.grid.comm, self.domain.particles),
             "time": self.activity.time,
             "inputs": self.inputs.state(),
             "total": self.total,
@@ -328,9 +325,8 @@ class Configuration:
         Raises:
             CheckpointError: Particles or fields with other arrays.
         """
-        particles, location = placement.scattered(
-            self.model.grid, self.domain.particles, state["particles"], moving=self.model.moves
-        )
+        given = self.model.grid, self.domain.particles, state["particles"]
+        particles, location = placement.restored(*given, moving=self.model.moves)
         sizes = {np.shape(state["total"]), np.shape(state["loads"]["unbalanced"])}
         if sizes - {(0,)} != {self.total.shape}:
             raise CheckpointError("its fields have another number of coefficients than the scene")

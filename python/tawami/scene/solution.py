@@ -17,6 +17,7 @@ from tawami.base.text import meant, quoted
 from tawami.field.constraints import LEAST_SHARE
 from tawami.form.kinematics import KINEMATICS
 from tawami.grid import edges
+from tawami.particles.gathered import Gathered
 from tawami.scene import presentation, quantities
 from tawami.scene.absent import Elsewhere
 from tawami.scene.configuration import Configuration
@@ -85,9 +86,8 @@ class Solution(Elsewhere, Sealed, Unique):
         self.on_edges = outcome.reactions.on_edges
         points, domain = scene.configuration.border.points, scene.configuration.domain
         self._outline = None if points is None else Outline(points, domain, self.u)
-        #: Arrays of the particles by name, for quantities.
         comm, own = self._model.grid.comm, outcome.particles
-        self._arrays = quantities.Gathered(comm, own)
+        self._arrays = Gathered(comm, own)
         self.arrays = Arrays(lambda name: self._array(name, self._arrays))
         self.own = Arrays(lambda name: self._array(name, self._arrays.own))
         self.num_particles = int(ranks.sum_of(comm, np.array([len(own["number"])]))[0])
