@@ -29,7 +29,7 @@ def fingerprint(comm: Any, number: Numbers, values: Array, size: float) -> float
         values: Their values, particles or particles x components.
         size: Size of the values.
     """
-    columns = np.reshape(values, (len(number), -1))
+    columns = values if values.ndim > 1 else values[:, None]
     along, across = SPREAD
     weights = 0.5 + (along * number[:, None] + across * np.arange(columns.shape[1])) % 1
     own = [(weights * columns + 2 * np.abs(columns)).sum(), columns.size]

@@ -120,7 +120,8 @@ class Quantity:
                 f"{what}: its function returned an array of shape {found.shape}: expected ({n},) or "
                 f"({n}, components), one row for each particle"
             )
-        wrong = np.flatnonzero(~np.isfinite(found.reshape(n, -1)).all(axis=1))
+        axes = tuple(range(1, found.ndim))
+        wrong = np.flatnonzero(~np.isfinite(found).all(axis=axes))
         if len(wrong):
             p = wrong[0]
             raise InputError(
