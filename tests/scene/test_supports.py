@@ -17,7 +17,7 @@ import tawami
 from tawami import _rust
 from tawami.base.errors import SupportError
 from tawami.field import constraints
-from tawami.field.layout import Place
+from tawami.field.coefficients import Place
 from tawami.field.reduction import Reduction
 from tawami.grid import edges
 from tawami.grid.basis import values_1d
@@ -41,14 +41,14 @@ def test_a_held_point_equals_a_lagrange_multiplier(basis, point, value):
     # the same with Lagrange multipliers, by scipy
     n = scene.num_coefficients
     matrix = scene.tangent(np.zeros(n))
-    cells, layout = scene.configuration.domain.active, scene.configuration.domain.layout
+    layout = scene.configuration.domain.layout
     held = constraints.held_edge(
         scene.grid, _place(basis), "left", np.arange(3), 0, 1e-3, "a support"
     )
     rows = [sp.csr_matrix(([1.0], ([0], [k])), shape=(1, n)) for k in held.indices]
     values = list(held.values)
     for place, v in ((point, value), ((0.3, 0.9), -value)):
-        p = constraints.held_point(scene.grid, basis, cells, place, 1, v, layout.active)
+        p = constraints.held_point(layout, place, 1, v)
         rows.append(sp.csr_matrix((p.weights, (np.zeros(len(p.indices)), p.indices)), shape=(1, n)))
         values.append(v)
     b = sp.vstack(rows)

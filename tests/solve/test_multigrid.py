@@ -46,7 +46,7 @@ def test_the_energy_of_a_linear_displacement(geometry):
     data = np.tile([mu, lame], (len(domain.particles), 1))
     matrix = rows_of(block.assembled("elasticity", data))
     a, b, c, d = 0.3, 0.0 if geometry == "axisymmetric" else 0.7, -0.2, 0.4
-    u = (layout.greville @ np.array([[a, c], [b, d]])).ravel()[block.unknowns]
+    u = (layout.greville @ np.array([[a, c], [b, d]])).ravel()[block.coefficients]
     hoop = a if geometry == "axisymmetric" else 0.0
     energy = 2 * mu * (a**2 + d**2 + hoop**2 + (b + c) ** 2 / 2) + lame * (a + d + hoop) ** 2
     volume = domain.particles.volume.sum()

@@ -67,9 +67,21 @@ def exchanged(comm: Any, rows: npt.NDArray[Any], to: npt.NDArray[Any]) -> npt.ND
         rows: Rows of this rank.
         to: Rank to which each of them is sent.
     """
+    return np.concatenate(parts_to(comm, rows, to))
+
+
+def parts_to(comm: Any, values: npt.NDArray[Any], to: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
+    """The values that each rank sends to this one.
+
+    Args:
+        comm: Communicator.
+        values: Values of this rank.
+        to: Rank to which each of them is sent.
+    """
     order = np.argsort(to, kind="stable")
     ends = np.searchsorted(to[order], np.arange(1, comm.size))
-    return np.concatenate(comm.alltoall(np.split(rows[order], ends)))
+    parts: list[npt.NDArray[Any]] = comm.alltoall(np.split(values[order], ends))
+    return parts
 
 
 def offsets(comm: Any, key: npt.NDArray[Any], count: npt.NDArray[Any]) -> npt.NDArray[np.int64]:

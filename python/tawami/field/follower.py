@@ -52,7 +52,7 @@ class FollowerPressure:
     def _at(self, coefficients: Array) -> tuple[Array, Array, Array]:
         """f^-T and cof(f) n0 dA0 in the plane at the points, and their thickness."""
         numbers, values, gradients = self._tabulated
-        u = self._space.vectors(coefficients[: self._layout.num_displacement])[numbers]
+        u = self._space.vectors(coefficients[: self._layout.num_displacement_of_grid])[numbers]
         f = np.einsum("pfi,pfj->pij", u, gradients) + np.eye(self._space.dim)
         inverse = np.linalg.inv(f).transpose(0, 2, 1)
         moved = self._x + np.einsum("pf,pfi->pi", values, u)
@@ -78,7 +78,7 @@ class FollowerPressure:
         if self._space.hoop:
             by_u[:, :, 0] += 2 * np.pi * self._now[:, :, None] * values[:, None]
         local = np.einsum("p,pf,pijg->pfigj", self._pressure, values, by_u)
-        size = self._layout.size
+        size = self._layout.size_of_grid
         of = of_components(numbers, self._space.dim).reshape(len(numbers), -1)
         width = of.shape[1]
         rows, columns = np.repeat(of, width, axis=1), np.tile(of, width)

@@ -1,4 +1,4 @@
-"""The sum of a reduced tangent and a sparse matrix that is the same on every rank."""
+"""The sum of a reduced tangent and a sparse matrix."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 from tawami.base import ranks
-from tawami.base.petsc import Handles, aij
+from tawami.base.petsc import Handles, add_rows, aij
+from tawami.base.places import share_places
 from tawami.field.reduction import Reduction
 
 
@@ -23,34 +24,38 @@ class Sum:
 
     def __init__(self, owner: Any, comm: Any) -> None:
         self._comm, self._petsc = comm, Handles(owner, comm)
-        #: What is in `_petsc`: the sum for this tangent and this matrix, whose rows are reduced.
+        #: What is in `_petsc`: the sum of this tangent and this matrix, with its reduced rows.
         self._tangent: Any = None
         self._matrix: sp.csr_matrix | None = None
         self._rows: sp.csr_matrix | None = None
 
-    def of(self, tangent: Any, matrix: sp.csr_matrix, reduction: Reduction) -> Any:
+    def of(
+        self, tangent: Any, matrix: sp.csr_matrix, reduction: Reduction, *, of_grid: bool = False
+    ) -> Any:
         """The sum: the same object as long as the tangent is the same and the matrix has its pattern.
 
         Args:
             tangent: A reduced tangent.
-            matrix: A, the same on every rank. If its values change it must be another object.
+            matrix: A, or the part of this rank. If its values change it must be another object.
             reduction: S.
+            of_grid: Whether it is A, on coefficients of the whole grid.
         """
         known, same = self._petsc, self._tangent is tangent
         if not same or self._matrix is not matrix:
-            rows = reduction.reduced(matrix)
+            rows = (reduction.of_grid if of_grid else reduction.of_window)(matrix)
             differs = not (same and _same_places(self._rows, rows))
             same = not ranks.any_of(self._comm, np.array([differs]))[0]
-            known.free("part")
-            known["part"], self._rows = aij(self._comm, rows, reduction.num_own), rows
+            self._rows = rows
         if same:
             known["total"].zeroEntries()
-            for part in (tangent, known["part"]):
-                known["total"].axpy(1.0, part, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            known["total"].axpy(1.0, tangent, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            add_rows(known["total"], self._rows)
         else:
             known.free("total")
+            part = aij(self._comm, self._rows, reduction.num_own)
             known["total"] = tangent.copy()
-            known["total"].axpy(1.0, known["part"], PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+            known["total"].axpy(1.0, part, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+            part.destroy()
         self._tangent, self._matrix = tangent, matrix
         return known["total"]
 
@@ -59,4 +64,6 @@ def _same_places(a: sp.csr_matrix | None, b: sp.csr_matrix) -> bool:
     """Whether two matrices have entries in the same places."""
     if a is None or a.nnz != b.nnz:
         return False
+    if share_places(a, b):
+        return True
     return np.array_equal(a.indptr, b.indptr) and np.array_equal(a.indices, b.indices)

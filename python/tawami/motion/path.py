@@ -128,7 +128,7 @@ class PathStep:
                 "follow(...): a new pressure follows the border, and a path scales dead loads only: "
                 "expected traction(...), or scene.solve() or ramp(scene) before for the pressure"
             )
-        if not rate.any():
+        if not now.domain.layout.largest(rate):
             raise InputError(
                 "follow(...): there is no new load: expected a traction, a force or gravity that the "
                 "scene has not been solved for"
@@ -139,11 +139,9 @@ class PathStep:
     def _control(self) -> controls.Control:
         domain, following = self.configuration.domain, self.following
         if following.point is not None:
-            held = held_point(
-                domain.model.grid, domain.model.basis, domain.active, following.point,
-                following.component, 0.0, domain.layout.active,
-            )  # fmt: skip
-            return controls.PointControl(held.indices, held.weights, following.sign * self.size)
+            held = held_point(domain.layout, following.point, following.component, 0.0)
+            size = following.sign * self.size
+            return controls.PointControl(domain.layout, held.indices, held.weights, size)
         particles, comm, space = domain.particles, domain.model.grid.comm, domain.model.space
         total = ranks.sum_of(comm, np.array([particles.volume.sum()]))[0]
         last = following.direction.at(particles.number)
@@ -173,7 +171,8 @@ class PathStep:
         direction = OfParticles(now.model.grid.comm, number, u, everywhere=False)
         control = accepted.problem.path.control if accepted.problem.path else None
         if now.model.moves and isinstance(control, controls.PointControl) and point is not None:
-            x, y = point + control.weights @ accepted.u[control.indices // dim]
+            moved = domain.layout.vectors_at(accepted.u, control.indices // dim)
+            x, y = point + control.weights @ moved
             point = (float(x), float(y))
         return PathUpdate(following, now, accepted.step.factor, direction, point)
 

@@ -39,7 +39,7 @@ def outside(grid: Grid, x: Array) -> Mask:
 def distributed(
     grid: Grid, body: _rust.Particles, moving: bool, *, whole: bool = True
 ) -> tuple[_rust.Particles, _rust.Location]:
-    """The particles in this rank's cells; a collective call.
+    """The particles in this rank's cells, which are those of its window; a collective call.
 
     Args:
         grid: The grid.
@@ -54,7 +54,7 @@ def distributed(
         return migrated(grid, body, moving=moving)
     location = located(grid, body.x, moving=moving)
     if grid.comm.size == 1:
-        return body, location
+        return body, grid.window.place(location)
     parts = (body.x, body.volume, body.material)
     digest = hashlib.sha1(b"".join(part.tobytes() for part in parts)).digest()
     if len(set(grid.comm.allgather(digest))) > 1:
@@ -64,8 +64,8 @@ def distributed(
             "move or choose particles of box(...) and other shapes, whose ranks have a part each, use "
             "dataclasses.replace(body, x=...) or body[mask]"
         )
-    mine = np.flatnonzero(grid.rank_of_cell[location.cell] == grid.comm.rank).astype(np.uint32)
-    return body.select(mine), location.select(mine)
+    mine = np.flatnonzero(grid.window.owns(location)).astype(np.uint32)
+    return body.select(mine), grid.window.place(location.select(mine))
 
 
 def columns(particles: _rust.Particles) -> list[tuple[str, int]]:
@@ -135,6 +135,9 @@ def migrated(
 ) -> tuple[_rust.Particles, _rust.Location]:
     """Move particles to the rank of their cell, in the order of their numbers; a collective call.
 
+    Returns:
+        The particles of this rank, and their cells in its window.
+
     Raises:
         InputError: Particles are outside the grid.
     """
@@ -143,10 +146,10 @@ def migrated(
         with ranks.raise_together(comm):
             location = located(grid, particles.x, moving=moving)
         if comm.size == 1:
-            return particles, location
-        rank = grid.rank_of_cell[location.cell]
+            return particles, grid.window.place(location)
+        rank = grid.ranks_of(location.cell.astype(np.int64))
         if not ranks.any_of(comm, np.array([(rank != comm.rank).any()]))[0]:
-            return particles, location
+            return particles, grid.window.place(location)
         particles = particles.of_rows(ranks.exchanged(comm, particles.rows(), rank))
         particles = particles.select(np.argsort(particles.number).astype(np.uint32))
 

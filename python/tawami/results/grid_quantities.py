@@ -124,10 +124,16 @@ def _at_vertices(scene: Scene, coefficients: Array) -> Array:
     return np.asarray(matrix @ scene.grid.space.vectors(coefficients))
 
 
+def _before(scene: Scene) -> Array:
+    """Coefficients of the whole grid since the start."""
+    return scene.configuration.domain.layout.whole(scene.configuration.before)
+
+
 def _displacement(now: Snapshot) -> Array:
     """Displacement since the start; at finite strain, of the last step."""
     scene, solution = now.scene, now.solution
-    u = scene.split(scene.configuration.before)[0] if solution is None else solution.u
+    u = _before(scene)[: scene.configuration.domain.layout.num_displacement_of_grid]
+    u = u if solution is None else solution.u
     return _at_vertices(scene, u)
 
 
@@ -136,9 +142,9 @@ def _bilinear(name: str) -> Callable[[Snapshot], Array]:
 
     def of(now: Snapshot) -> Array:
         configuration = now.scene.configuration
-        part = configuration.domain.layout.fields[name].slice
+        part = configuration.domain.layout.of_grid[name].slice
         solution = now.solution
-        of_all = configuration.before if solution is None else solution.coefficients
+        of_all = _before(now.scene) if solution is None else solution.coefficients
         return np.asarray(of_all[part])
 
     return of
@@ -148,15 +154,16 @@ def _velocity(now: Snapshot) -> Array:
     """Velocity of the particles, weighted by mass, with its gradient; NaN without particles around."""
     motion, attached = now.subject.motion, now.scene.configuration.domain
     assert motion is not None
-    kept = motion.on_grid
+    kept, functions, basis = motion.on_grid, attached.layout.functions, attached.layout.basis
     if kept is not None:  # a grid that is not reset has its own velocity
-        return _at_vertices(now.scene, kept[0])
+        return _at_vertices(now.scene, functions.whole(basis, kept[0]).ravel())
     fields = [(motion.velocity, motion.velocity_gradient)]
     (momentum,) = to_grid(attached, motion.mass, fields)
     mass = attached.sums(motion.mass, np.ones((len(motion.mass), 1)))
     v = np.divide(momentum, mass, out=np.zeros_like(momentum), where=mass > 0)
-    near = attached.sums(motion.mass, np.ones((len(motion.mass), 1)), "bilinear") > 0
-    return np.where(near, _at_vertices(now.scene, v), np.nan)
+    sums = attached.sums(motion.mass, np.ones((len(motion.mass), 1)), "bilinear")
+    near = functions.whole("bilinear", sums) > 0
+    return np.where(near, _at_vertices(now.scene, functions.whole(basis, v).ravel()), np.nan)
 
 
 def _reaction(now: Snapshot) -> Array:

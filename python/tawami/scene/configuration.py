@@ -167,7 +167,7 @@ class Configuration:
             obstacles: Contact with obstacles.
         """
         found: list[Term] = [*self.loads.following(self.domain, now), *supports, *obstacles]
-        return Terms(found, self.model.grid.comm) if found else None
+        return Terms(found, self.domain.layout) if found else None
 
     def external(self, now: Moment | None = None) -> Array:
         """External forces on all coefficients [N per metre depth], under all loads by default."""
@@ -262,7 +262,7 @@ class Configuration:
         if moved is None:
             coefficients = self.total = self.total + coefficients
             return self._outcome(accepted, coefficients)
-        self.supports.follow(accepted.u, accepted.problem.reduction.points)
+        self.supports.follow(self.domain.layout, accepted.u, accepted.problem.reduction.points)
         projects = self._travel.must_project(self.domain, moved.particles)
         self.domain.particles.move_to(moved.particles)
         with left_edges.taken_over(self.domain, self.supports.all, accepted.forces):
@@ -280,7 +280,7 @@ class Configuration:
 
     def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:
         self.obstacles.warn(self.domain, coefficients)
-        wall_gap.warn_of_distant(self.supports.walls, self.border.points, accepted.forces)
+        wall_gap.warn_of_distant(self.supports.walls, self.border.points, accepted)
         arrays = quantities.copies(self.domain.particles)
         return Outcome(accepted, coefficients, Reactions.of(accepted, self.supports), arrays)
 
@@ -306,14 +306,14 @@ class Configuration:
             "particles": placement.stored(self.model.grid.comm, self.domain.particles),
             "time": self.activity.time,
             "inputs": self.inputs.state(),
-            "total": self.total,
+            "total": self.domain.layout.whole(self.total),
             "left": self.left,
             "removed": [*self.removed],
             "laws": self.model.texts,
             "travel": self._travel.cells,
             "coverage_checked": self._coverage_checked,
             "supports": self.supports.state(),
-            "loads": self.loads.state(),
+            "loads": self.loads.state(self.domain.layout),
             "obstacles": self.obstacles.state(),
             "border": self.border.state(),
             "newton": self.domain.newton.state(),
@@ -328,10 +328,10 @@ class Configuration:
         given = self.model.grid, self.domain.particles, state["particles"]
         particles, location = placement.restored(*given, moving=self.model.moves)
         sizes = {np.shape(state["total"]), np.shape(state["loads"]["unbalanced"])}
-        if sizes - {(0,)} != {self.total.shape}:
+        if sizes - {(0,)} != {(self.domain.layout.size_of_grid,)}:
             raise CheckpointError("its fields have another number of coefficients than the scene")
         self.model.check_same_laws(state["laws"])
-        self.activity.time, self.total = state["time"], state["total"]
+        self.activity.time, self.total = state["time"], self.domain.layout.part(state["total"])
         self.activity.statics += 1
         self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
         self.removed = np.reshape(state["removed"], 2)
@@ -340,7 +340,7 @@ class Configuration:
         self.inputs.restore(state["inputs"])
         self.border.restore(state["border"])
         self.supports.restore(state["supports"])
-        self.loads.restore(state["loads"])
+        self.loads.restore(state["loads"], self.domain.layout)
         self.obstacles.restore(state["obstacles"])
         self._attach(particles, location)
         self.domain.newton.record()

@@ -123,6 +123,7 @@ def _remove(now: Configuration, mask: Mask) -> Removed:
     kinetic = 0.5 * mass @ (velocity**2).sum(axis=1) if moving else 0.0
     kept, gone = placement.removed(model.grid, particles, mask)
     location = placement.located(model.grid, kept.x, moving=model.moves)
+    location = model.grid.window.place(location)
     after = Domain.attach(model, kept, location, now.numerics, now.stopwatch)
     excavation = Excavation(comm, kept.x, particles.x[mask])
     now.supports.check_reach(before, after, excavation)
@@ -164,7 +165,8 @@ def _replace(now: Configuration, after: Domain, excavation: Excavation | None = 
     forces[after.layout.num_displacement :] = 0.0
     forces[~after.layout.active] = 0.0
     now.model, now.domain = after.model, after
-    if np.abs(forces).max() > ROUND_OFF * np.abs(internal).max():
+    layout = after.layout
+    if layout.largest(forces) > ROUND_OFF * layout.largest(internal):
         now.loads.keep_balance(forces)
     now.loads.changed()
 

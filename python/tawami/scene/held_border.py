@@ -40,7 +40,7 @@ class HeldBorder:
         support: The support.
         values: Prescribed values at its points at the end of the step, counted as `before`: all of
             those at small strain, the increments where particles move.
-        before: Coefficients at the start, which the values include.
+        before: Coefficients of the whole grid at the start, which the values include.
         chosen: Mask of the points that it holds; by default all that it holds by tractions.
     """
 
@@ -57,7 +57,7 @@ class HeldBorder:
         assert isinstance(support.place, MovingPoints)
         self._support, self._domain = support, domain
         self._weak = weak = np.flatnonzero(support.weak if chosen is None else chosen)
-        place, fields, h = support.place, domain.layout.fields, domain.model.grid.h
+        place, fields, h = support.place, domain.layout.of_grid, domain.model.grid.h
         field = fields[str(support.component)] if support.is_field else next(iter(fields.values()))
         cells = place.cells(domain)
         numbers, functions, _ = cells.tabulated(field.basis)
@@ -78,7 +78,7 @@ class HeldBorder:
         self.prescribed = float(np.abs(self.values).max(initial=0.0))
         self._before, self._held = before, self._mean(support.held[weak])
         self._largest, self._stiffened = np.inf, 1.0
-        K, mu = (m[cells.location.cell] for m in domain.moduli_of_cells)
+        K, mu = domain.moduli_at(cells)
         self._elastic = (K + PENALTY * mu)[weak]
         self._tied = self._with_penalty(self._elastic)
 

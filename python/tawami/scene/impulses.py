@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from tawami.base.arrays import Array, Mask
+from tawami.field.layout import Layout
 from tawami.scene.held_border import HeldBorder
 
 
@@ -18,15 +19,20 @@ class Impulses:
     the impulses. Fixed coefficients stay.
 
     Args:
+        layout: Places of the coefficients.
         held: The supports; those of fields are ignored.
         mass: Mass of each displacement coefficient [kg per metre depth].
         fixed: Whether other supports prescribe each of them.
     """
 
-    def __init__(self, held: Sequence[HeldBorder], mass: Array, fixed: Mask) -> None:
+    def __init__(
+        self, layout: Layout, held: Sequence[HeldBorder], mass: Array, fixed: Mask
+    ) -> None:
+        self._layout = layout
         self._chosen = [k for k, one in enumerate(held) if not one.support.is_field]
         if not self._chosen:
             return
+        mass, fixed = layout.whole(mass), layout.whole(fixed.astype(float)) > 0
         n = len(mass)
         self._means = sp.vstack([held[k].means[:, :n] for k in self._chosen]).tocsr()
         inverse = np.divide(1.0, mass, out=np.zeros(n), where=(mass > 0) & ~fixed)
@@ -44,8 +50,8 @@ class Impulses:
         if not self._chosen:
             return values
         prescribed = np.concatenate([rates[k] for k in self._chosen]) if rates else 0.0
-        impulse = self._inverse @ (prescribed - self._means @ values)
-        return np.asarray(values + self._weighted @ impulse)
+        impulse = self._inverse @ (prescribed - self._means @ self._layout.whole(values))
+        return np.asarray(values + self._layout.part(self._weighted @ impulse))
 
     def work(self, forces: Array, u: Array) -> float:
         """Work of the supports, given the forces out of balance without them.
@@ -57,5 +63,6 @@ class Impulses:
         """
         if not self._chosen:
             return 0.0
-        multipliers = self._inverse @ (self._weighted.T @ forces)
-        return float(multipliers @ (self._means @ u))
+        whole = self._layout.whole
+        multipliers = self._inverse @ (self._weighted.T @ whole(forces))
+        return float(multipliers @ (self._means @ whole(u)))

@@ -116,7 +116,8 @@ class Traction(OnBorder):
     def on(self, domain: Domain, term: Term) -> Array:
         """Forces of the whole traction, functions x dim [N per metre depth]."""
         forces = self.points.reference[:, None] * self.at_points(term)
-        return self.points.cells(domain).sums(domain.layout.basis, forces)
+        of = domain.layout.functions, domain.layout.basis
+        return self.points.cells(domain).sums(*of, forces)
 
 
 class Pressure(OnBorder):
@@ -136,7 +137,8 @@ class Pressure(OnBorder):
         """Forces of the whole pressure where the border is, functions x dim [N per metre depth]."""
         thickness = self.points.space.thickness(self.points.x)
         forces = -self.at_points(term) * thickness[:, None] * self.points.area
-        return self.points.cells(domain).sums(domain.layout.basis, forces)
+        of = domain.layout.functions, domain.layout.basis
+        return self.points.cells(domain).sums(*of, forces)
 
 
 class Flux(OnBorder):
@@ -172,7 +174,8 @@ class Flux(OnBorder):
         """Coefficients of the field, and the integrals of the whole flux times their functions."""
         place = domain.layout.fields[self.field]
         flux = self.points.weight[:, None] * self.at_points(term)
-        return place.slice, self.points.cells(domain).sums(place.basis, flux)[:, 0]
+        sums = self.points.cells(domain).sums(domain.layout.functions, place.basis, flux)
+        return place.slice, sums[:, 0]
 
     def __str__(self) -> str:
         return f"{super().__str__()} of {self.field}"

@@ -14,6 +14,7 @@ from tawami.base.arrays import Array
 from tawami.base.errors import SupportError
 from tawami.base.text import listed
 from tawami.field.follower import FollowerPressure
+from tawami.field.layout import Layout
 from tawami.grid.grid import Grid
 from tawami.scene import selection
 from tawami.scene.action import Owner, Term, restored
@@ -207,7 +208,7 @@ class Loads(Owner[Load]):
         """All external forces, with those of pressures that follow the border."""
         total = self.external(domain, now)
         for term in self.following(domain, now):
-            total += term.forces(np.zeros_like(total))
+            total += domain.layout.part(term.forces(np.zeros(domain.layout.size_of_grid)))
         return total
 
     def keep_balance(self, forces: Array) -> None:
@@ -244,17 +245,18 @@ class Loads(Owner[Load]):
         """Facts that decide the results of a run, in the types of JSON."""
         return [[type(load).__name__, *load.place(), *load.identity()] for load in self.all]
 
-    def state(self) -> dict[str, Any]:
-        """Share of each load that the body carries, and the forces that fade."""
-        unbalanced = np.zeros(0) if self.unbalanced is None else self.unbalanced
+    def state(self, layout: Layout) -> dict[str, Any]:
+        """Share of each load that the body carries, and the forces that fade; a call for all ranks."""
+        unbalanced = np.zeros(0) if self.unbalanced is None else layout.whole(self.unbalanced)
         return {"all": [load.state() for load in self.all], "unbalanced": unbalanced}
 
-    def restore(self, state: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Any], layout: Layout) -> None:
         """The reverse of :meth:`state`, for the same loads.
 
         Raises:
             CheckpointError: The script has made others.
         """
         self.all = restored("load", self.all, state["all"])
-        self.unbalanced = state["unbalanced"] if len(state["unbalanced"]) else None
+        unbalanced = state["unbalanced"]
+        self.unbalanced = layout.part(unbalanced) if len(unbalanced) else None
         self.changed()

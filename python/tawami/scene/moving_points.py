@@ -278,7 +278,7 @@ def halve(ends: MovingPoints, longest: float) -> Indices:
 def moved(
     all_points: Sequence[MovingPoints], domain: Domain, u: Array
 ) -> list[tuple[Array, Array]]:
-    """Positions and areas of points after a step.
+    """Positions and areas of points after a step; a call for all ranks.
 
     Points without particles near them, as after a body broke, stay where they are; loads and supports
     on them raise an error.
@@ -297,7 +297,7 @@ def moved(
     normal = area / np.linalg.norm(area, axis=1)[:, None]
     cells = BorderInCells(grid, domain.active, x, normal, torn=True)
     location, near = cells.location, ~cells.lost
-    flat = np.ascontiguousarray(u).ravel()
+    flat = domain.layout.whole(np.ascontiguousarray(u).ravel())
     gradient = space.in_space(space.gradients(_rust.gradients(location, basis, flat)))
     f = gradient + np.eye(space.dim)
     x, area = x.copy(), area.copy()

@@ -44,7 +44,8 @@ class ObstacleContact:
         domain: The particles at its start.
         obstacle: The obstacle.
         motion: Its motion in the step.
-        before: Displacement coefficients since the start where particles do not move, else 0.
+        before: Displacement coefficients of the whole grid since the start where particles do not move,
+            else 0.
     """
 
     smooth, implicit, first_work = False, True, 0.0
@@ -161,7 +162,7 @@ class ObstacleContact:
     def stiffness(self) -> sp.csr_matrix:
         """See `Term`. Its entries are in the same places as long as no patch comes near."""
         self.now = self._states.linearised(self.now)
-        return self._border.on_coefficients(-self.motion.factor * self.now.derivative)
+        return self._border.on_coefficients(-self.motion.factor * self.now.derivatives)
 
     def improve(self) -> bool:
         """See `Term`."""
@@ -229,7 +230,7 @@ class ObstacleContact:
         """Work on body and obstacle from outside, dissipation by friction, and loss by impact.
 
         Args:
-            u: Increments of the displacement.
+            u: Increments of the displacement, in the whole grid.
         """
         q, free, resultant = self.motion.unknown, self.motion.free, self.now.resultant
         external = float(self.motion.force[free] @ q[free] - resultant[~free] @ q[~free])
@@ -331,7 +332,7 @@ class ObstacleContact:
         rows, directions = [], [now.surface.normal]
         if self.obstacle.friction > 0:
             directions += list(now.tangent.transpose(1, 0, 2))
-        shares = now.contact.patches.shares(now.contact.weights)
+        shares = now.contact.shares
         for k in np.flatnonzero(now.pressure > 0):
             mine = now.contact.patches.number == k
             x, y = now.x[mine][0]

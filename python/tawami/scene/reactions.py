@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from tawami.base import checks
-from tawami.base.arrays import Array
+from tawami.base.arrays import Array, of_components
 from tawami.base.errors import InputError
 from tawami.base.text import quoted
+from tawami.field.owned import Owned
 from tawami.field.reduction import Reduction
 from tawami.grid import edges
 from tawami.grid.grid import EDGES, Edge
@@ -45,33 +46,40 @@ def _check_known(place: str, edges_held: Collection[str], names: Collection[str]
 
 def divided(reduction: Reduction, forces: Array) -> tuple[Array, Array]:
     """Forces of supports: those of edges and walls on all displacement coefficients, and the multipliers
-    of points, which carry as much as possible.
+    of points, which carry as much as possible; a call for all ranks.
 
     Args:
         reduction: The supports.
         forces: Of all supports on the displacement coefficients [N per metre depth].
     """
-    fixed, points, rest = reduction.fixed[: len(forces)], reduction.points, forces
-    multipliers = np.zeros(len(points))
+    layout, points = reduction.layout, reduction.points
+    fixed, rest, multipliers = reduction.fixed[: len(forces)], forces, np.zeros(len(points))
     if points:
-        weights = np.zeros((len(forces), len(points)))
+        some = np.unique(np.concatenate([point.indices for point in points]))
+        weights = np.zeros((len(some), len(points)))
         for k, point in enumerate(points):
-            weights[point.indices, k] = point.weights
-        multipliers = np.linalg.lstsq(weights[~fixed], forces[~fixed], rcond=None)[0]
-        rest = forces - weights @ multipliers
+            weights[np.searchsorted(some, point.indices), k] = point.weights
+        loose = layout.at(fixed.astype(float), some) == 0
+        carried = layout.at(forces, some)[loose]
+        multipliers = np.linalg.lstsq(weights[loose], carried, rcond=None)[0]
+        place, rest = layout.places(some), forces.copy()
+        rest[place[place >= 0]] -= (weights @ multipliers)[place >= 0]
     return np.where(fixed, rest, 0.0), multipliers
 
 
 def work(reduction: Reduction, forces: Array, u: Array) -> float:
     """Work of forces of supports on increments of the displacement [J per metre depth].
 
+    A call for all ranks.
+
     Args:
         reduction: The supports.
         forces, u: On all displacement coefficients [N per metre depth], [m].
     """
     held, multipliers = divided(reduction, forces)
-    moved = [point.weights @ u[point.indices] for point in reduction.points]
-    return float(held @ u + multipliers @ np.array(moved))
+    layout = reduction.layout
+    moved = [point.weights @ layout.at(u, point.indices) for point in reduction.points]
+    return layout.dot(held, u) + float(multipliers @ np.array(moved))
 
 
 @dataclass(frozen=True)
@@ -95,7 +103,7 @@ class Reactions:
     its length.
 
     Attributes:
-        on_edges: Of edges and walls, functions x dim [N per metre depth].
+        on_edges: Of edges and walls, on the displacement coefficients [N per metre depth].
         at_points: Of points.
         on_border: Of patches of the border [N per metre depth], by the names of its parts.
         on_obstacles: Contact with obstacles.
@@ -103,7 +111,7 @@ class Reactions:
         names: Parts of the border with supports, each with the edges of the grid that it is held on.
     """
 
-    on_edges: Array
+    on_edges: Owned
     at_points: Sequence[AtPoint] = field(default_factory=list)
     on_border: Sequence[tuple[str, Array]] = ()
     on_obstacles: Sequence[ContactResult] = ()
@@ -112,7 +120,7 @@ class Reactions:
 
     @classmethod
     def of(cls, accepted: Accepted, supports: Supports) -> Reactions:
-        """Points by their multipliers, the rest to edges and walls.
+        """Points by their multipliers, the rest to edges and walls; a call for all ranks.
 
         Args:
             accepted: The step.
@@ -127,7 +135,8 @@ class Reactions:
             assert not isinstance(support.component, str)
             places = (support.given, support.place, point.place)
             at_points.append(AtPoint(places, support.component, float(force)))
-        on_edges = held.reshape(accepted.u.shape) + accepted.friction
+        layout, friction = reduction.layout, accepted.friction
+        on_edges = layout.owned(held + friction.ravel())
         on_border = [
             part
             for held in accepted.problem.supports
@@ -151,7 +160,7 @@ class Reactions:
         )
 
     def at(self, model: Model, place: str | Sequence[float] | Obstacle) -> Array:
-        """Force (x, y) [N per metre depth] of a support; see `Solution.reaction`."""
+        """Force (x, y) [N per metre depth] of a support, a call for all ranks; see `Solution`."""
         force, found = np.zeros(model.space.dim), False
         if isinstance(place, Obstacle) or any(place == one.name for one in self.on_obstacles):
             return -self.contact(place).force
@@ -162,7 +171,8 @@ class Reactions:
                 on_edges.add(checks.choice("reaction(...)", place, EDGES))
             for edge in sorted(on_edges):
                 functions = edges.edge_functions(model.grid, model.basis, edge)
-                force = force + self.on_edges[functions].sum(axis=0)
+                places = of_components(functions, model.space.dim)
+                force = force + self.on_edges.at(places).sum(axis=0)
             parts = [part for name, part in self.on_border if name == place]
             return np.asarray(sum(parts, force))
         place = checks.point("reaction(...)", place)

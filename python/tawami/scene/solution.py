@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks, html, ranks
+from tawami.base.arrays import of_components
 from tawami.base.errors import InputError, NotModelledError
 from tawami.base.process import Unique
 from tawami.base.sealed import Sealed
@@ -23,6 +24,7 @@ from tawami.scene.absent import Elsewhere
 from tawami.scene.configuration import Configuration
 from tawami.scene.contact_result import ContactResult
 from tawami.scene.obstacle import Obstacle
+from tawami.scene.of_all_particles import OfAllParticles
 from tawami.scene.outcome import Outcome
 from tawami.scene.outline import Outline
 from tawami.scene.points import ROUND_OFF, outside
@@ -42,18 +44,15 @@ class Solved(Protocol):
         """Its particles, supports and loads."""
 
 
-class Solution(Elsewhere, Sealed, Unique):
+class Solution(OfAllParticles, Elsewhere, Sealed, Unique):
     """Equilibrium of a scene, or the end of a step.
 
     Arrays of particles are in the order of their numbers. On several ranks a solution holds the
-    particles of this rank, `own`. An array of all (`x`, `stress`, ...) is gathered when it is first
-    read, and kept: this is a call for all ranks. Coefficients are complete on every rank.
+    particles and coefficients of this rank. An array of all (`x`, `stress`, `u`, ...) is gathered when
+    it is first read, and kept: this is a call for all ranks. `own` has the particles of this rank.
 
     Attributes:
         scene: The scene.
-        coefficients: Of all fields, one after the other, as `u`.
-        u: Coefficients of the displacement [m], two per function, x fastest: since the start, and of
-            the last step where strains are finite.
         unknowns: Number of reduced unknowns.
         load: Share of the new loads and displacements that it is in equilibrium with; NaN in dynamics.
         iterations: Newton iterations of the last step.
@@ -67,7 +66,6 @@ class Solution(Elsewhere, Sealed, Unique):
             Frobenius norm over the square root of its size, times that of its inverse as random
             vectors show it.
         symmetric: Whether that tangent was symmetric.
-        on_edges: Forces of edges and walls on the body, functions x 2 [N per metre depth].
     """
 
     def __init__(self, scene: Solved, outcome: Outcome) -> None:
@@ -75,17 +73,15 @@ class Solution(Elsewhere, Sealed, Unique):
         self.scene: Any = scene
         self._model = scene.configuration.model
         layout, step = outcome.accepted.problem.reduction.layout, outcome.accepted.step
-        self.coefficients = outcome.coefficients
-        self.u, self._volumetric = layout.split(outcome.coefficients)
-        self._active = layout.active[: layout.num_displacement].astype(float)
+        self._coefficients, self._of_grid = layout.owned(outcome.coefficients), layout.of_grid
+        self._active = layout.owned(layout.active.astype(float))
         self.unknowns, self.iterations = outcome.accepted.problem.reduction.size, step.iterations
         self.load, self.history = outcome.accepted.load, step.history
         self.krylov = tuple(step.krylov)
         self.condition, self.symmetric = step.condition, step.symmetric
         self._reactions = outcome.reactions
-        self.on_edges = outcome.reactions.on_edges
         points, domain = scene.configuration.border.points, scene.configuration.domain
-        self._outline = None if points is None else Outline(points, domain, self.u)
+        self._outline = None if points is None else Outline(points, domain, outcome.coefficients)
         comm, own = self._model.grid.comm, outcome.particles
         self._arrays = Gathered(comm, own)
         self.arrays = Arrays(lambda name: self._array(name, self._arrays))
@@ -101,29 +97,25 @@ class Solution(Elsewhere, Sealed, Unique):
         )
 
     @property
-    def number(self) -> Array:
-        """Numbers of the particles in the body, ascending: all, unless some have left."""
-        return self.arrays["number"]
+    def coefficients(self) -> Array:
+        """Coefficients of all fields, one after the other, as `u`; gathered from the ranks when they are
+        first read.
+        """
+        return self._coefficients.whole
 
     @property
-    def x(self) -> Array:
-        """Positions of the particles [m]."""
-        return self.arrays["x"]
+    def u(self) -> Array:
+        """Coefficients of the displacement [m], two per function, x fastest: since the start, and of the
+        last step where strains are finite; gathered as `coefficients`.
+        """
+        return self.coefficients[next(iter(self._of_grid.values())).slice]
 
     @property
-    def volume(self) -> Array:
-        """Their volumes [m2] at the start."""
-        return self.arrays["volume"]
-
-    @property
-    def stress(self) -> Array:
-        """Their stress [Pa] (xx, yy, zz, xy) at the end of this step."""
-        return self.arrays["stress"]
-
-    @property
-    def displacement_of_particles(self) -> Array:
-        """Their displacement [m] since the start."""
-        return self.arrays["displacement"]
+    def on_edges(self) -> Array:
+        """Forces of edges and walls on the body, functions x 2 [N per metre depth]; gathered as
+        `coefficients`.
+        """
+        return self._reactions.on_edges.whole.reshape(-1, self._model.space.dim)
 
     @property
     def volumetric(self) -> Array:
@@ -132,7 +124,12 @@ class Solution(Elsewhere, Sealed, Unique):
         Raises:
             InputError: The form has neither.
         """
-        return self._of_form("volumetric", self._volumetric, "has_mean_stress")
+        volumetric = [
+            self.coefficients[self._of_grid[name].slice]
+            for name, field in self._model.form.fields.items()
+            if field.role in ("volumetric_strain", "pressure")
+        ]
+        return self._of_form("volumetric", next(iter(volumetric), None), "has_mean_stress")
 
     @property
     def eps_v(self) -> Array:
@@ -193,13 +190,8 @@ class Solution(Elsewhere, Sealed, Unique):
         """
         return self.arrays["strain"]
 
-    @property
-    def mean_stress(self) -> Array:
-        """Mean stress [Pa] at the particles, (xx + yy + zz)/3, tension positive."""
-        return np.asarray(self.stress[:, :3].mean(axis=1))
-
     def displacement(self, point: Sequence[float]) -> Array:
-        """Displacement (u_x, u_y) [m] of the grid at a point.
+        """Displacement (u_x, u_y) [m] of the grid at a point; a call for all ranks.
 
         At small strain it is the displacement since the start. At finite strain, where the grid is reset
         after each step, it is the increment of the last step only: `displacement_of_particles` has the
@@ -214,19 +206,15 @@ class Solution(Elsewhere, Sealed, Unique):
         """
         what = f"displacement({checks.shown(point)})"
         location = edges.locate_point(self._model.grid, point, what)
-        fields = np.column_stack([self.u, self._active])
-        value, share = (
-            np.asarray(
-                _rust.interpolate(location, self._model.basis, self._model.space.dim, field)[0]
-            )
-            for field in np.ascontiguousarray(fields.T)
-        )
+        functions, shares, _ = _rust.functions_at(location, self._model.basis)
+        places = of_components(functions[0], self._model.space.dim)
+        value, share = (shares[0] @ of.at(places) for of in (self._coefficients, self._active))
         reached = float(share.min())
         if reached < LEAST_SHARE:
             distances = np.linalg.norm(self.own["x"] - np.asarray(point), axis=1)
             nearest = np.array([distances.min(initial=np.inf)])
             raise outside(what, float(ranks.least_of(self._model.grid.comm, nearest)[0]))
-        return value if reached > 1 - ROUND_OFF else value / reached
+        return np.asarray(value if reached > 1 - ROUND_OFF else value / reached)
 
     # -- in a notebook -------------------------------------------------------
 

@@ -15,6 +15,7 @@ from tawami.base.errors import SupportWarning
 from tawami.base.warn import warn
 from tawami.grid.grid import ON_LINE
 from tawami.scene.moving_points import MovingPoints
+from tawami.scene.step import Accepted
 from tawami.scene.walls import FORCE, Wall
 
 #: Distances [cells]: at which the functions of a wall end, and below which a border that moves is on
@@ -41,25 +42,29 @@ def warn_of_new(wall: Wall, border: MovingPoints | None, *, moves: bool) -> None
         _warn(wall, gap, "the wall acts already" if acts else "the wall never acts")
 
 
-def warn_of_distant(walls: Iterable[Wall], border: MovingPoints | None, forces: Array) -> None:
+def warn_of_distant(walls: Iterable[Wall], border: MovingPoints | None, accepted: Accepted) -> None:
     """Warn, once for each wall, of one that pushed the body in a step at a distance from its border.
+
+    A call for all ranks.
 
     Args:
         walls: The walls.
         border: The border at the end of the step, None for a body without one.
-        forces: Forces of supports and walls on the body, functions x dim [N per metre depth].
+        accepted: The step.
 
     Warns:
         SupportWarning: A wall did.
     """
     if border is None or not len(border):
         return
+    layout, forces = accepted.problem.reduction.layout, accepted.forces
     for wall in walls:
         if wall.told:
             continue
         across, _, inward = wall.axes
-        push = inward * forces[wall.functions[wall.state.touching], across]
-        if push.max(initial=0.0) <= FORCE * np.abs(forces).max(initial=0.0):
+        on_wall = layout.vectors_at(forces, wall.functions[wall.state.touching])
+        push = inward * on_wall[:, across]
+        if push.max(initial=0.0) <= FORCE * layout.largest(forces):
             continue
         gap = border.gap(wall.edge)
         if gap > CLOSED * wall.grid.h:

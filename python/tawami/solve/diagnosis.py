@@ -147,7 +147,9 @@ class Diagnosis:
         attachment = self._assembly.attachment
         off = not attachment.compiled.penalises and "ghost_penalty" in form.options
         moves = form.strain.finite  # elsewhere full cells have no penalty
-        if off and moves and not lagrange and not attachment.active.all():
+        inactive = np.array([not attachment.active.all()])
+        partly = ranks.any_of(self._comm, inactive)[0]
+        if off and moves and not lagrange and partly:
             advice.append("use ghost_penalty='on', which ties partial cells to their neighbours")
         return (
             "some functions of the grid get no stiffness from the particles. Support every part of the "
@@ -191,18 +193,17 @@ class Diagnosis:
         """
         grid = self._layout.grid
         own = np.argsort(-np.abs(direction))[:ENTRIES]
-        entries = ranks.allgathered(self._comm, np.abs(direction[own]))
-        unknowns = ranks.allgathered(self._comm, reduction.own.start + own)
-        counts = self._responses.particles_per_cell
-        found: list[str] = []
-        for unknown in unknowns[np.argsort(-entries, kind="stable")][:ENTRIES]:
-            coefficient = int(reduction.unknowns[unknown])
+        counts, mine = self._responses.particles_per_cell, []
+        for unknown in own:
+            coefficient = int(reduction.coefficients[unknown])
             cells, name = self._layout.cells_of(coefficient), self._layout.name_of(coefficient)
-            number = counts[grid.cell_numbers(cells)]
+            number = counts[grid.window.numbers(cells)]
             i, j = cells[number.argmin()]
             text = f"({i}, {j}) with {number.min()} particles"
             if name in self._responses.form.own_fields:
                 text += f" in field '{name}'"
-            if text not in found:
-                found.append(text)
-        return found[:CELLS]
+            mine.append((-abs(float(direction[unknown])), text))
+        every = sorted(
+            (one for part in self._comm.allgather(mine) for one in part), key=lambda one: one[0]
+        )
+        return list(dict.fromkeys(text for _, text in every[:ENTRIES]))[:CELLS]

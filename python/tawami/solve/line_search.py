@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -42,7 +41,7 @@ class LineSearch:
     """The work of the unbalance along one change of the increments.
 
     Args:
-        comm: Communicator; all ranks get the same bits.
+        dot: Scalar product of vectors of coefficients, the same on all ranks.
         change: Change of all increments by a full step.
         residual: Forces out of balance at its beginning.
         signs: Sign of each coefficient in g: 1, -1 or 0.
@@ -51,13 +50,13 @@ class LineSearch:
 
     def __init__(
         self,
-        comm: Any,
+        dot: Callable[[Array, Array], float],
         change: Array,
         residual: Array,
         signs: Array,
         terms: Terms | None = None,
     ) -> None:
-        self._comm, self._change, self._residual = comm, change, residual
+        self._dot, self._change, self._residual = dot, change, residual
         self._signs, self._terms = signs, terms
 
     @functools.cached_property
@@ -71,7 +70,7 @@ class LineSearch:
         return self._work(self._residual, of_terms)
 
     def _work(self, residual: Array, of_terms: float) -> float:
-        return float(self._comm.bcast(float(self._weights @ residual) + of_terms))
+        return self._dot(self._weights, residual) + of_terms
 
     def _at_last_forces(self, residual: Array) -> float:
         return self._work(residual, 0.0 if self._terms is None else self._terms.work)

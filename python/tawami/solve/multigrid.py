@@ -38,8 +38,6 @@ STEPS, RATIO = 7, 12.0
 GROWTH, MORE = 1.5, 5
 #: Tolerance for a second right-hand side, relative to that of the first.
 AGAIN = 1e-4
-#: Tolerance of the solve for the random vector, by which a singular tangent is noticed.
-LOW_TOLERANCE = 0.1
 PREFIX = "tawami_multigrid_"
 
 
@@ -63,6 +61,7 @@ class MultigridSolver(LinearSolver):
         self._tested, self._matrix, self.first = False, None, 0
         self.made = False
         self._grids: list[Handles] = []
+        self._parts: list[Part] = []
         self._records = False
 
     def forget(self) -> None:
@@ -70,7 +69,7 @@ class MultigridSolver(LinearSolver):
         super().forget()
         for handles in self._grids:
             handles.free()
-        self._grids, self._matrix = [], None
+        self._grids, self._parts, self._matrix = [], [], None
 
     def successor(self) -> LinearSolver:
         """This solver: its operators serve as long as the matrix is used."""
@@ -138,16 +137,28 @@ class MultigridSolver(LinearSolver):
         return np.asarray(np.random.default_rng(0).standard_normal(size)[begin:end])
 
     def _test(self, matrix: Any) -> None:
-        """Estimate the condition number from a random right-hand side; raise an error if singular."""
-        self._converge(self._probe(matrix), LOW_TOLERANCE)
+        """Estimate the condition number by the preconditioner; raise an error if singular."""
+        ksp, x, b = (self._handles[name] for name in ("ksp", "x", "b"))
+        b.setArray(self._probe(matrix))
+        ksp.setUp()
+        self._handles["pc"].apply(b, x)
         norm, size = matrix.norm(PETSc.NormType.FROBENIUS), matrix.getSize()[0]
-        self.condition = float(norm / np.sqrt(size) * self._handles["x"].norm())
+        self.condition = float(norm / np.sqrt(size) * x.norm())
         self._tested = True
         if self.singular:
             raise StalledError(
                 "the tangent is singular (condition number of the scaled matrix: about "
-                f"{self.condition:.1e}, from a random vector)"
+                f"{self.condition:.1e}, by the preconditioner of a random vector)"
             )
+
+    def _krylov(self, right: Array, tolerance: float, limit: int) -> bool:
+        """See `LinearSolver._krylov`; the vectors of GMRES are freed if it converges."""
+        ksp = self._handles["ksp"]
+        ksp.setGMRESRestart(RESTART)
+        converged = super()._krylov(right, tolerance, limit)
+        if converged:
+            ksp.setGMRESRestart(1)
+        return converged
 
     def _converge(self, right: Array, tolerance: float) -> None:
         if not self._krylov(right, tolerance, LIMIT):
@@ -161,7 +172,7 @@ class MultigridSolver(LinearSolver):
 
     def _precondition(self, matrix: Any, parts: list[Part]) -> None:
         """Make the operators of all fields, and GMRES."""
-        handles, comm = self._handles, matrix.comm
+        handles, comm, self._parts = self._handles, matrix.comm, parts
         handles.free("ksp", "pc", "parts")
         start = matrix.getOwnershipRange()[0]
         numbers = [(start + np.flatnonzero(p.block.mine)).astype(PETSc.IntType) for p in parts]
@@ -179,7 +190,6 @@ class MultigridSolver(LinearSolver):
         ksp.setOperators(matrix, handles["parts"])
         ksp.setType("gmres")
         ksp.setPCSide(PETSc.PC.Side.RIGHT)
-        ksp.setGMRESRestart(RESTART)
         # near a singular tangent, vectors that are not orthogonal let the residual grow
         _set(ksp, {"ksp_gmres_cgs_refinement_type": "refine_ifneeded"})
         pc = handles["pc"] = ksp.getPC()
@@ -256,6 +266,7 @@ class MultigridSolver(LinearSolver):
             handles[f"operator {k + 1}"] = operators[-1]
         pc.setType("mg")
         pc.setMGLevels(len(operators))
+        pc.setMGType(PETSc.PC.MGType.KASKADE)
         for level, matrix in enumerate(reversed(operators)):
             if level == 0:
                 coarse = pc.getMGCoarseSolve()
@@ -265,16 +276,13 @@ class MultigridSolver(LinearSolver):
                 coarse.destroy()
                 continue
             pc.setMGInterpolation(level, steps[len(operators) - 1 - level])
-            for smoother, sweep in (
-                (pc.getMGSmootherDown(level), "forward"),
-                (pc.getMGSmootherUp(level), "backward"),
-            ):
-                smoother.setOperators(matrix)
-                smoother.setType("richardson")
-                smoother.setNormType(PETSc.KSP.NormType.NONE)
-                smoother.setTolerances(max_it=1)
-                _set(smoother, {"pc_type": "sor", f"pc_sor_local_{sweep}": None})
-                smoother.destroy()
+            smoother = pc.getMGSmoother(level)
+            smoother.setOperators(matrix)
+            smoother.setType("richardson")
+            smoother.setNormType(PETSc.KSP.NormType.NONE)
+            smoother.setTolerances(max_it=1)
+            _set(smoother, {"pc_type": "sor", "pc_sor_local_symmetric": None})
+            smoother.destroy()
         pc.setUp()
 
 

@@ -10,7 +10,6 @@ from typing import Any, NoReturn
 import numpy as np
 
 from tawami import _rust
-from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import CheckpointError, SingularError
 from tawami.base.files import reason
@@ -99,7 +98,7 @@ class Newton:
         self._linear = linear
         self._assembly, self._responses = assembly, responses
         self.numerics, self._stopwatch = numerics, stopwatch
-        self._comm = assembly.layout.grid.comm
+        self._layout, self._comm = assembly.layout, assembly.layout.grid.comm
         self._measures = Measures(assembly, responses)
         self._scaling = Scaling(assembly.layout, responses)
         self._operators = Operators(assembly, responses)
@@ -234,7 +233,7 @@ class Newton:
             with reported():
                 change, of_factor = self._change(iterate, forces, equations, add_mass, history)
             if equations.is_searched(self._responses.form.strain.finite):
-                search = LineSearch(self._comm, change, forces.residual, self._signs, terms)
+                search = LineSearch(self._layout.dot, change, forces.residual, self._signs, terms)
             iterate.add(change, of_factor)
             krylov.append(self._solver.iterations)
             self._stopwatch.lap()
@@ -289,7 +288,7 @@ class Newton:
         system = System(
             tangent,
             functools.partial(self._scaling.factors, tangent, reduction),
-            -reduction.restricted(forces.residual)[reduction.own],
+            -reduction.restricted(forces.residual),
             tolerance,
             functools.partial(self._operators.parts, equations),
         )
@@ -307,13 +306,10 @@ class Newton:
             self._diagnosis.report_singular(solver, equations, history, singular)
 
         def again(right: Array) -> Array:
-            mine = reduction.restricted(right)[reduction.own]
-            return self._on_all(reduction, solver.again(mine, tolerance))
+            return reduction.expanded(solver.again(reduction.restricted(right), tolerance))
 
         try:
-            change, of_factor = complete(
-                equations, iterate.u, self._on_all(reduction, found), again
-            )
+            change, of_factor = complete(equations, iterate.u, reduction.expanded(found), again)
         except GivesWayError as error:
             self._fail(history, f"Then {error}. {equations.advice}")
         if not np.isfinite(of_factor):
@@ -336,10 +332,6 @@ class Newton:
         self.internal(np.zeros(size))
         tangent = self._assembly.tangent(np.zeros(size), self._responses.data, reduction)
         return diagonal_of(tangent, reduction)
-
-    def _on_all(self, reduction: Reduction, unknowns: Array) -> Array:
-        """All coefficients from this rank's unknowns."""
-        return reduction.expanded(ranks.allgathered(self._comm, unknowns))
 
     def _fail(self, history: History, advice: str) -> NoReturn:
         field = self._measures.worst_field

@@ -19,6 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from tawami.base import ranks
+from tawami.base.petsc import aij
 from tawami.field.assembly import Assembly
 from tawami.field.block import Block
 from tawami.particles.responses import Responses
@@ -90,23 +91,24 @@ class Operators:
             if place.start == 0 and not self._responses.form.kinematics.volume_at_centre:
                 moduli = np.ascontiguousarray(np.column_stack([mu, lame]))
                 operator = block.assembled("elasticity", moduli)
-                added = self._added(equations)
-                if added is not None:
-                    extra = block.reduced(added)
+                for rows in self._added(equations, block):
+                    extra = aij(attachment.grid.comm, rows, block.num_own)
                     operator.axpy(1.0, extra)
                     extra.destroy()
             elif place is layout.volumetric:
                 operator = block.assembled("mass", np.ascontiguousarray(mu[:, None]))
             yield Part(name, block, operator, place is layout.volumetric)
 
-    def _added(self, equations: Equations) -> sp.csr_matrix | None:
-        """Stiffness beside that of the particles, on all coefficients; None without any."""
-        parts = [self._assembly.penalty(self._responses.data)]
+    def _added(self, equations: Equations, block: Block) -> Iterator[sp.csr_matrix]:
+        """Rows of stiffness of the displacement beside that of the particles."""
+        layout = self._assembly.layout
+        penalty = self._assembly.penalty(self._responses.data)
+        if penalty is not None:
+            yield block.of_window(penalty)
         if equations.inertia is not None:
             mass = equations.inertia.slope * equations.inertia.mass
-            parts.append(sp.diags(np.pad(mass, (0, self._assembly.layout.size - len(mass)))))
+            mine = np.where(layout.own, np.pad(mass, (0, layout.size - len(mass))), 0.0)
+            yield block.of_window(sp.diags(mine).tocsr())
         stiffness = None if equations.terms is None else equations.terms.stiffness
         if stiffness is not None:
-            parts.append((stiffness + stiffness.T) / 2)
-        known = [part for part in parts if part is not None]
-        return sp.csr_matrix(sum(known[1:], known[0])) if known else None
+            yield block.of_grid(((stiffness + stiffness.T) / 2).tocsr())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import operator
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
@@ -10,6 +11,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from tawami.base.arrays import Array
+from tawami.base.places import Added
+from tawami.field.layout import Layout
 from tawami.field.reduction import Reduction
 from tawami.field.sum import Sum
 from tawami.solve.bordered import Bordering, Elimination
@@ -20,7 +23,10 @@ PASSES = 20
 
 
 class Term(Protocol):
-    """Forces of one action on the border; the same on every rank."""
+    """Forces of one action on the border.
+
+    They are the same on every rank: coefficients are all those of the whole grid.
+    """
 
     @property
     def prescribed(self) -> float:
@@ -64,15 +70,16 @@ class Terms:
 
     Args:
         terms: The actions.
-        comm: Communicator.
+        layout: Places of the coefficients.
 
     Attributes:
         stuck: Message if the multipliers do not settle.
-        stiffness: That of the last tangent, on all coefficients.
+        stiffness: That of the last tangent, on all coefficients of the whole grid.
     """
 
-    def __init__(self, terms: Sequence[Term], comm: Any) -> None:
-        self._terms, self._sum = terms, Sum(self, comm)
+    def __init__(self, terms: Sequence[Term], layout: Layout) -> None:
+        self._terms, self._layout, self._added = terms, layout, Added()
+        self._sum = Sum(self, layout.grid.comm)
         #: Stiffness of each term when they were last added, and their sum.
         self._stiffnesses: list[sp.csr_matrix] = [None] * len(terms)
         self.stiffness: sp.csr_matrix | None = None
@@ -89,10 +96,11 @@ class Terms:
 
     def begin(self, diagonal: Callable[[], Array], inertia: Inertia | None) -> None:
         """Start a step; see `Term.begin`."""
-        of_mass = None if inertia is None else inertia.slope * inertia.mass
+        whole = self._layout.whole
+        of_mass = None if inertia is None else whole(inertia.slope * inertia.mass)
         self._passes, self.stuck = 0, ""
         for term in self._terms:
-            term.begin(diagonal, of_mass)
+            term.begin(lambda: whole(diagonal()), of_mass)
 
     def restart(self) -> None:
         """Go back to the first guess of the unknowns of their own."""
@@ -115,12 +123,17 @@ class Terms:
         return sum(term.work for term in self.bordering)
 
     def forces(self, coefficients: Array) -> Array:
-        """Their sum, as `Term.forces`."""
+        """Their sum, on the coefficients of the window; a collective call.
+
+        Args:
+            coefficients: Increments of all fields, in the window.
+        """
+        in_grid = self._layout.whole(coefficients)
         #: Of all that are no contact.
         self.loads = np.zeros_like(coefficients)
         total = np.zeros_like(coefficients)
         for term in self._terms:
-            forces = term.forces(coefficients)
+            forces = self._layout.part(term.forces(in_grid))
             total += forces
             if not term.implicit:
                 self.loads += forces
@@ -130,10 +143,10 @@ class Terms:
         """A reduced tangent with their stiffness."""
         parts = [term.stiffness() for term in self._terms]
         if not all(map(operator.is_, parts, self._stiffnesses)):
-            self._stiffnesses, self.stiffness = parts, _added(parts)
-        return self._sum.of(tangent, self.stiffness, reduction)
+            self._stiffnesses, self.stiffness = parts, self._added.of(parts)
+        return self._sum.of(tangent, self.stiffness, reduction, of_grid=True)
 
-    @property
+    @functools.cached_property
     def bordering(self) -> list[Bordering]:
         """The terms with unknowns of their own."""
         return [t for t in self._terms if isinstance(t, Bordering) and t.num_unknowns]
@@ -147,10 +160,12 @@ class Terms:
         """The elimination of their own unknowns; None if there are none.
 
         Args:
-            solve: As in `Elimination`.
+            solve: As in `Elimination`, with coefficients of the window.
         """
-        terms = self.bordering
-        return Elimination(terms, solve) if terms else None
+        terms, layout = self.bordering, self._layout
+        if not terms:
+            return None
+        return Elimination(terms, lambda right: layout.whole(solve(layout.part(right))))
 
     def improve(self) -> bool:
         """Improve all multipliers; whether another solve is needed."""
@@ -164,14 +179,3 @@ class Terms:
         """Keep what later steps need, once a step is stored."""
         for term in self._terms:
             term.accept()
-
-
-def _added(matrices: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
-    """A sum with an entry wherever one of them has one, zeros too."""
-    if len(matrices) == 1:
-        return matrices[0]
-    parts = [matrix.tocoo() for matrix in matrices]
-    data, rows, columns = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("data", "row", "col")
-    )
-    return sp.coo_matrix((data, (rows, columns)), shape=parts[0].shape).tocsr()

@@ -22,13 +22,21 @@ def complete(
         solve: Gives K^-1 f for forces f on all coefficients.
     """
     path, terms, of_factor, own = equations.path, equations.terms, 0.0, np.zeros(0)
-    elimination = None if terms is None else terms.elimination(solve)
+    elimination, layout = None, equations.reduction.layout
+    if terms is not None:
+        elimination = terms.elimination(solve)
+
+    def eliminated(given: Array, residual: Array) -> tuple[Array, Array]:
+        assert elimination is not None
+        found, of_terms = elimination.solve(layout.whole(given), residual)
+        return layout.part(found), of_terms
+
     if elimination is not None:
-        change, own = elimination.solve(change, elimination.residual)
+        change, own = eliminated(change, elimination.residual)
     if path is not None:
         rate, own_rate = solve(path.rate), 0 * own
         if elimination is not None:
-            rate, own_rate = elimination.solve(rate, own_rate)
+            rate, own_rate = eliminated(rate, own_rate)
         of_factor = path.control.change(u, change[: len(u)], rate[: len(u)])
         change, own = change + of_factor * rate, own + of_factor * own_rate
     if elimination is not None:
