@@ -12,11 +12,11 @@ from mpi4py import MPI
 
 from tawami import _rust
 from tawami.base import program, ranks
-from tawami.base.arrays import Array, Indices
+from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.checks import choice, number, one_of, pair, point, room, shown, whole_number
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
-from tawami.base.space import SPACES, Counts, Position
+from tawami.base.space import SPACES, Counts, Position, lattice
 from tawami.base.text import meant, position
 from tawami.fem import mesh
 from tawami.grid.window import Window
@@ -174,6 +174,27 @@ class Grid(Unique):
         for rank, cells in enumerate(ranks.parts_to(self.comm, own, own // self._share)):
             owners[cells - self.comm.rank * self._share] = rank
         return owners
+
+    def own_cells(self, lower: Sequence[int], upper: Sequence[int]) -> Indices:
+        """Indices (i, j) of this rank's cells in a box, in the order of their numbers, cells x dim.
+
+        A collective call on several ranks.
+
+        Args:
+            lower: Its first cell along each axis.
+            upper: The cell after its last one.
+        """
+        if self.comm.size == 1:
+            return lattice([np.arange(*ends) for ends in zip(lower, upper, strict=True)])
+        index = self.rectangle.ij
+        index = index[((index >= lower) & (index < upper)).all(axis=1)]
+        return np.asarray(index[np.argsort(self.cell_numbers(index))])
+
+    def owns(self, cell: Indices) -> Mask:
+        """Whether cells, given by their numbers, are this rank's; a collective call on several ranks."""
+        if self.comm.size == 1:
+            return np.ones(len(cell), dtype=bool)
+        return np.isin(cell, self.cell_numbers(self.rectangle.ij))
 
     def function_space(self, element: Any) -> mesh.FunctionSpace:
         """The function space of an element."""

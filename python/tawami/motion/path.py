@@ -16,6 +16,7 @@ from tawami.grid.edges import Component
 from tawami.motion.observer import Recorder, observed
 from tawami.motion.pace import Pace, Steps
 from tawami.motion.stepping import Stop, end_early, march
+from tawami.particles.following import OfParticles
 from tawami.scene.configuration import Configuration
 from tawami.scene.points import check_in_body
 from tawami.scene.scene import Scene
@@ -53,7 +54,9 @@ class Following:
     ) -> None:
         self.scene, self.point, self.component, self.sign = scene, point, component, sign
         self.factor, self.loads = 0.0, list[float]()
-        self.direction = np.zeros((scene.num_particles, scene.grid.space.dim))
+        number, dim = scene.particles.number.astype(np.int64), scene.grid.space.dim
+        zero = np.zeros((len(number), dim))
+        self.direction = OfParticles(scene.grid.comm, number, zero, everywhere=False)
 
     def header(self) -> str:
         """As `Scene.header`."""
@@ -67,7 +70,7 @@ class Following:
         """As `Scene.state`, with the place on the path."""
         own = {
             "factor": self.factor,
-            "direction": self.direction,
+            "direction": self.direction.state(),
             "point": self.point,
             "loads": self.loads,
         }
@@ -77,7 +80,8 @@ class Following:
         """The reverse of :meth:`state`."""
         self.scene.restore(state)
         own = state["path"]
-        self.factor, self.direction = own["factor"], np.asarray(own["direction"])
+        self.factor = own["factor"]
+        self.direction = OfParticles.of_state(self.scene.grid.comm, own["direction"])
         self.point = None if own["point"] is None else (own["point"][0], own["point"][1])
         self.loads[:] = own["loads"]
 
@@ -140,7 +144,7 @@ class PathStep:
             return controls.PointControl(domain.layout, held.indices, held.weights, size)
         particles, comm, space = domain.particles, domain.model.grid.comm, domain.model.space
         total = ranks.sum_of(comm, np.array([particles.volume.sum()]))[0]
-        last = following.direction[particles.number]
+        last = following.direction.at(particles.number)
 
         def product(a: Array, b: Array) -> float:
             """Mean over the volume of a . b, particles x dim; the same bits on all ranks."""
@@ -163,9 +167,8 @@ class PathStep:
         """The place on the path after the step."""
         following, now = self.following, self.configuration
         domain, point, dim = now.domain, following.point, now.model.space.dim
-        own = np.zeros_like(following.direction)
-        own[domain.particles.number] = domain.at_particles(accepted.u)
-        direction = ranks.sum_of(now.model.grid.comm, own)
+        number, u = domain.particles.number.astype(np.int64), domain.at_particles(accepted.u)
+        direction = OfParticles(now.model.grid.comm, number, u, everywhere=False)
         control = accepted.problem.path.control if accepted.problem.path else None
         if now.model.moves and isinstance(control, controls.PointControl) and point is not None:
             moved = domain.layout.vectors_at(accepted.u, control.indices // dim)
@@ -186,7 +189,7 @@ class PathUpdate:
     following: Following
     configuration: Configuration
     factor: float
-    direction: Array
+    direction: OfParticles
     point: tuple[float, float] | None
 
     def store(self, dissipated: float) -> None:

@@ -21,10 +21,10 @@ from tawami.scene.quantities import (
     PARTICLES,
     Given,
     Quantity,
-    body_arrays,
     local_arrays,
     of_particles,
     of_scene,
+    own_values,
     unknown,
 )
 from tawami.scene.scene import Scene
@@ -113,10 +113,8 @@ def _projected_own(quantity: Quantity, projection: Projection) -> GridQuantity:
         )
 
     def of(now: Snapshot) -> Array:
-        arrays = body_arrays(now.subject)
-        values = quantity.values(arrays)
-        mine = np.searchsorted(arrays["number"], np.asarray(now.scene.particles.number))
-        return nodal(now.scene, values[mine], projection)
+        values = own_values(quantity, now.subject, local_arrays(now.subject))
+        return nodal(now.scene, values, projection)
 
     return GridQuantity(quantity.label, of)
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami import _rust
-from tawami.base import checks, stored
+from tawami.base import checks, ranks, stored
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import CheckpointError, InputError
 from tawami.base.text import meant, quoted
@@ -58,7 +58,7 @@ class SceneBorder:
 
     Args:
         model: Grid, form and laws of the scene; its border is None for a body without one.
-        particles: The particles of the whole body.
+        particles: The particles of this rank.
 
     Attributes:
         points: All points; None for a body without a border.
@@ -290,10 +290,12 @@ class SceneBorder:
 def check_fits(grid: Grid, points: BorderPoints, x: Array, area: Array) -> None:
     """Check that a closed border encloses the particles: area and centroid by the divergence theorem.
 
+    A call for all ranks.
+
     Args:
         grid: The grid.
         points: Points of the border.
-        x: Positions of all particles [m], particles x dim.
+        x: Positions of the particles of this rank [m], particles x dim.
         area: Their areas in the plane [m2].
 
     Raises:
@@ -308,8 +310,8 @@ def check_fits(grid: Grid, points: BorderPoints, x: Array, area: Array) -> None:
     middle[:axis] = 0.0
     enclosed = ((points.x - middle) * flux).sum() / grid.space.dim
     centroid = ((points.x - middle) ** 2 * flux).sum(axis=0) / 2 / enclosed
-    total = area.sum()
-    away = float(np.linalg.norm(centroid - area @ (x - middle) / total))
+    total, *moments = ranks.sum_of(grid.comm, np.array([area.sum(), *(area @ (x - middle))]))
+    away = float(np.linalg.norm(centroid - np.array(moments) / total))
     if abs(enclosed - total) > FITS * total or away > FITS * max(grid.h, np.sqrt(total)):
         raise InputError(
             f"the border of the body encloses {enclosed:.6g} m2 and its particles have {total:.6g} m2, "

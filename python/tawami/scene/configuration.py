@@ -17,11 +17,11 @@ import numpy.typing as npt
 from tawami import _rust
 from tawami.base import checks, ranks, signals
 from tawami.base.errors import CheckpointError
-from tawami.base.meaning import fingerprint
 from tawami.base.process import check_process
 from tawami.base.program import leave_together
 from tawami.base.timing import Stopwatch
 from tawami.particles import placement
+from tawami.particles.following import fingerprints
 from tawami.scene import (
     coverage,
     fitting,
@@ -64,7 +64,7 @@ class Configuration:
 
     Args:
         model: Grid, form and laws of the scene.
-        particles: The particles of the whole body, on every rank.
+        particles: The particles of the body that the driver script has on this rank.
         numerics: Numerical settings of a step.
 
     Attributes:
@@ -83,19 +83,20 @@ class Configuration:
 
     def __init__(self, model: Model, particles: _rust.Particles, numerics: Numerics) -> None:
         self.model, self.numerics, self.stopwatch = model, numerics, Stopwatch()
-        mine, location = placement.distributed(model.grid, particles, moving=model.moves)
+        whole = model.part is None
+        mine, location = placement.distributed(model.grid, particles, model.moves, whole=whole)
         if model.form.kinematics.has_eps_v:
             mine.add_eps_v()
         mine.add_strain(model.moves, model.grid.geometry)
         own_fields.carry(model.form, mine, model.space.dim)
-        self.border = SceneBorder(model, particles)
+        self.border = SceneBorder(model, mine)
         self.border_sums = BorderSums(model, self.border, lambda: self.total)
         self._attach(mine, location)
         self.activity = Activity()
         own = model.form.own_fields
         self.supports = Supports(model.grid, model.basis, own, self.border, self.activity)
         self.obstacles = Obstacles(self.border, self.activity)
-        self.loads = Loads(model.grid, np.array(particles.volume), self.activity)
+        self.loads = Loads(model.grid, self.activity)
         self.border.users += [self.supports, self.obstacles, self.border_sums]
         self.total = np.zeros(self.domain.layout.size)
         self.inputs = FormInputs(model, self.activity.time, self.border_sums)
@@ -280,7 +281,7 @@ class Configuration:
     def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:
         self.obstacles.warn(self.domain, coefficients)
         wall_gap.warn_of_distant(self.supports.walls, self.border.points, accepted)
-        arrays = quantities.of_body(self.model.grid.comm, self.domain.particles)
+        arrays = quantities.copies(self.domain.particles)
         return Outcome(accepted, coefficients, Reactions.of(accepted, self.supports), arrays)
 
     # -- checkpoints ---------------------------------------------------------
@@ -289,11 +290,8 @@ class Configuration:
         """Facts that identify it, for checkpoints; a call for all ranks."""
         grid = self.model.grid
         sizes = {"stress": self.domain.responses.stiffest} | dict.fromkeys(LENGTHS, grid.h)
-        arrays = placement.gathered(grid, self.domain.particles)
-        particles = {
-            f"'{name}' of the particles at its start": fingerprint(values, sizes.get(name, 1.0))
-            for name, values in arrays.items()
-        }
+        found = fingerprints(grid.comm, self.domain.particles, sizes)
+        particles = {f"'{name}' of the particles at its start": one for name, one in found.items()}
         facts = {
             "tolerance": self.numerics.tolerance,
             "supports": self.supports.identity(),
@@ -305,7 +303,7 @@ class Configuration:
     def state(self) -> dict[str, Any]:
         """State that passes from one step to the next, of all ranks; a call for all ranks."""
         return {
-            "particles": placement.gathered(self.model.grid, self.domain.particles),
+            "particles": placement.stored(self.model.grid.comm, self.domain.particles),
             "time": self.activity.time,
             "inputs": self.inputs.state(),
             "total": self.domain.layout.whole(self.total),
@@ -327,9 +325,8 @@ class Configuration:
         Raises:
             CheckpointError: Particles or fields with other arrays.
         """
-        particles, location = placement.scattered(
-            self.model.grid, self.domain.particles, state["particles"], moving=self.model.moves
-        )
+        given = self.model.grid, self.domain.particles, state["particles"]
+        particles, location = placement.restored(*given, moving=self.model.moves)
         sizes = {np.shape(state["total"]), np.shape(state["loads"]["unbalanced"])}
         if sizes - {(0,)} != {(self.domain.layout.size_of_grid,)}:
             raise CheckpointError("its fields have another number of coefficients than the scene")

@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from tawami.base.arrays import Array, Indices
+from tawami.base.arrays import Array
 from tawami.base.errors import SupportError
 from tawami.base.text import listed
 from tawami.field.follower import FollowerPressure
 from tawami.field.layout import Layout
 from tawami.grid.grid import Grid
+from tawami.scene import selection
 from tawami.scene.action import Owner, Term, restored
 from tawami.scene.activity import Activity
 from tawami.scene.domain import Domain
@@ -23,6 +24,7 @@ from tawami.scene.excavation import Excavation
 from tawami.scene.factor import Factor
 from tawami.scene.load import Flux, Forces, Load, OnBorder, Pressure, Traction, Weight
 from tawami.scene.moving_points import MovingPoints
+from tawami.scene.selection import Where
 from tawami.scene.share import Moment
 
 
@@ -31,7 +33,6 @@ class Loads(Owner[Load]):
 
     Args:
         grid: The grid.
-        volume: Volume of each particle of the body [m2].
         activity: Time and activity of the scene.
 
     Attributes:
@@ -41,9 +42,9 @@ class Loads(Owner[Load]):
         version: A number that changes with every change of a load.
     """
 
-    def __init__(self, grid: Grid, volume: Array, activity: Activity) -> None:
+    def __init__(self, grid: Grid, activity: Activity) -> None:
         super().__init__(activity)
-        self.grid, self._volume = grid, volume
+        self.grid = grid
         self.unbalanced: Array | None = None
 
     def remove(self, action: Load) -> None:
@@ -89,10 +90,11 @@ class Loads(Owner[Load]):
         self.all.append(flux)
         return flux
 
-    def add_forces(self, particles: Indices, force: Any, amplitude: Any) -> Load:
-        """Load particles of the body, given by their numbers."""
+    def add_forces(self, domain: Domain, particles: Where, force: Any, amplitude: Any) -> Load:
+        """Load particles of the body; a call for all ranks."""
+        chosen = selection.in_order(domain, "load(...): particles", particles)
         factor = self._factor("load(...)", amplitude)
-        forces = Forces(self, self.grid.space.dim, particles, self._volume, force, factor)
+        forces = Forces(self, domain, *chosen, force, factor)
         self.all.append(forces)
         return forces
 
