@@ -104,13 +104,19 @@ class ErrorEstimate:
 
 
 def estimate(now: Configuration, goal: Any, coefficients: Array, load: float) -> ErrorEstimate:
-    """The error of a quantity of a static solution; see `Solution.error`.
+    """Estimate the error of a quantity of a static solution of small strain, on one rank.
 
     Args:
         now: The scene.
         goal: The quantity.
         coefficients: The solution, of all fields since the start.
         load: Share of the loads that it is in equilibrium with; NaN in dynamics.
+
+    Raises:
+        InputError: No such quantity, a point outside the body, a body without a border, or a scene that
+            has changed since.
+        NotModelledError: A solution in motion or at finite strain, or a scene with walls, contact, more
+            fields, flow in several steps, ...
     """
     if not isinstance(goal, Goal):
         raise InputError(
@@ -135,7 +141,7 @@ def estimate(now: Configuration, goal: Any, coefficients: Array, load: float) ->
         "stabilisation": (layout, (form - plain) * z),
         "Newton": (layout, -form * z),
     }
-    points, u = now.border.points, layout.split(coefficients)[0]
+    points = now.border.points
     return ErrorEstimate(
         goal,
         ladder.value,
@@ -143,7 +149,7 @@ def estimate(now: Configuration, goal: Any, coefficients: Array, load: float) ->
         ladder.order,
         {name: _in_cells(now.model.grid, *part) for name, part in parts.items()},
         now.model.grid,
-        None if points is None else Outline(points, now.domain, u),
+        None if points is None else Outline(points, now.domain, coefficients),
     )
 
 

@@ -31,7 +31,9 @@ def check(now: Configuration, coefficients: Array, load: float) -> None:
             f"error(...) with form {model.form.name}: expected a form of small strain: at finite strain "
             "each step has a body of its own"
         )
-    if now.total is not coefficients:
+    if now.model.grid.comm.size > 1:
+        raise NotModelledError("error(...) on several ranks: expected one rank")
+    if not np.array_equal(now.total, coefficients):
         raise InputError(
             "error(...): the scene has changed since this solution: expected the call before the next "
             "solve()"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tawami.base import checks, ranks
+from tawami.base import checks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.text import quoted
@@ -51,9 +51,7 @@ class Goal:
             check_in_body(domain, place, name)
             location = edges.locate_point(domain.model.grid, place, name)
             cells = PointsInCells(domain.model.grid, location)
-            return _of_component(
-                domain, component, cells.sums(domain.layout.basis, np.ones((1, 1)))
-            )
+            return _of_component(domain, component, cells.values(domain.layout.basis).T.toarray())
 
         return cls(name, "m", weights)
 
@@ -71,7 +69,9 @@ class Goal:
             points = border.part(name, part)
             share = points.weight[:, None] / points.weight.sum()
             return _of_component(
-                domain, component, points.cells(domain).sums(domain.layout.basis, share)
+                domain,
+                component,
+                points.cells(domain).sums(domain.layout.functions, domain.layout.basis, share),
             )
 
         return cls(name, "m", weights)
@@ -91,9 +91,7 @@ class Goal:
             inside = np.ones(len(particles), dtype=bool)
             if where is not None:
                 inside = np.asarray(where(*particles.x.T), dtype=bool)
-            volume = float(
-                ranks.sum_of(domain.model.grid.comm, particles.volume[inside].sum()[None])[0]
-            )
+            volume = particles.volume[inside].sum()
             if volume == 0:
                 raise InputError(f"{name}: no part of the body is there: expected some of it")
             share = np.where(inside, particles.volume, 0.0) / volume

@@ -25,8 +25,8 @@ IRREGULAR, SLOWEST, FASTEST, SMOOTH = 0.5, 2.0, 64.0, 16.0
 class Ladder:
     """Dual solutions for a quantity on three grids.
 
-    Those on cells of h/2, h and 2h give the errors e', e and e_2 of the computed value, without the parts
-    that these grids do not resolve. With ratio = (e - e_2)/(e' - e) the error of the grid is
+    Those on cells of h/2, h and 2h give the errors e', e and e_2 of the computed value, without the
+    parts that these grids do not resolve. With ratio = (e - e_2)/(e' - e) the error of the grid is
     (e' - e) ratio/(ratio - 1) (Richardson).
 
     Args:
@@ -58,8 +58,9 @@ class Ladder:
             grid.comm, origin=grid.origin, h=grid.h / 2, cells=[2 * n for n in grid.cells],
             geometry=grid.geometry,
         )  # fmt: skip
-        body = _exact(double, model, particles)
-        half, whole = (Level(now, replace(model, grid=g), body) for g in (double, grid))
+        half = Level(now, replace(model, grid=double), _exact(double, model, particles))
+        body = _exact(grid, model, particles)
+        whole = Level(now, model, body)
         self.fine, self.coarse = half.layout, whole.layout
         up = prolongation(self.fine)
         at = up @ coefficients

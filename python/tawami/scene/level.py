@@ -13,7 +13,6 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from tawami import _rust
-from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.base.timing import Stopwatch
 from tawami.field.border import PointsInCells
@@ -139,10 +138,10 @@ class Level:
         matrix = tangent.copy().transpose()
         scale = functools.partial(Scaling(self.layout, responses).factors, matrix, reduction)
         solver = DirectSolver(self.domain.model.grid.comm, Stopwatch())
-        right = reduction.restricted(weights)[reduction.own]
+        right = reduction.restricted(weights)
         found = solver.solve(System(matrix, scale, right, 0.0, list))
         matrix.destroy()
-        return reduction.expanded(ranks.allgathered(self.domain.model.grid.comm, found))
+        return reduction.expanded(found)
 
     def nearest(self, finer: Layout, prolongation: sp.csr_matrix, fine: Array) -> Array:
         """The coefficients that obey the supports and are next to those of a finer grid."""

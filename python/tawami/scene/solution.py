@@ -219,17 +219,7 @@ class Solution(OfAllParticles, Elsewhere, Sealed, Unique):
         return np.asarray(value if reached > 1 - ROUND_OFF else value / reached)
 
     def error(self, goal: Goal) -> ErrorEstimate:
-        """Estimate the error of a quantity and its sources; a call for all ranks.
-
-        Args:
-            goal: The quantity, as `tawami.Goal.displacement((2, 0), "y")`.
-
-        Raises:
-            InputError: No such quantity, a point outside the body, a body without a border, or a scene
-                that has changed since.
-            NotModelledError: A solution in motion or at finite strain, or a scene with walls, contact,
-                more fields, flow in several steps, ...
-        """
+        """The estimated error of a quantity, by source; see `tawami.scene.error.estimate`."""
         return estimate(self.scene.configuration, goal, self.coefficients, self.load)
 
     # -- in a notebook -------------------------------------------------------
