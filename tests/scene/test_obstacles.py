@@ -8,7 +8,7 @@ from mpi4py import MPI
 from pressed import HALF, Pressed
 
 import tawami
-from cases.costs.contact import block
+from cases.costs.contact import block, dragged
 
 E, NU, HEIGHT = 1e6, 0.3, 0.9
 M = E * (1 - NU) / ((1 + NU) * (1 - 2 * NU))
@@ -81,6 +81,14 @@ def test_friction_of_cattaneo_and_mindlin():
     assert width == pytest.approx(HALF * np.sqrt(1 - share), rel=0.08)
     assert 0.3 < share < 0.5
     assert pressed.solution.iterations <= 10
+
+
+@pytest.mark.filterwarnings("ignore::tawami.base.errors.SmallStrainWarning")
+def test_a_drag_that_does_not_converge_at_once_does_in_the_steps_of_the_message():
+    setting = ("u_epsv", "disc", 1.0, 0.3, 0.25, 0.03, 0.03)
+    with pytest.raises(tawami.ConvergenceError, match=r"ramp\(scene, 0.5\) moves obstacles"):
+        dragged(*setting, 1.0)
+    dragged(*setting, 0.5)
 
 
 @pytest.mark.parametrize(
