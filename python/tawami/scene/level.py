@@ -71,8 +71,7 @@ class Level:
         body: Its particles.
 
     Attributes:
-        body: As given.
-        domain: Its particles.
+        domain: The particles.
         external: Forces of the loads on all coefficients [N per metre depth].
         on_patches: Supports that no coefficient of an edge or a point expresses.
         reduction: Unknowns that the supports leave free, of the coefficients since the start.
@@ -86,7 +85,6 @@ class Level:
         if model.form.kinematics.has_eps_v:
             mine.add_eps_v()
         mine.add_strain(False, model.grid.geometry)
-        self.body = body
         self.domain = Domain.attach(model, mine, location, now.numerics, Stopwatch())
         attachment, known = self.domain.assembly.attachment, now.domain.assembly.attachment.values
         shared = {n: v for n, v in known.items() if n in attachment.values and n != "h"}
