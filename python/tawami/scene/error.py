@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -130,7 +130,7 @@ def estimate(now: Configuration, goal: Any, coefficients: Array, load: float) ->
     form, plain = (own.residual(coefficients, stabilised=s) for s in (True, False))
     estimable.check_state(own, form, plain)
     at = coefficients if model is now.model else own.with_volume(model.form, coefficients)
-    ladder = Ladder(now, model, body, goal, at)
+    ladder = Ladder(now, replace(model, fits=False), body, goal, at)
     z = ladder.z[: layout.size]
     of_particles = -ladder.residual * ladder.z
     of_particles[: layout.size] += plain * z
