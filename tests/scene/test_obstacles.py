@@ -58,6 +58,14 @@ def test_contact_starts_when_the_gap_closes():
     assert scene.solve().reaction("bottom") == pytest.approx([0.0, 0.0], abs=1e-3)
 
 
+def test_an_obstacle_far_from_the_body_changes_nothing():
+    scene = column()
+    far = scene.obstacle(tawami.rigid_disc((0.5, HEIGHT + 3.0), 0.5))
+    solution = scene.solve()
+    assert not solution.contact(far).pressure.any()
+    assert solution.reaction("bottom") == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
 @pytest.mark.parametrize("nu", [0.3, 0.4999])
 def test_pressure_of_hertz(nu):
     pressed = Pressed(nu, 4, 6, half=True)
