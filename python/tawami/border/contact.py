@@ -69,6 +69,19 @@ class Contact:
     start: Array
     least: Array | float = 0.0
 
+    @cached_property
+    def areas(self) -> Array:
+        """Area of each patch [m2]."""
+        return self.patches.sums(self.weights)
+
+    @cached_property
+    def shares(self) -> Array:
+        """Share of each point in the area of its patch."""
+        return np.asarray(self.weights / self.areas[self.patches.number])
+
+    def _means(self, values: Array) -> Array:
+        return self.patches.sums((values.T * self.shares).T)
+
     def evaluate(
         self,
         x: Array,
@@ -94,11 +107,11 @@ class Contact:
         surface = _turned(self.shape.evaluate(local), pose.rotation)
         moved = (local - self.start) @ pose.rotation.T
         tangent, turning = tangents(surface)
-        gap = self.patches.means(self.weights, surface.distance) - self.least
+        gap = self._means(surface.distance) - self.least
         pressure = held.pressure - self.penalty * gap
         touching = (held.pressure > 0) if tied else (pressure > 0)
         pressure[~touching] = 0.0
-        slip = self.patches.means(self.weights, np.einsum("jka,ja->jk", tangent, moved))
+        slip = self._means(np.einsum("jka,ja->jk", tangent, moved))
         trial = held.traction - self.penalty[:, None] * slip
         size, limit = np.linalg.norm(trial, axis=1), np.zeros_like(pressure)
         if self.friction > 0:
@@ -210,33 +223,54 @@ class ContactForces:
         contact = self.contact
         sliding = (self.trial - self.traction) / contact.penalty[:, None]
         work = np.einsum("ak,ak->a", self.traction, sliding)
-        return np.asarray(contact.patches.sums(contact.weights) * work)
+        return np.asarray(contact.areas * work)
+
+    @cached_property
+    def derivatives(self) -> Array:
+        """Derivatives of the forces on the points of each patch by their positions [N/m per m]: patches
+        x points x dim x points x dim, of the points in the order of `Patches.table`.
+
+        They are symmetric without friction.
+        """
+        contact = self.contact
+        points, inside = contact.patches.table
+        loaded = self.state != OPEN
+        weights = contact.weights[points] * (inside * loaded[:, None])
+        shares = contact.shares[points] * inside
+        by_gap, by_slip = self._law()
+        gap, slips = self._weighted(shares, self.surface.normal, self.slip_gradient)
+        normal, tangent = self._weighted(weights, self.surface.normal, self.tangent)
+        rows = [normal, *tangent]
+        columns = [-contact.penalty[:, None, None] * gap]
+        for k in range(len(slips)):
+            change = by_gap[:, k, None, None] * gap
+            columns.append(
+                sum((by_slip[:, k, m, None, None] * slip for m, slip in enumerate(slips)), change)
+            )
+        total = np.einsum("ckja,ckib->cjaib", np.stack(rows, axis=1), np.stack(columns, axis=1))
+        if self.bends and self.surface.curvature.any():
+            number = contact.patches.number
+            bent = self.pressure[number, None, None] * self.surface.curvature
+            bent += np.einsum("jk,jkab->jab", self.traction[number], self.turning)
+            place = np.arange(points.shape[1])
+            total[:, place, :, place] += (weights[..., None, None] * bent[points]).swapaxes(0, 1)
+        return np.asarray(total)
+
+    def _weighted(self, weights: Array, first: Array, others: Array) -> tuple[Array, list[Array]]:
+        """Vectors at the points of each patch times weights, patches x points x dim."""
+        points = self.contact.patches.table[0]
+        vectors = [first, *others.swapaxes(0, 1)]
+        found = [weights[..., None] * vector[points] for vector in vectors]
+        return found[0], found[1:]
 
     @cached_property
     def derivative(self) -> sp.csr_matrix:
-        """Derivative of the forces by the positions of all points [N/m per m].
-
-        Rows and columns are the components of the first point, then of the second, and so on. It is
-        symmetric without friction.
-        """
-        number = self.contact.patches.number
-        loaded = np.flatnonzero(self.state[number] != OPEN)
-        blocks = self.pressure[number[loaded], None, None] * self.surface.curvature[loaded]
-        blocks += np.einsum("jk,jkab->jab", self.traction[number[loaded]], self.turning[loaded])
-        blocks *= self.bends * self.contact.weights[loaded, None, None]
-        by_gap, by_slip = self._law()
-        gap, normal = self._pair(loaded, self.surface.normal, self.surface.normal)
-        total = _block_diagonal(loaded, blocks, self.x.shape)
-        total -= normal @ sp.diags(self.contact.penalty) @ gap
-        directions = range(self.tangent.shape[1])
-        pairs = [
-            self._pair(loaded, self.slip_gradient[:, k], self.tangent[:, k]) for k in directions
-        ]
-        for k, (_, tangent) in enumerate(pairs):
-            change = sp.diags(by_gap[:, k]) @ gap
-            change += sum(sp.diags(by_slip[:, k, m]) @ pairs[m][0] for m in directions)
-            total += tangent @ change
-        return total.tocsr()
+        """The same as a matrix: the components of the first point, then of the second, and so on."""
+        points, _ = self.contact.patches.table
+        index = of_components(points, self.x.shape[1])
+        rows, columns = np.broadcast_arrays(index[:, :, :, None, None], index[:, None, None, :, :])
+        entries = (self.derivatives.ravel(), (rows.ravel(), columns.ravel()))
+        return sp.csr_matrix(entries, shape=(self.x.size, self.x.size))
 
     @cached_property
     def by_motion(self) -> Array:
@@ -288,22 +322,6 @@ class ContactForces:
         across = np.eye(num) - along * direction[:, :, None] * direction[:, None, :]
         return by_gap, (minus_r * self.scale)[:, None, None] * across
 
-    def _pair(
-        self, points: Indices, row: Array, column: Array
-    ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-        """Means of row . displacement over patches, and forces w column on points, as matrices.
-
-        Args:
-            points: The points that are in contact.
-            row: Vector at each point, points x dim.
-            column: Vector at each point.
-        """
-        patches, weights = self.contact.patches, self.contact.weights
-        return (
-            _on_patches(patches, points, patches.shares(weights)[:, None] * row),
-            _on_patches(patches, points, weights[:, None] * column).T,
-        )
-
 
 def tangents(surface: Distance) -> tuple[Array, Array]:
     """Unit tangents and their derivatives by the position.
@@ -323,21 +341,3 @@ def _turned(local: Distance, rotation: Array) -> Distance:
     """Distances in the frame of the obstacle as distances in space."""
     curvature = rotation @ local.curvature @ rotation.T
     return Distance(local.distance, local.normal @ rotation.T, curvature)
-
-
-def _on_patches(patches: Patches, points: Indices, vectors: Array) -> sp.csr_matrix:
-    """Vectors at some points as rows of their patches, patches x points dim."""
-    num, dim = vectors.shape
-    columns = of_components(points, dim)
-    rows = np.repeat(patches.number[points], dim)
-    entries = (vectors[points].ravel(), (rows, columns.ravel()))
-    return sp.csr_matrix(entries, shape=(patches.count, num * dim))
-
-
-def _block_diagonal(points: Indices, blocks: Array, shape: tuple[int, ...]) -> sp.csr_matrix:
-    """Blocks of some points as a matrix on all components."""
-    num, dim = shape
-    index = of_components(points, dim)
-    rows, columns = np.broadcast_arrays(index[:, :, None], index[:, None, :])
-    entries = (blocks.ravel(), (rows.ravel(), columns.ravel()))
-    return sp.csr_matrix(entries, shape=(num * dim, num * dim))

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.sparse as sp
 
 from tawami.base.arrays import Array, Indices
 from tawami.border.points import BorderPoints
@@ -31,11 +30,15 @@ class Patches:
     count: int
 
     @cached_property
-    def incidence(self) -> sp.csr_matrix:
-        """1 where a point belongs to a patch, patches x points."""
-        points = np.arange(len(self.number))
-        ones = np.ones(len(points))
-        return sp.csr_matrix((ones, (self.number, points)), shape=(self.count, len(points)))
+    def table(self) -> tuple[Indices, Array]:
+        """The points of each patch, patches x most points, filled up with its first one; and 1 for each
+        of its points, 0 for those that fill up.
+        """
+        order = np.argsort(self.number, kind="stable")
+        many = np.bincount(self.number, minlength=self.count)
+        place, first = np.arange(many.max(initial=0)), np.cumsum(many) - many
+        inside = place < many[:, None]
+        return order[first[:, None] + np.where(inside, place, 0)], inside.astype(float)
 
     def sums(self, values: Array) -> Array:
         """Sums over the points of each patch, patches x ...
@@ -43,8 +46,9 @@ class Patches:
         Args:
             values: Values at the points, points x ...
         """
-        columns = values.reshape(len(values), int(np.prod(values.shape[1:])))
-        return np.asarray(self.incidence @ columns).reshape(self.count, *values.shape[1:])
+        columns = values.reshape(len(values), int(np.prod(values.shape[1:]))).T
+        sums = [np.bincount(self.number, column, self.count) for column in columns]
+        return np.asarray(np.transpose(sums)).reshape(self.count, *values.shape[1:])
 
     def means(self, weights: Array, values: Array) -> Array:
         """Weighted means over the points of each patch, patches x ...

@@ -78,6 +78,8 @@ class Pose:
     @cached_property
     def rotation(self) -> Array:
         """The matrix of the rotation, dim x dim."""
+        if not self.turn.any():
+            return np.eye(len(self.centre))
         return np.asarray(expm(np.tensordot(self.turn, generators(len(self.centre)), axes=1)))
 
     def moved(self, coordinates: Array) -> Pose:

@@ -17,6 +17,7 @@ from scipy.sparse.linalg import spsolve
 
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import SupportError
+from tawami.base.places import Places, share_places
 from tawami.field.constraints import Held, PointHeld
 from tawami.field.layout import Layout
 from tawami.field.rigid import check_rigid_motions
@@ -53,6 +54,9 @@ class Reduction:
 
     #: Elimination by point constraints: dependent coefficients, the others involved, and their weights.
     _eliminated: tuple[Indices, Indices, Array] | None
+
+    #: A matrix, which of its entries are in rows of this rank, and their places there.
+    _reduced: tuple[sp.csr_matrix, Mask, Places] | None = None
 
     def __init__(
         self,
@@ -188,12 +192,14 @@ class Reduction:
         """
         if self._places is None:
             return (self._transposed @ matrix @ self.selection).tocsr()[self.own]
-        entries = matrix.tocoo()
-        row, column = self._number_of[entries.row], self._number_of[entries.col]
-        mine = (row >= self.own.start) & (row < self.own.stop) & (column >= 0)
-        shape = (self.num_own, self.size)
-        places = (row[mine] - self.own.start, column[mine])
-        return sp.coo_matrix((entries.data[mine], places), shape=shape).tocsr()
+        if self._reduced is None or not share_places(self._reduced[0], matrix):
+            entries = matrix.tocoo()
+            row, column = self._number_of[entries.row], self._number_of[entries.col]
+            mine = (row >= self.own.start) & (row < self.own.stop) & (column >= 0)
+            places = row[mine] - self.own.start, column[mine]
+            self._reduced = matrix, mine, Places(*places, (self.num_own, self.size))
+        _, mine, of_rows = self._reduced
+        return of_rows.matrix(matrix.data[mine])
 
     def diagonal(self, masses: Array) -> Array | None:
         """The diagonal of S^T M S, M the diagonal matrix of masses of all coefficients.

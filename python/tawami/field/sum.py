@@ -9,7 +9,8 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 from tawami.base import ranks
-from tawami.base.petsc import Handles, aij
+from tawami.base.petsc import Handles, add_rows, aij
+from tawami.base.places import share_places
 from tawami.field.reduction import Reduction
 
 
@@ -23,7 +24,7 @@ class Sum:
 
     def __init__(self, owner: Any, comm: Any) -> None:
         self._comm, self._petsc = comm, Handles(owner, comm)
-        #: What is in `_petsc`: the sum for this tangent and this matrix, whose rows are reduced.
+        #: What is in `_petsc`: the sum of this tangent and this matrix, with its reduced rows.
         self._tangent: Any = None
         self._matrix: sp.csr_matrix | None = None
         self._rows: sp.csr_matrix | None = None
@@ -41,16 +42,17 @@ class Sum:
             rows = reduction.reduced(matrix)
             differs = not (same and _same_places(self._rows, rows))
             same = not ranks.any_of(self._comm, np.array([differs]))[0]
-            known.free("part")
-            known["part"], self._rows = aij(self._comm, rows, reduction.num_own), rows
+            self._rows = rows
         if same:
             known["total"].zeroEntries()
-            for part in (tangent, known["part"]):
-                known["total"].axpy(1.0, part, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            known["total"].axpy(1.0, tangent, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            add_rows(known["total"], self._rows)
         else:
             known.free("total")
+            part = aij(self._comm, self._rows, reduction.num_own)
             known["total"] = tangent.copy()
-            known["total"].axpy(1.0, known["part"], PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+            known["total"].axpy(1.0, part, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+            part.destroy()
         self._tangent, self._matrix = tangent, matrix
         return known["total"]
 
@@ -59,4 +61,6 @@ def _same_places(a: sp.csr_matrix | None, b: sp.csr_matrix) -> bool:
     """Whether two matrices have entries in the same places."""
     if a is None or a.nnz != b.nnz:
         return False
+    if share_places(a, b):
+        return True
     return np.array_equal(a.indptr, b.indptr) and np.array_equal(a.indices, b.indices)

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from tawami.base.arrays import Array, Indices, Mask, of_components
+from tawami.base.places import Places
 from tawami.border.patches import Patches, patches
 from tawami.border.rigid import Pose
 from tawami.border.shapes import Shape
@@ -41,13 +42,11 @@ class BorderNear:
         chosen: Which patches are evaluated.
         points: Numbers of their points.
         patches: The same patches of these points.
-        at_points: Displacements of these points, from the coefficients of the displacement.
     """
 
     chosen: Mask
     points: Indices
     patches: Patches
-    at_points: sp.csr_matrix
 
     def __init__(
         self,
@@ -61,8 +60,7 @@ class BorderNear:
         self.h, self._dim = domain.model.grid.h, domain.model.space.dim
         self.n, self.size = domain.layout.num_displacement, domain.layout.size
         cells = place.cells(domain)
-        functions = cells.values(domain.layout.basis)
-        self._at_all = sp.kron(functions, sp.identity(self._dim), format="csr")
+        self._numbers, self._values, _ = cells.tabulated(domain.layout.basis)
         self.x = place.x
         self.x = self.positions(before)
         self.start = pose.to_local(self.x)
@@ -86,8 +84,8 @@ class BorderNear:
 
     def positions(self, coefficients: Array) -> Array:
         """Positions of all points at increments of the displacement [m]."""
-        moved = self._at_all @ coefficients[: self.n]
-        return np.asarray(self.x + moved.reshape(-1, self._dim))
+        u = coefficients[: self.n].reshape(-1, self._dim)[self._numbers]
+        return np.asarray(self.x + np.matmul(self._values[:, None], u)[:, 0])
 
     def choose(self, points: Mask) -> None:
         """Evaluate the patches of further points from now on."""
@@ -96,14 +94,18 @@ class BorderNear:
         self.points = np.flatnonzero(self.chosen[number])
         new_number = np.cumsum(self.chosen) - 1
         self.patches = Patches(new_number[number[self.points]], int(self.chosen.sum()))
-        rows = of_components(self.points, self._dim)
-        self.at_points = self._at_all[rows.ravel()]
-        incidence = self.patches.incidence
-        together = (incidence.T @ incidence).astype(float)
-        of_points = sp.kron(together, np.ones((self._dim, self._dim)), format="csr")
-        touched = abs(self.at_points)
-        #: Where a stiffness may have entries.
-        self._places = (touched.T @ of_points @ touched).tocoo()
+        of = self._numbers[self.points], self._values[self.points]
+        self._places, self._of_points = of_components(of[0], self._dim), of[1][..., None]
+        self._coupled = _Coupled(*of, self.patches)
+
+    @property
+    def at_points(self) -> sp.csr_matrix:
+        """Displacements of the chosen points, from the coefficients of the displacement."""
+        rows = np.arange(self.points.size * self._dim).reshape(-1, 1, self._dim)
+        places = np.broadcast_arrays(rows, self._places)
+        values = np.broadcast_to(self._of_points, self._places.shape)
+        entries = (values.ravel(), (places[0].ravel(), places[1].ravel()))
+        return sp.csr_matrix(entries, shape=(rows.size, self.n))
 
     def reached(self, local: Array) -> Mask:
         """Points of other patches that may have come to the obstacle since the start of the step.
@@ -116,17 +118,58 @@ class BorderNear:
 
     def on_all(self, forces: Array) -> Array:
         """Forces on the chosen points as forces on all coefficients."""
-        on_all = np.zeros(self.size)
-        on_all[: self.n] = self.at_points.T @ forces.ravel()
-        return on_all
+        shares = self._of_points * forces[:, None]
+        return np.asarray(np.bincount(self._places.ravel(), shares.ravel(), self.size), dtype=float)
 
-    def on_coefficients(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
-        """A matrix on the chosen points as one on all coefficients.
+    def on_coefficients(self, derivatives: Array) -> sp.csr_matrix:
+        """Derivatives of forces on the chosen points of each patch as a matrix on all coefficients.
 
         Its entries are in the same places until further points are chosen.
+
+        Args:
+            derivatives: As `ContactForces.derivatives`.
         """
-        reduced, places = (self.at_points.T @ matrix @ self.at_points).tocoo(), self._places
-        data = np.concatenate([reduced.data, np.zeros(places.nnz)])
-        rows = np.concatenate([reduced.row, places.row])
-        columns = np.concatenate([reduced.col, places.col])
-        return sp.coo_matrix((data, (rows, columns)), shape=(self.size, self.size)).tocsr()
+        return self._coupled.matrix(derivatives, self.size)
+
+
+class _Coupled:
+    """The functions of the grid at the points of each patch, which contact couples.
+
+    Args:
+        numbers, values: Functions at each point, points x functions.
+        patches: Patches of the points.
+    """
+
+    def __init__(self, numbers: Indices, values: Array, patches: Patches) -> None:
+        points, inside = patches.table
+        of_patch = numbers[points].reshape(patches.count, -1)
+        order = np.argsort(of_patch, axis=1, kind="stable")
+        inverse = np.argsort(order, axis=1, kind="stable")
+        ranked = np.take_along_axis(of_patch, order, axis=1)
+        new = np.diff(ranked, axis=1, prepend=-1) > 0
+        local = np.take_along_axis(np.cumsum(new, axis=1) - 1, inverse, axis=1)
+        #: Functions that each patch touches, filled up with its first one, patches x functions.
+        width = int(local.max(initial=-1)) + 1
+        self._functions = np.repeat(ranked[:, :1], width, axis=1)
+        patch = np.arange(patches.count)[:, None]
+        self._functions[np.broadcast_to(patch, local.shape), local] = of_patch
+        #: Values of these at its points, patches x points x functions.
+        self._values = np.zeros((*points.shape, width))
+        at = local.reshape(*points.shape, -1)
+        place = np.arange(points.shape[1])[:, None]
+        self._values[patch[..., None], place, at] = values[points] * inside[..., None]
+        self._entries: Places | None = None
+
+    def matrix(self, derivatives: Array, size: int) -> sp.csr_matrix:
+        """The matrix on all coefficients, of derivatives on the points of each patch."""
+        values, dim = self._values, derivatives.shape[2]
+        count, num, width = values.shape
+        half = np.matmul(derivatives.transpose(0, 1, 2, 4, 3).reshape(count, -1, num), values)
+        half = half.reshape(count, num, -1).transpose(0, 2, 1)
+        blocks = np.matmul(half, values).reshape(count, dim, dim, width, width)
+        blocks = blocks.transpose(0, 4, 1, 3, 2)
+        if self._entries is None:
+            index = of_components(self._functions, dim).reshape(count, -1)
+            rows, columns = np.broadcast_arrays(index[:, :, None], index[:, None])
+            self._entries = Places(rows.ravel(), columns.ravel(), (size, size))
+        return self._entries.matrix(blocks.ravel())

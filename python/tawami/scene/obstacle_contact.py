@@ -161,7 +161,7 @@ class ObstacleContact:
     def stiffness(self) -> sp.csr_matrix:
         """See `Term`. Its entries are in the same places as long as no patch comes near."""
         self.now = self._states.linearised(self.now)
-        return self._border.on_coefficients(-self.motion.factor * self.now.derivative)
+        return self._border.on_coefficients(-self.motion.factor * self.now.derivatives)
 
     def improve(self) -> bool:
         """See `Term`."""
@@ -331,7 +331,7 @@ class ObstacleContact:
         rows, directions = [], [now.surface.normal]
         if self.obstacle.friction > 0:
             directions += list(now.tangent.transpose(1, 0, 2))
-        shares = now.contact.patches.shares(now.contact.weights)
+        shares = now.contact.shares
         for k in np.flatnonzero(now.pressure > 0):
             mine = now.contact.patches.number == k
             x, y = now.x[mine][0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import operator
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
@@ -10,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from tawami.base.arrays import Array
+from tawami.base.places import Added
 from tawami.field.reduction import Reduction
 from tawami.field.sum import Sum
 from tawami.solve.bordered import Bordering, Elimination
@@ -72,7 +74,7 @@ class Terms:
     """
 
     def __init__(self, terms: Sequence[Term], comm: Any) -> None:
-        self._terms, self._sum = terms, Sum(self, comm)
+        self._terms, self._sum, self._added = terms, Sum(self, comm), Added()
         #: Stiffness of each term when they were last added, and their sum.
         self._stiffnesses: list[sp.csr_matrix] = [None] * len(terms)
         self.stiffness: sp.csr_matrix | None = None
@@ -130,10 +132,10 @@ class Terms:
         """A reduced tangent with their stiffness."""
         parts = [term.stiffness() for term in self._terms]
         if not all(map(operator.is_, parts, self._stiffnesses)):
-            self._stiffnesses, self.stiffness = parts, _added(parts)
+            self._stiffnesses, self.stiffness = parts, self._added.of(parts)
         return self._sum.of(tangent, self.stiffness, reduction)
 
-    @property
+    @functools.cached_property
     def bordering(self) -> list[Bordering]:
         """The terms with unknowns of their own."""
         return [t for t in self._terms if isinstance(t, Bordering) and t.num_unknowns]
@@ -164,14 +166,3 @@ class Terms:
         """Keep what later steps need, once a step is stored."""
         for term in self._terms:
             term.accept()
-
-
-def _added(matrices: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
-    """A sum with an entry wherever one of them has one, zeros too."""
-    if len(matrices) == 1:
-        return matrices[0]
-    parts = [matrix.tocoo() for matrix in matrices]
-    data, rows, columns = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("data", "row", "col")
-    )
-    return sp.coo_matrix((data, (rows, columns)), shape=parts[0].shape).tocsr()
