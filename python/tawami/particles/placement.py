@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,37 +13,56 @@ from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array, Mask
 from tawami.base.errors import CheckpointError, InputError
-from tawami.grid.grid import Grid
+from tawami.grid.grid import EDGES, Edge, Grid
 
 #: Least distance of moving particles from the sides of their cell [cells]. A single particle on a side
 #: would leave functions beyond it without stiffness and mass.
 MARGIN = 1e-5
+#: Distance beyond a wall at which a particle that moves is taken as on it [cells]: contact acts on means
+#: over patches of the border, so that a corner or a curved border may pass it a little.
+BEYOND = 0.5
 
 
-def located(grid: Grid, x: Array, *, moving: bool) -> _rust.Location:
-    """Cells of particles; moving particles are placed away from the sides of their cells."""
+def located(grid: Grid, x: Array, *, moving: bool, moved: bool = True) -> _rust.Location:
+    """Cells of particles; moving particles are placed away from the sides of their cells.
+
+    Args:
+        grid: The grid.
+        x: Positions [m], particles x dim.
+        moving: Whether particles move.
+        moved: Whether they may have passed a wall a little.
+    """
+    if moving and moved:
+        x = np.clip(x, grid.origin, grid.upper)
     location = grid.rust.locate(x)
     return location.away_from_sides(MARGIN) if moving else location
 
 
-def outside(grid: Grid, x: Array) -> Mask:
-    """Whether each position is outside the grid, by more than the round-off that Rust accepts."""
-    margin = 1e-9 * grid.h
-    gone = np.zeros(len(x), dtype=bool)
-    for along, low, high in zip(x.T, grid.origin, grid.upper, strict=True):
-        gone |= ~((along >= low - margin) & (along <= high + margin))
-    return gone
+def outside(grid: Grid, x: Array, walls: Collection[Edge] = ()) -> Mask:
+    """Whether each position is outside the grid, by more than the round-off that Rust accepts, or than
+    a particle may be beyond a wall.
+
+    Args:
+        grid: The grid.
+        x: Positions [m], points x dim.
+        walls: Edges with walls.
+    """
+    inside = np.ones(len(x), dtype=bool)
+    for edge in EDGES:
+        margin = BEYOND if edge in walls else 1e-9
+        inside &= grid.inwards(edge, x) >= -margin * grid.h
+    return ~inside
 
 
 def distributed(
-    grid: Grid, body: _rust.Particles, *, moving: bool
+    grid: Grid, body: _rust.Particles, *, moving: bool, moved: bool = False
 ) -> tuple[_rust.Particles, _rust.Location]:
-    """The particles in this rank's cells, from a body that every rank has.
+    """The particles in this rank's cells, from a body that every rank has; see :func:`located`.
 
     Raises:
         InputError: Particles are outside the grid, or the body is not the same on all ranks.
     """
-    location = located(grid, body.x, moving=moving)
+    location = located(grid, body.x, moving=moving, moved=moved)
     if grid.comm.size == 1:
         return body, location
     parts = (body.x, body.volume, body.material)
@@ -99,7 +118,7 @@ def scattered(
             "only, or has another width. Expected the same form, laws and motion"
         )
     everything = particles.of_rows(np.hstack([arrays[name] for name in wanted]))
-    mine, location = distributed(grid, everything, moving=moving)
+    mine, location = distributed(grid, everything, moving=moving, moved=True)
     return (particles if particles.assign(mine) else mine), location
 
 
@@ -117,10 +136,16 @@ def migrated(grid: Grid, particles: _rust.Particles) -> tuple[_rust.Particles, _
         particles = particles.select(np.argsort(particles.number).astype(np.uint32))
 
 
-def check_staying(
-    grid: Grid, particles: _rust.Particles, x: Array, time: float, *, stop: bool
-) -> None:
-    """Check that a step may move the particles to x.
+def leaving(
+    grid: Grid,
+    particles: _rust.Particles,
+    x: Array,
+    time: float,
+    *,
+    stop: bool,
+    walls: Collection[Edge] = (),
+) -> Mask:
+    """Mask of the particles of this rank that leave the grid when a step moves them to x.
 
     Args:
         grid: The grid.
@@ -128,11 +153,12 @@ def check_staying(
         x: Their new positions [m].
         time: Time at the end of the step [s]; NaN in a static scene.
         stop: Whether it is an error if any particle leaves the grid.
+        walls: Edges with walls.
 
     Raises:
         InputError: A particle leaves the grid, or the last one does.
     """
-    gone = outside(grid, x)
+    gone = outside(grid, x, walls)
     with ranks.raise_together(grid.comm):
         if gone.any() and stop:
             p = np.flatnonzero(gone)[0]
@@ -145,6 +171,7 @@ def check_staying(
     staying = ranks.sum_of(grid.comm, np.array([np.sum(~gone)]))
     if not staying[0]:
         raise InputError("the last particle would leave the grid, and no body would remain")
+    return gone
 
 
 def removed(

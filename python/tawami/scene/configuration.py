@@ -250,10 +250,9 @@ class Configuration:
             return None
         particles = self.domain.particles
         moved = np.asarray(particles.x + self.domain.at_particles(accepted.u))
-        placement.check_staying(
-            self.model.grid, particles, moved, time, stop=self.model.leaving == "stop"
-        )
-        return Moved(moved, self.border.moved(self.domain, accepted.u))
+        stop, walls = self.model.leaving == "stop", self.supports.edges_with_walls
+        gone = placement.leaving(self.model.grid, particles, moved, time, stop=stop, walls=walls)
+        return Moved(moved, gone, self.border.moved(self.domain, accepted.u))
 
     def _store(self, accepted: Accepted, moved: Moved | None, time: float) -> Outcome:
         """Store a step that the laws have committed, and move the particles."""
@@ -268,7 +267,7 @@ class Configuration:
             self.border.move(moved.border)
         outcome, particles = self._outcome(accepted, coefficients), self.domain.particles
         self.border.divide()
-        particles, gone = placement.removed(grid, particles, placement.outside(grid, particles.x))
+        particles, gone = placement.removed(grid, particles, moved.gone)
         self.left += [(number, x, time) for number, x in gone]
         self._attach(*placement.migrated(grid, particles))
         with self.stopwatch("commit"):
@@ -279,7 +278,7 @@ class Configuration:
 
     def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:
         self.obstacles.warn(self.domain, coefficients)
-        wall_gap.warn_of_distant(self.supports.walls, self.border.points, accepted.forces)
+        wall_gap.warn_of_distant(self.supports.walls_on_functions, self.domain, accepted.forces)
         arrays = quantities.of_body(self.model.grid.comm, self.domain.particles)
         return Outcome(accepted, coefficients, Reactions.of(accepted, self.supports), arrays)
 

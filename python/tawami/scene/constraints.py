@@ -75,13 +75,13 @@ def constraints(
     for one in held:
         fixed[one.indices] = True
     prescribed = []
-    for wall in supports.walls:
+    for wall in supports.walls_on_functions:
         by_others = fixed.copy()
-        for other in supports.walls:
+        for other in supports.walls_on_functions:
             by_others[other.stopped if other is not wall else []] = True
         prescribed.append(wall.prescribed(by_others))
         held += wall.held(layout.active, prescribed[-1], start, before)
-    contact = ActiveSet(supports.walls, prescribed)
+    contact = ActiveSet(supports.walls_on_functions, prescribed)
     rows = [row for one in border for row in one.rows] if not moving else []
     rows += also
     may_move = moving or domain.model.compiled.may_hold

@@ -142,7 +142,7 @@ class _Coupled:
 
     def __init__(self, numbers: Indices, values: Array, patches: Patches) -> None:
         points, inside = patches.table
-        of_patch = numbers[points].reshape(patches.count, -1)
+        of_patch = numbers[points].reshape(patches.count, points.shape[1] * numbers.shape[1])
         order = np.argsort(of_patch, axis=1, kind="stable")
         inverse = np.argsort(order, axis=1, kind="stable")
         ranked = np.take_along_axis(of_patch, order, axis=1)
@@ -155,7 +155,7 @@ class _Coupled:
         self._functions[np.broadcast_to(patch, local.shape), local] = of_patch
         #: Values of these at its points, patches x points x functions.
         self._values = np.zeros((*points.shape, width))
-        at = local.reshape(*points.shape, -1)
+        at = local.reshape(*points.shape, numbers.shape[1])
         place = np.arange(points.shape[1])[:, None]
         self._values[patch[..., None], place, at] = values[points] * inside[..., None]
         self._entries: Places | None = None
@@ -164,12 +164,12 @@ class _Coupled:
         """The matrix on all coefficients, of derivatives on the points of each patch."""
         values, dim = self._values, derivatives.shape[2]
         count, num, width = values.shape
-        half = np.matmul(derivatives.transpose(0, 1, 2, 4, 3).reshape(count, -1, num), values)
-        half = half.reshape(count, num, -1).transpose(0, 2, 1)
+        by_point = derivatives.transpose(0, 1, 2, 4, 3).reshape(count, num * dim * dim, num)
+        half = np.matmul(by_point, values).reshape(count, num, dim * dim * width).transpose(0, 2, 1)
         blocks = np.matmul(half, values).reshape(count, dim, dim, width, width)
         blocks = blocks.transpose(0, 4, 1, 3, 2)
         if self._entries is None:
-            index = of_components(self._functions, dim).reshape(count, -1)
+            index = of_components(self._functions, dim).reshape(count, width * dim)
             rows, columns = np.broadcast_arrays(index[:, :, None], index[:, None])
             self._entries = Places(rows.ravel(), columns.ravel(), (size, size))
         return self._entries.matrix(blocks.ravel())

@@ -84,7 +84,7 @@ class Solution(Elsewhere, Sealed, Unique):
         self.krylov = tuple(step.krylov)
         self.condition, self.symmetric = step.condition, step.symmetric
         self._reactions = outcome.reactions
-        self.on_edges = outcome.reactions.on_edges
+        self.on_edges = outcome.reactions.on_edges + outcome.reactions.on_walls
         particles = outcome.particles
         now = scene.configuration
         #: The border of the body; None if it has none.

@@ -1,7 +1,8 @@
 """Walls with Coulomb friction at the edges of the grid.
 
-A function of the wall is apart from it, or in contact; in contact it sticks, or slides against a
-friction of `mu` times its pressure:
+A wall is an obstacle, the half-plane behind the edge. Bodies without a border have no contact with
+obstacles. For these it holds functions of the grid: each is apart from the wall, or in contact; in
+contact it sticks, or slides against a friction of `mu` times its pressure:
 
     g_n >= 0,  r_n >= 0,  g_n r_n = 0;       |r_t| <= mu r_n,  sliding at |r_t| = mu r_n against it
 
@@ -19,14 +20,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tawami.base import checks
 from tawami.base.arrays import of_components
 from tawami.base.errors import InputError
+from tawami.border.shapes import HalfPlane, half_plane
 from tawami.field.constraints import Held
 from tawami.grid.basis import Basis
 from tawami.grid.edges import edge_functions
 from tawami.grid.grid import Edge, Grid
 from tawami.scene.action import Owner
+from tawami.scene.obstacle import Obstacle
+from tawami.scene.obstacle_inputs import checked_friction
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -38,19 +41,9 @@ FORCE, GAP = 1e-6, 1e-12
 RETURNS = 4
 
 
-def checked_friction(what: str, friction: Any) -> float:
-    """A coefficient of friction, which may be infinite.
-
-    Raises:
-        InputError: Anything else.
-    """
-    mu = checks.real(f"{what}: friction", friction)
-    if not mu >= 0:
-        raise InputError(
-            f"{what}: friction = {checks.shown(friction)}: expected a number of at least 0, or "
-            "numpy.inf for a surface without sliding"
-        )
-    return mu
+def name_of(edge: str) -> str:
+    """Name of the wall at an edge of the grid."""
+    return f"wall {edge}"
 
 
 @dataclass
@@ -79,6 +72,7 @@ class Wall:
         owner: The supports of the scene that it is one of, if there is a scene.
 
     Attributes:
+        obstacle: The obstacle; None for a body without a border.
         functions: Displacement functions along it.
         state: Their states of contact.
         returns: Number of times that each came back to the wall or to rest in this step.
@@ -91,6 +85,7 @@ class Wall:
     friction: float
     separates: bool
     owner: Owner[Any] | None = None
+    obstacle: Obstacle | None = field(init=False, default=None)
     functions: npt.NDArray[np.int64] = field(init=False)
     state: Contact = field(init=False)
     returns: npt.NDArray[np.int64] = field(init=False)
@@ -121,6 +116,8 @@ class Wall:
         """
         owner = self._owner("change(...)")
         self.friction = checked_friction(f"wall(edge='{self.edge}')", friction)
+        if self.obstacle is not None:
+            self.obstacle.change(friction=friction)
         self._touch(self.state.touching)
         owner.changed()
 
@@ -132,6 +129,8 @@ class Wall:
         """
         self._owner("release()").remove(self)
         self.owner = None
+        if self.obstacle is not None:
+            self.obstacle.release()
 
     def _owner(self, what: str) -> Owner[Any]:
         if self.owner is None:
@@ -153,6 +152,18 @@ class Wall:
     def begin(self) -> None:
         """Start a step: forget how often functions came back in the last one."""
         self.returns = np.zeros(len(self.functions), dtype=np.int64)
+
+    @property
+    def name(self) -> str:
+        """Its name for `solution.contact(...)`."""
+        return name_of(self.edge)
+
+    @property
+    def half_plane(self) -> HalfPlane:
+        """The half-plane behind the edge."""
+        across, _, inward = self.axes
+        point = self.grid.origin if inward > 0 else self.grid.upper
+        return half_plane(point, inward * np.eye(self.grid.space.dim)[across])
 
     @property
     def axes(self) -> tuple[int, int, int]:
