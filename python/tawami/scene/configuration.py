@@ -278,7 +278,7 @@ class Configuration:
 
     def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:
         self.obstacles.warn(self.domain, coefficients)
-        wall_gap.warn_of_distant(self.supports.walls_on_functions, self.domain, accepted.forces)
+        wall_gap.warn_of_distant(self.supports.walls, self.domain, accepted.forces)
         arrays = quantities.of_body(self.model.grid.comm, self.domain.particles)
         return Outcome(accepted, coefficients, Reactions.of(accepted, self.supports), arrays)
 

@@ -20,6 +20,7 @@ from tawami.scene.held_border import HeldBorder
 from tawami.scene.moving_points import MovingPoints
 from tawami.scene.support import Support
 from tawami.scene.supports import Supports
+from tawami.scene.walls import on_functions
 
 
 def constraints(
@@ -74,14 +75,14 @@ def constraints(
     fixed = np.zeros(layout.size, dtype=bool)
     for one in held:
         fixed[one.indices] = True
-    prescribed = []
-    for wall in supports.walls_on_functions:
+    prescribed, walls = [], on_functions(supports.walls, domain)
+    for wall, of_border in walls.items():
         by_others = fixed.copy()
-        for other in supports.walls_on_functions:
+        for other in walls:
             by_others[other.stopped if other is not wall else []] = True
-        prescribed.append(wall.prescribed(by_others))
+        prescribed.append(wall.prescribed(by_others) | of_border[:, None])
         held += wall.held(layout.active, prescribed[-1], start, before)
-    contact = ActiveSet(supports.walls_on_functions, prescribed)
+    contact = ActiveSet([*walls], prescribed)
     rows = [row for one in border for row in one.rows] if not moving else []
     rows += also
     may_move = moving or domain.model.compiled.may_hold

@@ -104,15 +104,19 @@ class MovingPoints:
         along[order] = ends - length[order] / 2 - (ends - length[order])[first]
         return replace(made, x=self.x, length=length, normal=self.normal, along=along)
 
-    def cells(self, domain: Domain) -> BorderInCells:
+    def cells(self, domain: Domain, *, torn: bool = False) -> BorderInCells:
         """The points in the cells of a domain.
+
+        Args:
+            domain: The domain.
+            torn: Whether points may have no particles near them.
 
         Raises:
             SupportError: A point has no particles near it.
         """
         if self._located is None or self._located[0] is not domain:
-            made = BorderInCells(self._grid, domain.active, self.x, self.normal, self.what)
-            self._located = domain, made
+            of = self._grid, domain.active, self.x, self.normal, self.what
+            self._located = domain, BorderInCells(*of, torn=torn)
         return self._located[1]
 
     def edge(self, edge: Edge, tolerance: float = ON_LINE) -> Mask:

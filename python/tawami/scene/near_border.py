@@ -16,6 +16,8 @@ from tawami.scene.moving_points import MovingPoints
 
 #: Lengths of patches that stay, unless they were made so [cells].
 SHORTEST, LONGEST = 0.7, 2.2
+#: Share of the largest area that a point has on an axis of symmetry, or without particles near it.
+NO_WEIGHT = 1e-12
 
 
 class BorderNear:
@@ -59,18 +61,20 @@ class BorderNear:
     ) -> None:
         self.h, self._dim = domain.model.grid.h, domain.model.space.dim
         self.n, self.size = domain.layout.num_displacement, domain.layout.size
-        cells = place.cells(domain)
+        cells = place.cells(domain, torn=True)
         self._numbers, self._values, _ = cells.tabulated(domain.layout.basis)
         self.x = place.x
         self.x = self.positions(before)
         self.start = pose.to_local(self.x)
         self.groups = self._grouped(place, groups)
         weight = place.weight
-        self.weights = np.maximum(weight, 1e-12 * weight.max())  # 0 on an axis of symmetry
-        shear = domain.moduli_of_cells[1][cells.location.cell]
+        least = NO_WEIGHT * weight.max()
+        self.weights = np.where(cells.lost, least, np.maximum(weight, least))
+        shear = np.where(cells.lost, 0.0, domain.moduli_of_cells[1][cells.location.cell])
         self.penalty = PENALTY / self.h * self.groups.means(self.weights, shear)
         self.distance = shape.evaluate(self.start).distance
         self.chosen = np.zeros(self.groups.count, dtype=bool)
+        self._lost = cells.lost
 
     def _grouped(self, place: MovingPoints, groups: Patches | None) -> Patches:
         """Patches of all points."""
@@ -90,7 +94,7 @@ class BorderNear:
     def choose(self, points: Mask) -> None:
         """Evaluate the patches of further points from now on."""
         number = self.groups.number
-        self.chosen[number[points]] = True
+        self.chosen[number[points & ~self._lost]] = True
         self.points = np.flatnonzero(self.chosen[number])
         new_number = np.cumsum(self.chosen) - 1
         self.patches = Patches(new_number[number[self.points]], int(self.chosen.sum()))
@@ -114,7 +118,7 @@ class BorderNear:
             local: Present positions in the frame of the obstacle.
         """
         moved = np.linalg.norm(local - self.start, axis=1)
-        return np.asarray((self.distance <= moved) & ~self.chosen[self.groups.number])
+        return np.asarray((self.distance <= moved) & ~self._lost & ~self.chosen[self.groups.number])
 
     def on_all(self, forces: Array) -> Array:
         """Forces on the chosen points as forces on all coefficients."""

@@ -270,11 +270,6 @@ class Supports(Owner[Support]):
         return {wall.edge for wall in self.walls}
 
     @property
-    def walls_on_functions(self) -> list[Wall]:
-        """The walls that hold functions of the grid."""
-        return [wall for wall in self.walls if wall.obstacle is None]
-
-    @property
     def at_points(self) -> list[Support]:
         """The supports that hold a point."""
         return [s for s in self.all if isinstance(s.place, tuple)]

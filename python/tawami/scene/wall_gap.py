@@ -36,7 +36,7 @@ def warn_of_distant(walls: Iterable[Wall], domain: Domain, forces: Array) -> Non
     call for all ranks.
 
     Args:
-        walls: The walls that hold functions.
+        walls: The walls.
         domain: The particles at the end of the step.
         forces: Forces of supports and walls on the body, functions x dim [N per metre depth].
 
@@ -44,7 +44,7 @@ def warn_of_distant(walls: Iterable[Wall], domain: Domain, forces: Array) -> Non
         SupportWarning: A wall did.
     """
     for wall in walls:
-        if wall.told:
+        if wall.told or wall.obstacle is not None:
             continue
         across, _, inward = wall.axes
         push = inward * forces[wall.functions[wall.state.touching], across]

@@ -1,8 +1,9 @@
 """Walls with Coulomb friction at the edges of the grid.
 
-A wall is an obstacle, the half-plane behind the edge. Bodies without a border have no contact with
-obstacles. For these it holds functions of the grid: each is apart from the wall, or in contact; in
-contact it sticks, or slides against a friction of `mu` times its pressure:
+A wall is an obstacle, the half-plane behind the edge, for the border of the body. Loose particles have
+no border, nor have parts that broke off. For these it holds functions of the grid that no border
+reaches: each is apart from the wall, or in contact; in contact it sticks, or slides against a friction
+of `mu` times its pressure:
 
     g_n >= 0,  r_n >= 0,  g_n r_n = 0;       |r_t| <= mu r_n,  sliding at |r_t| = mu r_n against it
 
@@ -13,7 +14,7 @@ contradict it are changed, and it is solved again from there.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -28,6 +29,7 @@ from tawami.grid.basis import Basis
 from tawami.grid.edges import edge_functions
 from tawami.grid.grid import Edge, Grid
 from tawami.scene.action import Owner
+from tawami.scene.domain import Domain
 from tawami.scene.obstacle import Obstacle
 from tawami.scene.obstacle_inputs import checked_friction
 
@@ -59,7 +61,7 @@ class Contact:
     slip: npt.NDArray[np.int8]
 
 
-@dataclass(repr=False)
+@dataclass(repr=False, eq=False)
 class Wall:
     """A wall along an edge of the grid.
 
@@ -177,6 +179,14 @@ class Wall:
         across, _, _ = self.axes
         return self.grid.space.dim * self.functions[self.state.touching] + across
 
+    def of_border(self, domain: Domain) -> Mask:
+        """Mask of its functions that the border of the body reaches: they belong to the obstacle."""
+        reached = np.zeros(domain.layout.num_displacement // self.grid.space.dim, dtype=bool)
+        if self.obstacle is not None:
+            cells = self.obstacle.place.cells(domain, torn=True)
+            reached[cells.tabulated(self.basis)[0][~cells.lost]] = True
+        return np.asarray(reached[self.functions])
+
     def prescribed(self, fixed: Mask) -> Mask:
         """Whether other supports prescribe its components, functions x dim.
 
@@ -249,3 +259,13 @@ class Wall:
         if self.friction > 0:
             state.slip[sticks | meets] = 0
         return bool((leaves | meets | slides | sticks).any())
+
+
+def on_functions(walls: Sequence[Wall], domain: Domain) -> dict[Wall, Mask]:
+    """The walls that hold functions of the grid, with masks of those that belong to their obstacles."""
+    found = {}
+    for wall in walls:
+        of_border = wall.of_border(domain)
+        if (domain.layout.active[wall.grid.space.dim * wall.functions] & ~of_border).any():
+            found[wall] = of_border
+    return found
