@@ -46,8 +46,8 @@ class Costs:
 
     def __str__(self) -> str:
         return (
-            f"{self.ratio:.3f} ({self.low:.3f} to {self.high:.3f}), of all steps {self.total:.3f}, "
-            f"iterations {self.iterations[0]} / {self.iterations[1]}"
+            f"{self.ratio:.3f} ({self.low:.3f} to {self.high:.3f}), iterations {self.iterations[0]} / "
+            f"{self.iterations[1]}, of all steps {self.total:.3f}"
         )
 
 
