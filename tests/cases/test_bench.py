@@ -43,7 +43,7 @@ def test_terms_on_the_border_are_compared_in_one_run(capsys):
     lines = capsys.readouterr().out.splitlines()
     found = [re.search(r": ([\d.]+) \(([\d.]+) to ([\d.]+)\), iterations \d+ / \d+,", text)
              for text in lines if "/" in text]  # fmt: skip
-    assert len(found) == 2
+    assert len(found) == 3
     for one in found:
         ratio, low, high = map(float, one.groups())
         assert 0 < low <= ratio <= high

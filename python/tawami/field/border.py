@@ -7,15 +7,12 @@ for linear fields, so that no force and no moment of a load is lost.
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 import scipy.sparse as sp
 
 from tawami import _rust
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import SupportError
-from tawami.base.space import lattice
 from tawami.base.text import position
 from tawami.grid.basis import Basis
 from tawami.grid.grid import Grid
@@ -136,12 +133,6 @@ def _far_from_particles(grid: Grid, x: Array, lost: Mask, where: str) -> Support
     )
 
 
-@lru_cache
-def _around(dim: int) -> Indices:
-    """Steps to the cells in which one with particles is sought, cells x dim."""
-    return lattice([np.arange(-REACH, REACH + 1)] * dim)
-
-
 def _nearest(grid: Grid, active: Mask, scaled: Array) -> tuple[Indices, Mask]:
     """The nearest active cell of each point, by its position along the axes, and whether there is none.
 
@@ -150,15 +141,20 @@ def _nearest(grid: Grid, active: Mask, scaled: Array) -> tuple[Indices, Mask]:
         active: Whether each cell holds particles, x fastest.
         scaled: Positions [cells].
     """
-    most = np.array(grid.cells) - 1
-    dim = grid.space.dim
-    base = np.clip(np.floor(scaled), 0, most).astype(np.int64)
-    near = base[:, None] + _around(dim)
-    inside = ((near >= 0) & (near <= most)).all(axis=2)
-    held = inside & active[grid.cell_numbers(np.clip(near, 0, most))]
-    outside = np.maximum(np.maximum(near - scaled[:, None], scaled[:, None] - near - 1), 0.0)
-    distance = np.where(held, (outside**2).sum(axis=2), np.inf)
-    best = distance.argmin(axis=1)
-    lost = ~np.isfinite(distance.min(axis=1))
-    chosen = np.where(lost[:, None], base, near[np.arange(len(near)), best])
-    return np.asarray(chosen), np.asarray(lost)
+    cells, dim, steps = grid.cells, grid.space.dim, np.arange(-REACH, REACH + 1)
+    base = np.clip(np.floor(scaled), 0, np.array(cells) - 1).astype(np.int64)
+    square, number, stride = np.zeros(1), np.zeros(1, dtype=np.int64), 1
+    for axis in range(dim):
+        near = base[:, axis, None] + steps
+        before = near - scaled[:, axis, None]
+        away = np.maximum(np.maximum(before, 0.0), -1 - before)
+        away[(near < 0) | (near >= cells[axis])] = np.inf
+        along = (-1, *(len(steps) if k == axis else 1 for k in range(dim)))
+        square = square + (away**2).reshape(along)
+        number = number + stride * np.clip(near, 0, cells[axis] - 1).reshape(along)
+        stride *= cells[axis]
+    square = np.where(active[number], square, np.inf).reshape(len(base), -1)
+    best = square.argmin(axis=1)
+    lost = np.asarray(np.isinf(square[np.arange(len(base)), best]))
+    change = np.column_stack(np.unravel_index(best, (len(steps),) * dim)) - REACH
+    return np.where(lost[:, None], base, base + change), lost

@@ -219,7 +219,10 @@ class SceneBorder:
         if self._ends is not None:
             of = halve(self._ends, self._grid.h)
             self._left, self._shares = self._left[of], self._shares[of]
-        kept = {points: points.divide() for points in self.all if points is not self._ends}
+        all_points = [points for points in self.all if points is not self._ends]
+        if not any(points.is_stretched for points in all_points):
+            return
+        kept = {points: points.divide() for points in all_points}
         for user in self.users:
             user.keep(kept)
 

@@ -194,6 +194,12 @@ class MovingPoints:
         self.number, self.made, self.middle = self.number[kept], self.made[kept], self.middle[kept]
         self._located = None
 
+    @property
+    def is_stretched(self) -> bool:
+        """Whether a point is on a longer stretch of the border than `LONGEST`."""
+        longest = LONGEST * self._grid.h * (1 + 1e-9)
+        return bool(np.einsum("ja,ja->j", self.area, self.area).max(initial=0.0) > longest**2)
+
     def divide(self) -> Indices:
         """Divide points on longer stretches of the border than `LONGEST` into equal parts.
 
@@ -300,12 +306,11 @@ def moved(
     )
     normal = area / np.linalg.norm(area, axis=1)[:, None]
     cells = BorderInCells(grid, domain.active, x, normal, torn=True)
-    location, near = cells.location, ~cells.lost
+    location, near = cells.location, ~cells.lost[:, None]
     flat = np.ascontiguousarray(u).ravel()
     gradient = space.in_space(space.gradients(_rust.gradients(location, basis, flat)))
     f = gradient + np.eye(space.dim)
-    x, area = x.copy(), area.copy()
-    x[near] += _rust.interpolate(location, basis, space.dim, flat)[near]
-    area[near] = transformed(area[near], f[near])
+    x = x + np.where(near, _rust.interpolate(location, basis, space.dim, flat), 0.0)
+    area = np.where(near, transformed(area, f), area)
     ends = np.cumsum([len(p) for p in all_points])[:-1]
     return list(zip(np.split(x, ends), np.split(area, ends), strict=True))
