@@ -157,6 +157,7 @@ class Configuration:
         now: Moment,
         supports: Sequence[HeldBorder],
         obstacles: Sequence[ObstacleContact] = (),
+        ends: Sequence[Moment] = (),
     ) -> Terms | None:
         """Forces on the border that depend on the solution of a step; None without any.
 
@@ -164,8 +165,11 @@ class Configuration:
             now: The end of the step.
             supports: Supports on patches of the border.
             obstacles: Contact with obstacles.
+            ends: Load factors 0 and 1 of a path.
         """
-        found: list[Term] = [*self.loads.following(self.domain, now), *supports, *obstacles]
+        found: list[Term] = [
+            *self.loads.following(self.domain, now, ends), *supports, *obstacles
+        ]  # fmt: skip
         return Terms(found, self.model.grid.comm) if found else None
 
     def external(self, now: Moment | None = None) -> Array:
