@@ -12,10 +12,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks, ranks, signals
+from tawami.base.arrays import Array
 from tawami.base.errors import CheckpointError
 from tawami.base.meaning import fingerprint
 from tawami.base.process import check_process
@@ -52,9 +52,8 @@ from tawami.scene.step_values import Fields
 from tawami.scene.strain_limits import StrainLimits
 from tawami.scene.supports import Supports
 from tawami.solve.numerics import Numerics
-from tawami.solve.terms import Term, Terms
+from tawami.solve.terms import Terms
 
-Array = npt.NDArray[np.float64]
 #: Arrays of particles of lengths, or lengths per time.
 LENGTHS = ("x", "displacement", "velocity", "acceleration")
 
@@ -167,9 +166,7 @@ class Configuration:
             obstacles: Contact with obstacles.
             ends: Load factors 0 and 1 of a path.
         """
-        found: list[Term] = [
-            *self.loads.following(self.domain, now, ends), *supports, *obstacles
-        ]  # fmt: skip
+        found: list[Term] = [*self.loads.following(self.domain, now, ends), *supports, *obstacles]
         return Terms(found, self.model.grid.comm) if found else None
 
     def external(self, now: Moment | None = None) -> Array:
@@ -252,9 +249,9 @@ class Configuration:
         """Positions at the end of the step; None where particles do not move."""
         if not self.model.moves:
             return None
-        particles = self.domain.particles
+        particles, walls = self.domain.particles, self.supports.edges_with_walls
         moved = np.asarray(particles.x + self.domain.at_particles(accepted.u))
-        stop, walls = self.model.leaving == "stop", self.supports.edges_with_walls
+        stop = self.model.leaving == "stop"
         gone = placement.leaving(self.model.grid, particles, moved, time, stop=stop, walls=walls)
         return Moved(moved, gone, self.border.moved(self.domain, accepted.u))
 

@@ -88,7 +88,7 @@ class Obstacles(Owner[Obstacle]):
         speeds = inputs.speeds_of(what, velocity, space, self.activity.time)
         inputs.check_motions(what, space, speeds, moves, np.array(by), np.array(forces))
         _check_place(what, made, part, domain, total)
-        warn_of_small(what, made, h)
+        warn_of_small(what, made, domain.model.grid)
         obstacle = Obstacle(
             self, part, given, name, made, mu, moves, masses, np.where(moves, forces, by), factor,
             speeds, separates,
