@@ -52,7 +52,7 @@ from tawami.scene.step_values import Fields
 from tawami.scene.strain_limits import StrainLimits
 from tawami.scene.supports import Supports
 from tawami.solve.numerics import Numerics
-from tawami.solve.terms import Terms
+from tawami.solve.terms import Term, Terms
 
 #: Arrays of particles of lengths, or lengths per time.
 LENGTHS = ("x", "displacement", "velocity", "acceleration")
