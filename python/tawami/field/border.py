@@ -141,7 +141,18 @@ def _nearest(grid: Grid, active: Mask, scaled: Array) -> tuple[Indices, Mask]:
         active: Whether each cell holds particles, x fastest.
         scaled: Positions [cells].
     """
-    cells, dim, steps = grid.cells, grid.space.dim, np.arange(-REACH, REACH + 1)
+    index, square = _nearest_within(grid, active, scaled, 1)
+    far = square >= 1  # cells further away may be nearer
+    if far.any():
+        index[far], square[far] = _nearest_within(grid, active, scaled[far], REACH)
+    return index, np.isinf(square)
+
+
+def _nearest_within(grid: Grid, active: Mask, scaled: Array, reach: int) -> tuple[Indices, Array]:
+    """The nearest active cell at most `reach` cells away along each axis, and the distance squared;
+    infinite for none.
+    """
+    cells, dim, steps = grid.cells, grid.space.dim, np.arange(-reach, reach + 1)
     base = np.clip(np.floor(scaled), 0, np.array(cells) - 1).astype(np.int64)
     square, number, stride = np.zeros(1), np.zeros(1, dtype=np.int64), 1
     for axis in range(dim):
@@ -155,6 +166,6 @@ def _nearest(grid: Grid, active: Mask, scaled: Array) -> tuple[Indices, Mask]:
         stride *= cells[axis]
     square = np.where(active[number], square, np.inf).reshape(len(base), -1)
     best = square.argmin(axis=1)
-    lost = np.asarray(np.isinf(square[np.arange(len(base)), best]))
-    change = np.column_stack(np.unravel_index(best, (len(steps),) * dim)) - REACH
-    return np.where(lost[:, None], base, base + change), lost
+    least = square[np.arange(len(base)), best]
+    change = np.column_stack(np.unravel_index(best, (len(steps),) * dim)) - reach
+    return np.where(np.isinf(least)[:, None], base, base + change), least

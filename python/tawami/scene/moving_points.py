@@ -64,6 +64,8 @@ class MovingPoints:
         self.reference = self.weight
         self.middle = self.now.along - points.along if middle is None else middle
         self._located: tuple[Domain, BorderInCells] | None = None
+        #: Masks of points on edges, at these positions.
+        self._on_edges: tuple[Array, dict[tuple[Edge, float], Mask]] = self.x, {}
 
     def __len__(self) -> int:
         return len(self.x)
@@ -126,7 +128,13 @@ class MovingPoints:
             edge: Name of the edge.
             tolerance: Distance that is ignored [cells].
         """
-        return np.asarray(self._grid.inwards(edge, self.x) <= tolerance * self._grid.h)
+        if self._on_edges[0] is not self.x:
+            self._on_edges = self.x, {}
+        known = self._on_edges[1]
+        if (edge, tolerance) not in known:
+            inwards = self._grid.inwards(edge, self.x)
+            known[edge, tolerance] = np.asarray(inwards <= tolerance * self._grid.h)
+        return known[edge, tolerance]
 
     def gap(self, edge: Edge) -> float:
         """Distance from an edge of the grid [m] that the nearest place on the border has at least.
