@@ -49,6 +49,7 @@ quick: setup $(STAMPS)/cargo-tests
 test-all: setup $(STAMPS)/cargo-tests $(STAMPS)/docs $(STAMPS)/notebook
 	cargo test --locked --quiet
 	$(PYTEST) $(TESTS)
+	$(PYTHON) -m cases.extremes --short
 
 fuzz: SEED := $(or $(SEED),$(shell od -An -N4 -tu4 /dev/urandom | tr -d ' '))
 fuzz: setup $(STAMPS)/cargo-tests

@@ -12,8 +12,9 @@ residual_based  the same with the whole momentum residual grad p + div s, p = K 
 projection      Dohrmann and Bochev 2004: the part of eps_v that varies within a cell; needs no h^2
 
 `ghost_penalty` ties partially filled cells to their neighbours: jumps of the second normal derivative of
-u, whose first is continuous for splines, and of the first of eps_v, on the sides that they share. Bodies
-on the lines of the grid have no such cells.
+u, whose first is continuous for splines, with the factor k, and of the first of eps_v with k_v, on the
+sides that they share. A larger k stiffens the border where u bends, as at the end of a contact; a larger
+k_v smooths the mean stress there. Bodies on the lines of the grid have no such cells.
 """
 
 from ufl import dot, inner
@@ -28,8 +29,10 @@ parameters = {
         "usual": 1.0,
         "maximum": {"residual_based": 0.14},
         "unit": "-",
+        "stabilises": True,
     },
-    "k": {"default": 0.01, "minimum": 0.0, "unit": "-"},
+    "k": {"default": 0.003, "minimum": 0.0, "unit": "-", "stabilises": True},
+    "k_v": {"default": 0.03, "minimum": 0.0, "unit": "-", "stabilises": True},
 }
 options = {
     "stabilisation": ("laplacian", "residual_based", "projection"),
@@ -40,7 +43,7 @@ whole_cells = ("residual_based",)
 
 def residual(
     u, eps_v, w, q, sigma, eps_p, K, mu, h, grad, div, eps, I, sum_p, cell_mean, dx_c, dG,
-    facet_mean, jump_n, jump_nn, alpha, k, stabilisation, ghost_penalty,
+    facet_mean, jump_n, jump_nn, alpha, k, k_v, stabilisation, ghost_penalty,
 ):  # fmt: skip
     """R_u = sum_p V_p sigma_p : grad w
     R_q = sum_p V_p K_p q (div u - eps_v - eps_p) - S.
@@ -49,7 +52,7 @@ def residual(
     R_q = sum_p(K, q * (div(u) - eps_v)) - sum_p(K * eps_p, q)
     if ghost_penalty == "on":
         R_u += k * facet_mean(mu) * h**3 * inner(jump_nn(u), jump_nn(w)) * dG
-        R_q -= k * facet_mean(K**2 / mu) * h**3 * jump_n(eps_v) * jump_n(q) * dG
+        R_q -= k_v * facet_mean(K**2 / mu) * h**3 * jump_n(eps_v) * jump_n(q) * dG
     if stabilisation == "projection":
         # int (q - q_c) (eps_v - eps_v,c), _c at the centre of the cell
         c = alpha * cell_mean(K**2 / mu)

@@ -9,7 +9,9 @@ from ufl import dot
 from tawami.form import scalar, vector
 
 fields = {"u": vector("w"), "p": scalar("q", role="pressure")}
-parameters = {"alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0, "unit": "-"}}
+parameters = {
+    "alpha": {"default": 0.01, "minimum": 0.0, "usual": 1.0, "unit": "-", "stabilises": True}
+}
 
 
 def residual(u, p, w, q, sigma, eps_p, K, mu, h, grad, div, sum_p, alpha):

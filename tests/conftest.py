@@ -39,6 +39,14 @@ def pytest_configure(config: pytest.Config) -> None:
         config.addinivalue_line("filterwarnings", "default::tawami.SolverWarning")
 
 
+@pytest.fixture(autouse=True)
+def _own_solver(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The solver by default, in tests of that solver."""
+    if request.node.get_closest_marker("direct"):
+        defaults = tawami.Scene.__init__.__kwdefaults__
+        monkeypatch.setitem(defaults, "linear_solver", "auto")
+
+
 @pytest.fixture(params=scenes.FORMS)
 def form(request: pytest.FixtureRequest) -> dict[str, Any]:
     """Options of each shipped form of small strain, with each of its stabilisations."""

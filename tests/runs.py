@@ -81,8 +81,11 @@ def block(**options: Any) -> tawami.Scene:
 
 def plastic_block(**options: Any) -> tawami.Dynamics:
     """A plastic block that strikes a floor; its particles are in a random order."""
-    grid = tawami.Grid(MPI.COMM_WORLD, origin=(-1.0, 0.5), h=0.25, cells=(6, 5))
-    body = tawami.box(grid, (-0.75, 0.5), (0.0, 1.25), per_axis=2)
+    grid, alone = (
+        tawami.Grid(comm, origin=(-1.0, 0.5), h=0.25, cells=(6, 5))
+        for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)
+    )
+    body = tawami.box(alone, (-0.75, 0.5), (0.0, 1.25), per_axis=2)  # whole on every rank
     order = np.random.default_rng(0).permutation(len(body.x))
     body = tawami.Body(body.x[order], body.volume[order])
     steel = tawami.von_mises(

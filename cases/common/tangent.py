@@ -21,4 +21,4 @@ def reduced_tangent(scene: tawami.Scene) -> tuple[Array, npt.NDArray[np.bool_]]:
     reduction = scene.reduction()
     tangent = scene.tangent(np.zeros(scene.num_coefficients))
     matrix = (reduction.selection.T @ tangent @ reduction.selection).toarray()
-    return matrix, reduction.unknowns < scene.configuration.domain.layout.num_displacement
+    return matrix, reduction.coefficients < scene.configuration.domain.layout.num_displacement

@@ -3,7 +3,9 @@
 Each row is a process of its own with one thread: processor time of one step without the making of the
 scene, peak memory, and iterations of the linear solver. The growth exponent is the slope of the time in
 the number of unknowns, in logarithms, between the coarsest and the finest grid of a solver. A second
-table has the iterations of multigrid for a clamped beam by Poisson's ratio, tolerance and grid.
+table has the iterations of multigrid for a clamped beam by Poisson's ratio, tolerance and grid. A third
+one compares the product with the assembled tangent, as scipy does it, with the residual of a linear
+problem: laws and form at the particles, without a matrix.
 
 python -m cases.costs.solvers
 python -m cases.costs.solvers --cells 32,64,128,256 --particles 800,51200
@@ -16,9 +18,10 @@ import json
 import resource
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from time import process_time
+from unittest.mock import patch
 
 import numpy as np
 
@@ -27,6 +30,7 @@ from cases.common.program import Program, numbers, progress
 from cases.common.table import as_csv, as_text
 from cases.costs.bench.timed import Steps, beam, pile
 from cases.verification.cantilever.mpm import build
+from tawami.solve import measures
 
 PROGRAM = Program("cases.costs.solvers", __doc__)
 WHOLE = numbers(int, lambda n: n > 0, "whole numbers separated by commas, such as 32,64")
@@ -38,6 +42,8 @@ PROGRAM.option("--steps", type=int, default=5, help="steps of a pile, of which t
 RATIOS, TOLERANCES, MOST = (0.0, 0.3, 0.4999, 0.499999), (1e-4, 1e-8), 128
 #: Tolerance of the solve of a linear problem, relative to that of Newton's method.
 OF_NEWTON = 0.3
+#: Products of which the median is taken.
+PRODUCTS = 7
 SOLVERS = ("direct", "multigrid", "auto")
 COUNTED = ("nu", "tolerance", "n", "iterations")
 COLUMNS = ("scene", "solver", "unknowns", "seconds", "MB", "newton", "iterations")
@@ -119,7 +125,38 @@ def iterations(cells: Sequence[int]) -> Iterator[Iterations]:
             "u_epsv", "clamped", n, alpha=0.01, material=tawami.linear_elastic(E=3e6, nu=nu),
             linear_solver="multigrid", tolerance=tolerance / OF_NEWTON,
         )  # fmt: skip
-        yield Iterations(nu, tolerance, n, scene.solve().krylov[0])
+        with patch.object(measures, "LINEAR", 1.0):  # to this tolerance and not further
+            yield Iterations(nu, tolerance, n, scene.solve().krylov[0])
+
+
+@dataclass(frozen=True)
+class Product:
+    """Milliseconds of a product with the tangent, and the memory of the matrix [MB]."""
+
+    n: int
+    assembled: float
+    matrix_free: float
+    MB: float
+
+
+def product(n: int) -> Product:
+    """Products for the cantilever with 2n x n cells; the median of some."""
+    scene = beam(n)
+    newton, x = scene.configuration.domain.newton, np.zeros(scene.num_coefficients)
+    tangent = scene.tangent(x)
+    x += np.random.default_rng(0).standard_normal(len(x))
+
+    def milliseconds(multiply: Callable[[], object]) -> float:
+        times = []
+        for _ in range(PRODUCTS):
+            start = process_time()
+            multiply()
+            times.append(1e3 * (process_time() - start))
+        return float(np.median(times))
+
+    memory = 1e-6 * (tangent.data.nbytes + tangent.indices.nbytes + tangent.indptr.nbytes)
+    of_matrix, of_particles = lambda: tangent @ x, lambda: newton.internal(x)
+    return Product(n, milliseconds(of_matrix), milliseconds(of_particles), memory)
 
 
 def exponent(rows: Sequence[Row]) -> float:
@@ -137,6 +174,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         mine = [r for r in rows if r.solver == solver and r.scene.startswith("beam")]
         print(f"growth exponent of the beam, {solver}: {exponent(mine):.2f}")
     print(as_text(list(iterations([n for n in options.cells if n <= MOST])), COUNTED))
+    products = [product(n) for n in options.cells if n <= MOST]
+    print(as_text(products, ("n", "assembled", "matrix_free", "MB")))
     PROGRAM.write("solvers.csv", as_csv(rows, COLUMNS))
     PROGRAM.list_results()
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from importlib import import_module
 from time import perf_counter
 
@@ -22,6 +23,8 @@ SUBJECTS = (
     "inf_sup",
     "particles",
     "slivers",
+    "border",
+    "axisymmetry",
     "contrast",
     "scales",
     "directions",
@@ -32,6 +35,9 @@ SUBJECTS = (
     "stretch",
     "rotation",
     "friction_angle",
+    "dilatancy",
+    "obstacles",
+    "fields",
     "impact",
     "sudden_load",
     "corruption",
@@ -88,6 +94,39 @@ def _limit(rows: Sequence[Attempt], series: str = "") -> str:
     return "; ".join(parts)
 
 
+@dataclass(frozen=True)
+class Summary:
+    """Outcomes of a subject: numbers of attempts, and the first that was warned and refused."""
+
+    subject: str
+    tried: int
+    green: int
+    yellow: int
+    refused: int
+    wrong: int
+    first_yellow: str
+    first_refused: str
+
+
+SUMMARY = (
+    "subject", "tried", "green", "yellow", "refused", "wrong", "first_yellow", "first_refused",
+)  # fmt: skip
+
+
+def summary(rows: Sequence[Attempt]) -> list[Summary]:
+    """One line for each subject."""
+    found = []
+    for subject in dict.fromkeys(row.subject for row in rows):
+        mine = [row for row in rows if row.subject == subject]
+        kinds = {
+            outcome: [row.setting for row in mine if row.outcome == outcome]
+            for outcome in ("survived", "warned", "refused", "WRONG")
+        }
+        first = [next(iter(kinds[outcome]), "") for outcome in ("warned", "refused")]
+        found.append(Summary(subject, len(mine), *map(len, kinds.values()), *first))
+    return found
+
+
 def study(subjects: Sequence[str], short: bool) -> list[Attempt]:
     """Run all attempts. Print each at once, and write the file after every subject."""
     rows: list[Attempt] = []
@@ -110,7 +149,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if name not in known:
             PROGRAM.error(f"--only {name}: expected one of {', '.join(known)}")
     rows = study([name for name in chosen if name != "map"], options.short)
-    print("\n".join(ends(rows)))
+    limits = "\n".join(ends(rows))
+    print(limits)
+    PROGRAM.write("limits.txt", limits + "\n")
+    PROGRAM.write("summary.csv", as_csv(summary(rows), SUMMARY))
     wrong = [row for row in rows if row.wrong]
     for row in wrong:
         print(f"WRONG: {row.subject}, {row.setting}: {row.error}, {row.says}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,7 @@ def scene(
     by = H * np.array(shift)
     corners = half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) + by
     border = tawami.polyline(corners, names=["bottom", "right", "top", "left"])
-    body = tawami.Body(body.x + by, body.volume, border=border)
+    body = replace(body, x=body.x + by, border=border)
     law = tawami.linear_elastic(E=E, nu=0.4) if law is None else law
     if form == "u_epsv_finite":
         options.setdefault("alpha", 0.01)

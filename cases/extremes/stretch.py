@@ -1,12 +1,14 @@
 """Stretch by 100 % and more, and compression to a tenth and less, at finite strain.
 
-Edges of the grid do not move, and move a body by a quarter of a cell at most. So there are two cases:
+Edges of the grid do not move, and move a body by a quarter of a cell at most. So there are three cases:
 
 coasting  A block flies apart, or together, with the velocity (A - I) X. It is so heavy that its stress
           does not slow it down: F = I + t (A - I) everywhere. The stress is the closed form of F.
 hanging   A column between smooth sides is held at its foot and loaded by its weight, upward or downward.
           The weight of the part above, w (1 - Y), is tau(stretch)/stretch at Y. Hencky's law carries at
           most (K + 4/3 mu)/e, at a stretch of e. There is no equilibrium beyond this load.
+pulled    A block is pulled by its side, between smooth sides, by supports on the border inside of the
+          cells. Its stress is uniform. Rows of particles move apart, while the cells stay.
 """
 
 from __future__ import annotations
@@ -32,6 +34,9 @@ LAWS = {"Hencky": tawami.linear_elastic, "neo-Hookean": tawami.neo_hookean}
 CELLS, PER_AXIS = 16, 4
 #: Bound of `coasting`: moving particles stay 1e-5 of a cell away from its sides.
 COASTING = 1e-5
+#: Bound of `pulled`, rms of the error of the stress, for particles up to 0.7 h apart. Beyond that there
+#: is a warning (`tawami.scene.spacing`).
+PULLED = 0.11
 #: Bounds of `hanging`: with two particles per cell the rms error in tension is 1.3 and 2 % at the end of
 #: a body (documentation, Limits). B-bar fails the patch test by up to 22 %.
 HANGING = {"u_epsv_finite": 0.05, "u_finite": 0.05, "u_bbar_finite": 0.22}
@@ -112,6 +117,26 @@ def column(made: tawami.Material, form: str, height: float, weight: float) -> ta
     return scene
 
 
+def pulled(per_axis: int, volumes: Any, most: float, step: float = 0.1) -> tuple[float, str]:
+    """The rms error of the stress of a neo-Hookean block, and that of the reaction."""
+    h, law = 0.25, tawami.neo_hookean(E=1.0, nu=0.3)
+    cells = (int(np.ceil(most / h)) + 4, 8)
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(-0.4 * h, -0.4 * h), h=h, cells=cells)
+    body = tawami.box(grid, (0, 0), (1, 1), per_axis=per_axis)
+    scene = tawami.Scene(grid, body, law, form="u_finite", ghost_penalty="on", volumes=volumes)
+    scene.fix("left", "x")
+    scene.fix(["bottom", "top"], "y")
+    pull = scene.fix("right", "x", 0.0)
+    steps = round((most - 1) / step)
+    for k in range(steps):
+        pull.change((k + 1) * (most - 1) / steps)
+        solution = scene.solve()
+    expected = stress("neo-Hookean", law.bulk_modulus, law.shear_modulus, np.array([most, 1, 1]))[0]
+    error = np.sqrt(np.mean((scene.particles.stress[:, 0] / expected - 1) ** 2))
+    force = solution.reaction("right")[0] * most / expected - 1
+    return float(error), f"error of the reaction {100 * force:+.2g} %"
+
+
 def without_equilibrium(form: str) -> float:
     """A weight of 1.1 times the largest that a Hencky column carries."""
     made = tawami.linear_elastic(E=1.0, nu=0.3)
@@ -121,7 +146,14 @@ def without_equilibrium(form: str) -> float:
 
 
 def attempts(short: bool) -> Iterator[Attempt]:
-    """Each finite form and law, compressible and nearly incompressible."""
+    """Each finite form and law, compressible and nearly incompressible; then blocks that are pulled."""
+    for per_axis in (2,) if short else (2, 3, 4):
+        for volumes in ("own", "fitted"):
+            for most in (1.4,) if short else (1.2, 1.4, 1.6, 1.8, 2.0, 2.5, 3.0, 4.0):
+                yield attempted(
+                    SUBJECT, f"{per_axis} x {per_axis}, volumes {volumes}, to {most:g}, pulled", PULLED,
+                    partial(pulled, per_axis, volumes, most),
+                )  # fmt: skip
     forms = block.FINITE[:1] if short else block.FINITE
     shapes = {"2 x 1": (2.0, 1.0), "0.1 x 1": (0.1, 1.0)}
     if not short:

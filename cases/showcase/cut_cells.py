@@ -16,7 +16,7 @@ python -m cases.showcase.cut_cells
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -75,7 +75,7 @@ def build(method: str, offset: float) -> tawami.Scene:
     """The block, shifted by an offset in cells."""
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=H, cells=(N + 3, N + 3))
     body = tawami.box(grid, (H, H), ((N + 1) * H, (N + 1) * H), per_axis=2)
-    body = tawami.Body(body.x + offset * H, body.volume)
+    body = replace(body, x=body.x + offset * H, border=None)
     material = tawami.linear_elastic(E=E, nu=NU)
     scene = tawami.Scene(grid, body, material, density=RHO, **METHODS[method])
     scene.gravity((0.0, -G))

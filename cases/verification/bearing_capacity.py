@@ -34,9 +34,9 @@ from itertools import product
 from time import perf_counter
 
 import numpy as np
-from mpi4py import MPI
 
 import tawami
+from cases.common.ground import ground
 from cases.common.program import Program, progress
 from cases.common.table import as_csv, as_text
 
@@ -59,11 +59,11 @@ def prandtl(phi: float, c: float = C) -> float:
     return float(c * (np.exp(np.pi * tan) * passive - 1) / tan)
 
 
-def davis(phi: float, psi: float) -> float:
+def davis(phi: float, psi: float, c: float = C) -> float:
     """Low estimate of the traction at collapse with psi < phi [Pa]; Prandtl's for psi = phi."""
     of_phi, of_psi = np.radians(phi), np.radians(psi)
     r = np.cos(of_psi) * np.cos(of_phi) / (1 - np.sin(of_psi) * np.sin(of_phi))
-    return prandtl(float(np.degrees(np.arctan(r * np.tan(of_phi)))), float(r) * C)
+    return prandtl(float(np.degrees(np.arctan(r * np.tan(of_phi)))), float(r) * c)
 
 
 def dilatancies(phi: float) -> list[float]:
@@ -112,16 +112,10 @@ class Run:
 def build(run: Run) -> tawami.Scene:
     """The ground, with `HIGHEST` times Prandtl's traction on the footing."""
     width, depth = GROUND[run.phi]
-    grid = tawami.Grid(
-        MPI.COMM_WORLD, origin=(0.0, -depth), h=1 / run.n, cells=(width * run.n, depth * run.n)
-    )
-    ground = tawami.box(grid, (0.0, -depth), (width, 0.0), per_axis=3)
     elastic = tawami.linear_elastic(E=2 * RIGIDITY * C * (1 + run.nu), nu=run.nu)
     soil = LAWS[run.law](elastic, phi=run.phi, psi=run.psi, c=C)
     parameters = {"alpha": 0.1} if run.form == "u_epsv" else {}
-    scene = tawami.Scene(grid, ground, soil, form=run.form, tolerance=1e-5, **parameters)
-    for edge, component in (("left", "x"), ("right", "x"), ("bottom", "x"), ("bottom", "y")):
-        scene.fix(edge, component)
+    scene = ground(1 / run.n, (0.0, width), depth, soil, per_axis=3, form=run.form, **parameters)
     scene.pressure(lambda x, y: (y == 0) & (x < 1), HIGHEST * prandtl(run.phi))
     return scene
 

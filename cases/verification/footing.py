@@ -36,10 +36,10 @@ from typing import Any, Literal
 import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
-from mpi4py import MPI
 
 import tawami
 from cases.common.figure import COLOURS, save
+from cases.common.ground import ground
 from cases.common.program import Program, progress
 from cases.common.table import as_csv, as_text
 from tawami.picture import style
@@ -164,26 +164,21 @@ def held_points(footing: Footing, n: int) -> Array:
     return positions.get(footing, np.empty(0))
 
 
+def clay(law: Law = "tresca", nu: float = 0.499) -> Any:
+    """The clay."""
+    elastic = tawami.linear_elastic(E=2 * RIGIDITY * S_U * (1 + nu), nu=nu)
+    if law == "von_mises":
+        return tawami.von_mises(elastic, yield_stress=np.sqrt(3) * S_U)
+    return tawami.mohr_coulomb(elastic, phi=0.0, c=S_U)
+
+
 def build(run: Run, settlement: float = SETTLEMENT) -> tawami.Scene:
     """The ground, with the settlement of the footing [s_u b/mu] as the next displacement to apply."""
-    h, mu = B_HALF / run.n, RIGIDITY * S_U
-    grid = tawami.Grid(
-        MPI.COMM_WORLD, origin=(0.0, -DEPTH), h=h, cells=(WIDTH * run.n, DEPTH * run.n)
-    )
-    ground = tawami.box(grid, (0.0, -DEPTH), (WIDTH, 0.0), per_axis=run.per_axis)
-    elastic = tawami.linear_elastic(E=2 * mu * (1 + run.nu), nu=run.nu)
-    if run.law == "von_mises":
-        clay = tawami.von_mises(elastic, yield_stress=np.sqrt(3) * S_U)
-    else:
-        clay = tawami.mohr_coulomb(elastic, phi=0.0, c=S_U)
     parameters = {"alpha": run.alpha} if run.form == "u_epsv" else {}
-    scene = tawami.Scene(
-        grid, ground, clay, form=run.form, basis=run.basis, tolerance=1e-5, **parameters
-    )
-    scene.fix("left", "x")
-    scene.fix("right", "x")
-    scene.fix("bottom", "x")
-    scene.fix("bottom", "y")
+    scene = ground(
+        B_HALF / run.n, (0.0, WIDTH), DEPTH, clay(run.law, run.nu),
+        per_axis=run.per_axis, form=run.form, basis=run.basis, **parameters,
+    )  # fmt: skip
     down = -settlement * B_HALF / RIGIDITY
     if run.footing in ("rough", "smooth"):
         scene.fix(under_footing, "y", down)

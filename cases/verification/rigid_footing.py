@@ -29,19 +29,19 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
-from mpi4py import MPI
 from scipy.optimize import brentq
 
 import tawami
 from cases.common.figure import save
+from cases.common.ground import ground
 from cases.common.program import Program
 from cases.common.table import as_csv, as_text
-from cases.verification.footing import PRANDTL, RIGIDITY, S_U
+from cases.verification.footing import DEPTH, PRANDTL, RIGIDITY, S_U, clay
 from tawami.picture import style
 
 Array = npt.NDArray[np.float64]
 
-B, WIDTH, DEPTH = 2.0, 8, 2  # footing and ground [m]
+B, WIDTH = 2.0, 8  # footing and ground [m]
 VERTICAL = 4.0  # V/(s_u B) under which the footing is pushed sideways
 END = 10.0  # displacement along x at the end [s_u b/mu], b = B/2
 COLUMNS = ("base", "cells", "largest", "exact", "error", "iterations")
@@ -100,16 +100,8 @@ def build(cells: int, friction: float, force: float) -> tuple[tawami.Scene, Any]
         friction: Of the footing.
         force: V/(s_u B).
     """
-    h, mu, nu = B / cells, RIGIDITY * S_U, 0.499
-    grid = tawami.Grid(
-        MPI.COMM_WORLD, origin=(-WIDTH / 2, -DEPTH), h=h, cells=(int(WIDTH / h), int(DEPTH / h))
-    )
-    ground = tawami.box(grid, (-WIDTH / 2, -DEPTH), (WIDTH / 2, 0.0), per_axis=2)
-    elastic = tawami.linear_elastic(E=2 * mu * (1 + nu), nu=nu)
-    clay = tawami.mohr_coulomb(elastic, phi=0.0, c=S_U)
-    scene = tawami.Scene(grid, ground, clay, form="u_epsv", alpha=0.1, tolerance=1e-5)
-    for edge, component in (("left", "x"), ("right", "x"), ("bottom", "x"), ("bottom", "y")):
-        scene.fix(edge, component)
+    sides = (-WIDTH / 2, WIDTH / 2)
+    scene = ground(B / cells, sides, DEPTH, clay(), form="u_epsv", alpha=0.1)
     footing = scene.obstacle(
         tawami.half_plane((0.0, 0.0), (0.0, -1.0)), friction, name="footing",
         where=lambda x, y: (y == 0) & (abs(x) < B / 2), force=(0.0, -force * S_U * B), free="y",

@@ -189,7 +189,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     rings += [small(n, shift, gauss=True) for shift in SHIFTS]
     drawn = [rings[0], rings[1]]
     rings += [large(m) for m in (n // 4, n // 2, n)]
-    rings += [large(n // 2, SHIFTS[1]), large(n // 2, volumes="own")]
+    rings += [large(n, SHIFTS[1]), large(n, volumes="own")]
     drawn += [rings[-1], rings[-2]]
     print(as_text(rings, COLUMNS))
     PROGRAM.write("table.csv", as_csv(rings, COLUMNS))

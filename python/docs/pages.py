@@ -267,12 +267,22 @@ def _trade() -> str:
         words = text.partition("\n")[2].strip()
         title = CASES[name][0]
         picture = f"![{title}: errors over wall time](trade/{name}.png)"
-        sections.append(f"## {title}\n\n{picture}\n\n{_paragraphs(words)}")
+        sections.append(f"### {title}\n\n{picture}\n\n{words}")
     return "\n\n".join(sections)
 
 
-def _paragraphs(words: str) -> str:
-    return "\n\n".join(messages.plain(part) for part in words.split("\n\n"))
+def _extremes() -> str:
+    """Outcomes by subject, and the limits of each series behind them."""
+    folder = ROOT / "cases" / "extremes"
+    lines = list(csv.DictReader((folder / "summary.csv").read_text().splitlines()))
+    table = ["| subject | green | yellow | refused | first yellow or refused |", "| --- " * 5 + "|"]
+    for line in lines:
+        first = line["first_yellow"] or line["first_refused"]
+        counts = " | ".join(line[kind] for kind in ("green", "yellow", "refused"))
+        table.append(f"| {line['subject']} | {counts} | {first} |")
+    limits = (folder / "limits.txt").read_text()
+    behind = f":::{{dropdown}} The limits of each series\n```text\n{limits}```\n:::"
+    return "\n".join(table) + f"\n\n{behind}"
 
 
 def _compatibility() -> str:
@@ -363,6 +373,7 @@ def documented(text: str) -> list[str]:
 
 GENERATED: dict[str, Callable[[], str]] = {
     "trade": _trade,
+    "extremes": _extremes,
     "compatibility": _compatibility,
     "peers": _peers,
     "form sizes": _sizes,

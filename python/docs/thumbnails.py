@@ -24,7 +24,7 @@ PARTS: dict[str, tuple[str, tuple[float, float, float, float]]] = {
     "ring": ("ring.png", (0.5, 0.0, 1.0, 1.0)),
     "creep": ("creep.png", (0.0, 0.0, 0.5, 1.0)),
     "fracture": ("fracture.png", (0.37, 0.17, 0.62, 0.745)),
-    "penetration": ("penetration.png", (0.0, 0.0, 0.5, 1.0)),
+    "penetration": ("penetration.png", (0.5, 0.5, 1.0, 1.0)),
     "rolling": ("rolling.png", (0.0, 0.0, 1.0, 1.0)),
     "collapse": ("film.png", (0.0, 0.165, 0.305, 0.645)),
 }

@@ -64,6 +64,8 @@ from tawami.results.plot import plot
 from tawami.results.results import Results
 from tawami.results.table import TableOutput
 from tawami.scene.earlier import earlier
+from tawami.scene.error import ErrorEstimate
+from tawami.scene.goal import Goal
 from tawami.scene.quantities import Quantity
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
@@ -81,10 +83,12 @@ __all__ = [
     "ConvergenceError",
     "Dynamics",
     "EnergyWarning",
+    "ErrorEstimate",
     "Form",
     "FormError",
     "FormReport",
     "GeometryWarning",
+    "Goal",
     "Grid",
     "GridOutput",
     "IncompleteWarning",

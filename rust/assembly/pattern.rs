@@ -93,8 +93,9 @@ impl Place {
     }
 }
 
-/// Rows that one task makes.
+/// Rows that one task makes, and tasks at a time.
 const ROWS: usize = 512;
+const TASKS: usize = 64;
 
 /// Pattern of the reduced matrix; `None` if it has more entries than its indices can count.
 ///
@@ -114,14 +115,14 @@ pub fn pattern(cells: &Cells, location: &Location, selection: &Selection) -> Opt
         // the components of a function have the same row: it is made once
         let (mut row, mut of_support) = (Vec::new(), None);
         for (k, &c) in unknowns.iter().enumerate() {
-            let support = support(c as usize);
-            if of_support != Some(support) {
+            let support = (c >= 0).then(|| support(c as usize));
+            if support.is_none() || of_support != support {
                 row.clear();
-                for field in &fields {
+                for (field, support) in fields.iter().flat_map(|f| support.map(|s| (f, s))) {
                     field.sharing(&active, support, selection, &mut row);
                 }
                 sort(&mut row);
-                of_support = Some(support);
+                of_support = support;
             }
             let start = columns.len();
             columns.extend_from_slice(&row);
@@ -135,16 +136,24 @@ pub fn pattern(cells: &Cells, location: &Location, selection: &Selection) -> Opt
         }
         (lengths, columns)
     };
-    let tasks = selection.coefficients().par_chunks(ROWS).enumerate().map(of_task);
-    let (lengths, columns): (Vec<_>, Vec<_>) = tasks.unzip();
+    let tasks: Vec<_> = selection.coefficients().chunks(ROWS).enumerate().collect();
     let mut start = Vec::with_capacity(selection.coefficients().len() + 1);
+    let mut columns = Vec::new();
     let mut end = 0;
     start.push(0);
-    for length in lengths.iter().flatten() {
-        end += length;
-        start.push(i32::try_from(end).ok()?);
+    // some tasks at a time: all of their rows would need as much memory again as the pattern
+    for some in tasks.chunks(TASKS) {
+        let rows: Vec<_> = some.par_iter().map(|&task| of_task(task)).collect();
+        for (lengths, of_rows) in rows {
+            columns.extend(of_rows);
+            for length in lengths {
+                end += length;
+                start.push(i32::try_from(end).ok()?);
+            }
+        }
     }
-    let (start, columns) = (start.into(), columns.concat().into());
+    columns.shrink_to_fit();
+    let (start, columns) = (start.into(), columns.into());
     Some(Pattern { start, columns, active: location.active.clone(), reaching })
 }
 

@@ -13,7 +13,7 @@ pub struct Selection {
     unknown: Vec<i32>,
     /// Weight of each entry.
     weight: Vec<f64>,
-    /// Coefficient that each unknown is.
+    /// Coefficient that each unknown is; -1 for one that is none of these.
     coefficient: Vec<i64>,
     /// Unknown that each coefficient is; -1 for held coefficients and those that depend on others.
     own: Vec<i32>,
@@ -57,18 +57,18 @@ impl Selection {
             && start[coefficients] as usize == unknown.len()
             && unknown.len() == weight.len()
             && unknown.iter().all(|&u| inside(i64::from(u), coefficient.len()))
-            && coefficient.iter().all(|&c| inside(c, coefficients));
+            && coefficient.iter().all(|&c| c == -1 || inside(c, coefficients));
         if !fits {
             return None;
         }
         let mut own = vec![-1; coefficients];
-        for (u, &c) in coefficient.iter().enumerate() {
+        for (u, &c) in coefficient.iter().enumerate().filter(|(_, &c)| c >= 0) {
             own[c as usize] = u as i32;
         }
         Some(Self { start, unknown, weight, coefficient, own })
     }
 
-    /// Coefficient that each unknown is.
+    /// Coefficient that each unknown is; -1 for one that is none of these.
     pub(super) fn coefficients(&self) -> &[i64] {
         &self.coefficient
     }

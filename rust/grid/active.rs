@@ -65,8 +65,7 @@ impl Active {
         functions.indices().map(|index| self.count(functions.support_at(index)) > 0).collect()
     }
 
-    /// Parts of the body that share no function: how many, and the part of each function, -1 for
-    /// inactive functions.
+    /// Parts of the body that share no function: how many, and the part of each cell, -1 for inactive cells.
     #[must_use]
     pub fn parts(&self, basis: Basis) -> (usize, Vec<i64>) {
         let (size, reach) = (self.grid.cells, basis.reach());
@@ -93,7 +92,7 @@ impl Active {
             }
             parts += 1;
         }
-        (parts, self.spread(basis, &label, -1))
+        (parts, label)
     }
 
     /// For each function the value of the last active cell of its support; `none` for inactive functions.

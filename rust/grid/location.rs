@@ -30,7 +30,7 @@ impl Grid {
     /// to the cell on its positive side (but see `leave_border_cells`).
     fn locate_1d(&self, axis: usize, x: f64) -> Option<(usize, f64)> {
         let n = self.cells[axis];
-        let s = (x - self.origin[axis]) / self.h;
+        let s = (x - self.origin[axis]) / self.h - self.first[axis] as f64;
         if !(s >= -BORDER && s <= n as f64 + BORDER) {
             return None;
         }

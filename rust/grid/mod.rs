@@ -32,6 +32,8 @@ pub struct Grid {
     pub cells: Index,
     /// Meaning of the axes.
     pub geometry: Geometry,
+    /// Cells below the first one along each axis; not 0 in a part of a larger grid, whose origin it keeps.
+    pub first: Index,
 }
 
 impl Grid {
@@ -58,7 +60,7 @@ impl Grid {
                 return refuse(CELLS[axis], cells[axis] as f64, "between 1 and 32768 cells");
             }
         }
-        Ok(Self { origin, h, cells, geometry })
+        Ok(Self { origin, h, cells, geometry, first: [0; DIM] })
     }
 
     /// The grid with another meaning of its axes.
@@ -72,6 +74,13 @@ impl Grid {
             return Err(Error::Parameter { name, value, expected });
         }
         Ok(Self { geometry, ..self })
+    }
+
+    /// The part of the grid with these cells, which are counted from its own first cell. At its ends functions
+    /// are as at those of the grid: they have a meaning in its inner cells, and where the grid ends too.
+    #[must_use]
+    pub fn window(self, first: Index, cells: Index) -> Self {
+        Self { first, cells, ..self }
     }
 
     /// Number of cells.
@@ -89,7 +98,8 @@ impl Grid {
     /// Coordinates [m] of a position in a cell.
     #[must_use]
     pub fn position(&self, cell: Index, xi: Point) -> Point {
-        std::array::from_fn(|axis| self.origin[axis] + self.h * (cell[axis] as f64 + xi[axis]))
+        let along = |axis: usize| (self.first[axis] + cell[axis]) as f64 + xi[axis];
+        std::array::from_fn(|axis| self.origin[axis] + self.h * along(axis))
     }
 
     /// Upper corner [m].

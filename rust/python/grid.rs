@@ -26,6 +26,13 @@ impl PyGrid {
         Ok(Self(Grid::new(origin, h, cells)?.with(geometry.parse()?)?))
     }
 
+    /// A part of the grid, given by its first cell along each axis and its numbers of cells.
+    fn window(&self, first: Index, cells: Index) -> PyResult<Self> {
+        let inside = (0..DIM).all(|k| cells[k] > 0 && first[k] + cells[k] <= self.0.cells[k]);
+        require(inside, "a part beyond the grid")?;
+        Ok(Self(self.0.window(first, cells)))
+    }
+
     /// Cells of points [m] and positions in them.
     fn locate(&self, py: Python, x: Read2<f64>) -> PyResult<PyLocation> {
         let x = points(&x)?;
@@ -116,17 +123,17 @@ impl PyActive {
         Ok(self.0.functions(basis.parse()?).to_pyarray(py))
     }
 
-    /// Number of parts of the body that share no function, and the part of each function.
+    /// Number of parts of the body that share no function, and the part of each cell, -1 for inactive cells.
     fn parts<'py>(
         &self,
         py: Python<'py>,
         basis: &str,
     ) -> PyResult<(usize, Bound<'py, PyArray1<i64>>)> {
-        let (number, of_functions) = self.0.parts(basis.parse()?);
-        Ok((number, of_functions.to_pyarray(py)))
+        let (number, of_cells) = self.0.parts(basis.parse()?);
+        Ok((number, of_cells.to_pyarray(py)))
     }
 
-    /// For each function, the value of one of its active cells; 0 if it has none.
+    /// For each function, the value of one of its active cells; -1 if it has none.
     fn spread<'py>(
         &self,
         py: Python<'py>,
@@ -135,7 +142,7 @@ impl PyActive {
     ) -> PyResult<Bound<'py, PyArray1<i64>>> {
         let of_cells = of_cells.as_slice()?;
         require(of_cells.len() == self.1.num_cells(), "values of other cells")?;
-        Ok(self.0.spread(basis.parse()?, of_cells, 0).to_pyarray(py))
+        Ok(self.0.spread(basis.parse()?, of_cells, -1).to_pyarray(py))
     }
 
     /// The active cells in the support of a function, by their positions along the axes: cells x 2.

@@ -143,9 +143,9 @@ def test_bodies_that_end_at_edges_of_the_grid():
     [
         (1.0, {}, "f = 1.0: expected a function f"),
         (lambda x, y: x * 0 + 1, {}, "f is not negative at any of the 825 samples.*change its sign"),
-        (lambda x, y: np.where(x > 0, np.nan, 1), {}, r"f is NaN at 400 points, the first is \(0.0625"),
+        (lambda x, y: np.where(x > 0, np.nan, 1), {}, r"f is NaN at 459 points, the first is \(0.0625"),
         (lambda x, y: -1.0 if x < 0 else 1.0, {}, "f failed on arrays .*np.where"),
-        (lambda x, y: x[:3], {}, r"f returned an array of shape \(3,\): expected \(825,\)"),
+        (lambda x, y: x[:3], {}, r"f returned an array of shape \(3,\): expected \(972,\)"),
         (lambda x, y: x, {"tolerance": 0}, "tolerance = 0: expected a finite number of at least 1e-13"),
         (lambda x, y: x, {"samples": 1}, "samples = 1: expected a whole number, at least 2"),
         (lambda x, y: x, {"ends": ("front",)}, "front"),

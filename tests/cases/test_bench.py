@@ -23,6 +23,7 @@ def test_ratios_are_medians_over_pairs():
     assert (rows["law"].new_ms, rows["law"].old_ms) == (4000.0, 2000.0)
 
 
+@pytest.mark.slow
 def test_a_checkout_against_itself(tmp_path, capsys):
     sizes = ["--cells", "2", "--particles", "800", "--rounds", "1", "--pairs", "1"]
     options = [*sizes, "--old-kernels", "Prescott", "--results", str(tmp_path)]

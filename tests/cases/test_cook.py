@@ -40,12 +40,12 @@ def test_the_elements_import_nothing_of_tawami():
 @pytest.mark.parametrize(
     ("method", "body", "error", "order"),
     [
-        ("u_epsv_0.1", "even", 0.94, 1.69),
-        ("u_epsv_0.1", "gauss", 0.61, 1.93),
-        ("u_epsv_0.01", "even", 0.18, 1.93),
-        ("u_epsv_0.01", "gauss", -0.18, 0.89),
-        ("u_epsv_0.01", "lattice", 2.34, 1.04),
-        ("u_epsv_projection", "gauss", -0.18, 0.91),
+        ("u_epsv_0.1", "even", 1.02, 1.62),
+        ("u_epsv_0.1", "gauss", 0.68, 1.81),
+        ("u_epsv_0.01", "even", 0.29, 1.51),
+        ("u_epsv_0.01", "gauss", -0.08, 0.70),
+        ("u_epsv_0.01", "lattice", 2.67, 1.03),
+        ("u_epsv_projection", "gauss", -0.08, 0.73),
         ("u_bbar", "gauss", 2.85, 1.00),
         ("u", "gauss", -3.08, 1.25),
     ],

@@ -12,7 +12,7 @@ SCRIPT = """
 import time
 from typing import Annotated
 
-def build(h: Annotated[float, (1/2, 1/4, 1/8)] = 1 / 2):
+def build(h: Annotated[float, (1/2, 1/4, 1/8, 1/16)] = 1 / 2):
     time.sleep(0.005 / h)
     return {"tip": 1 + h**4}
 """

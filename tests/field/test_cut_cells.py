@@ -14,7 +14,7 @@ from tawami.field.cut_cells import partially_filled, sides
 from tawami.form import vector
 from tawami.form.form import Form
 
-GHOST = {"form": "u_epsv", "ghost_penalty": "on", "k": 0.5}
+GHOST = {"form": "u_epsv", "ghost_penalty": "on", "k": 0.5, "k_v": 0.5}
 WITHOUT = {"form": "u_epsv", "ghost_penalty": "off"}
 
 
@@ -98,8 +98,9 @@ def test_partly_filled_cells_are_beside_empty_ones():
     active[3, 4] = False
     partly = partially_filled(active)
     assert np.argwhere(partly).tolist() == [[2, 3], [2, 4], [3, 3]]  # not those at the grid's end
-    assert len(list(sides(active))) == 6
-    assert not list(sides(np.ones((3, 3), dtype=bool)))
+    grid = tawami.Grid(MPI.COMM_SELF, origin=(0, 0), h=1.0, cells=active.shape[::-1])
+    assert len(list(sides(grid.window, active))) == 6
+    assert not list(sides(grid.window, np.ones((4, 5), dtype=bool)))
 
 
 @pytest.mark.parametrize(

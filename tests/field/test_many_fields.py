@@ -141,8 +141,9 @@ def solved(unit=1.0, equation=1.0, scale=None, assembly="points", theta="bilinea
     body = tawami.box(grid, grid.origin, (0.5, 1.5))
     form = heated.form_of(basis=theta, scale=scale, **values)
     scene = tawami.Scene(
-        grid, body, tawami.linear_elastic(E=1e7, nu=0.499), form=form, assembly=assembly
-    )
+        grid, body, tawami.linear_elastic(E=1e7, nu=0.499), form=form, assembly=assembly,
+        tolerance=1e-10,
+    )  # fmt: skip
     scene.fix("bottom", "x")
     scene.fix("bottom", "y")
     solution = scene.solve()
@@ -161,7 +162,7 @@ def test_the_solution_does_not_depend_on_units_and_scales(theta):
     for _, other, same in others:
         close(same, values, 1e-9)
         close(other.u, solution.u, 1e-9)
-        assert other.iterations == solution.iterations
+        assert abs(other.iterations - solution.iterations) <= 1  # of linear solves to a tolerance
 
 
 @pytest.mark.parametrize("basis", ["bilinear", "quadratic_spline"])

@@ -24,7 +24,7 @@ def rectangle(options, *, per_axis, gauss, basis="quadratic_spline", cells=(4, 3
     grid = grid_of(cells)
     body = tawami.box(grid, grid.origin, grid.upper, per_axis=per_axis, gauss=gauss)
     material = tawami.linear_elastic(E=E, nu=NU)
-    return tawami.Scene(grid, body, material, basis=basis, **options)
+    return tawami.Scene(grid, body, material, basis=basis, tolerance=1e-13, **options)
 
 
 def tension_error(options, **kind):
@@ -200,7 +200,7 @@ def test_particles_anywhere_release_a_stress(name, basis):
     x = grid.origin + grid.h * x
     law = tawami.linear_elastic(E=E, nu=NU)
     body = tawami.Body(x, np.full(len(x), grid.h**2 / 4))
-    scene = tawami.Scene(grid, body, law, basis=basis, **FORMS[name])
+    scene = tawami.Scene(grid, body, law, basis=basis, tolerance=1e-12, **FORMS[name])
     div = np.trace(GRADIENT)
     stress = K * div + 2 * MU * (np.array([GRADIENT[0, 0], GRADIENT[1, 1], 0]) - div / 3)
     stress = np.append(stress, MU * (GRADIENT[0, 1] + GRADIENT[1, 0]))

@@ -204,7 +204,7 @@ def residual(w, sigma, sum_p):
         ({"stabilisation": "pspg"}, "stabilisation = 'pspg': expected one of 'laplacian'"),
         (
             {"gamma": 1},
-            "form 'u_epsv' has no parameter 'gamma': it has 'alpha', 'k', 'stabilisation'",
+            "form 'u_epsv' has no parameter 'gamma': it has 'alpha', 'k', 'k_v', 'stabilisation'",
         ),
     ],
 )

@@ -17,7 +17,7 @@ from tawami.motion.dynamics import TRANSFERS
 @pytest.mark.parametrize("form", FINITE)
 @pytest.mark.parametrize("transfer", TRANSFERS)
 def test_a_block_falls_freely(form, transfer):
-    scene = block(form)
+    scene = block(form, tolerance=1e-12)
     scene.gravity((1.0, -G))
     start = np.array(scene.particles.x)
     motion = tawami.Dynamics(scene, velocity=(0.5, 0.0), transfer=transfer)
@@ -34,7 +34,7 @@ def test_a_block_falls_freely(form, transfer):
 )
 def test_a_spinning_block_keeps_its_momentum(transfer, loss):
     """1.6 rad in 100 steps on 4 cells; plain FLIP loses a third."""
-    scene = block()
+    scene = block(tolerance=1e-12)
     motion = tawami.Dynamics(scene, velocity=spin(scene, 2.0), transfer=transfer)
     if transfer != "flip":
         motion.velocity_gradient[:] = 2.0 * np.array([[0, -1], [1, 0]])
@@ -227,7 +227,7 @@ def test_the_impulse_of_a_moving_support_is_the_momentum():
 
 def test_loads_on_particles_move_with_them():
     """The body moves as a point mass does."""
-    scene = block()
+    scene = block(tolerance=1e-12)
     scene.load(scene.particles.x[:, 1] > 0.2, (50.0, 0.0))
     scene.load(np.flatnonzero(scene.particles.x[:, 1] < -0.2), (50.0, 0.0))
     motion = tawami.Dynamics(scene)

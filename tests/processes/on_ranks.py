@@ -29,11 +29,12 @@ COMM = MPI.COMM_WORLD
 
 
 def beams() -> dict[str, float | np.ndarray]:
-    """The cantilever by every form, support and assembly."""
+    """The cantilever by every form and support, and by every form and assembly."""
     found: dict[str, float | np.ndarray] = {}
     for support in ("paper", "exact", "clamped"):
         for method, alpha in (("u", None), ("u_bbar", None), ("u_epsv", 0.1), ("u_p", 0.1)):
-            for path in ("points", "dolfinx"):
+            paths = ("points", "dolfinx") if support == "paper" else ("points",)
+            for path in paths:
                 row, solution = mpm.solve(method, support, 4, alpha, assembly=path)
                 name = f"beam {support} {method} {path}"
                 found[f"{name} deflection"] = row.deflection_m
@@ -55,7 +56,7 @@ def random_clouds() -> dict[str, np.ndarray]:
     found = {}
     for name, options in FORMS.items():
         for basis in BASES:
-            for path in ("points", "dolfinx"):
+            for path in ("points", "dolfinx") if basis == BASES[0] else ("points",):
                 grid, random = grid_of((6, 5)), np.random.default_rng(0)
                 x = grid.origin + grid.h * np.array([3.0, 2.5]) * random.random((40, 2))
                 body = tawami.Body(x, random.uniform(0.01, 0.1, len(x)))
@@ -91,7 +92,7 @@ def fields() -> dict[str, np.ndarray]:
         scene.fix("bottom", "y")
         solution = scene.solve()
         found[f"fields {theta} {path} u"] = solution.u
-        found[f"fields {theta} {path} all"] = scene.configuration.total
+        found[f"fields {theta} {path} all"] = solution.coefficients
         found[f"fields {theta} {path} measure"] = np.array(solution.history[0][2])
     return found
 
@@ -364,6 +365,36 @@ def stretched() -> dict[str, np.ndarray]:
     return {"stretched points": np.array(count), "stretched border": scene.border.x}
 
 
+def wide() -> dict[str, np.ndarray]:
+    """A body over ranks that know a part of the grid each: multigrid, ghost penalty, supports off its
+    lines, and then a motion along walls.
+    """
+    grid = tawami.Grid(COMM, origin=(0, 0), h=0.25, cells=(27, 6))
+    corners = [(0.1, 0.07), (5.8, 0.1), (5.9, 1.3), (3.0, 1.45), (0.05, 1.2)]
+    body = tawami.polygon(grid, corners, per_axis=2)
+    law = tawami.linear_elastic(E=1e6, nu=0.4)
+    of = {"ghost_penalty": "on", "linear_solver": "multigrid", "tolerance": 1e-11}
+    scene = tawami.Scene(grid, body, law, **of)
+    scene.fix("4", "x")
+    scene.fix("4", "y")
+    scene.hold((3.0, 0.7), "x", 1e-3)
+    scene.pressure("2", 1e3)
+    solution = scene.solve()
+    box = tawami.box(grid, (0, 0), (5, 0.5), per_axis=2)
+    scene = tawami.Scene(grid, box, law, form="u_finite", density=1e3, tolerance=1e-11)
+    scene.wall("bottom", 0.2)
+    scene.wall("left")
+    scene.gravity((0, -9.81))
+    scene.hold((2.0, 0.3), "x", velocity=0.2)
+    motion = tawami.Dynamics(scene)
+    for _ in range(2):
+        last = motion.step(0.004)
+    return {
+        "wide u": solution.u, "wide force": solution.reaction("4"), "wide x": last.x,
+        "wide wall": last.reaction("bottom"), "krylov wide": np.array(solution.krylov),
+    }  # fmt: skip
+
+
 def few_cells() -> dict[str, np.ndarray]:
     """Two cells, of which some ranks have none; a load that is a function of the whole edge."""
     grid = tawami.Grid(COMM, origin=(0, 0), h=1.0, cells=(2, 1))
@@ -394,7 +425,7 @@ def output(folder: Path) -> dict[str, np.ndarray]:
 def results(folder: Path) -> dict[str, Any]:
     """Results of all scenes; files are written to the folder."""
     found = beams() | random_clouds() | fields() | nonlinear() | singular() | motion() | initial()
-    found |= construction() | border() | contact() | stretched()
+    found |= construction() | border() | contact() | stretched() | wide()
     return found | errors() | inverted() | few_cells() | output(folder)
 
 

@@ -48,7 +48,7 @@ def several(request, tmp_path_factory) -> Found:
 
 @pytest.mark.parametrize("subject", [
     "beam", "cloud", "fields", "nonlinear", "fem", "singular", "motion", "construction", "initial",
-    "inverted", "few", "border", "contact", "stretched",
+    "inverted", "few", "border", "contact", "stretched", "wide",
 ])  # fmt: skip
 def test_results_do_not_depend_on_the_number_of_ranks(alone, several, subject):
     names = [name for name in alone.results if name.startswith(subject)]
@@ -84,6 +84,11 @@ def test_the_scenes_are_what_they_are_meant_to_be(alone, several):
             krylov = list(results[f"nonlinear {path} krylov"])
             assert len(krylov) > 4
             assert 0 < krylov.count(0) < len(krylov)
+
+
+def test_multigrid_takes_the_same_iterations(alone, several):
+    one, more = (np.asarray(found.results["krylov wide"]) for found in (alone, several))
+    assert np.abs(more - one).max() <= 2
 
 
 def test_an_error_on_one_rank_can_be_caught_on_all(several):
@@ -148,6 +153,8 @@ scene()
 """
 EXIT = """
 import sys
+from tawami.base import program
+program.GRACE = 0.5  # the other rank is given up early
 def main():
     if rank == 1: sys.exit("no such file")
     scene().solve()

@@ -166,7 +166,7 @@ def study() -> str:
         "beam", run, {"n": (4, 8), "alpha": (0.01, 0.1)}, {"error": 0.0}, beside=[beside]
     )
     table = study.run()
-    return table.in_words("error") + str(tawami.recommend(study, 0.01).knobs["n"])
+    return tawami.study.verdict(table) + str(tawami.recommend(study, 0.01).knobs["n"])
 
 
 def wrong(comm: MPI.Comm) -> None:

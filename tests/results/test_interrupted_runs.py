@@ -286,7 +286,7 @@ def cycled(results, each, form="u_epsv_finite"):
     motion = tawami.Dynamics(scene, velocity=(0.3, 0.0), gamma=0.6)
     steps.append(motion.run(2.03, 0.004, results=results, each=each))
     state = (
-        scene.configuration.loads.state()["all"],
+        scene.configuration.loads.state(scene.configuration.domain.layout)["all"],
         scene.configuration.supports.state()["supports"],
     )
     state = repr(state)

@@ -55,11 +55,12 @@ proptest! {
             }
             prop_assert_eq!(count, groups.len());
             for group in &groups {
-                let numbers: BTreeSet<i64> = group.iter().map(|&f| part[f]).collect();
+                let mine = cells.iter().zip(&of_cells).filter(|(_, of_cell)| !group.is_disjoint(of_cell));
+                let numbers: BTreeSet<i64> = mine.map(|(&c, _)| part[c as usize]).collect();
                 prop_assert_eq!(numbers.len(), 1);
                 prop_assert!(numbers.iter().all(|&n| n >= 0 && (n as usize) < count));
             }
-            prop_assert!((0..part.len()).all(|f| all.contains(&f) == (part[f] >= 0)));
+            prop_assert!((0..part.len()).all(|c| cells.contains(&(c as u32)) == (part[c] >= 0)));
             // the value of a function is that of one of its cells
             let values: Vec<i64> = (0..grid.num_cells()).map(|c| 10 + c as i64).collect();
             for (f, value) in active.spread(basis, &values, -7).into_iter().enumerate() {

@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use tawami::error::Error;
-use tawami::grid::Grid;
-use tawami::space::{Extent, Point, Position};
+use tawami::grid::{Basis, Functions, Grid};
+use tawami::space::{indices_below, Extent, Point, Position};
 
 proptest! {
     #[test]
@@ -83,4 +83,26 @@ fn bad_input_is_rejected() {
         assert!(matches!(Grid::new([0.0, 0.0], h, cells), Err(Error::Parameter { .. })));
     }
     assert!(Grid::new([f64::INFINITY, 0.0], 1.0, [1, 1]).is_err());
+}
+
+proptest! {
+    #[test]
+    fn a_part_of_a_grid_has_its_positions_and_functions(
+        first in [0..3_usize, 0..3_usize], cells in [3..6_usize, 3..6_usize], xi in [0.0..1.0_f64, 0.0..1.0_f64],
+    ) {
+        let grid = Grid::new([0.1, -3.0], 0.3, [9, 9]).unwrap();
+        let part = grid.window(first, cells);
+        for cell in indices_below(cells) {
+            let whole = [first[0] + cell[0], first[1] + cell[1]];
+            prop_assert_eq!(part.position(cell, xi), grid.position(whole, xi));
+            // functions away from the ends of the part
+            let inner = (0..2).all(|a| cell[a] > 0 && cell[a] + 1 < cells[a]);
+            for basis in [Basis::QuadraticSpline, Basis::Bilinear, Basis::Biquadratic] {
+                let values = |cells, cell| Functions { basis, cells }.values(cell, xi);
+                if inner && (0..2).all(|a| whole[a] > 0 && whole[a] < 8) {
+                    prop_assert_eq!(values(cells, cell), values([9, 9], whole));
+                }
+            }
+        }
+    }
 }

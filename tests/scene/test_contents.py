@@ -177,7 +177,7 @@ print(*[name for name in others if name in sys.modules])
     run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
     static, more = run.stdout.split("\n")[-3:-1]
     assert static == ""
-    assert {"meshio", "shapely"} <= set(more.split())
+    assert "shapely" in more.split()
 
 
 # -- what is not modelled ------------------------------------------------------
@@ -243,7 +243,7 @@ def test_a_parameter_without_effect_is_rejected():
     with pytest.raises(tawami.InputError, match=r"k = 0.1: form .* expected ghost_penalty='on'"):
         scene_of(form="u_epsv", k=0.1, ghost_penalty="off")
     scene = scene_of(form="u_epsv", alpha=0.2, k=0.1, ghost_penalty="on")
-    assert scene.parameters == {"alpha": 0.2, "k": 0.1}
+    assert scene.parameters == {"alpha": 0.2, "k": 0.1, "k_v": 0.03}
     idle = tawami.Form({"u": vector("w")}, _residual,
                        parameters={"beta": {"default": 1.0}})  # fmt: skip
     assert scene_of(form=idle).parameters == {}

@@ -154,6 +154,6 @@ def test_particles_are_named_by_their_group():
     law = tawami.linear_elastic(E=10.0, nu=0.3)
     scene = tawami.Scene(grid, body, {"clay": law, "sand": law})
     load = scene.load("sand", (0.0, -8.0))
-    assert load.chosen.tolist() == np.flatnonzero(upper).tolist()
+    assert load.shares.number.tolist() == np.flatnonzero(upper).tolist()
     with pytest.raises(tawami.InputError, match="= 'silt': expected 'clay' or 'sand'"):
         scene.load("silt", (0.0, -8.0))

@@ -104,7 +104,7 @@ def test_parameters_of_the_form_cannot_be_set(scene, name):
         match=rf"'{name}' cannot be set to 1.0: expected scene.parameter\(name, value\)",
     ):
         scene.parameters[name] = 1.0
-    assert dict(scene.parameters) == {"alpha": 0.01, "k": 0.01}
+    assert dict(scene.parameters) == {"alpha": 0.01, "k": 0.003, "k_v": 0.03}
 
 
 def test_attributes_of_motions_and_solutions_cannot_be_set(scene):

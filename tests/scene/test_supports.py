@@ -17,7 +17,7 @@ import tawami
 from tawami import _rust
 from tawami.base.errors import SupportError
 from tawami.field import constraints
-from tawami.field.layout import Place
+from tawami.field.coefficients import Place
 from tawami.field.reduction import Reduction
 from tawami.grid import edges
 from tawami.grid.basis import values_1d
@@ -31,7 +31,7 @@ def _place(basis):
 @pytest.mark.parametrize("point", [(-1.0, 1.25), (-1.0, 1.0), (-0.63, 1.87), (1.0, 2.0)])
 @pytest.mark.parametrize("value", [0.0, 3e-3])
 def test_a_held_point_equals_a_lagrange_multiplier(basis, point, value):
-    scene = beam(basis=basis)
+    scene = beam(basis=basis, tolerance=1e-12)
     scene.fix("left", "x", 1e-3)
     scene.hold(point, "y", value)
     scene.hold((0.3, 0.9), "y", -value)
@@ -41,14 +41,14 @@ def test_a_held_point_equals_a_lagrange_multiplier(basis, point, value):
     # the same with Lagrange multipliers, by scipy
     n = scene.num_coefficients
     matrix = scene.tangent(np.zeros(n))
-    cells, layout = scene.configuration.domain.active, scene.configuration.domain.layout
+    layout = scene.configuration.domain.layout
     held = constraints.held_edge(
         scene.grid, _place(basis), "left", np.arange(3), 0, 1e-3, "a support"
     )
     rows = [sp.csr_matrix(([1.0], ([0], [k])), shape=(1, n)) for k in held.indices]
     values = list(held.values)
     for place, v in ((point, value), ((0.3, 0.9), -value)):
-        p = constraints.held_point(scene.grid, basis, cells, place, 1, v, layout.active)
+        p = constraints.held_point(layout, place, 1, v)
         rows.append(sp.csr_matrix((p.weights, (np.zeros(len(p.indices)), p.indices)), shape=(1, n)))
         values.append(v)
     b = sp.vstack(rows)
@@ -243,7 +243,10 @@ def test_coefficients_of_another_length_are_rejected():
 
 
 def test_many_solves_free_their_factorisations():
-    """Memory after 30 more solves of 32 x 16 cells: a factorisation takes about 20 MB."""
+    """Memory after 30 more solves of 32 x 16 cells: their factorisations would take about 600 MB.
+
+    Python frees scenes late, because they refer to themselves.
+    """
     code = """
 import logging, resource; logging.disable(logging.INFO)
 from cases.verification.cantilever import mpm
@@ -255,7 +258,7 @@ for k in range(40):
 print(peak() - before)
 """
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert float(run.stdout.splitlines()[-1]) < 60  # MPI may print lines before
+    assert float(run.stdout.splitlines()[-1]) < 150  # MPI may print lines before
 
 
 def test_a_support_may_be_given_twice():

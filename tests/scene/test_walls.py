@@ -7,7 +7,6 @@ import pytest
 from mpi4py import MPI
 
 import tawami
-from tawami.scene.contact import ActiveSet
 from tawami.scene.walls import Wall
 
 G = 10.0
@@ -103,25 +102,24 @@ def test_the_reaction_of_a_wall_is_the_weight():
 def test_contradicting_states_are_changed():
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=1.0, cells=(3, 2))
     wall = Wall(grid, "bilinear", "bottom", 0.5, True)
-    contact = ActiveSet([wall], [np.zeros((4, 2), dtype=bool)])
-    active, gap = np.ones(12, dtype=bool), np.zeros((12, 2))
-    forces, u = np.zeros((12, 2)), np.zeros((12, 2))
+    active, alone = np.ones(4, dtype=bool), np.zeros((4, 2), dtype=bool)
+    gap, forces, u = np.zeros((3, 4, 2))
     forces[0] = [0.4, 1.0]  # within the cone
     forces[1] = [-0.6, 1.0]  # beyond it
     forces[2] = [0.0, -1.0]  # pulls
     forces[3] = [0.5, 1.0]
-    assert contact.adapt(forces, u, gap, active)
+    assert wall.adapt(forces, u, gap, active, alone)
     assert wall.state.touching.tolist() == [True, True, False, True]
     assert wall.state.slip.tolist() == [0, -1, 0, 0]
-    assert contact.friction(forces)[1] == pytest.approx([-0.5, 0.0])
+    assert wall.friction_of(forces, alone)[1] == pytest.approx([-0.5, 0.0])
     u[1, 0], u[2, 1] = -1.0, -1.0  # back the way friction points, and into the wall
     forces[1, 0] = -0.5
     forces[2] = 0.0
     gap[2, 1] = 1.5
-    assert contact.adapt(forces, u, gap, active)
+    assert wall.adapt(forces, u, gap, active, alone)
     assert wall.state.touching.tolist() == [True, True, False, True]  # it is above it still
     gap[2, 1] = 0.0
-    assert contact.adapt(forces, u, gap, active)
+    assert wall.adapt(forces, u, gap, active, alone)
     assert wall.state.touching.all()
     assert wall.state.slip.tolist() == [0, 0, 0, 0]
 
@@ -145,17 +143,20 @@ def test_wrong_walls_are_rejected():
 def test_a_function_that_keeps_coming_back_is_released():
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=1.0, cells=(3, 2))
     wall = Wall(grid, "bilinear", "bottom", 0.0, True)
-    contact = ActiveSet([wall], [np.zeros((4, 2), dtype=bool)])
-    active, zero = np.ones(12, dtype=bool), np.zeros((12, 2))
+    active, zero, alone = np.ones(4, dtype=bool), np.zeros((4, 2)), np.zeros((4, 2), dtype=bool)
+
+    def changes_by(forces, u):
+        return wall.adapt(forces, u, zero, active, alone)
+
     pulls, falls = zero.copy(), zero.copy()
     pulls[1, 1], falls[1, 1] = -1.0, -1.0
     changes = 0
-    while contact.adapt(pulls, zero, zero, active) or contact.adapt(zero, falls, zero, active):
+    while changes_by(pulls, zero) or changes_by(zero, falls):
         changes += 1
         assert changes < 10
     assert not wall.state.touching[1]
     wall.begin()
-    assert contact.adapt(zero, falls, zero, active)
+    assert changes_by(zero, falls)
 
 
 @pytest.mark.parametrize("form", ["u_epsv", "u_epsv_finite"])

@@ -209,6 +209,7 @@ def test_a_factorisation_takes_over_and_names_the_cells():
         block(**given, linear_solver="multigrid")[0].solve()
 
 
+@pytest.mark.direct
 def test_a_new_factorisation_of_every_tangent(monkeypatch):
     """One that is reused may not do for the second right-hand side of a path."""
     monkeypatch.setattr(linear_solver, "MOST", 2)

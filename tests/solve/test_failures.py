@@ -11,6 +11,9 @@ from scenes import grid_of
 import tawami
 from tawami.solve import direct, failures
 
+#: Whatever solver the session names.
+pytestmark = pytest.mark.direct
+
 #: A beam whose matrix does not fit into the memory that is left, after a first small step.
 LITTLE_MEMORY = """
 import resource

@@ -20,6 +20,9 @@ from tawami.form.form import Form
 from tawami.solve import direct
 from tawami.solve.scaling import Scaling
 
+#: Whatever solver the session names.
+pytestmark = pytest.mark.direct
+
 
 def hardening(strength):
     """Displacement only, with a stress that grows with the cube of the volume change."""

@@ -46,6 +46,19 @@ def test_fgmres_iterations_of_the_mixed_form_are_bounded():
     assert max(most(n, nu) for n in (8, 32) for nu in (0.3, 0.4999, 0.4999999)) < 60
 
 
+@pytest.mark.parametrize("solver", ["direct", "multigrid"])
+def test_a_tolerance_below_round_off(solver):
+    def solve(tolerance: float) -> tawami.Solution:
+        return mpm.build("u_epsv", "paper", 16, linear_solver=solver, tolerance=tolerance).solve()
+
+    with pytest.raises(tawami.ConvergenceError, match="expected a tolerance of") as error:
+        solve(1e-14)
+    expected = float(str(error.value).split("tolerance of ")[1].split(" or")[0])
+    assert expected < 1e-10
+    solve(expected)
+
+
+@pytest.mark.direct
 def test_a_factorisation_in_every_iteration_gives_the_same_solution():
     seldom, always = (pushed(factorise=when).solve() for when in ("when_it_pays", "always"))
     assert always.krylov == (0,) * always.iterations

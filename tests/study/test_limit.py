@@ -12,18 +12,21 @@ HALVED = [1 / 4, 1 / 8, 1 / 16, 1 / 32]
 
 @pytest.mark.parametrize("order", [0.5, 1, 2, 3.7])
 @pytest.mark.parametrize("sizes", [HALVED, HALVED[:3], [0.3, 0.2, 0.1, 0.07]])
-def test_a_power_is_extrapolated_exactly(order, sizes):
+def test_a_power_is_extrapolated(order, sizes):
     found = limit_of(sizes, [2 + s**order for s in sizes])
-    assert found.value == pytest.approx(2, abs=1e-9)
-    assert found.order == pytest.approx(order, abs=1e-6)
-    assert found.exists
+    error = sizes[-1] ** order  # of the finest value
+    assert abs(found.value - 2) <= min(found.uncertainty, error / 4) + 1e-9
+    if len(sizes) > 3:  # a second order confirms the first
+        assert found.value == pytest.approx(2, abs=1e-3 * error)
+        assert found.uncertainty < 0.15 * error
+        assert found.order == pytest.approx(order, abs=0.02)
 
 
 def test_a_number_that_grows_is_an_inverse_size():
     assert sizes_of([2, 4, 8]) == [1 / 2, 1 / 4, 1 / 8]
     assert sizes_of([0.5, 0.25]) == [0.5, 0.25]
-    found = limit_of(sizes_of([2, 3, 5]), [1 + 1 / n**2 for n in (2, 3, 5)])
-    assert found.value == pytest.approx(1, abs=1e-9)
+    found = limit_of(sizes_of([2, 3, 5, 8]), [1 + 1 / n**2 for n in (2, 3, 5, 8)])
+    assert found.value == pytest.approx(1, abs=1e-5)
 
 
 def coverage(make):
@@ -31,7 +34,7 @@ def coverage(make):
     error of the finest value is at most three times that error.
     """
     covered, narrow = [], []
-    for seed in range(300):
+    for seed in range(60):
         values = make(np.random.default_rng(seed))
         found = limit_of(HALVED, list(values))
         covered.append(abs(found.value - 1) <= found.uncertainty)
@@ -53,11 +56,19 @@ def test_the_uncertainty_covers_sums_of_powers():
 
 def test_the_uncertainty_covers_noise():
     covered, _ = coverage(lambda random: 1 + 1e-3 * random.normal(size=4))
-    assert covered >= 0.75  # the limit, not the finest value, is 1
+    assert covered >= 0.8  # the limit, not the finest value, is 1
     covered, _ = coverage(
         lambda random: 1 + 0.1 * np.array(HALVED) ** 2 * (1 + 0.2 * random.uniform(-1, 1, 4))
     )
     assert covered >= 0.9
+
+
+def test_repetitions_measure_the_noise():
+    sizes, random = np.repeat(HALVED, 4), np.random.default_rng(1)
+    noise = 1e-3 * random.normal(size=sizes.size)
+    found = limit_of(list(sizes), list(1 + noise))
+    assert abs(found.value - 1) <= found.uncertainty < 3e-3
+    assert found.deviation == pytest.approx(1e-3, rel=0.5)
 
 
 @pytest.mark.parametrize(
@@ -81,7 +92,6 @@ def test_two_values_one_value_and_equal_values():
     assert limit_of(HALVED, [1.1, 1.0, 1.0, 1.0]).value == 1
 
 
-def test_a_value_that_stays_after_refinement_has_its_last_change_as_uncertainty():
+def test_a_single_coarse_value_is_left_behind():
     found = limit_of([1e-3, 1e-6, 1e-9], [1.1, 1.0 + 1e-9, 1.0])
-    assert found.value == pytest.approx(1, abs=1e-8)
-    assert found.uncertainty <= 1e-8
+    assert abs(found.value - 1) <= found.uncertainty < 0.05

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import tawami
-from tawami.study import Row, Table
+from tawami.study import Row, Table, figure, verdict
+from tawami.study.peers import read_peers
 from tawami.study.row import error_of
 
 
@@ -42,9 +44,46 @@ def test_changes_compare_pairs_that_differ_in_one_knob():
     assert (of_n.pairs, of_n.before, of_n.after) == (2, 1, 2)
     assert of_n.error == pytest.approx((0.1 * 0.025) ** 0.5)
     assert of_n.cost == pytest.approx((2 * 4) ** 0.5)
-    assert ("form", "c") in table.dominated("x")
-    assert ("form", "a") not in table.dominated("x")
-    assert "Changes that reduce the error: n 1 to 2" in table.in_words("x")
+
+
+def test_the_verdict_has_a_row_for_each_knob():
+    table = table_of(
+        (1, 0.1), (2, 0.01), (3, 0.2), (6, 0.02), (2, 0.1), (4, 0.01),
+        n=(1, 2, 1, 2, 1, 2), form=("a", "a", "b", "b", "a", "a"), slow=(0, 0, 0, 0, 1, 1),
+    )  # fmt: skip
+    assert verdict(table).splitlines() == [
+        "| change | error of x | time |  |",
+        "| --- | --- | --- | --- |",
+        "| n 1 → 2 | x 0.1 | x 2 | reduces the error |",
+        "| form a → b | x 2 | x 3 | only costs time |",
+        "| slow 0 → 1 | x 1 | x 2 | only costs time |",
+        "",
+        "The error is reduced by n 1 → 2. More time without more accuracy: form a → b and slow 0 → 1.",
+    ]
+
+
+PEERS = "code,version,command,machine,source,setting,wall_s,x\n"
+
+
+def test_results_of_other_codes_are_read(tmp_path):
+    path = tmp_path / "toy.csv"
+    path.write_text(f"{PEERS}other,1.2,other run.in,8 cores,,h = 1,3.5,0.01\n"
+                    "paper,2020,read from table 1,unknown,Doe 2020,h = 1,,0.02\n")  # fmt: skip
+    one, two = read_peers(path)
+    assert (one.label, one.wall_s, one.errors) == ("other 1.2", 3.5, {"x": 0.01})
+    assert np.isnan(two.wall_s)
+    figure.picture(table_of((1, 0.1), (2, 0.01)), tmp_path / "toy.png", peers=[one, two])
+    assert (tmp_path / "toy.png").exists()
+    for line, message in (
+        ("other,,run,8 cores,,h = 1,3,0.1", "line 2: version is empty: expected the origin"),
+        ("other,1,run,8 cores,,h = 1,soon,0.1", "line 2: .*'soon': expected numbers"),
+    ):
+        path.write_text(f"{PEERS}{line}\n")
+        with pytest.raises(tawami.InputError, match=message):
+            read_peers(path)
+    path.write_text("code,x\nother,1\n")
+    with pytest.raises(tawami.InputError, match="has no column version, command"):
+        read_peers(path)
 
 
 def test_a_table_is_read_from_its_file(tmp_path):

@@ -6,6 +6,7 @@ import csv
 import io
 from typing import Annotated
 
+import numpy as np
 import pytest
 
 import tawami
@@ -46,6 +47,16 @@ def fails_when_coarse(h: Annotated[float, H] = 1 / 16):
     return {"tip": 1 + h**2}
 
 
+def fails_when_fine(h: Annotated[float, H] = 1 / 8):
+    if h < 1 / 5:
+        raise tawami.InputError("the footing sinks")
+    return {"tip": 1 + h**2}
+
+
+def shifted(h: Annotated[float, H] = 1 / 8, shift: Annotated[float, {0.3, 0.0, 0.7}] = 0.0):
+    return {"tip": 1 + 0.01 * h * np.sin(40 * shift + 7 / h)}
+
+
 def always_fails(h: Annotated[float, H] = 1 / 8):
     raise tawami.InputError(f"no h = {h} is possible")
 
@@ -75,10 +86,11 @@ FUNCTIONS = {name: value for name, value in globals().items() if callable(value)
 
 @pytest.fixture
 def runs(monkeypatch):
-    """Run functions here, with the times that they ask for; the knobs of the runs, in order."""
+    """Run functions here, each in a second of the clock; the knobs of the runs, in order."""
     done = []
+    monkeypatch.setattr("tawami.study.ladder.perf_counter", lambda: float(len(done)))
 
-    def measure(name, knobs, limit):
+    def measure(name, knobs, limit, threads):
         done.append(dict(knobs))
         try:
             values = process._plain(FUNCTIONS[name.partition(":")[2]](**knobs))
@@ -95,7 +107,8 @@ def runs(monkeypatch):
 
 
 def traded(function, tmp_path, budget=600.0, **options):
-    return tawami.trade(function, "tip", budget, folder=tmp_path, quiet=True, **options)
+    options = {"folder": tmp_path, "quiet": True, "jobs": 1} | options
+    return tawami.trade(function, "tip", budget, **options)
 
 
 # -- estimates ---------------------------------------------------------------------
@@ -105,8 +118,8 @@ def test_an_error_that_vanishes_with_h_does_not_count_twice():
     knobs = knobs_of(quadratic)
     points = {(h, a): quadratic(h, a)["tip"] for h in knobs[0].values for a in knobs[1].values}
     found = estimate("tip", knobs, points)
-    assert found.value == pytest.approx(2, abs=1e-9)
-    assert found.orders["h"] == pytest.approx(2)
+    assert found.value == pytest.approx(2, abs=1e-7)
+    assert found.orders["h"] == pytest.approx(2, abs=0.01)
     assert found.remarks == ()
 
 
@@ -116,7 +129,7 @@ def test_an_error_that_stays_is_extrapolated_too():
     found = estimate("tip", knobs, points)
     assert abs(found.value - 1) <= found.uncertainty + 1e-12
     assert found.uncertainty < 2e-3
-    assert found.orders == pytest.approx({"h": 2, "dt": 1})
+    assert found.orders == pytest.approx({"h": 2, "dt": 1}, abs=0.01)
 
 
 # -- trades ------------------------------------------------------------------------
@@ -156,10 +169,8 @@ def test_cheap_settings_run_first_and_stored_runs_are_not_repeated(tmp_path, run
     assert len(runs) == before
 
 
-def test_a_larger_budget_continues(tmp_path, monkeypatch, runs):
-    clock = iter(range(10**6))
-    monkeypatch.setattr("tawami.study.ladder.perf_counter", lambda: float(next(clock)))
-    few = traded(quadratic, tmp_path, budget=4.5)  # each run takes a second of this clock
+def test_a_larger_budget_continues(tmp_path, runs):
+    few = traded(quadratic, tmp_path, budget=4.5)
     assert 2 <= len(few.runs) < 6
     before = len(runs)
     more = traded(quadratic, tmp_path, budget=100.0)
@@ -196,10 +207,33 @@ def test_a_knob_that_changes_the_problem_is_reported(tmp_path, function, message
 @pytest.mark.usefixtures("runs")
 def test_runs_that_fail_are_shown(tmp_path):
     trade = traded(fails_when_coarse, tmp_path)
-    assert trade.estimates["tip"].value == pytest.approx(1, abs=1e-9)
+    assert trade.estimates["tip"].value == pytest.approx(1, abs=1e-5)
     assert (
         "1 of 4 runs failed, the first with h 0.25: InputError: h is too large" in trade.sentence()
     )
+
+
+@pytest.mark.usefixtures("runs")
+def test_no_limit_if_finer_runs_fail(tmp_path):
+    trade = traded(fails_when_fine, tmp_path, knobs={"h": (1 / 2, 1 / 4, 1 / 8, 1 / 16)})
+    assert not trade.converges
+    assert "does not converge with 'h': runs with 0.125 and finer fail (Inp" in trade.sentence()
+
+
+@pytest.mark.usefixtures("runs")
+def test_repetitions_with_shifts(tmp_path):
+    trade = traded(shifted, tmp_path)
+    assert trade.knobs[1].values == (0.0, 0.3, 0.7)
+    found = trade.estimates["tip"]
+    assert len(trade.succeeded) == 12
+    assert abs(found.value - 1) <= found.uncertainty < 2e-3
+    assert found.remarks == ()
+
+
+def test_jobs_change_no_result(tmp_path, runs):
+    one, two = (traded(quadratic, tmp_path / str(jobs), jobs=jobs) for jobs in (1, 2))
+    assert one.as_csv() == two.as_csv()
+    assert len(runs) == 2 * len(one.runs)
 
 
 @pytest.mark.usefixtures("runs")
@@ -224,9 +258,7 @@ def test_wrong_input(tmp_path, function, message):
 
 
 @pytest.mark.usefixtures("runs")
-def test_a_budget_for_less_than_two_runs(tmp_path, monkeypatch):
-    clock = iter(range(10**6))
-    monkeypatch.setattr("tawami.study.ladder.perf_counter", lambda: float(next(clock)))
+def test_a_budget_for_less_than_two_runs(tmp_path):
     with pytest.raises(tawami.InputError, match=r"budget = 0.9 s is too small .* at least 4 s"):
         traded(quadratic, tmp_path, budget=0.9)
     assert len(traded(quadratic, tmp_path, budget=4.0).succeeded) >= 2  # the advice

@@ -12,12 +12,13 @@ from pathlib import Path
 from cases.common.program import Program
 from cases.costs.trade import cantilever, collapse, cook, self_weight, spinning_disc
 from tawami.base.files import atomic_file
-from tawami.study import Table
+from tawami.study import Table, verdict
 
 CASES = (cantilever, cook, collapse, self_weight, spinning_disc)
 STUDIES = {case.STUDY.name: case.STUDY for case in CASES}
-#: Folder of the results that come with the repository.
+#: Folder of the results that come with the repository, and of results of other codes.
 SHIPPED = Path(__file__).parent
+PEERS = SHIPPED / "peers"
 
 PROGRAM = Program("cases.costs.trade", __doc__, files=False)
 PROGRAM.option("studies", nargs="*", help=f"among {', '.join(STUDIES)}; all by default")
@@ -27,10 +28,8 @@ PROGRAM.option("--words", action="store_true", help="print the shipped results, 
 
 
 def in_words(table: Table) -> str:
-    """One paragraph per quantity, and one per setting that failed."""
-    paragraphs = [table.in_words(quantity) for quantity in table.quantities]
-    failed = [f"Failed: {str(row)[:300]}" for row in table.failed]
-    return "\n\n".join([f"# {table.name}", *paragraphs, *failed]) + "\n"
+    """Table and sentences about changes that reduce the error or only cost time."""
+    return f"# {table.name}\n\n{verdict(table)}\n"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -46,6 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         else:
             study = STUDIES[name]
             study.path = Path(options.results) / name
+            peers = PEERS / f"{name}.csv"
+            study.peers = peers if peers.exists() else None
             table = study.run(sample=options.sample)
             with atomic_file(study.path / f"{name}.md") as part:
                 part.write_text(in_words(table))

@@ -53,10 +53,15 @@ GRIDS = [
      "particles": ("2 x 2",), "threads": (1, 2)},
 ]  # fmt: skip
 
+SETTING = {"form": "u_epsv", "stabilisation": "laplacian", "n": ...}
 STUDY = tawami.Study(
     "cantilever",
     tawami.Series("MPM", run, GRIDS),
     reference={"deflection": V_THEORY, "mean stress": 0.0},
     beside=[tawami.Series("FEM only", run_fem, {"element": fem.METHODS, "n": (*CELLS, 64)})],
     colour="form",
+    marks={
+        "paper's setting": SETTING | {"alpha": 0.1, "particles": "2 x 2"},
+        "default": SETTING | {"alpha": 0.01, "particles": "3 x 3"},
+    },
 )

@@ -56,4 +56,8 @@ STUDY = tawami.Study(
     reference={"run-out": None, "profile": None, "mean stress": None, "roughness": 0.0},
     finest={"form": "u_epsv_finite", "h": 0.005, "dt": 5e-4, "per_axis": 3},
     colour="form",
+    marks={
+        "alpha = 0.01, 2 x 2 particles": {"form": "u_epsv_finite", "h": ..., "dt": 2e-3},
+        "paper's setting": {"form": "u_epsv_finite", "h": ..., "dt": ..., "alpha": 0.1},
+    },
 )

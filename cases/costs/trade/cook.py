@@ -40,10 +40,15 @@ GRIDS = [
      "body": ("gauss",), "linear_solver": ("direct", "multigrid"), "threads": (1, 2)},
 ]  # fmt: skip
 
+SETTING = {"form": "u_epsv", "stabilisation": "laplacian", "h": ...}
 STUDY = tawami.Study(
     "cook",
     tawami.Series("MPM", run, GRIDS),
     reference={"deflection": REFERENCE[NU]},
     beside=[tawami.Series("FEM only", run_fem, {"element": fem.METHODS, "h": (*SIZES, 0.25)})],
     colour="form",
+    marks={
+        "paper's setting": SETTING | {"alpha": 0.1, "body": "even"},
+        "default, with Gauss points": SETTING | {"alpha": 0.01, "body": "gauss"},
+    },
 )

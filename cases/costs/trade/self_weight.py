@@ -44,4 +44,5 @@ STUDY = tawami.Study(
     tawami.Series("MPM", run, GRIDS),
     reference={"height": 1.0, "stress": 0.0},
     colour="form",
+    marks={"default": {"form": "u_epsv_finite", "inertia": "none", "increments": 10, "h": ...}},
 )

@@ -35,4 +35,5 @@ STUDY = tawami.Study(
     tawami.Series("MPM", run, GRIDS),
     reference=dict.fromkeys(("momentum", "angular momentum", "energy", "mean stress"), 0.0),
     colour="form",
+    marks={"default": {"form": "u_epsv_finite", "transfer": "affine_flip", "n": ..., "steps": 150}},
 )

@@ -6,6 +6,8 @@ there.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import shapely
 from mpi4py import MPI
 
@@ -45,7 +47,7 @@ def body_of(grid: tawami.Grid, kind: str) -> tawami.Body:
     if kind == "lattice":
         body = tawami.box(grid, grid.origin, grid.upper, per_axis=2)
         inside = shapely.contains_xy(shapely.Polygon(CORNERS), *body.x.T)
-        return tawami.Body(body.x[inside], body.volume[inside], border=tawami.polyline(CORNERS))
+        return replace(body[inside], border=tawami.polyline(CORNERS))
     raise tawami.InputError(f"body '{kind}': expected one of {', '.join(map(repr, BODIES))}")
 
 

@@ -2,7 +2,7 @@
 
 The load grows in steps. After each step the particles have moved and the grid is reset. Without inertia
 the tangent becomes singular as soon as the beam leaves the grid lines: the first particle in a cell
-activates functions that no other particle supports. The ghost penalty of the shipped forms, k = 0.01,
+activates functions that no other particle supports. The ghost penalty of the finite forms, k = 0.01,
 ties these functions to their neighbours. Each reset costs some accuracy, so more
 steps do not help.
 """

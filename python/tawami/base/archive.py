@@ -2,7 +2,8 @@
 
 A file is an archive of NumPy (.npz). Each array of the state is stored under its path, as
 'scene.particles.stress'; all else is JSON: the state without its arrays, and the identity of the run.
-The checksums of the archive detect damage.
+The checksums of the archive detect damage. Each rank writes and reads its own rows of the arrays of the
+particles, in the order of their numbers: the file does not depend on the number of ranks.
 """
 
 from __future__ import annotations
@@ -18,12 +19,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
+from tawami.base import shared_file
 from tawami.base.errors import CheckpointError
-from tawami.base.files import atomic_file, reason
+from tawami.base.files import reason
+from tawami.base.ranks import raise_together
+from tawami.base.shared_file import Rows, crc_of
 
 #: Version of the content of a state.
-FORMAT = 4
+FORMAT = 5
 #: Entry of the archive with the JSON.
 ABOUT = "about.json"
 #: Folder of the checkpoints in the folder of a run.
@@ -53,54 +58,90 @@ def steps_of(path: Path) -> int:
     return int(path.stem.rpartition("-")[2])
 
 
-def write(path: Path, identity: Mapping[str, Any], state: Mapping[str, Any]) -> None:
-    """Write a state.
+def write(
+    path: Path, identity: Mapping[str, Any], state: Mapping[str, Any], comm: Any = MPI.COMM_SELF
+) -> None:
+    """Write a state; a call for all ranks, each of which writes its own rows.
 
     Args:
         path: The file.
         identity: Facts that identify the run, as JSON can hold them.
-        state: Dictionaries, lists, numbers, texts and arrays.
+        state: Dictionaries, lists, numbers, texts, arrays that all ranks have, and `Rows` of arrays.
+        comm: Communicator.
 
     Raises:
         OutputError: The file cannot be written; an older one of that name is kept.
     """
     arrays: dict[str, Any] = {}
     about = {"format": FORMAT, "identity": identity, "state": _pack(state, "", arrays)}
-    content = io.BytesIO()  # in memory: NumPy does not close a file whose disk is full
-    np.savez(content, **{ABOUT: np.frombuffer(json.dumps(about).encode(), np.uint8)}, **arrays)
-    with atomic_file(path) as part, part.open("wb") as file:
-        file.write(content.getbuffer())
-        file.flush()
-        os.fsync(file.fileno())
+    content = {ABOUT: np.frombuffer(json.dumps(about).encode(), np.uint8), **arrays}
+    pieces, entries, place = list[tuple[int, Any]](), list[zipfile.ZipInfo](), 0
+    for name, array in content.items():
+        rows = array if isinstance(array, Rows) else Rows.of_first_rank(comm, array)
+        own = np.ascontiguousarray(rows.own).reshape(-1).view(np.uint8).data
+        head = _head(rows)
+        entry = zipfile.ZipInfo(f"{name}.npy")
+        entry.CRC, entry.header_offset = crc_of(comm, head, own), place
+        entry.file_size = entry.compress_size = len(head) + rows.row_bytes * rows.total
+        start = entry.FileHeader(zip64=True) + head
+        pieces.append((place + len(start) + rows.row_bytes * rows.first, own))
+        if comm.rank == 0:
+            pieces.append((place, start))
+        place += len(start) - len(head) + entry.file_size
+        entries.append(entry)
+
+    def finish(part: Path) -> None:
+        with part.open("r+b") as file:
+            with zipfile.ZipFile(file, "w") as directory:
+                directory.filelist, directory.start_dir = entries, place
+            file.flush()
+            os.fsync(file.fileno())
+
+    shared_file.write(comm, path, pieces, finish, sync=True)
 
 
-def read(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Read a checkpoint.
+def _head(rows: Rows) -> bytes:
+    """The beginning of an array of NumPy, before its rows."""
+    head, form = io.BytesIO(), np.lib.format
+    facts = form.header_data_from_array_1_0(  # type: ignore[no-untyped-call]
+        np.ascontiguousarray(rows.own)
+    )
+    form.write_array_header_1_0(  # type: ignore[no-untyped-call]
+        head, facts | {"shape": rows.shape}
+    )
+    return head.getvalue()
+
+
+def read(path: Path, comm: Any = MPI.COMM_SELF) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Read a checkpoint; a call for all ranks.
 
     Returns:
-        The identity of its run, and the state.
+        The identity of its run, and the state. What was written from `Rows` is an array on one rank,
+        and `Rows` in equal blocks on several.
 
     Raises:
         CheckpointError: The file cannot be read, is damaged, or has another format.
     """
-    try:
-        with zipfile.ZipFile(path) as content:
-            damaged = content.testzip()
-        if damaged is not None:
-            raise ValueError(f"wrong checksum of '{damaged}'")
-        with np.load(path, allow_pickle=False) as arrays:
-            about = json.loads(arrays[ABOUT].tobytes())
-            found, identity = about["format"], about["identity"]
-            state = _unpack(about["state"], arrays) if found == FORMAT else {}
-    except Exception as error:
-        raise CheckpointError(
-            f"checkpoint '{path}' cannot be read ({reason(error)}): it is damaged, or is not a "
-            "checkpoint of tawami"
-        ) from None
-    if found != FORMAT:
-        raise CheckpointError(
-            f"checkpoint '{path}' has format {found!r}: this version of tawami reads format {FORMAT}"
-        )
+    with raise_together(comm):
+        try:
+            with zipfile.ZipFile(path) as content:
+                damaged = content.testzip() if comm.rank == 0 else None
+            if damaged is not None:
+                raise ValueError(f"wrong checksum of '{damaged}'")
+            with np.load(path, allow_pickle=False) as arrays:
+                about = json.loads(arrays[ABOUT].tobytes())
+                found, identity = about["format"], about["identity"]
+                state = _unpack(about["state"], arrays, comm) if found == FORMAT else {}
+        except Exception as error:
+            raise CheckpointError(
+                f"checkpoint '{path}' cannot be read ({reason(error)}): it is damaged, or is not a "
+                "checkpoint of tawami"
+            ) from None
+        if found != FORMAT:
+            raise CheckpointError(
+                f"checkpoint '{path}' has format {found!r}: this version of tawami reads format "
+                f"{FORMAT}"
+            )
     return identity, state
 
 
@@ -135,6 +176,8 @@ def check_particles(arrays: Any) -> None:
         ValueError: They are not such arrays, or not finite; numbers that repeat, volumes that are not
             positive.
     """
+    if isinstance(arrays, Mapping):
+        arrays = {n: a.own if isinstance(a, Rows) else a for n, a in arrays.items()}
     if not isinstance(arrays, Mapping) or not {"x", "number", "volume"} <= set(arrays):
         raise ValueError("it has no positions, numbers and volumes of particles")
     rows = {getattr(array, "shape", (None,))[:1] for array in arrays.values()}
@@ -166,6 +209,10 @@ def check_like(found: Any, own: Any, name: str) -> None:
     Raises:
         ValueError: Another kind of value; the message names it.
     """
+    if isinstance(own, Rows):
+        own = own.own
+    if isinstance(found, Rows):
+        found = found.own
     if isinstance(own, np.ndarray):
         same = isinstance(found, np.ndarray) and found.dtype == own.dtype
         if not same or found.shape[1:] != own.shape[1:] or found.ndim != own.ndim:
@@ -197,9 +244,9 @@ def check_like(found: Any, own: Any, name: str) -> None:
 
 def _pack(value: Any, path: str, arrays: dict[str, Any]) -> Any:
     """The value as JSON can hold it; its arrays are added to `arrays`."""
-    if isinstance(value, np.ndarray):
+    if isinstance(value, np.ndarray | Rows):
         arrays[path] = value
-        return {"array": path}
+        return {"rows" if isinstance(value, Rows) else "array": path}
     if isinstance(value, Mapping):
         return {
             "items": {
@@ -212,12 +259,26 @@ def _pack(value: Any, path: str, arrays: dict[str, Any]) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _unpack(value: Any, arrays: Mapping[str, Any]) -> Any:
+def _unpack(value: Any, arrays: Mapping[str, Any], comm: Any) -> Any:
     """The reverse of :func:`_pack`."""
     if isinstance(value, list):
-        return [_unpack(item, arrays) for item in value]
+        return [_unpack(item, arrays, comm) for item in value]
     if not isinstance(value, dict):
         return value
-    if "array" in value:
-        return arrays[value["array"]]
-    return {name: _unpack(item, arrays) for name, item in value["items"].items()}
+    if "rows" in value and comm.size > 1:
+        return _block(arrays, value["rows"], comm)
+    if "rows" in value or "array" in value:
+        return arrays[value["array" if "array" in value else "rows"]]
+    return {name: _unpack(item, arrays, comm) for name, item in value["items"].items()}
+
+
+def _block(arrays: Any, name: str, comm: Any) -> Rows:
+    """This rank's rows of an array, of which it reads nothing else."""
+    with arrays.zip.open(f"{name}.npy") as file:
+        np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
+        shape, _, dtype = np.lib.format.read_array_header_1_0(file)  # type: ignore[no-untyped-call]
+        first, last = (shape[0] * (comm.rank + k) // comm.size for k in range(2))
+        row = dtype.itemsize * math.prod(shape[1:])
+        file.seek(first * row, os.SEEK_CUR)
+        own = np.frombuffer(file.read((last - first) * row), dtype)
+    return Rows(own.reshape(last - first, *shape[1:]).copy(), first, shape[0])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import weakref
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +12,13 @@ from petsc4py import PETSc
 
 if TYPE_CHECKING:  # SciPy takes longer to import than all of this room
     import scipy.sparse as sp
+
+
+#: A setting of glibc (malloc.h): the number of large arrays that may have pages of their own, and its
+#: default. Libraries that come with PETSc set it to 0, after which freed arrays stay with the process.
+M_MMAP_MAX, MANY = -4, 65536
+with contextlib.suppress(AttributeError, OSError):  # another library for C
+    ctypes.CDLL(None).mallopt(M_MMAP_MAX, MANY)
 
 
 class Handles(dict[str, Any]):

@@ -67,8 +67,79 @@ def exchanged(comm: Any, rows: npt.NDArray[Any], to: npt.NDArray[Any]) -> npt.ND
         rows: Rows of this rank.
         to: Rank to which each of them is sent.
     """
-    parts = comm.alltoall([rows[to == rank] for rank in range(comm.size)])
-    return np.concatenate(parts)
+    return np.concatenate(parts_to(comm, rows, to))
+
+
+def parts_to(comm: Any, values: npt.NDArray[Any], to: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
+    """The values that each rank sends to this one.
+
+    Args:
+        comm: Communicator.
+        values: Values of this rank.
+        to: Rank to which each of them is sent.
+    """
+    order = np.argsort(to, kind="stable")
+    ends = np.searchsorted(to[order], np.arange(1, comm.size))
+    parts: list[npt.NDArray[Any]] = comm.alltoall(np.split(values[order], ends))
+    return parts
+
+
+def offsets(comm: Any, key: npt.NDArray[Any], count: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    """Sums of the counts of all smaller keys, on any rank; a collective call.
+
+    No rank gets the keys of all: each is sent to the rank that has its share of their range.
+
+    Args:
+        comm: Communicator.
+        key: Whole numbers from 0, ascending, each on one rank only.
+        count: Count of each.
+    """
+    own = np.stack([key, count]).astype(np.int64)
+    if comm.size == 1:
+        return np.asarray(np.cumsum(own[1]) - own[1])
+    end = comm.allreduce(int(own[0].max(initial=0)), op=MPI.MAX) + 1
+    parts = comm.alltoall(_split(comm, own.T, own[0], end))
+    received = np.concatenate(parts)
+    order = np.argsort(received[:, 0])
+    sums = np.cumsum(received[order, 1])
+    before = comm.exscan(int(received[:, 1].sum())) or 0
+    starts = np.empty(len(order), dtype=np.int64)
+    starts[order] = before + sums - received[order, 1]
+    ends = np.cumsum([len(part) for part in parts])[:-1]
+    return np.concatenate(comm.alltoall(np.split(starts, ends)))
+
+
+def looked_up(
+    comm: Any, number: npt.NDArray[Any], rows: npt.NDArray[Any], wanted: npt.NDArray[Any]
+) -> npt.NDArray[Any]:
+    """Rows of some numbers, 0 for numbers that no rank has; a collective call.
+
+    Args:
+        comm: Communicator.
+        number: Whole numbers from 0, each on one rank only.
+        rows: Row of each.
+        wanted: Numbers whose rows this rank gets.
+    """
+    end = int(largest(comm, max(number.max(initial=0), wanted.max(initial=0)))) + 1
+    share = -(-end // comm.size)
+    table = np.zeros((share, *rows.shape[1:]), dtype=rows.dtype)
+    table[exchanged(comm, number, number // share) - share * comm.rank] = exchanged(
+        comm, rows, number // share
+    )
+    order = np.argsort(wanted, kind="stable")
+    asked = comm.alltoall(_split(comm, wanted[order], wanted[order], share * comm.size))
+    found = comm.alltoall([table[part - share * comm.rank] for part in asked])
+    result = np.empty((len(wanted), *rows.shape[1:]), dtype=rows.dtype)
+    result[order] = np.concatenate(found)
+    return result
+
+
+def _split(
+    comm: Any, rows: npt.NDArray[Any], key: npt.NDArray[Any], end: int
+) -> list[npt.NDArray[Any]]:
+    """Rows with ascending keys below `end`, divided into equal shares of the range of the keys."""
+    share = -(-end // comm.size)
+    return np.split(rows, np.searchsorted(key, share * np.arange(1, comm.size)))
 
 
 @contextmanager

@@ -8,12 +8,15 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+from mpi4py import MPI
 
 from tawami.base import checks
-from tawami.base.arrays import Array
+from tawami.base.arrays import Array, Indices
 from tawami.base.errors import InputError
+from tawami.base.ranks import raise_together
 from tawami.base.space import PLANE, Counts, Position
 from tawami.base.text import position
+from tawami.body.part import Part
 from tawami.border.pieces import Border
 
 #: Share of a cell by which two bodies may overlap in it.
@@ -26,7 +29,12 @@ class Body:
 
     `one + other` is a body with the particles of both, in this order, and with the groups of both;
     groups of the same name become one. `sum([...])` joins several. Parts of the border that both have
-    in common are inside of it. It has no border if one of them has none.
+    in common are inside of it. It has no border if one of them has none. `body[mask]` has some of the
+    particles and no border.
+
+    On several ranks `box`, `polygon`, `disc`, `level_set` and `mesh` give each rank the particles in its
+    cells: the arrays of a body hold these, and so do masks and fields that are made of them. `Body(x,
+    volume)` is a whole body, the same on every rank.
 
     Attributes:
         x: Positions [m], particles x 2.
@@ -38,6 +46,7 @@ class Body:
             None: unknown.
         border: The border of the body, with the names of its parts. None: unknown, as for loose
             particles; `polyline` makes one.
+        part: The part of the body on this rank. None: it is whole.
     """
 
     x: Array
@@ -46,10 +55,41 @@ class Body:
     names: tuple[str, ...] = ()
     lattice: tuple[Position, float, Counts] | None = field(default=None, repr=False)
     border: Border | None = field(default=None, repr=False)
+    part: Part | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         materials = f", materials {', '.join(self.names)}" if self.names else ""
-        return f"Body({len(self.x)} particles, {np.sum(self.volume):g} m2{materials})"
+        of = "" if self.part is None else f" of {self.part.total} on this rank"
+        return f"Body({len(self.x)}{of} particles, {np.sum(self.volume):g} m2{materials})"
+
+    @property
+    def number(self) -> Indices:
+        """Number of each particle in the whole body."""
+        return np.arange(len(self.x)) if self.part is None else self.part.number
+
+    def __getitem__(self, mask: npt.ArrayLike) -> Body:
+        """The body of some of the particles, without a border; a call for all ranks.
+
+        Args:
+            mask: True for each particle that it has.
+
+        Raises:
+            InputError: No mask of the particles.
+        """
+        chosen = checks.any_array("body[mask]", mask)
+        if chosen.dtype != bool or chosen.shape != (len(self.x),):
+            raise InputError(
+                f"body[mask]: {chosen.dtype} of shape {chosen.shape}: expected a mask of its "
+                f"{len(self.x)} particles, as body.x[:, 1] > 0.5"
+            )
+        return replace(
+            self,
+            x=self.x[chosen],
+            volume=self.volume[chosen],
+            material_of=None if self.material_of is None else self.material_of[chosen],
+            border=None,
+            part=None if self.part is None else self.part.chosen(chosen),
+        )
 
     def named(self, name: str) -> Body:
         """The same body as one group, to which a scene gives a material by this name.
@@ -76,6 +116,8 @@ class Body:
         """
         if not isinstance(other, Body):
             return NotImplemented
+        if (self.part is None) != (other.part is None):
+            return self._divided(other) + other._divided(self)
         one, others = _arrays(self), _arrays(other)
         lattice = self.lattice or other.lattice
         if self.lattice is not None and other.lattice is not None:
@@ -84,13 +126,29 @@ class Body:
                     "Body + Body: they were made for different grids: expected the same origin, h and "
                     "cells; make both with the grid of the scene"
                 )
-            _check_apart(one, others, *self.lattice)
+            with raise_together(MPI.COMM_SELF if self.part is None else self.part.grid.comm):
+                _check_apart(one, others, *self.lattice)
         names, number = _groups(self, other)
         x, volume = (np.concatenate(arrays) for arrays in zip(one, others, strict=True))
         for part in (self, other):
             checks.instance("Body + Body: border", part.border, Border | None, "a tawami.Border")
         border = self.border and other.border and self.border.joined(other.border)
-        return Body(x, volume, number, names, lattice, border)
+        joined = None
+        if self.part is not None and other.part is not None:
+            joined = self.part.followed_by(other.part)
+        return Body(x, volume, number, names, lattice, border, joined)
+
+    def _divided(self, other: Body) -> Body:
+        """The part of a whole body that a rank holds of its sum with another one."""
+        if self.part is not None or other.part is None:
+            return self
+        _arrays(self)
+        part, mask = Part.of_whole(other.part.grid, self.x)
+        number = self.material_of
+        return replace(
+            self, x=self.x[mask], volume=self.volume[mask], part=part,
+            material_of=None if number is None else np.asarray(number)[mask],
+        )  # fmt: skip
 
     def __radd__(self, other: Literal[0]) -> Body:
         """Join bodies with `sum([...])`, which begins with 0."""
@@ -143,15 +201,24 @@ def _check_apart(
     Raises:
         InputError: They overlap.
     """
-    strides, size = np.cumprod([1, *cells[:-1]]), h ** len(cells)
-    covered = []
-    for x, volume in (one, other):
-        index = np.clip(np.floor((x - origin) / h), 0, np.subtract(cells, 1)).astype(np.int64)
-        covered.append(np.bincount(index @ strides, volume, int(np.prod(cells))) / size)
+    index = [
+        np.clip(np.floor((x - origin) / h), 0, np.subtract(cells, 1)).astype(np.int64)
+        for x, _ in (one, other)
+        if len(x)
+    ]
+    if len(index) < 2:  # one of them has no particles on this rank
+        return
+    first = np.min([part.min(axis=0) for part in index], axis=0)
+    shape = np.max([part.max(axis=0) for part in index], axis=0) - first + 1
+    strides, size = np.cumprod([1, *shape[:-1]]), h ** len(cells)
+    covered = [
+        np.bincount((part - first) @ strides, volume, int(shape.prod())) / size
+        for part, (_, volume) in zip(index, (one, other), strict=True)
+    ]
     excess = sum(covered) - np.maximum(1.0, np.maximum(*covered))
     worst = int(np.argmax(excess))
     if excess[worst] > ROUNDING:
-        place = origin + h * (np.array(np.unravel_index(worst, cells, order="F")) + 0.5)
+        place = origin + h * (first + np.unravel_index(worst, shape, order="F") + 0.5)
         raise InputError(
             f"Body + Body: they overlap by at least {size * np.maximum(excess, 0.0).sum():.3g} m2, most "
             f"in the cell at {position(place)} m: expected bodies side by side; subtract one from the "

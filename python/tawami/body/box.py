@@ -10,10 +10,11 @@ import numpy as np
 from tawami.base.arrays import Array
 from tawami.base.checks import point
 from tawami.base.errors import InputError
-from tawami.base.space import lattice, tensor_product
+from tawami.base.space import lattice
 from tawami.body import clipping
 from tawami.body.body import Body
 from tawami.body.filling import PER_AXIS, Filling
+from tawami.body.part import Part
 from tawami.body.points import in_boxes
 from tawami.border.pieces import Border
 from tawami.border.polyline import straight
@@ -31,7 +32,7 @@ def box(
     per_axis: int = PER_AXIS,
     gauss: bool = False,
 ) -> Body:
-    """A rectangle filled with particles; its sides may cut cells of the grid.
+    """A rectangle filled with particles; its sides may cut cells of the grid. A call for all ranks.
 
     A full cell gets `per_axis` x `per_axis` particles. The part of a cut cell gets 16 at the Gauss
     points, which are exact up to degree 6. The area is exact, but a side within 1e-6 of a line of the
@@ -56,26 +57,33 @@ def box(
     if len(on_lines) == len(cells):
         return _of_full_cells(filling, np.array(on_lines))
     ends = _ends(grid, np.array([lower, upper]))
-    # along each axis, the ends of the box and the lines of the grid between them
-    cuts = [np.unique([low, *np.arange(np.ceil(low), high), high]) for low, high in ends.T]
-    filling.check_memory(math.prod(len(cut) - 1 for cut in cuts))
-    low, high = lattice([cut[:-1] for cut in cuts]), lattice([cut[1:] for cut in cuts])
+    first, last = np.floor(ends[0]).astype(int), np.ceil(ends[1]).astype(int)
+    filling.check_memory(math.prod(last - first))
+    index = grid.own_cells(first, last)
+    low, high = np.maximum(index, ends[0]), np.minimum(index + 1, ends[1])
     full = (high - low == 1).all(axis=1)
-    cell = grid.cell_numbers(grid.cell_at((low + high) / 2))
+    cell = grid.cell_numbers(index)
     cut = in_boxes(low[~full], high[~full], cell[~full])
     return filling.body(cell[full], cut, border=_border(grid, ends))
 
 
 def _of_full_cells(filling: Filling, cells: Array) -> Body:
     """A box of full cells, given the first and the last line along each axis, dim x 2."""
-    grid = filling.grid
+    grid, per_axis = filling.grid, filling.per_axis
     filling.check_memory(math.prod(cells[:, 1] - cells[:, 0]))
+    index = grid.own_cells(*cells.T)
+    shape = per_axis * (cells[:, 1] - cells[:, 0])  # particles of the whole box along each axis
+    corner = per_axis * (index - cells[:, 0])
+    place = corner[:, None] + lattice([np.arange(per_axis)] * grid.space.dim)
+    number = np.sort((place @ np.cumprod((1, *shape[:-1]))).ravel(), kind="stable")
     along = [(np.arange(*ends)[:, None] + filling.points).ravel() for ends in cells]
-    volume = tensor_product(
-        [np.tile(filling.weights * grid.h, last - first) for first, last in cells]
-    )
+    weights = [np.tile(filling.weights * grid.h, last - first) for first, last in cells]
+    at = np.unravel_index(number, shape, order="F")
+    x = np.stack([c[k] for c, k in zip(along, at, strict=True)], axis=-1)
+    volume = np.prod([w[k] for w, k in zip(weights, at, strict=True)], axis=0)
+    part = Part(grid, number, int(shape.prod())) if grid.comm.size > 1 else None
     border = _border(grid, cells.T)
-    return Body(grid.in_metres(lattice(along)), volume, lattice=grid.lattice, border=border)
+    return Body(grid.in_metres(x), volume, lattice=grid.lattice, border=border, part=part)
 
 
 def _ends(grid: Grid, corners: Array) -> Array:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from tawami.base.arrays import Array, Indices
-from tawami.base.space import lattice
 from tawami.body.points import ROUND_OFF
 from tawami.grid.grid import ON_LINE, Grid
 
@@ -43,7 +42,7 @@ def squares(index: Indices) -> Any:
 
 
 def clipped(grid: Grid, shape: Any) -> tuple[Indices, Array, Indices]:
-    """A polygon or multipolygon in cells, clipped by the cells.
+    """A polygon or multipolygon in cells, clipped by the cells of this rank; a collective call.
 
     Returns:
         Numbers of the cells that it fills; triangles (n x 3 x 2) of its parts in other cells; the cell
@@ -53,7 +52,7 @@ def clipped(grid: Grid, shape: Any) -> tuple[Indices, Array, Indices]:
 
     bounds = np.array(shape.bounds)
     lower, upper = np.floor(bounds[:2]).astype(int), np.ceil(bounds[2:]).astype(int)
-    index = lattice([np.arange(a, b) for a, b in zip(lower, upper, strict=True)])
+    index = grid.own_cells(lower, upper)
     cell, boxes = grid.cell_numbers(index), squares(index)
     shapely.prepare(shape)
     full = shapely.covers(shape, boxes)

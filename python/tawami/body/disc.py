@@ -37,7 +37,7 @@ def disc(
     gauss: bool = False,
 ) -> Body:
     """A disc, or a ring, filled with particles; a sphere, or a spherical shell, where its centre is on
-    the axis of an axisymmetric grid.
+    the axis of an axisymmetric grid. A call for all ranks.
 
     A full cell gets `per_axis` x `per_axis` particles. A cut cell gets at most 28, which integrate
     exactly over its part of the disc up to degree 6. Area and first moments are those of the circle to
@@ -79,11 +79,13 @@ def disc(
     # The chords of the outer circle must not cross the inner one.
     chords = max(CHORDS, int(np.ceil(2 * np.pi / np.sqrt(1 - hole / r))))
     border, caps = _circle(grid, middle, r, chords)
+    caps = caps[grid.owns(caps.cell)]
     arcs = _border(grid, middle, {"outer": r, "inner": hole})
     if hole == 0.0:
         full, triangles, cell = clipping.clipped(grid, shapely.Polygon(border))
         return filling.body(full, joined([in_triangles(triangles, cell), caps]), border=arcs)
     inner_border, removed = _circle(grid, middle, hole, chords)
+    removed = removed[grid.owns(removed.cell)]
     clipped = clipping.clipped(grid, shapely.Polygon(border, [inner_border]))
     full, triangles, cell = _refined(grid, *clipped, removed.cell)
     removed = Points(removed.x, -removed.weight, removed.cell, removed.material)

@@ -158,27 +158,28 @@ def check_apart(grid: Grid, elements: Elements) -> None:
 
 
 def by_cells(grid: Grid, elements: Elements, num_materials: int) -> tuple[Indices, Indices, Points]:
-    """The parts of elements in each cell.
+    """The parts of elements in each cell of this rank; a collective call.
 
     Returns:
         Numbers of the cells that are filled by one material; this material; points that integrate over
         the other parts.
     """
-    triangles, of = _cut(elements.corners)
+    triangles, of = _cut(grid, elements.corners)
     area = areas(triangles)
     large = area > 0
     triangles, of, area = triangles[large], of[large], area[large]
     cell = grid.cell_numbers(grid.cell_at(triangles.mean(axis=1)))
-    key = cell * num_materials + elements.material[of]
-    covered = np.bincount(key, area, minlength=grid.num_cells * num_materials)
-    full = np.flatnonzero(covered > 1 - COVERED)
-    rest = covered[key] <= 1 - COVERED
+    mine = grid.owns(cell)
+    triangles, of, area, cell = triangles[mine], of[mine], area[mine], cell[mine]
+    key, place = np.unique(cell * num_materials + elements.material[of], return_inverse=True)
+    covered = np.bincount(place.ravel(), area, len(key)) > 1 - COVERED
+    full, rest = key[covered], ~covered[place.ravel()]
     cut = in_triangles(triangles[rest], cell[rest], elements.material[of[rest]])
     return full // num_materials, full % num_materials, cut
 
 
-def _cut(corners: Array) -> tuple[Array, Indices]:
-    """Triangles cut by the cells into triangles, and the triangle that each is a part of."""
+def _cut(grid: Grid, corners: Array) -> tuple[Array, Indices]:
+    """Triangles cut by this rank's cells into triangles, and the triangle that each is a part of."""
     import shapely
 
     low = np.floor(corners.min(axis=1)).astype(np.int64)
@@ -192,6 +193,8 @@ def _cut(corners: Array) -> tuple[Array, Indices]:
     of = np.repeat(many, count)
     step = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
     cell = low[of] + np.column_stack([step % size[of, 0], step // size[of, 0]])  # x fastest
+    mine = grid.owns(grid.cell_numbers(cell))
+    of, cell = of[mine], cell[mine]
     parts = shapely.intersection(shapely.polygons(corners)[of], clipping.squares(cell))
     some = shapely.area(parts) > 0
     parts, of = parts[some], of[some]

@@ -13,12 +13,14 @@ from typing import Any
 import numpy as np
 
 from tawami import _rust
+from tawami.base import ranks
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.checks import instance, room, shown, switch, whole_number
 from tawami.base.errors import InputError
 from tawami.base.space import lattice, tensor_product
 from tawami.body.body import Body
 from tawami.body.moment_fitting import fewer
+from tawami.body.part import Part
 from tawami.body.points import ROUND_OFF, Points, joined
 from tawami.border.pieces import Border
 from tawami.grid.grid import Grid
@@ -76,7 +78,8 @@ class Filling:
             InputError: There is not enough.
         """
         what = f"per_axis = {shown(self.per_axis)} in {cells} cell{'s' if cells > 1 else ''}"
-        room(what, cells * self.per_cell, BYTES_PER_PARTICLE, "expected fewer particles")
+        of_rank = BYTES_PER_PARTICLE / self.grid.comm.size
+        room(what, cells * self.per_cell, of_rank, "expected fewer particles")
 
     def in_full_cells(self, cell: Indices, material: Indices) -> Points:
         """The particles of full cells, given the numbers of cells and of their materials."""
@@ -100,11 +103,11 @@ class Filling:
         border: Border | None,
         allowed: Callable[[Array], Mask] | None = None,
     ) -> Body:
-        """The particles of full and of cut cells.
+        """The particles of full and of cut cells; a collective call.
 
         Args:
-            full: Numbers of the full cells.
-            cut: Points that integrate over parts of cells.
+            full: Numbers of the full cells of this rank, ascending.
+            cut: Points that integrate over parts of cells of this rank.
             material: Number of the material of each full cell.
             names: Names of the materials; None for a body of one material.
             border: The border of the body.
@@ -113,35 +116,42 @@ class Filling:
         Raises:
             InputError: There is no particle.
         """
+        grid = self.grid
         material = np.zeros_like(full) if material is None else material
-        parts = joined([self.in_full_cells(full, material), self._thinned(cut, len(full), allowed)])
-        if not len(parts.x):
+        area = ranks.sum_of(grid.comm, np.array([len(full) + cut.weight.sum()]))[0]
+        with ranks.raise_together(grid.comm):
+            key = cut.cell * max(len(names or ()), 1) + cut.material
+            in_full = self.in_full_cells(full, material)
+            in_cut, key = self._thinned(cut, key, ROUND_OFF * min(1.0, float(area)), allowed)
+        parts = joined([in_full, in_cut])
+        if not ranks.any_of(grid.comm, np.array([len(parts.x) > 0]))[0]:
             raise InputError("the body has no particles: expected a shape with an area")
-        x, volume = (
-            self.grid.in_metres(parts.x),
-            self.grid.space.measure(self.grid.h) * parts.weight,
-        )
+        x, volume = grid.in_metres(parts.x), grid.space.measure(grid.h) * parts.weight
         number = None if names is None else parts.material.astype(np.uint32)
-        return Body(x, volume, number, names or (), self.grid.lattice, border)
+        groups = (full, np.full(len(full), self.per_cell)), np.unique(key, return_counts=True)
+        part = Part.of_cells(grid, *groups)
+        return Body(x, volume, number, names or (), grid.lattice, border, part)
 
     def _thinned(
-        self, points: Points, full: int, allowed: Callable[[Array], Mask] | None
-    ) -> Points:
-        """At most 28 points for each material in each cell; none for parts that are round-off.
+        self,
+        points: Points,
+        key: Indices,
+        least: float,
+        allowed: Callable[[Array], Mask] | None,
+    ) -> tuple[Points, Indices]:
+        """At most 28 points for each material in each cell, and their keys, ascending.
 
         Args:
             points: Points that integrate over parts of cells.
-            full: Number of full cells, to judge what is round-off.
+            key: Key of cell and material of each.
+            least: Area of a part that is round-off, and gets none [cells^2].
             allowed: As in `body`.
         """
-        num_materials = int(points.material.max(initial=0)) + 1
-        key = points.cell * num_materials + points.material
         order = np.argsort(key, kind="stable")
         starts = np.flatnonzero(np.diff(key[order], prepend=-1))
-        least = ROUND_OFF * min(1.0, full + float(points.weight.sum()))
-        parts = [points[:0]]
+        parts, keys = [points[:0]], [key[:0]]
         ends = np.append(starts, len(order))[1:]
-        points = points[order]
+        points, key = points[order], key[order]
         for begin, end in zip(starts, ends, strict=True):
             x, weight = points.x[begin:end], points.weight[begin:end]
             if weight.sum() <= least:
@@ -150,4 +160,5 @@ class Filling:
             x, weight = fewer(x, weight, inside)
             first = np.full(len(x), begin)
             parts.append(Points(x, weight, points.cell[first], points.material[first]))
-        return joined(parts)
+            keys.append(key[first])
+        return joined(parts), np.concatenate(keys)

@@ -8,12 +8,13 @@ from functools import reduce
 import numpy as np
 import numpy.typing as npt
 
+from tawami.base import ranks
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.checks import names, number, real_values, room, shown, whole_number
 from tawami.base.errors import InputError
 from tawami.base.space import lattice
 from tawami.body.body import Body
-from tawami.body.border_squares import Signs, Squares, merged, triangulated
+from tawami.body.border_squares import CORNERS, Signs, Squares, merged, triangulated
 from tawami.body.filling import PER_AXIS, Filling
 from tawami.body.outline import outline
 from tawami.body.points import ROUND_OFF, areas, in_boxes, in_triangles, joined
@@ -35,6 +36,8 @@ class Function:
     def __call__(self, x: Array) -> Signs:
         """-1 if the function is negative, else 1, as bytes; for positions of shape (..., 2)."""
         points = self.grid.in_metres(x).reshape(-1, 2)
+        if not len(points):  # on a rank without cells
+            return np.empty(x.shape[:-1], dtype=np.int8)
         try:
             values = real_values(self.f(points[:, 0], points[:, 1]))
         except (TypeError, ValueError, OverflowError) as error:
@@ -59,15 +62,18 @@ class Function:
         signs[values < 0] = -1
         return signs.reshape(x.shape[:-1])
 
-    def at_samples(self, samples: int) -> Signs:
-        """The same at `samples` points per cell and axis, y by x; rows of them are taken together."""
-        nx, ny = (n * samples for n in self.grid.cells)
-        rows = max(1, BLOCK // (nx + 1))
-        x = np.arange(nx + 1) / samples
-        return np.concatenate([
-            self(lattice([x, along / samples]).reshape(len(along), nx + 1, 2))
-            for along in np.split(np.arange(ny + 1), range(rows, ny + 1, rows))
-        ])  # fmt: skip
+    def in_cells(self, index: Indices, samples: int) -> Signs:
+        """The same at `samples` points per axis in cells, and at their ends: cells x y x x.
+
+        Args:
+            index: Indices (i, j) of the cells.
+            samples: Number per cell and axis.
+        """
+        step = lattice([np.arange(samples + 1)] * 2)
+        count = max(1, BLOCK // len(step))
+        parts = np.split(samples * index[:, None], range(count, len(index), count))
+        signs = np.concatenate([self((part + step) / samples) for part in parts])
+        return signs.reshape(-1, samples + 1, samples + 1)
 
 
 def level_set(
@@ -81,7 +87,8 @@ def level_set(
     per_axis: int = PER_AXIS,
     gauss: bool = False,
 ) -> Body:
-    """The body where f(x, y) < 0, filled with particles; only the sign of f is used.
+    """The body where f(x, y) < 0, filled with particles; only the sign of f is used. A call for all
+    ranks, each of which calls f in its cells.
 
     f is evaluated at `samples` x `samples` points in every cell. The squares between samples where f
     changes sign are divided until dividing changes the area by less than the tolerance. In each of
@@ -118,43 +125,68 @@ def level_set(
     samples, sign = whole_number("samples", samples, low=2), Function(grid, f)
     nx, ny = (n * samples for n in grid.cells)
     what = f"level_set: samples = {shown(samples)} in {grid.cells[0]} x {grid.cells[1]} cells"
-    room(what, (nx + 1) * (ny + 1), BYTES_PER_SAMPLE, "expected fewer samples")
-    signs = sign.at_samples(samples)
-    if not (signs < 0).any():
+    of_rank = BYTES_PER_SAMPLE / grid.comm.size
+    room(what, (nx + 1) * (ny + 1), of_rank, "expected fewer samples")
+    index = grid.own_cells((0, 0), grid.cells)
+    with ranks.raise_together(grid.comm):
+        signs = sign.in_cells(index, samples)
+    if not ranks.any_of(grid.comm, np.array([(signs < 0).any()]))[0]:
         raise InputError(
-            f"level_set: f is not negative at any of the {signs.size} samples, "
+            f"level_set: f is not negative at any of the {(nx + 1) * (ny + 1)} samples, "
             f"{grid.h / samples:g} m apart, so the body has no particles: expected f < 0 inside the "
             "body; change its sign, move it into the grid, or use more samples"
         )
-    _check_ends(signs, [*ended, "left"] if grid.on_axis else ended)
-    corners = signs[:-1, :-1], signs[:-1, 1:], signs[1:, :-1], signs[1:, 1:]
+    _check_ends(grid, index, signs, [*ended, "left"] if grid.on_axis else ended)
+    inside, squares = _along_border(grid, sign, index, signs, samples)
+    area = ranks.sum_of(grid.comm, np.array([np.count_nonzero(inside)]))[0] / samples**2
+    with ranks.raise_together(grid.comm):
+        triangles, whole, pieces = triangulated(sign, squares, area, tolerance)
+        ending = outline(grid, pieces, name, bool(sign(np.zeros((1, 2)))[0] < 0))
+    return _filled(filling, index, inside, triangles, whole, ending)
+
+
+def _along_border(
+    grid: Grid, sign: Function, index: Indices, signs: Signs, samples: int
+) -> tuple[Mask, Squares]:
+    """Mask of the squares between samples that are inside and not along the border, cells x y x x, and
+    the squares along the border, where the sign changes or that touch one of these, on all ranks.
+
+    Args:
+        grid: The grid.
+        sign: Sign of the function.
+        index: Indices (i, j) of this rank's cells.
+        signs: Signs at the samples in these cells.
+        samples: Samples per cell and axis.
+    """
+    corners = signs[:, :-1, :-1], signs[:, :-1, 1:], signs[:, 1:, :-1], signs[:, 1:, 1:]
     least, most = reduce(np.minimum, corners), reduce(np.maximum, corners)
-    border = _grown(least != most)
-    inside = (most < 0) & ~border
-    at = np.stack([corner[border] for corner in corners], axis=-1)
-    squares = Squares(np.argwhere(border)[:, ::-1] / samples, 1 / samples, at)
-    area = np.count_nonzero(inside) / samples**2
-    triangles, whole, pieces = triangulated(sign, squares, area, tolerance)
-    ending = outline(grid, pieces, name, bool(signs[0, 0] < 0))
-    return _filled(filling, inside, triangles, whole, samples, ending)
+    count = np.multiply(grid.cells, samples)
+    cell, j, i = np.nonzero(least != most)
+    found = ranks.allgathered(grid.comm, samples * index[cell] + np.stack([i, j], axis=-1))
+    grown = (found[:, None] + lattice([np.arange(-1, 2)] * 2)).reshape(-1, 2)
+    grown = grown[((grown >= 0) & (grown < count)).all(axis=1)]
+    key = np.unique(grown @ [1, count[0]])  # in rows along x
+    place = np.stack(np.unravel_index(key, count, order="F"), axis=-1)
+    with ranks.raise_together(grid.comm):
+        at = sign((place[:, None] + CORNERS) / samples)
+    inside = most < 0
+    number, mine = grid.cell_numbers(index), grid.cell_numbers(place // samples)
+    own = np.flatnonzero(np.isin(mine, number))
+    i, j = (place[own] % samples).T
+    inside[np.searchsorted(number, mine[own]), j, i] = False
+    return inside, Squares(place / samples, 1 / samples, at)
 
 
-def _grown(mask: Mask) -> Mask:
-    """A mask of squares with all squares that touch it."""
-    for axis in range(mask.ndim):
-        grown, (low, high) = mask.copy(), (slice(None, -1), slice(1, None))
-        along = (slice(None),) * axis
-        grown[(*along, low)] |= mask[(*along, high)]
-        grown[(*along, high)] |= mask[(*along, low)]
-        mask = grown
-    return mask
-
-
-def _check_ends(signs: Signs, ends: Sequence[str]) -> None:
-    """Check that the body only ends at these edges of the grid; signs at the samples, y by x."""
-    along = {"left": signs[:, 0], "right": signs[:, -1], "bottom": signs[0], "top": signs[-1]}
-    for edge in EDGES:
-        if (along[edge] < 0).any() and edge not in ends:
+def _check_ends(grid: Grid, index: Indices, signs: Signs, ends: Sequence[str]) -> None:
+    """Check that the body only ends at these edges of the grid, given the signs in this rank's cells."""
+    (i, j), (nx, ny) = index.T, grid.cells
+    along = {
+        "left": signs[i == 0, :, 0], "right": signs[i == nx - 1, :, -1],
+        "bottom": signs[j == 0, 0], "top": signs[j == ny - 1, -1],
+    }  # fmt: skip
+    reached = ranks.any_of(grid.comm, np.array([(along[edge] < 0).any() for edge in EDGES]))
+    for edge, reaches in zip(EDGES, reached, strict=True):
+        if reaches and edge not in ends:
             raise InputError(
                 f"level_set: f is negative on the edge '{edge}' of the grid, where the body would end: "
                 f"enlarge the grid, or allow it with ends=('{edge}',)"
@@ -163,38 +195,47 @@ def _check_ends(signs: Signs, ends: Sequence[str]) -> None:
 
 def _filled(
     filling: Filling,
+    index: Indices,
     inside: Mask,
     triangles: Array,
     whole: Sequence[Squares],
-    samples: int,
     border: Border,
 ) -> Body:
     """Particles for squares between samples that are inside, and along the border.
 
     Args:
         filling: Rule for filling cells.
-        inside: Mask of the squares between samples, y by x.
+        index: Indices (i, j) of this rank's cells.
+        inside: Mask of the squares between samples in them, cells x y x x.
         triangles: Triangles along the border, n x 3 x 2.
         whole: Smaller squares along the border.
-        samples: Samples per cell and axis.
         border: The border of the body.
     """
-    grid, (nx, ny) = filling.grid, filling.grid.cells
-    count = inside.reshape(ny, samples, nx, samples).sum(axis=(1, 3), dtype=np.int64)
-    area = count.ravel() / samples**2
+    grid, samples = filling.grid, inside.shape[1]
+    number = grid.cell_numbers(index)
+    area = inside.sum(axis=(1, 2), dtype=np.int64) / samples**2
     of_triangle = grid.cell_numbers(grid.cell_at(triangles.mean(axis=1)))
-    area += np.bincount(of_triangle, areas(triangles), minlength=grid.num_cells)
+    mine = np.isin(of_triangle, number)
+    triangles, of_triangle = triangles[mine], of_triangle[mine]
+    whole = [one[np.isin(_cells(grid, one), number)] for one in whole]
+
+    def place(cell: Indices) -> Indices:
+        return np.searchsorted(number, cell)
+
+    area += np.bincount(place(of_triangle), areas(triangles), minlength=len(number))
     for one in whole:
-        area += np.bincount(_cells(grid, one), minlength=grid.num_cells) * one.size**2
+        area += np.bincount(place(_cells(grid, one)), minlength=len(number)) * one.size**2
     full = area > 1 - ROUND_OFF
-    in_cut_cells = np.kron(~full.reshape(ny, nx), np.ones((samples, samples), dtype=bool))
-    corner = np.argwhere(inside & in_cut_cells)[:, ::-1] / samples
-    parts = [in_triangles(triangles[~full[of_triangle]], of_triangle[~full[of_triangle]])]
+    cell, j, i = np.nonzero(inside & ~full[:, None, None])
+    corner = (samples * index[cell] + np.stack([i, j], axis=-1)) / samples
+    rest = ~full[place(of_triangle)]
+    parts = [in_triangles(triangles[rest], of_triangle[rest])]
     for one in [Squares(corner, 1 / samples, np.empty((0, 4), dtype=np.int8)), *whole]:
         cell = _cells(grid, one)
-        lower, upper = merged(one.corner[~full[cell]], one.size, cell[~full[cell]])
+        rest = ~full[place(cell)]
+        lower, upper = merged(one.corner[rest], one.size, cell[rest])
         parts.append(in_boxes(lower, upper, grid.cell_numbers(grid.cell_at((lower + upper) / 2))))
-    return filling.body(np.flatnonzero(full), joined(parts), border=border)
+    return filling.body(number[full], joined(parts), border=border)
 
 
 def _cells(grid: Grid, squares: Squares) -> Indices:

@@ -36,6 +36,7 @@ def mesh(
     gauss: bool = False,
 ) -> Body:
     """The elements of a mesh filled with particles; each group of elements has its own material.
+    A call for all ranks, each of which reads the mesh.
 
     The elements are triangles and quadrilaterals of any size, linear or quadratic. The sides of
     quadratic elements are taken as straight, with a warning if they are not. A cell that one group

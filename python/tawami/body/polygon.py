@@ -32,7 +32,7 @@ def polygon(
     per_axis: int = PER_AXIS,
     gauss: bool = False,
 ) -> Body:
-    """A polygon filled with particles; its sides may cut cells of the grid.
+    """A polygon filled with particles; its sides may cut cells of the grid. A call for all ranks.
 
     A full cell gets `per_axis` x `per_axis` particles, placed as by `box`. The part of a cut cell that
     the polygon covers is divided into triangles with the 12 points of a Gauss rule in each. More than

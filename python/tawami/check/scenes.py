@@ -249,7 +249,7 @@ def inf_sup(form: Form, given: Settings, basis: Basis = "quadratic_spline") -> f
         scene.fix(edge, "x")
         scene.fix(edge, "y")
     selection = scene.reduction().selection
-    unknowns = scene.reduction().unknowns
+    unknowns = scene.reduction().coefficients
     at_rest = scene.tangent(np.zeros(scene.num_coefficients), dt=trial.LONG)
     tangent = (selection.T @ at_rest @ selection).toarray()
     of_u = unknowns < scene.configuration.domain.layout.num_displacement

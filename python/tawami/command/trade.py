@@ -29,6 +29,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="error of the recommended setting, as 0.5%% (default: 1%%)",
     )  # fmt: skip
     parser.add_argument(
+        "--jobs", metavar="N", type=int,
+        help="runs at a time, with one thread each (default: the number of processors)",
+    )  # fmt: skip
+    parser.add_argument(
         "--apply", metavar="E", type=part,
         help="write a copy of the script with the fastest setting within this error, as 0.5%%",
     )  # fmt: skip
@@ -54,14 +58,14 @@ def part(text: str) -> float:
 def run(asked: argparse.Namespace) -> int:
     """Carry out the command."""
     from tawami.study.knobs import write_applied  # here: it imports SciPy
-    from tawami.study.trade import trade
+    from tawami.study.trade import default_folder, trade
 
     path: Path = checks.path("script", asked.script)
     Script(path, None).check()
     tolerance = asked.apply or asked.tolerance
-    result = trade(path, asked.quantity, asked.budget, tolerance=tolerance)
+    result = trade(path, asked.quantity, asked.budget, tolerance=tolerance, jobs=asked.jobs)
     print(result)
-    folder = Path("results") / "trade" / path.stem
+    folder = default_folder(path.stem)
     print(f"{folder / path.stem}.csv and .png are written")
     if asked.apply is not None:
         copy = write_applied(path, result.recommended().knobs, tolerance)

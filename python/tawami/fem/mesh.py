@@ -6,6 +6,7 @@ arrays packed by hand (contract 3 of CONTRIBUTING.md): a change of the active ce
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -76,27 +77,45 @@ class Rectangle:
 
 
 class FunctionSpace:
-    """A function space on the mesh of a grid.
+    """A function space on the mesh of a grid, made when it is first needed, on all ranks at once.
 
-    Attributes:
-        dofs: Degrees of freedom of each of this rank's cells, cells x dofs.
-        own: Number of degrees of freedom that this rank owns; they come first.
-        size: Number of degrees of freedom of its cells.
+    Assembly at the particles needs none.
     """
 
     def __init__(self, rectangle: Rectangle, element: Any) -> None:
-        self.rectangle = rectangle
-        compiled = settings(rectangle.mesh.comm, element) if OLD else None
+        self.rectangle, self._element = rectangle, element
+
+    @functools.cached_property
+    def _space(self) -> Any:
+        compiled = settings(self.rectangle.mesh.comm, self._element) if OLD else None
         with quiet():
-            self._space = function_space(rectangle.mesh, element, compiled)
-        dofmap = self._space.dofmap
-        bs = dofmap.index_map_bs
+            return function_space(self.rectangle.mesh, self._element, compiled)
+
+    @functools.cached_property
+    def dofs(self) -> Integers:
+        """Degrees of freedom of each of this rank's cells, cells x dofs."""
+        dofmap, bs = self._space.dofmap, self._bs
         width = dofmap.dof_layout.num_dofs
         blocks = _table(dofmap.list, width)
-        self.dofs = (bs * blocks[:, :, None] + np.arange(bs)).reshape(-1, bs * width)
-        self.own = int(dofmap.index_map.size_local) * bs
-        self.size = self.own + int(dofmap.index_map.num_ghosts) * bs
-        self._map, self._bs = dofmap.index_map, bs
+        return (bs * blocks[:, :, None] + np.arange(bs)).reshape(-1, bs * width)
+
+    @property
+    def own(self) -> int:
+        """Number of degrees of freedom that this rank owns; they come first."""
+        return int(self._map.size_local) * self._bs
+
+    @property
+    def size(self) -> int:
+        """Number of degrees of freedom of its cells."""
+        return self.own + int(self._map.num_ghosts) * self._bs
+
+    @property
+    def _map(self) -> Any:
+        return self._space.dofmap.index_map
+
+    @property
+    def _bs(self) -> int:
+        return int(self._space.dofmap.index_map_bs)
 
     def form(self, kernel: Kernel, rank: int, entities: Any) -> Any:
         """A form of a rank (1: vector, 2: matrix) with one kernel over some entities."""

@@ -55,7 +55,9 @@ class Assembly(ABC):
 
     @abstractmethod
     def residual(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
-        """Residual of every field on all coefficients, before supports, on every rank.
+        """Residual of every field on all coefficients, before supports.
+
+        This and the other methods are collective calls. All coefficients are those of the window.
 
         Args:
             coefficients: Increments of all fields.
@@ -64,7 +66,7 @@ class Assembly(ABC):
 
     @abstractmethod
     def magnitude(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
-        """Sums of the absolute values of the contributions to the residual, on every rank.
+        """Sums of the absolute values of the contributions to the residual.
 
         A contribution is that of a particle, and of a cell for integrals over cells. The ghost penalty
         is left out.
@@ -134,7 +136,7 @@ class Assembly(ABC):
             return 0.0
         zero, u = np.zeros(self.layout.size), slice(self.layout.num_displacement)
         ends = [self.border.add_vector(zero, c, absolute=False) for c in (zero, coefficients)]
-        return -float(self.attachment.summed(sum(ends) / 2)[u] @ coefficients[u])
+        return -self.layout.dot(self.layout.sum((ends[0] + ends[1]) / 2)[u], coefficients[u])
 
     def _no_border(self) -> InputError:
         names = sorted({name for term in self._compiled.border for name in term.on or ()})
@@ -145,7 +147,7 @@ class Assembly(ABC):
         )
 
     def penalty(self, data: Mapping[Rule, Array]) -> sp.csr_matrix | None:
-        """The ghost penalty on all coefficients, the same on every rank; None without one."""
+        """This rank's part of the ghost penalty, on all coefficients; None without one."""
         return self._ghost.on_all(data)
 
     def integrate_with(self, volume: Array) -> None:
@@ -161,11 +163,11 @@ class Assembly(ABC):
         """
 
     def unreduced_tangent(self, coefficients: Array, data: Mapping[Rule, Array]) -> sp.csr_matrix:
-        """E^T K E, the tangent of :meth:`residual`, complete on every rank.
+        """E^T K E, the tangent of :meth:`residual`, on all coefficients of the whole grid.
 
         The matrix of the steps, whose factorisation the next one may use, stays as it is.
         """
-        everything, comm = Reduction.of_all(self.layout), self.layout.grid.comm
+        everything, comm, layout = Reduction.of_all(self.layout), self.layout.grid.comm, self.layout
         apart = type(self)(self.attachment)
         apart._border = self._border
         mine = rows_of(apart.tangent(coefficients, data, everything)).tocoo()
@@ -173,5 +175,6 @@ class Assembly(ABC):
             ranks.allgathered(comm, part)
             for part in (mine.row + everything.own.start, mine.col, mine.data)
         )
-        unknowns, shape = everything.unknowns, (self.layout.size, self.layout.size)
+        unknowns = ranks.allgathered(comm, layout.in_grid[everything.coefficients])
+        shape = (layout.size_of_grid, layout.size_of_grid)
         return sp.csr_matrix((values, (unknowns[rows], unknowns[columns])), shape=shape)

@@ -41,11 +41,12 @@ class Attachment:
 
     Attributes:
         space: Function space of all fields on the mesh.
-        active: Whether each cell holds particles, on any rank, ny x nx.
+        active: Whether each cell of the rank's window holds particles, on any rank, ny x nx.
         cells: This rank's active cells, as dolfinx numbers them.
         rows: Position of each of them in `location.active`.
         layout: Places of the coefficients.
-        sides: Sides of partially filled cells, if the form has a ghost penalty; the same on all ranks.
+        sides: Sides of partially filled cells of this rank, if the form has a ghost penalty.
+        has_sides: Whether any rank has such a side.
         points: Indices along the axes of the points of each rule; none for means over cells.
         values: Values of h, time, dt, b and the parameters of the form; :meth:`change` replaces them.
         version: A number that changes with them.
@@ -72,27 +73,29 @@ class Attachment:
         self.version = 0
         self.start: Array | None = None
         self.space = grid.function_space(compiled.element)
-        number = grid.cell_numbers(grid.rectangle.ij)
-        active: Mask = np.zeros(grid.cells[::-1], dtype=bool)
-        active.ravel()[location.active] = True
-        self.cells = np.flatnonzero(active.ravel()[number]).astype(np.int32)
+        window = grid.window
+        number = window.numbers(grid.rectangle.ij)
+        active: Mask = np.zeros(len(window.rank_of_cell), dtype=bool)
+        active[location.active] = True
+        self.cells = np.flatnonzero(active[number]).astype(np.int32)
         self.rows = np.searchsorted(location.active, number[self.cells]).astype(np.uint32)
-        self.active = ranks.any_of(grid.comm, active)
-        self.layout = Layout(grid, basis, compiled.form.fields, self.space, self.active)
+        self.active = window.of_cells.update(active).reshape(window.cells[::-1])
+        self.layout = Layout(grid, basis, compiled.form.fields, self.space, self.active.ravel())
         self.sides: list[Side] = []
         if compiled.penalises:
             moves = compiled.form.strain.finite
             full = None if moves else full_cells(grid, location, volume)
-            self.sides = list(sides(self.active, full))
+            self.sides = list(sides(window, self.active, full))
+        self.has_sides = bool(ranks.any_of(grid.comm, np.array([bool(self.sides)]))[0])
         weak = [
             name
             for name, place in self.layout.fields.items()
-            if place.basis == "quadratic_spline" and (place.start > 0 or not self.sides)
+            if place.basis == "quadratic_spline" and (place.start > 0 or not self.has_sides)
         ]
         if weak:
             once = np.ones(len(volume))
-            sums = _rust.nodal_sums(location, once, once[:, None], "quadratic_spline")
-            self.layout.tie(weak, self.summed(sums)[:, 0], UNRESOLVED)
+            sums = self.layout.functions.sums(location, once, once[:, None], "quadratic_spline")
+            self.layout.tie(weak, sums[:, 0], UNRESOLVED)
         self.points: dict[Rule, list[tuple[int, ...]]] = {
             rule: _point_indices(rule, swapped=grid.rectangle.swapped)
             for rule in compiled.densities
@@ -114,10 +117,6 @@ class Attachment:
         self.start = None if total is None else np.array(total)
         if self.start is not None and self.layout.volumetric is not None:
             self.start[self.layout.volumetric.slice] = 0.0
-
-    def summed(self, of_cells: Any) -> Array:
-        """The sum over all ranks of arrays from their cells."""
-        return ranks.sum_of(self.grid.comm, np.ascontiguousarray(of_cells))
 
 
 @functools.lru_cache(maxsize=32)

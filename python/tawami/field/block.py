@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-from functools import reduce
 from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
 
 from tawami import _rust
-from tawami.base.arrays import Array, Mask
-from tawami.base.petsc import aij
+from tawami.base.arrays import Array, Indices, Mask
 from tawami.field.attachment import Attachment
+from tawami.field.coefficients import Place
 from tawami.field.kernels import assembler_of
-from tawami.field.layout import Place
 from tawami.field.matrix import ReducedMatrix
+from tawami.field.prolongation import Level, prolongations
 from tawami.field.reduction import Reduction
-from tawami.grid.basis import refinement
-
-#: Number of unknowns from which there is no coarser grid.
-COARSEST = 300
-#: Share of a coarse function on held functions from which the function is held.
-HELD = 0.5
+from tawami.field.unknowns import Unknowns
 
 
-class Block:
-    """One field of a reduction.
+class Block(Unknowns):
+    """One field of a reduction. Making one is a collective call.
 
     The unknowns of a rank follow those of the rank before, in the order that they have in the reduction.
 
@@ -36,36 +30,37 @@ class Block:
 
     Attributes:
         selection: Coefficients of the field x unknowns, as `Reduction.selection`.
-        unknowns: Number of the coefficient, in the field, of each unknown.
         mine: Whether each of this rank's unknowns in the reduction belongs to the field.
     """
 
     def __init__(self, attachment: Attachment, reduction: Reduction, place: Place) -> None:
-        self._attachment, self._place = attachment, place
-        self._layout, self._comm = reduction.layout, attachment.grid.comm
-        of_field = place.holds(reduction.unknowns)
+        self._attachment, self._place, self._first = attachment, place, place.start
+        comm = attachment.grid.comm
+        # unknowns outside the window are those of points, of the displacement
+        of_field = place.holds(np.maximum(reduction.place, 0))
+        self.mine: Mask = of_field[: reduction.num_own]
+        counts = np.array(comm.allgather(int(self.mine.sum())))
+        start = int(counts[: comm.rank].sum())
+        number = np.full(len(of_field), -1)
+        number[: len(self.mine)][self.mine] = np.arange(start, start + counts[comm.rank])
+        reduction.exchange.update(number)
         self.selection = reduction.selection[place.slice][:, of_field].tocsr()
-        self.unknowns = reduction.unknowns[of_field] - place.start
-        self.mine: Mask = of_field[reduction.own]
-        self.size, start = len(self.unknowns), int(of_field[: reduction.own.start].sum())
-        self.own = slice(start, start + int(self.mine.sum()))
-        self._held = reduction.fixed[place.slice]
+        places = np.where(reduction.place < 0, -1, reduction.place - place.start)[of_field]
+        own = slice(start, start + int(counts[comm.rank]))
+        self._set(reduction.layout, number[of_field], places, own, int(counts.sum()))
+        self._matrices: list[ReducedMatrix] = []
+        self._held = np.flatnonzero((reduction.fixed & reduction.layout.own)[place.slice])
 
-    @property
-    def num_own(self) -> int:
-        """Number of unknowns whose rows belong to this rank."""
-        return self.own.stop - self.own.start
+    def _places_of(self, in_grid: Indices) -> Indices:
+        """See `Unknowns`."""
+        return np.maximum(self.layout.places(in_grid) - self._first, -1)
 
     def reached_by(self, cells: Any) -> Mask:
         """Whether each coefficient belongs to a function with one of these cells in its support."""
-        return self._layout.reached_by(cells)[self._place.slice]
-
-    def same_unknowns(self, other: object) -> bool:
-        """Whether a matrix on other unknowns serves; it never does."""
-        return False
+        return self.layout.reached_by(cells)[self._place.slice]
 
     def assembled(self, kernel: Literal["elasticity", "mass"], data: Array) -> Any:
-        """A matrix of sums over the particles.
+        """A matrix of sums over the particles, which lives as long as this block.
 
         Args:
             kernel: 'elasticity' for 2 mu eps(u) : eps(w) + lambda tr eps(u) tr eps(w), or 'mass' for
@@ -80,47 +75,36 @@ class Block:
         else:
             kernels = _rust.Kernels.mass(assembler)
         matrix = ReducedMatrix(self._comm)
+        self._matrices.append(matrix)
         matrix.fit(assembler, attachment, self)
         nothing, zero = _rust.Kernels(assembler, 1, []), np.zeros(self.selection.shape[0])
         assembler.matrix(
             kernels, nothing, [data], attachment.volume, zero, matrix.pattern, matrix.values
         )
         matrix.written()
-        return matrix.summed().copy()  # the other one ends with `matrix`
+        return matrix.summed()
 
-    def reduced(self, matrix: sp.csr_matrix) -> Any:
-        """S^T A S of a matrix A on all coefficients of all fields."""
-        mine = matrix[self._place.slice][:, self._place.slice]
-        rows = (self.selection.T @ mine @ self.selection).tocsr()[self.own]
-        return aij(self._comm, rows, self.num_own)
+    def of_window(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
+        """See `Unknowns`; A is on the coefficients of all fields."""
+        return super().of_window(matrix[self._place.slice][:, self._place.slice])
 
     def prolongations(self) -> list[Any]:
         """Matrices from the unknowns of a coarser grid to those of the next finer one, the finest first.
 
-        A coarse cell is 2 x 2 fine ones; at the upper ends of a grid of odd size it may reach beyond.
-        Every basis contains that of the coarser grid (two-scale relation). Of a coarse function the part
-        on functions with particles counts. It is held if more than half of it is on held functions.
+        A collective call; see `tawami.field.prolongation`.
         """
-        cells: tuple[int, ...] = self._attachment.grid.cells
-        components = self._place.components
-        basis, unknowns, held = self._place.basis, self.unknowns, self._held
-        owner, matrices = self._layout.owner[self._place.slice][unknowns], []
-        while len(unknowns) > COARSEST and max(cells) > 1:
-            along = [refinement(basis, n) for n in cells]
-            whole = reduce(lambda inner, outer: sp.kron(outer, inner, format="csr"), along)
-            whole = sp.kron(whole, sp.eye(components), format="csr")
-            of_held = whole.T @ held.astype(float)
-            held = of_held >= HELD * np.asarray(whole.sum(axis=0)).ravel()
-            rows = whole[unknowns].tocsc()
-            used = np.flatnonzero((np.diff(rows.indptr) > 0) & ~held)
-            # a coarse unknown belongs to a rank of its part
-            first = rows.indices[rows.indptr[used]]
-            order = np.argsort(owner[first], kind="stable")
-            used, mine = used[order], np.flatnonzero(owner == self._comm.rank)
-            if len(used) >= len(unknowns):
-                break
-            coarse = owner[first][order]
-            part = rows[:, used].tocsr()[mine]
-            matrices.append(aij(self._comm, part, int((coarse == self._comm.rank).sum())))
-            unknowns, owner, cells = used, coarse, tuple((n + 1) // 2 for n in cells)
-        return matrices
+        place, layout = self._place, self.layout
+        there = next(
+            of for name, of in layout.of_grid.items() if layout.fields[name] is self._place
+        )
+
+        def in_field(coefficients: Indices) -> Indices:
+            return np.asarray(layout.in_grid[place.start + coefficients] - there.start)
+
+        cells = self._attachment.grid.cells
+        unknowns = in_field(self.coefficients)
+        if place.start == 0:  # parts are those of the displacement
+            unknowns = unknowns + layout.parts[1][self.coefficients] * (there.stop - there.start)
+        level = Level(cells, unknowns, in_field(self._held))
+        comm = self._attachment.grid.comm
+        return list(prolongations(comm, place.basis, place.components, level))

@@ -7,13 +7,18 @@ for linear fields, so that no force and no moment of a load is lost.
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Sequence
+
 import numpy as np
 import scipy.sparse as sp
 
 from tawami import _rust
+from tawami.base import ranks
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import SupportError
 from tawami.base.text import position
+from tawami.field.functions import ActiveFunctions
 from tawami.grid.basis import Basis
 from tawami.grid.grid import Grid
 
@@ -29,13 +34,18 @@ class PointsInCells:
     Args:
         grid: The grid.
         location: Cells and positions in them.
+        cells: Numbers of cells along each axis of the part of the grid that these belong to; the whole
+            grid by default.
 
     Attributes:
         grid, location: As given.
     """
 
-    def __init__(self, grid: Grid, location: _rust.Location) -> None:
+    def __init__(
+        self, grid: Grid, location: _rust.Location, cells: Sequence[int] | None = None
+    ) -> None:
         self.grid, self.location = grid, location
+        self._cells = grid.cells if cells is None else cells
         self._known: dict[Basis, tuple[Indices, Array, Array]] = {}
 
     def __len__(self) -> int:
@@ -56,15 +66,6 @@ class PointsInCells:
         numbers, values, _ = self.tabulated(basis)
         return self._matrix(basis, numbers, values)
 
-    def sums(self, basis: Basis, values: Array) -> Array:
-        """Sums over all points of the functions of a basis times values, functions x columns.
-
-        Args:
-            basis: The basis.
-            values: Values at the points, points x columns.
-        """
-        return _rust.nodal_sums(self.location, np.ones(len(self)), values, basis)
-
     def slopes(self, basis: Basis) -> list[sp.csr_matrix]:
         """Their derivatives along each axis [1/m], points x functions."""
         numbers, _, gradients = self.tabulated(basis)
@@ -74,18 +75,18 @@ class PointsInCells:
         ]
 
     def _matrix(self, basis: Basis, numbers: Indices, values: Array) -> sp.csr_matrix:
-        count = int(np.prod([_rust.basis_len(basis, n) for n in self.grid.cells]))
+        count = int(np.prod([_rust.basis_len(basis, n) for n in self._cells]))
         start = np.arange(0, numbers.size + 1, numbers.shape[1])
         entries = (np.ascontiguousarray(values).ravel(), numbers.ravel(), start)
         return sp.csr_matrix(entries, shape=(len(numbers), count))
 
 
 class BorderInCells(PointsInCells):
-    """Points of a border in the cells of a grid.
+    """Points of a border in the cells of a grid, the same on every rank. Making it is a collective call.
 
     Args:
         grid: The grid.
-        active: Whether each cell holds particles, on any rank, ny x nx.
+        active: Whether each cell of the window holds particles, on any rank, ny x nx.
         x: Positions [m], points x dim.
         normal: Outward unit normals, points x dim.
         where: Name of the border, for messages.
@@ -95,6 +96,8 @@ class BorderInCells(PointsInCells):
         grid: The grid.
         location: Cells and positions in them.
         lost: Whether each point has no particles near it; its cell has no meaning then.
+        own: Whether the cell of each point belongs to this rank.
+        here: Number of this cell in the window of this rank, if it does; -1 otherwise.
 
     Raises:
         SupportError: No cell near a point holds particles.
@@ -113,16 +116,43 @@ class BorderInCells(PointsInCells):
         scaled = (x - np.array(grid.origin)) / grid.h
         most = np.array(grid.cells) - 1
         index = np.clip(np.floor(scaled - INWARD * normal), 0, most).astype(np.int64)
-        flat = active.ravel()
-        away = ~flat[grid.cell_numbers(index)]
+        here = grid.window.found(index)
+        mine = here >= 0
+        away = mine & ~active.ravel()[here]
         self.lost: Mask = np.zeros(len(x), dtype=bool)
         if away.any():
-            index[away], self.lost[away] = _nearest(grid, flat, scaled[away])
-            if self.lost.any() and not torn:
-                raise _far_from_particles(grid, x, self.lost, where)
+            index[away], self.lost[away] = _nearest(grid, active.ravel(), scaled[away])
+        if grid.comm.size > 1:
+            found = np.where(mine[:, None], np.column_stack([index, self.lost]), 0)
+            *axes, lost = ranks.sum_of(grid.comm, found).T
+            index, self.lost = np.stack(axes, axis=-1), lost > 0
+        if self.lost.any() and not torn:
+            raise _far_from_particles(grid, x, self.lost, where)
+        self.here: Indices = grid.window.found(index)
+        self.own: Mask = self.here >= 0
         xi = np.ascontiguousarray(scaled - index)
         cell = grid.cell_numbers(index).astype(np.uint32)
         super().__init__(grid, grid.rust.place(cell, xi))
+
+    def sums(self, functions: ActiveFunctions, basis: Basis, values: Array) -> Array:
+        """Sums over all points of the functions of a basis times values; a collective call.
+
+        Args:
+            functions: The functions of the window.
+            basis: The basis.
+            values: Values at the points, points x columns.
+
+        Returns:
+            Functions of the window x columns.
+        """
+        mine = np.ascontiguousarray(values[self.own])
+        return functions.sums(self.of_rank, np.ones(len(mine)), mine, basis)
+
+    @functools.cached_property
+    def of_rank(self) -> _rust.Location:
+        """The points in cells of this rank, in its window."""
+        cell = self.here[self.own].astype(np.uint32)
+        return self.grid.window.rust.place(cell, np.asarray(self.location.xi)[self.own])
 
 
 def _far_from_particles(grid: Grid, x: Array, lost: Mask, where: str) -> SupportError:
@@ -138,8 +168,8 @@ def _nearest(grid: Grid, active: Mask, scaled: Array) -> tuple[Indices, Mask]:
 
     Args:
         grid: The grid.
-        active: Whether each cell holds particles, x fastest.
-        scaled: Positions [cells].
+        active: Whether each cell of the window holds particles, x fastest.
+        scaled: Positions [cells], in cells of this rank.
     """
     index, square = _nearest_within(grid, active, scaled, 1)
     far = square >= 1  # cells further away may be nearer
@@ -152,18 +182,19 @@ def _nearest_within(grid: Grid, active: Mask, scaled: Array, reach: int) -> tupl
     """The nearest active cell at most `reach` cells away along each axis, and the distance squared;
     infinite for none.
     """
-    cells, dim, steps = grid.cells, grid.space.dim, np.arange(-reach, reach + 1)
-    base = np.clip(np.floor(scaled), 0, np.array(cells) - 1).astype(np.int64)
+    window, dim, steps = grid.window, grid.space.dim, np.arange(-reach, reach + 1)
+    base = np.clip(np.floor(scaled), 0, np.array(grid.cells) - 1).astype(np.int64)
     square, number, stride = np.zeros(1), np.zeros(1, dtype=np.int64), 1
     for axis in range(dim):
-        near = base[:, axis, None] + steps
+        near, count = base[:, axis, None] + steps, window.cells[axis]
         before = near - scaled[:, axis, None]
         away = np.maximum(np.maximum(before, 0.0), -1 - before)
-        away[(near < 0) | (near >= cells[axis])] = np.inf
+        near -= window.first[axis]
+        away[(near < 0) | (near >= count)] = np.inf
         along = (-1, *(len(steps) if k == axis else 1 for k in range(dim)))
         square = square + (away**2).reshape(along)
-        number = number + stride * np.clip(near, 0, cells[axis] - 1).reshape(along)
-        stride *= cells[axis]
+        number = number + stride * np.clip(near, 0, count - 1).reshape(along)
+        stride *= count
     square = np.where(active[number], square, np.inf).reshape(len(base), -1)
     best = square.argmin(axis=1)
     least = square[np.arange(len(base)), best]

@@ -57,16 +57,17 @@ class BorderTerms:
         grid, terms = attachment.grid, attachment.compiled.border
         parts = [parts_of(points, term.on, self._form.name) for term in terms]
         self.cells = BorderInCells(grid, attachment.active, points.x, points.normal)
-        cells = self.cells.location
-        mine = np.isin(cells.cell, attachment.location.active)
+        cells = self.cells
+        mine = np.isin(cells.here, attachment.location.active)
+        xi = np.asarray(cells.location.xi)
         self._points, self._particles, self._carried = points, particles, carried
-        self._nearest = _nearest(attachment.location, cells, mine)
+        self._nearest = _nearest(attachment.location, cells.here, xi, mine)
         length = points.length * grid.space.thickness(points.x)
         #: Kernels of each sum, its points and their data.
         self._sums: list[tuple[KernelsAtPoints, Indices, Array]] = []
         for term, part in zip(terms, parts, strict=True):
             chosen = np.flatnonzero(mine & part)
-            location = grid.rust.place(cells.cell[chosen], np.asarray(cells.xi)[chosen])
+            location = grid.window.rust.place(cells.here[chosen].astype(np.uint32), xi[chosen])
             kernels = KernelsAtPoints(
                 attachment, location, length[chosen], term.residual, term.tangent
             )
@@ -85,22 +86,23 @@ class BorderTerms:
         """
         if self._is_fresh:
             return self._sums
+        given = {s.text: self._carried[s.text] for s in self._read if s.text in self._carried}
         with ranks.raise_together(self._comm):
             for column, scalar in enumerate(self._read):
-                values = self._values(scalar)
+                values = self._values(scalar, given)
                 for _, chosen, data in self._sums:
                     data[:, column] = values[chosen]
         self._is_fresh = True
         return self._sums
 
-    def _values(self, scalar: ParticleScalar) -> Array:
-        """A number of each point; NaN at those of other ranks."""
+    def _values(self, scalar: ParticleScalar, given: Mapping[str, Array]) -> Array:
+        """A number of each point, of those given by name or others; NaN at those of other ranks."""
         name, points, found = scalar.text, self._points, np.full(len(self._points), np.nan)
         mine = self._nearest >= 0
         if name.startswith("n["):
             return np.asarray(points.normal[:, int(name[2:-1])])
-        if name in self._carried:
-            found = np.asarray(self._carried[name], dtype=float)
+        if name in given:
+            found = np.asarray(given[name], dtype=float)
         elif scalar.border:
             raise InputError(
                 f"form {self._form.name} reads '{name}' at the border: expected its values at the "
@@ -173,23 +175,23 @@ def parts_of(points: BorderPoints, on: tuple[str, ...] | None, form: str) -> Mas
     return np.asarray(np.isin(points.tag, [points.names.index(name) for name in on]))
 
 
-def _nearest(particles: Any, points: Any, mine: Mask) -> Indices:
+def _nearest(particles: Any, cell: Indices, xi: Array, mine: Mask) -> Indices:
     """The nearest particle in the cell of each point of this rank; -1 for points of other ranks.
 
     Args:
         particles: Location of this rank's particles.
-        points: Location of the points.
+        cell, xi: Cells of the points in the window, and positions in them.
         mine: Whether each point is in a cell of this rank.
     """
     from scipy.spatial import cKDTree
 
     number = np.full(len(mine), -1)
 
-    def apart(location: Any, chosen: Any) -> Array:
-        order = np.searchsorted(particles.active, location.cell[chosen])
-        return np.column_stack([np.asarray(location.xi)[chosen], APART * order])
+    def apart(cells: Any, positions: Any) -> Array:
+        order = np.searchsorted(particles.active, cells)
+        return np.column_stack([positions, APART * order])
 
     if mine.any():
-        every = np.arange(len(particles.cell))
-        number[mine] = cKDTree(apart(particles, every)).query(apart(points, mine))[1]
+        tree = cKDTree(apart(particles.cell, np.asarray(particles.xi)))
+        number[mine] = tree.query(apart(cell[mine], xi[mine]))[1]
     return number

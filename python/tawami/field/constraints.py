@@ -11,12 +11,13 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
 from tawami import _rust
-from tawami.base.arrays import Array, Indices, Mask
+from tawami.base.arrays import Array, Indices
 from tawami.base.errors import SupportError
 from tawami.base.space import Position, lattice, tensor_product
 from tawami.base.text import position
-from tawami.field.layout import Place
-from tawami.grid.basis import Basis, functions_on, values_1d
+from tawami.field.coefficients import Place
+from tawami.field.layout import Layout
+from tawami.grid.basis import functions_on, values_1d
 from tawami.grid.edges import Profile, edge_functions, evaluate, locate_point
 from tawami.grid.grid import Edge, Grid
 
@@ -33,7 +34,7 @@ class Held:
     """Prescribed coefficients.
 
     Attributes:
-        indices: The coefficients, all of one component of a field.
+        indices: The coefficients, all of one component of a field, by their numbers in the whole grid.
         values: Their values [m], or in the unit of the field.
         where: Name of the support, for messages.
     """
@@ -48,7 +49,7 @@ class PointHeld:
     """A multi-point constraint: `weights . coefficients[indices] = value`.
 
     Attributes:
-        indices: Coefficients of one displacement component.
+        indices: Coefficients of one displacement component, by their numbers in the whole grid.
         weights: Values of their functions at the point.
         value: Displacement of the point [m].
         where: Name of the support, for messages.
@@ -77,7 +78,7 @@ def held_edge(
 
     Args:
         grid: The grid.
-        place: Place of the field among the coefficients.
+        place: Place of the field among the coefficients of the whole grid.
         edge: Name of the edge.
         touched: Numbers along the edge of the cells where the body touches it.
         component: Number of the component.
@@ -103,41 +104,34 @@ def held_edge(
     return Held(indices, coefficients)
 
 
-def held_point(
-    grid: Grid,
-    basis: Basis,
-    active: Mask,
-    point: Sequence[float],
-    component: int,
-    value: float,
-    active_functions: Mask,
-) -> PointHeld:
-    """Prescribe a displacement component at a point.
+def held_point(layout: Layout, point: Sequence[float], component: int, value: float) -> PointHeld:
+    """Prescribe a displacement component at a point; a collective call.
 
     A point at the border of a moving body may reach a cell without particles. Then the functions with
     particles replace all, if they make up most of the value at the point.
 
     Args:
-        grid: The grid.
-        basis: Basis of the displacement.
-        active: Whether each cell holds particles, ny x nx.
+        layout: Places of the coefficients.
         point: The point [m].
         component: Number of the component.
         value: Its displacement [m].
-        active_functions: Whether each coefficient belongs to a function with particles.
 
     Raises:
         InputError: The point is outside the grid.
         SupportError: The body does not reach the point.
     """
-    where = f"hold(point={position(point)})"
+    grid, basis, where = layout.grid, layout.basis, f"hold(point={position(point)})"
     location = locate_point(grid, point, where)
     cell = np.unravel_index(int(location.cell[0]), grid.cells, order="F")
     xi = location.xi[0]
     # on a side between cells, the point belongs to each of them
     near = [np.add(cell, shift) for shift in product(*map(_touching, xi))]
     inside = [c for c in near if (c >= 0).all() and (c < grid.cells).all()]
-    filled = [c for c in inside if active[tuple(c[::-1])]]
+    filled = [
+        c
+        for c, is_active in zip(inside, layout.has_particles(np.array(inside)), strict=True)
+        if is_active
+    ]
     chosen = filled[0] if filled else np.array(cell)
     along = [
         values_1d(basis, n, k, np.clip(t + i - k, 0, 1))
@@ -147,7 +141,7 @@ def held_point(
     functions = lattice([values.indices for values in along]).astype(np.int64) @ strides
     weights = tensor_product([values.data for values in along])
     dim = grid.space.dim
-    reached = active_functions[dim * functions]
+    reached = layout.at(layout.active.astype(float), dim * functions) > 0
     if not filled and weights[reached].sum() < LEAST_SHARE:
         raise SupportError(
             f"{where}: the point lies in a cell without particles; move it into the body"

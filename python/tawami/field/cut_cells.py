@@ -12,15 +12,17 @@ from collections.abc import Iterator
 import numpy as np
 
 from tawami import _rust
-from tawami.base import ranks
 from tawami.base.arrays import Array, Mask
 from tawami.grid.grid import ON_LINE, Grid
+from tawami.grid.window import Window
 
 Side = tuple[tuple[int, int], tuple[int, int], tuple[str, str]]
 
 
 def full_cells(grid: Grid, location: _rust.Location, volume: Array) -> Mask:
-    """Cells whose particles have the area of the cell to 1e-6, ny x nx; a call for all ranks.
+    """Cells of the window whose particles have the area of the cell to 1e-6, ny x nx.
+
+    A call for all ranks.
 
     Args:
         grid: The grid.
@@ -29,9 +31,9 @@ def full_cells(grid: Grid, location: _rust.Location, volume: Array) -> Mask:
     """
     area = volume / grid.space.thickness(grid.positions(location))
     sums = _rust.cell_sums(location, area, np.ones((len(area), 1)))
-    held = ranks.sum_of(grid.comm, np.ascontiguousarray(sums))
+    held = grid.window.of_cells.update(np.ascontiguousarray(sums))
     full: Mask = held >= (1 - ON_LINE) * grid.space.measure(grid.h)
-    return full.reshape(grid.cells[::-1])
+    return full.reshape(grid.window.cells[::-1])
 
 
 def partially_filled(active: Mask, full: Mask | None = None) -> Mask:
@@ -49,16 +51,21 @@ def partially_filled(active: Mask, full: Mask | None = None) -> Mask:
     return np.asarray(active & ~inside if full is None else active & ~inside & ~full)
 
 
-def sides(active: Mask, full: Mask | None = None) -> Iterator[Side]:
-    """Sides of partially filled cells: the cells (i, j) on both sides, and its name in each of them.
+def sides(window: Window, active: Mask, full: Mask | None = None) -> Iterator[Side]:
+    """Sides of partially filled cells: the cells (i, j) of the grid on both sides, and its name in each.
+
+    The first cell of each side belongs to this rank.
 
     Args:
+        window: The cells that the rank knows.
         active, full: As in `partially_filled`.
     """
+    own, (x, y) = window.own.reshape(active.shape), window.first
     partial = partially_filled(active, full)
     for (di, dj), names in (((1, 0), ("right", "left")), ((0, 1), ("top", "bottom"))):
         ny, nx = active.shape
         here, there = (slice(0, ny - dj), slice(0, nx - di)), (slice(dj, None), slice(di, None))
-        both = active[here] & active[there] & (partial[here] | partial[there])
+        both = own[here] & active[here] & active[there] & (partial[here] | partial[there])
         for j, i in np.argwhere(both):
-            yield (int(i), int(j)), (int(i) + di, int(j) + dj), names
+            i, j = int(i) + x, int(j) + y
+            yield (i, j), (i + di, j + dj), names

@@ -19,12 +19,13 @@ from typing import Literal
 import numpy as np
 import scipy.sparse as sp
 
+from tawami import _rust
 from tawami.base import checks, ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.border.pieces import Border
 from tawami.field.border import PointsInCells
-from tawami.grid.basis import Basis, greville
+from tawami.field.layout import Layout
 
 #: Weight of the corrections. Less damping makes them larger and the stress noisier.
 DAMPING = 0.01
@@ -61,48 +62,62 @@ def chosen(volumes: Volumes, border: Border | None) -> bool:
 
 
 def corrections(
-    border: PointsInCells, area: Array, particles: PointsInCells, volume: Array, basis: Basis
+    border: PointsInCells,
+    area: Array,
+    location: _rust.Location,
+    volume: Array,
+    layout: Layout,
 ) -> Array:
     """Corrections c of the volumes of this rank's particles; a call for all ranks.
 
     Args:
         border: The points of the whole border.
         area: Their outward normals times areas [m2 per metre depth], points x dim.
-        particles: The particles.
+        location: Cells of this rank's particles, and positions in them.
         volume: Their present volumes [m2 per metre depth].
-        basis: Whose functions w are.
+        layout: Places of the coefficients: w are the displacement functions.
     """
-    grid = border.grid
-    thickness = grid.space.thickness(np.maximum(greville(basis, *grid.lattice), grid.h / 2))
+    grid, basis = border.grid, layout.basis
+    particles = PointsInCells(grid, location, layout.window.cells)
+    thickness = grid.space.thickness(np.maximum(layout.greville, grid.h / 2))
     scale = sp.diags(1 / (grid.h * thickness))
     divergence = [sp.diags(volume) @ slope for slope in particles.slopes(basis)]
     if grid.space.hoop:
-        radius = grid.positions(particles.location)[:, 0]
+        radius = grid.positions(location)[:, 0]
         divergence[0] = divergence[0] + sp.diags(volume / radius) @ particles.values(basis)
     rows = sp.hstack([one @ scale for one in divergence]).T.tocsr()  # A
 
-    def summed(of_rank: Array) -> Array:
-        return np.asarray(ranks.sum_of(grid.comm, np.ascontiguousarray(of_rank)))
+    dim, exchange = grid.space.dim, layout.functions.exchange(basis)
 
-    at_border = border.values(basis).T @ area
+    def summed(of_rank: Array) -> Array:
+        return np.asarray(exchange.add(of_rank.reshape(dim, -1).T.copy()).T.ravel())
+
+    def dot(a: Array, b: Array) -> float:
+        own = layout.own[: len(a)].reshape(-1, dim)[:, 0]
+        mine = np.tile(own, dim)
+        return float(ranks.sum_of(grid.comm, np.array([a[mine] @ b[mine]]))[0])
+
+    at_border = layout.part_of(basis, border.values(basis).T @ area)
     b = np.concatenate([scale @ of_axis for of_axis in at_border.T])
     b -= summed(rows @ np.ones(len(volume)))
-    y = _conjugate_gradients(lambda y: summed(rows @ (rows.T @ y)) + DAMPING**2 * y, b)
+    y = _conjugate_gradients(lambda y: summed(rows @ (rows.T @ y)) + DAMPING**2 * y, b, dot)
     return np.asarray(np.clip(rows.T @ y, -LARGEST, LARGEST))
 
 
-def _conjugate_gradients(times: Callable[[Array], Array], b: Array) -> Array:
-    """Solution of a symmetric positive system to `TOLERANCE`, the same on all ranks."""
+def _conjugate_gradients(
+    times: Callable[[Array], Array], b: Array, dot: Callable[[Array, Array], float]
+) -> Array:
+    """Solution of a symmetric positive system to `TOLERANCE`, with this scalar product."""
     y, r = np.zeros(len(b)), b.copy()
-    p, size = r.copy(), float(r @ r)
+    p, size = r.copy(), dot(r, r)
     least = TOLERANCE**2 * size
     for _ in range(ITERATIONS):
         if size <= least:
             break
         q = times(p)
-        step = size / float(p @ q)
+        step = size / dot(p, q)
         y += step * p
         r -= step * q
-        size, before = float(r @ r), size
+        size, before = dot(r, r), size
         p = r + (size / before) * p
     return y

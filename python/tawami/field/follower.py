@@ -7,8 +7,6 @@ At small strain it is a dead load. In axisymmetry dA contains 2 pi (r + u_r).
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import scipy.sparse as sp
 
@@ -51,9 +49,6 @@ class FollowerPressure:
         """Add a share of the loads of a path to the pressure at the start of the step."""
         self._pressure = self._start + share * self._rate
 
-    def begin(self, diagonal: Callable[[], Array], inertia: Array | None) -> None:
-        """See `Term`."""
-
     def improve(self) -> bool:
         """See `Term`: there are no multipliers."""
         return False
@@ -64,7 +59,7 @@ class FollowerPressure:
     def _at(self, coefficients: Array) -> tuple[Array, Array, Array]:
         """f^-T and cof(f) n0 dA0 in the plane at the points, and their thickness."""
         numbers, values, gradients = self._tabulated
-        u = self._space.vectors(coefficients[: self._layout.num_displacement])[numbers]
+        u = self._space.vectors(coefficients[: self._layout.num_displacement_of_grid])[numbers]
         f = np.einsum("pfi,pfj->pij", u, gradients) + np.eye(self._space.dim)
         inverse = np.linalg.inv(f).transpose(0, 2, 1)
         moved = self._x + np.einsum("pf,pfi->pi", values, u)
@@ -89,7 +84,7 @@ class FollowerPressure:
         """Forces of a pressure at the last displacement, on all coefficients."""
         numbers, values, _ = self._tabulated
         on_points = -(pressure * self._thickness)[:, None] * self._now
-        forces = np.zeros(self._layout.size)
+        forces = np.zeros(self._layout.size_of_grid)
         np.add.at(
             forces, of_components(numbers, self._space.dim), values[:, :, None] * on_points[:, None]
         )
@@ -104,7 +99,7 @@ class FollowerPressure:
         if self._space.hoop:
             by_u[:, :, 0] += 2 * np.pi * self._now[:, :, None] * values[:, None]
         local = np.einsum("p,pf,pijg->pfigj", self._pressure, values, by_u)
-        size = self._layout.size
+        size = self._layout.size_of_grid
         of = of_components(numbers, self._space.dim).reshape(len(numbers), -1)
         width = of.shape[1]
         rows, columns = np.repeat(of, width, axis=1), np.tile(of, width)

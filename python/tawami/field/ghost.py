@@ -37,7 +37,7 @@ class GhostPenalty:
         self._matrix: sp.csr_matrix | None = None
         #: Values of the constants and of the particle data in it.
         self._read = np.zeros(0)
-        self._sum = Sum(self, attachment.grid.comm)
+        self._sum = Sum(attachment.grid.comm)
 
     def add_forces(self, forces: Array, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
         """Forces on all coefficients with those of the penalty.
@@ -51,7 +51,7 @@ class GhostPenalty:
         if matrix is None:
             return forces
         fields = coefficients if start is None else start + coefficients
-        return np.asarray(forces + matrix @ fields)
+        return np.asarray(forces + self._attachment.layout.sum(matrix @ fields))
 
     def add_tangent(self, tangent: Any, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
         """A reduced tangent plus S^T G S, G the penalty; the same object as long as `tangent` is."""
@@ -62,8 +62,11 @@ class GhostPenalty:
             return self._sum.of(tangent, penalty, reduction)
 
     def on_all(self, data: Mapping[Rule, Array]) -> sp.csr_matrix | None:
-        """G on all coefficients, the same on every rank; None without a penalty."""
-        if not self._attachment.sides:
+        """This rank's part of G, on the coefficients of the window; None without a penalty.
+
+        G is the sum of the parts. A collective call.
+        """
+        if not self._attachment.has_sides:
             return None
         integral = self._attachment.compiled.ghost
         assert integral is not None
@@ -93,7 +96,7 @@ class GhostPenalty:
             if integral.reads_position:
                 x[:, : grid.space.dim] += grid.in_metres(np.array(here))
             facets = np.array([grid.rectangle.facet_of_edge(n) for n in names], dtype=np.int32)
-            packed = means[grid.cell_numbers(np.array([here, there]))][:, columns].ravel()
+            packed = means[grid.window.numbers(np.array([here, there]))][:, columns].ravel()
             (c0, t0), (c1, t1) = (layout.on_cell(np.array(cell)) for cell in (here, there))
             element = np.zeros((2 * len(t0), 2 * len(t0)))
             kernel(element, packed, constants, x.ravel(), facets)
@@ -103,14 +106,17 @@ class GhostPenalty:
             cols.append(np.tile(coefficients, len(coefficients)))
             entries.append((t.T @ element @ t).ravel())
         shape = (layout.size, layout.size)
+        if not rows:
+            return sp.csr_matrix(shape)
         index = (np.concatenate(rows), np.concatenate(cols))
         return sp.csr_matrix((np.concatenate(entries), index), shape=shape)
 
     def _means(self, data: Array) -> Array:
-        """Volume-weighted means over the particles of each cell, on any rank, cells x columns."""
+        """Volume-weighted means over the particles of each cell of the window, cells x columns."""
         attached = self._attachment
         columns = np.column_stack([np.ones(len(data)), data])
-        sums = attached.summed(_rust.cell_sums(attached.location, attached.volume, columns))
+        sums = _rust.cell_sums(attached.location, attached.volume, columns)
+        attached.grid.window.of_cells.update(sums)
         volume = sums[:, :1]
         return np.asarray(sums[:, 1:] / np.where(volume > 0, volume, 1.0))
 

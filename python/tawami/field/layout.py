@@ -3,80 +3,57 @@
 The coefficients of all fields form one vector, in the order of the form: the displacement first. Those
 of a field go function by function and component by component. E gives the degrees of freedom of the
 mesh: nodal = E coefficients.
+
+A rank has the coefficients of its window (`tawami.grid.window`). Each coefficient belongs to one rank,
+and others have copies of it. `Layout.whole` and `Layout.part` convert to and from the coefficients of
+the whole grid, in the same order.
 """
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, cast
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from tawami import _rust
 from tawami.base.arrays import Array, Indices, Mask
+from tawami.base.exchange import Exchange
 from tawami.base.space import lattice
 from tawami.fem import dolfinx
 from tawami.fem.mesh import FunctionSpace
+from tawami.field.coefficients import Coefficients, places_of
+from tawami.field.functions import ActiveFunctions
 from tawami.form.fields import Field
-from tawami.grid.basis import Basis, greville
+from tawami.grid.basis import Basis
 from tawami.grid.grid import Grid
 
 
-@dataclass(frozen=True)
-class Place:
-    """Place of a field among the coefficients.
+class Layout(Coefficients):
+    """Places of the coefficients of a rank's window, and E.
 
-    Attributes:
-        basis: Its functions.
-        components: Number of components of each function.
-        degree: Degree along each axis of its element on the mesh.
-        start: Its first coefficient.
-        num_functions: Number of its functions.
-    """
-
-    basis: Basis
-    components: int
-    degree: int
-    start: int
-    num_functions: int
-
-    @property
-    def stop(self) -> int:
-        """The coefficient after its last one."""
-        return self.start + self.components * self.num_functions
-
-    @property
-    def slice(self) -> slice:
-        """All of its coefficients."""
-        return slice(self.start, self.stop)
-
-    def holds(self, coefficients: Any) -> Any:
-        """Whether numbers of coefficients are those of this field."""
-        return (coefficients >= self.start) & (coefficients < self.stop)
-
-
-class Layout:
-    """Places of the coefficients, and E.
+    Making one is a collective call.
 
     Args:
         grid: The grid.
         basis: Basis of the displacement.
         fields: The fields of the form; the displacement comes first.
         space: Their function space on the mesh.
-        active: Whether each cell holds particles, on any rank, ny x nx.
+        active: Whether each cell of the window holds particles, on any rank, x fastest.
 
     Attributes:
         fields: Place of each field by name.
+        of_grid: The same among the coefficients of the whole grid.
         volumetric: Place of the volumetric strain or pressure; None without such a field.
         num_displacement: Number of displacement coefficients; the other fields follow.
         size: Number of coefficients.
+        functions: The active functions.
         active: Whether each coefficient belongs to a function with a particle in its support.
-        owner: Rank of each coefficient: one with a cell in the support of the function.
-        num_parts: Number of parts of the body that share no displacement function.
-        part: Part of each displacement coefficient, -1 for inactive ones.
+        owner: Rank of each active coefficient: one with a cell in the support of the function; -1 for
+            coefficients that are not active, or whose functions are not known in the window.
+        exchange: The exchange of coefficients between ranks.
         tied: Pairs of coefficients, the first of which follows the second.
     """
 
@@ -89,30 +66,38 @@ class Layout:
         active: Mask,
     ) -> None:
         self.grid, self.basis, self._space = grid, basis, space
-        self.fields: dict[str, Place] = {}
-        self.size = 0
-        for name, field in fields.items():
-            its_basis = cast(Basis, field.basis or basis)
-            count = int(np.prod(self._shape(its_basis)))
-            place = Place(its_basis, field.components, field.degree, self.size, count)
-            self.fields[name], self.size = place, place.stop
+        self.window = grid.window
+        self.fields = places_of(fields, basis, self.window.cells)
+        self.of_grid = places_of(fields, basis, grid.cells)
+        places = list(self.fields.values())
+        self.num_displacement, self.size = places[0].stop, places[-1].stop
         roles = {field.role: self.fields[name] for name, field in fields.items()}
         self.volumetric = roles.get("volumetric_strain", roles.get("pressure"))
-        self._cells = np.flatnonzero(active).astype(np.uint32)
-        self._of_cells = _rust.Active(grid.rust, self._cells)
-        self.num_parts, part = self._of_cells.parts(basis)
-        self.part = np.repeat(part, grid.space.dim)
-        self.num_displacement = len(self.part)
-        self.active = self._of_all(self._of_cells.functions)
-        self.owner = self._of_all(lambda b: self._of_cells.spread(b, grid.rank_of_cell))
+        self.functions = ActiveFunctions(grid, active)
+        self.owner = np.concatenate(
+            [np.repeat(self.functions.owner(f.basis), f.components) for f in self.fields.values()]
+        )
+        self.active: Mask = self.owner >= 0
+        parts = [
+            (self.functions.exchange(f.basis), f.start, f.components) for f in self.fields.values()
+        ]
+        self.exchange = Exchange.joined(grid.comm, parts)
         self.tied: Indices = np.empty((0, 2), dtype=np.int64)
 
     def same_cells(self, other: Layout) -> bool:
-        """Whether another layout has the same functions and active cells."""
+        """Whether another layout has the same functions and active cells, on this rank."""
         if self is other:
             return True
         same = self.grid is other.grid and self.fields == other.fields
-        return same and np.array_equal(self._cells, other._cells)
+        return same and np.array_equal(self.functions.cells, other.functions.cells)
+
+    @functools.cached_property
+    def parts(self) -> tuple[int, Indices]:
+        """Number of parts of the body that share no displacement function, and the part of each
+        displacement coefficient, -1 for inactive ones; the first call is one for all ranks.
+        """
+        number, part = self.functions.parts(self.basis)
+        return number, np.repeat(part, self.grid.space.dim)
 
     def tie(self, names: Sequence[str], sums: Array, least: float) -> None:
         """Tie weak functions of some fields of the same basis to their strongest neighbours.
@@ -125,19 +110,21 @@ class Layout:
             least: Bound of the sums [-].
         """
         places = [self.fields[name] for name in names]
-        shape = self._shape(places[0].basis)
-        weak = np.flatnonzero(
-            self.active[places[0].slice][:: places[0].components] & (sums < least)
-        )
-        tied: list[tuple[int, int]] = []
+        basis, shape = places[0].basis, self.window.shape(places[0].basis)
+        weak = np.flatnonzero((self.functions.owner(basis) >= 0) & (sums < least))
+        #: The function of the whole grid that each function follows; -1 for none.
+        leader = np.full(len(sums), -1)
         for function in weak:
             at = np.unravel_index(function, shape, order="F")
             box = [np.arange(max(i - 1, 0), min(i + 2, n)) for i, n in zip(at, shape, strict=True)]
             near = lattice(box) @ np.cumprod((1, *shape[:-1]))
             strongest = near[sums[near].argmax()]
             if sums[strongest] >= least:
-                tied.append((int(function), int(strongest)))
-        pairs = np.array(tied, dtype=np.int64).reshape(-1, 1, 2)
+                leader[function] = self.window.in_grid(basis, strongest)
+        self.functions.exchange(basis).update(leader)  # its owner knows all of its neighbours
+        followers = np.flatnonzero(leader >= 0)
+        leaders = self.window.functions(basis, leader[followers])
+        pairs = np.column_stack([followers, leaders])[leaders >= 0].reshape(-1, 1, 2)
         self.tied = np.concatenate(
             [
                 (
@@ -146,24 +133,18 @@ class Layout:
                 for place in places
             ]
         )
-        self.active[self.tied[:, 0]] = False
-
-    def _shape(self, basis: Basis) -> tuple[int, ...]:
-        """Number of functions of a basis along each axis."""
-        return tuple(_rust.basis_len(basis, n) for n in self.grid.cells)
-
-    def _of_all(self, of_functions: Callable[[Basis], Any]) -> Any:
-        """Values for all coefficients, from those for the functions of each basis."""
-        bases = dict.fromkeys(field.basis for field in self.fields.values())
-        of_basis = {basis: of_functions(basis) for basis in bases}
-        return np.concatenate(
-            [np.repeat(of_basis[f.basis], f.components) for f in self.fields.values()]
-        )
+        for place in places:
+            for component in range(place.components):
+                self.active[place.start + place.components * followers + component] = False
 
     def reached_by(self, cells: Any) -> Mask:
         """Whether each coefficient belongs to a function with one of these cells in its support."""
-        mask: Mask = self._of_all(_rust.Active(self.grid.rust, cells).functions)
-        return mask
+        return np.concatenate(
+            [
+                np.repeat(self.functions.reached_by(cells, f.basis), f.components)
+                for f in self.fields.values()
+            ]
+        )
 
     @functools.cached_property
     def extraction(self) -> sp.csr_matrix:
@@ -172,7 +153,7 @@ class Layout:
 
     def extraction_on(self, cells: Any) -> sp.csr_matrix:
         """The rows of E of the degrees of freedom of some dolfinx cells; the others are empty."""
-        number = self.grid.cell_numbers(self.grid.rectangle.ij[cells])
+        number = self.window.numbers(self.grid.rectangle.ij[cells])
         dofs = self._space.dofs[cells]
         rows, columns, values, done = [], [], [], 0
         for field in self.fields.values():
@@ -196,8 +177,10 @@ class Layout:
         return matrix
 
     def on_cell(self, cell: Indices) -> tuple[Indices, Array]:
-        """Coefficients on a cell (i, j), and T: degrees of freedom of a kernel = T coefficients."""
-        number = np.array([self.grid.cell_numbers(cell)])
+        """Coefficients on a cell (i, j) of the grid, and T: degrees of freedom of a kernel = T
+        coefficients.
+        """
+        number = np.array([self.window.numbers(cell)])
         coefficients, blocks = [], []
         for field in self.fields.values():
             functions, at_nodes = self._at_nodes(field.basis, field.degree, number)
@@ -212,12 +195,12 @@ class Layout:
         (cells x nodes x functions).
         """
         nodes = self.grid.rectangle.to_grid_axes(dolfinx.reference_nodes(degree))
-        return _rust.extraction(basis, self.grid.cells, cells, np.ascontiguousarray(nodes))
+        return _rust.extraction(basis, self.window.cells, cells, np.ascontiguousarray(nodes))
 
     @property
     def greville(self) -> Array:
         """Greville points [m] of the displacement functions, functions x components."""
-        return greville(self.basis, self.grid.origin, self.grid.h, self.grid.cells)
+        return self.window.greville(self.basis)
 
     def split(self, coefficients: Array) -> tuple[Array, Array | None]:
         """Coefficients of the displacement, and of the volumetric strain or pressure (None without)."""
@@ -231,4 +214,4 @@ class Layout:
     def cells_of(self, coefficient: int) -> Indices:
         """Cells (i, j) with particles in the support of a coefficient's function, cells x axes."""
         field = self.fields[self.name_of(coefficient)]
-        return self._of_cells.support(field.basis, (coefficient - field.start) // field.components)
+        return self.functions.support(field.basis, (coefficient - field.start) // field.components)

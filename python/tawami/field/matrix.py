@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,32 +12,7 @@ from tawami import _rust
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.petsc import Handles
 from tawami.field.attachment import Attachment
-
-
-class Unknowns(Protocol):
-    """Unknowns of all fields, or of one: coefficients = S unknowns."""
-
-    @property
-    def selection(self) -> sp.csr_matrix:
-        """S, coefficients x unknowns."""
-
-    @property
-    def unknowns(self) -> Indices:
-        """Coefficient that each unknown is."""
-
-    @property
-    def size(self) -> int:
-        """Number of unknowns."""
-
-    @property
-    def num_own(self) -> int:
-        """Number of unknowns whose rows belong to this rank."""
-
-    def same_unknowns(self, other: Any) -> bool:
-        """Whether others have the same S."""
-
-    def reached_by(self, cells: Any) -> Mask:
-        """Whether each coefficient belongs to a function with one of these cells in its support."""
+from tawami.field.unknowns import Unknowns
 
 
 class ReducedMatrix:
@@ -65,17 +40,17 @@ class ReducedMatrix:
     def fit(self, assembler: _rust.Assembler, attachment: Attachment, reduction: Unknowns) -> None:
         """Make a new matrix if the unknowns, or the cells that couple them, are others.
 
-        Cells and unknowns of all ranks are known on each of them, so that all ranks decide alike.
+        A collective call.
         """
         if reduction.same_unknowns(self.reduction):
             return
         self._petsc.free()
         self.reduction = None
-        selection, used = reduction.selection, np.arange(reduction.size)
+        selection, used = reduction.selection, np.arange(len(reduction.number))
         if self._comm.size > 1:
             reached = reduction.reached_by(attachment.location.active)
             selection, used = _rows_of(selection, reached)
-        pattern = assembler.pattern(as_arrays(selection, reduction.unknowns[used]))
+        pattern = assembler.pattern(as_arrays(selection, reduction.place[used]))
         values = np.empty(len(pattern.columns))
         size, csr = (len(used), len(used)), (pattern.start, pattern.columns, values)
         # the matrix uses the arrays themselves: what Rust writes is what PETSc sees
@@ -83,7 +58,8 @@ class ReducedMatrix:
         self._petsc["of cells"] = matrix
         if self._comm.size > 1:
             own = (reduction.num_own, reduction.size)
-            numbers = PETSc.LGMap().create(used.astype(PETSc.IntType), comm=self._comm)
+            known = reduction.number[used].astype(PETSc.IntType)
+            numbers = PETSc.LGMap().create(known, comm=self._comm)
             # by name: their position depends on the version of petsc4py
             maps = {"lgmapr": numbers, "lgmapc": numbers}
             unassembled = PETSc.Mat().createIS((own, own), **maps, comm=self._comm)

@@ -36,7 +36,7 @@ class PointAssembly(Assembly):
 
     def __init__(self, attachment: Attachment) -> None:
         super().__init__(attachment)
-        on_cell, _ = self.layout.on_cell(np.zeros(self.layout.grid.space.dim, dtype=np.int64))
+        on_cell, _ = self.layout.on_cell(np.array(self.layout.window.first))
         count = len(on_cell)
         if count > _rust.MAX_COEFFICIENTS:
             raise FormError(
@@ -76,7 +76,7 @@ class PointAssembly(Assembly):
             of_cells = self._kernels.vector(arrays, coefficients, absolute=absolute)
             if self._compiled.border:
                 of_cells = self.border.add_vector(of_cells, coefficients, absolute=absolute)
-            return self.attachment.summed(of_cells)
+            return self.layout.sum(of_cells)
 
     def tangent(self, coefficients: Array, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
         """See `Assembly.tangent`."""

@@ -9,53 +9,50 @@ from __future__ import annotations
 import functools
 import hashlib
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import spsolve
 
+from tawami.base import ranks
 from tawami.base.arrays import Array, Indices, Mask
-from tawami.base.errors import SupportError
 from tawami.base.places import Places, share_places
 from tawami.field.constraints import Held, PointHeld
+from tawami.field.elimination import eliminated, prescribed_by
 from tawami.field.layout import Layout
 from tawami.field.rigid import check_rigid_motions
+from tawami.field.unknowns import Unknowns
 
 #: Difference of prescribed values that counts as round-off, relative to the largest value.
 ROUND_OFF = 1e-9
-#: Weight of a coefficient in a point constraint below which it does not determine the coefficient.
-NO_PIVOT = 1e-10
 
 
-class Reduction:
-    """Unknowns that the supports leave free.
+class Reduction(Unknowns):
+    """Unknowns that the supports leave free. Making one is a collective call.
 
     Args:
         layout: Places of the coefficients.
-        held: Prescribed coefficients.
-        points: Multi-point constraints.
+        held: Prescribed coefficients, the same on every rank.
+        points: Multi-point constraints, the same on every rank.
         start: Coefficients at the beginning. Values are prescribed for the sum of these and the
             increments; unknowns are increments.
         moving: Whether rigid motions may be free, because inertia holds the body.
         also: Constraints of supports that are no constraints here, but prevent rigid motions.
 
     Attributes:
-        size: Number of unknowns.
-        unknowns: Coefficient of each unknown, sorted by the rank that owns it.
-        own: Unknowns whose rows belong to this rank.
         offset: Increments of the coefficients if all unknowns are zero.
         fixed: Whether each coefficient is prescribed by itself, along an edge.
+        number_of: Number of the unknown that gives the value of each coefficient; -1 if none gives it by
+            itself.
         points: The multi-point constraints.
 
     Raises:
         SupportError: Supports contradict each other, or leave a rigid motion free.
     """
 
-    #: Elimination by point constraints: dependent coefficients, the others involved, and their weights.
-    _eliminated: tuple[Indices, Indices, Array] | None
-
-    #: A matrix, which of its entries are in rows of this rank, and their places there.
+    #: Elimination by point constraints: dependent coefficients of the whole grid, the others involved,
+    #: and their weights.
+    _eliminated: tuple[Indices, Indices, Array] | None = None
+    #: A matrix, which of its entries couple unknowns, and their places there.
     _reduced: tuple[sp.csr_matrix, Mask, Places] | None = None
 
     def __init__(
@@ -68,24 +65,31 @@ class Reduction:
         moving: bool = False,
         also: Sequence[PointHeld] = (),
     ) -> None:
-        self.layout, self.points = layout, points
+        self.points = points
         sizes = [float(np.abs(support.values).max(initial=0.0)) for support in held]
         sizes += [abs(point.value) for point in points]
         tolerance = ROUND_OFF * max(sizes, default=0.0)
-        self.fixed, total = _prescribed(held, layout.size, tolerance)
+        prescribed, values = prescribed_by(held, tolerance)
+        place = layout.places(prescribed)
+        inside = place >= 0
+        self.fixed, total = np.zeros(layout.size, dtype=bool), np.zeros(layout.size)
+        self.fixed[place[inside]], total[place[inside]] = True, values[inside]
         if not moving:
             check_rigid_motions(layout, self.fixed, [*points, *also])
         self.offset = np.where(self.fixed, total - start, 0.0)
         free = layout.active & ~self.fixed
-        self._eliminated = None
         if points:
-            dependent, involved, weights, values = _eliminate(
-                points, self.fixed, total, start, tolerance, held
-            )
-            self._eliminated = (dependent, involved, weights)
-            free[dependent] = False
-            self.offset[dependent] = values
-        self._number(free)
+            involved = np.unique(np.concatenate([point.indices for point in points]))
+            known = np.isin(involved, prescribed)
+            total_there = np.zeros(len(involved))
+            total_there[known] = values[np.searchsorted(prescribed, involved[known])]
+            of_points = (involved, known, total_there, layout.at(start, involved))
+            dependent, others, weights, increments = eliminated(points, *of_points, tolerance, held)
+            self._eliminated = (dependent, others, weights)
+            here = layout.places(dependent)
+            free[here[here >= 0]] = False
+            self.offset[here[here >= 0]] = increments[here >= 0]
+        self._begin(layout, free)
         followers, leaders = self._tied
         self.offset[followers] = self.offset[leaders]
 
@@ -95,27 +99,67 @@ class Reduction:
         tied = self.layout.tied
         return np.asarray(tied[~self.fixed[tied[:, 0]]].T)
 
+    def _begin(self, layout: Layout, free: Mask, *, tied: bool = True) -> None:
+        """Number the free coefficients, rank by rank.
+
+        Args:
+            layout: Places of the coefficients.
+            free: Whether each coefficient is an unknown.
+            tied: Whether tied coefficients follow others.
+        """
+        self.layout, comm = layout, layout.grid.comm
+        unknowns = np.flatnonzero(free & layout.own)
+        counts = np.array(comm.allgather(len(unknowns)))
+        start = int(counts[: comm.rank].sum())
+        own, size = slice(start, start + len(unknowns)), int(counts.sum())
+        self.number_of = np.full(layout.size, -1)
+        self.number_of[unknowns] = np.arange(own.start, own.stop)
+        layout.exchange.update(self.number_of)
+        others = np.flatnonzero((self.number_of >= 0) & ~layout.own)
+        others = others[np.argsort(self.number_of[others])]
+        place = np.concatenate([unknowns, others])
+        number = self.number_of[place]
+        if tied:
+            followers, leaders = self._tied
+            self.number_of[followers] = self.number_of[leaders]
+        if self._eliminated is not None:
+            dependent, involved, weights = self._eliminated
+            #: Numbers of the involved coefficients.
+            self._involved = layout.at(self.number_of + 1.0, involved).astype(np.int64) - 1
+            if (layout.places(dependent) >= 0).any():
+                far = np.setdiff1d(self._involved[(weights != 0).any(axis=0)], [*number, -1])
+                number = np.concatenate([number, far])
+                place = np.concatenate([place, np.full(len(far), -1)])
+        self._set(layout, number, place, own, size)
+
     @functools.cached_property
     def of_displacement(self) -> Mask:
-        """Whether each unknown belongs to the displacement."""
-        return np.asarray(self.unknowns < self.layout.num_displacement)
-
-    def reached_by(self, cells: Any) -> Mask:
-        """Whether each coefficient belongs to a function with one of these cells in its support."""
-        return self.layout.reached_by(cells)
+        """Whether each unknown of this rank belongs to the displacement."""
+        return np.asarray(self.coefficients < self.layout.num_displacement)
 
     def of_field(self, name: str) -> Mask:
-        """Whether each unknown belongs to a field."""
-        return np.asarray(self.layout.fields[name].holds(self.unknowns))
+        """Whether each unknown of this rank belongs to a field."""
+        return np.asarray(self.layout.fields[name].holds(self.coefficients))
+
+    def columns(self, number: Indices) -> Indices:
+        """Places of unknowns with these numbers among those that this rank knows; -1 for others."""
+        if self.size == self.num_own:
+            return number
+        order = self._order
+        if not len(order):
+            return np.full(len(number), -1)
+        at = np.minimum(np.searchsorted(self.number, number, sorter=order), len(order) - 1)
+        found = order[at]
+        return np.where((number >= 0) & (self.number[found] == number), found, -1)
 
     @functools.cached_property
-    def _number_of(self) -> Indices:
-        """Unknown that gives the value of each coefficient; -1 for those that none gives by itself."""
-        number = np.full(self.layout.size, -1)
-        number[self.unknowns] = np.arange(self.size)
-        followers, leaders = self._tied
-        number[followers] = number[leaders]
-        return number
+    def _order(self) -> Indices:
+        return np.argsort(self.number)
+
+    @functools.cached_property
+    def _column_of(self) -> Indices:
+        """Known unknown that gives the value of each coefficient; -1 if none gives it by itself."""
+        return self.columns(self.number_of)
 
     @functools.cached_property
     def _places(self) -> tuple[Indices, Indices] | None:
@@ -125,28 +169,39 @@ class Reduction:
         """
         if self._eliminated is not None:
             return None
-        rows = np.flatnonzero(self._number_of >= 0)
-        return rows, self._number_of[rows]
+        rows = np.flatnonzero(self._column_of >= 0)
+        return rows, self._column_of[rows]
+
+    @functools.cached_property
+    def is_plain(self) -> bool:
+        """Whether each unknown is one coefficient, on all ranks."""
+        if self._eliminated is not None:
+            return False
+        tied = np.array([bool(self._tied.size)])
+        return not ranks.any_of(self._comm, tied)[0]
 
     @functools.cached_property
     def selection(self) -> sp.csr_matrix:
-        """S, coefficients x unknowns."""
-        shape = (self.layout.size, self.size)
+        """S, coefficients x known unknowns."""
+        shape = (self.layout.size, len(self.number))
         if self._places is not None:
             rows, columns = self._places
             start = np.zeros(shape[0] + 1, dtype=np.int32)
-            np.cumsum(self._number_of >= 0, out=start[1:])
+            np.cumsum(self._column_of >= 0, out=start[1:])
             entries = (np.ones(len(rows)), columns.astype(np.int32), start)
             return sp.csr_matrix(entries, shape=shape)
         assert self._eliminated is not None
-        dependent, involved, weights = self._eliminated
-        number, (row, column) = np.full(self.layout.size, -1), np.nonzero(weights)
-        number[self.unknowns] = np.arange(self.size)
-        entries = np.concatenate([np.ones(self.size), -weights[row, column]])
-        rows = np.concatenate([self.unknowns, dependent[row]])
-        columns = np.concatenate([np.arange(self.size), number[involved[column]]])
-        selection = sp.csr_matrix((entries, (rows, columns)), shape=shape)
+        dependent, _, weights = self._eliminated
+        here = self.layout.places(dependent)
+        row, column = np.nonzero(weights * (here >= 0)[:, None])
+        number = self.number_of.copy()
         followers, leaders = self._tied
+        number[followers] = -1
+        rows = np.flatnonzero(number >= 0)
+        entries = np.concatenate([np.ones(len(rows)), -weights[row, column]])
+        columns = np.concatenate([self.columns(number[rows]), self.columns(self._involved[column])])
+        rows = np.concatenate([rows, here[row]])
+        selection = sp.csr_matrix((entries, (rows, columns)), shape=shape)
         if not len(followers):
             return selection
         shape = (self.layout.size, self.layout.size)
@@ -155,20 +210,18 @@ class Reduction:
 
     @classmethod
     def of_all(cls, layout: Layout) -> Reduction:
-        """The reduction whose unknowns are all coefficients, inactive ones too."""
+        """The reduction whose unknowns are all coefficients, on one rank inactive ones too."""
         reduction = cls.__new__(cls)
-        reduction.layout, reduction.points = layout, []
+        reduction.points = []
         reduction.fixed = np.zeros(layout.size, dtype=bool)
-        reduction._eliminated = None
-        reduction._number(np.ones(layout.size, dtype=bool))
-        number = np.empty(layout.size, dtype=np.int64)
-        number[reduction.unknowns] = np.arange(layout.size)
-        reduction._number_of = number  # tied coefficients are unknowns as well
+        # tied coefficients are unknowns as well
+        reduction._begin(layout, layout.own | (layout.owner >= 0), tied=False)
         reduction.offset = np.zeros(layout.size)
         return reduction
 
-    def expanded(self, unknowns: Array) -> Array:
-        """S x: all coefficients, from the unknowns."""
+    def expanded(self, own: Array) -> Array:
+        """S x: all coefficients, from the unknowns of this rank; a collective call."""
+        unknowns = self.known(own)
         if self._places is None:
             return np.asarray(self.selection @ unknowns)
         rows, columns = self._places
@@ -177,170 +230,68 @@ class Reduction:
         return coefficients
 
     def restricted(self, forces: Array) -> Array:
-        """S^T f: forces on the unknowns, from those on all coefficients."""
+        """S^T f: forces on the unknowns of this rank, from those on all coefficients.
+
+        A collective call.
+        """
+        if self.is_plain:
+            return np.asarray(forces[self.coefficients])
+        mine = forces if self._comm.size == 1 else np.where(self.layout.own, forces, 0.0)
         if self._places is None:
-            return np.asarray(self._transposed @ forces)
-        rows, columns = self._places
-        if len(rows) == self.size:
-            return np.asarray(forces[self.unknowns])
-        return np.asarray(np.bincount(columns, forces[rows], self.size), dtype=float)
+            known = np.asarray(self._transposed @ mine)
+        else:
+            rows, columns = self._places
+            known = np.bincount(columns, mine[rows], len(self.number)).astype(float)
+        return np.asarray(self.exchange.add(known)[: self.num_own])
 
     def reduced(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
-        """This rank's rows of S^T A S, A on all coefficients.
+        """S^T A S in the unknowns that this rank knows, A on the coefficients of the window.
 
         Without point constraints its entries are in places that depend on those of A only, zeros too.
         """
         if self._places is None:
-            return (self._transposed @ matrix @ self.selection).tocsr()[self.own]
+            return super().reduced(matrix)
         if self._reduced is None or not share_places(self._reduced[0], matrix):
             entries = matrix.tocoo()
-            row, column = self._number_of[entries.row], self._number_of[entries.col]
-            mine = (row >= self.own.start) & (row < self.own.stop) & (column >= 0)
-            places = row[mine] - self.own.start, column[mine]
-            self._reduced = matrix, mine, Places(*places, (self.num_own, self.size))
+            row, column = self._column_of[entries.row], self._column_of[entries.col]
+            mine = (row >= 0) & (column >= 0)
+            places = Places(row[mine], column[mine], (len(self.number),) * 2)
+            self._reduced = matrix, mine, places
         _, mine, of_rows = self._reduced
         return of_rows.matrix(matrix.data[mine])
 
     def diagonal(self, masses: Array) -> Array | None:
-        """The diagonal of S^T M S, M the diagonal matrix of masses of all coefficients.
+        """This rank's diagonal of S^T M S, M the diagonal matrix of masses of all coefficients.
 
         None if point constraints make it another matrix.
         """
         return None if self._places is None else self.restricted(masses)
 
-    @functools.cached_property
-    def _transposed(self) -> sp.csc_matrix:
-        return self.selection.T
-
-    def imposed(self, values: Array, mass: Array, offset: Array) -> Array:
-        """Velocities after an impulse of the supports.
-
-        This is the field nearest to `values`, in the norm of the lumped mass, that obeys the supports.
-
-        Args:
-            values: Velocities, or other rates, of all displacement coefficients.
-            mass: Mass of each [kg per metre depth].
-            offset: As `offset`, for the rate.
-        """
-        n, g = len(values), offset[: len(values)]
-        if self._places is None:
-            s = self.selection[:n][:, self.of_displacement]
-            weighted = s.T @ sp.diags(mass)
-            return np.asarray(s @ spsolve((weighted @ s).tocsc(), weighted @ (values - g)) + g)
-        rows, columns = self._places
-        rows, columns = rows[: np.searchsorted(rows, n)], columns[: np.searchsorted(rows, n)]
-        rates = (values - g)[rows]
-        if len(self._places[0]) > self.size:  # tied coefficients share the momentum of all
-            momentum = np.bincount(columns, mass[rows] * rates, minlength=self.size)
-            whole = np.bincount(columns, mass[rows], minlength=self.size)
-            rates = np.divide(momentum, whole, out=momentum, where=whole > 0)[columns]
-        imposed = g.copy()
-        imposed[rows] += rates
-        return np.asarray(imposed)
-
-    def _number(self, free: Mask) -> None:
-        """Number the free coefficients, rank by rank."""
-        comm, unknowns = self.layout.grid.comm, np.flatnonzero(free)
-        owner = self.layout.owner[unknowns]
-        self.unknowns = unknowns[np.argsort(owner, kind="stable")]
-        self.size = len(unknowns)
-        ends = np.cumsum(np.bincount(owner, minlength=comm.size))
-        self.own = slice(int(ends[comm.rank - 1]) if comm.rank else 0, int(ends[comm.rank]))
-
-    @property
-    def num_own(self) -> int:
-        """Number of unknowns whose rows belong to this rank."""
-        return self.own.stop - self.own.start
-
     @property
     def digest(self) -> str:
-        """A hash of the unknowns and S."""
+        """A hash of the unknowns and S, on this rank."""
         s = self.selection
-        parts = (self.unknowns, s.indptr, s.indices, s.data)
+        parts = (self.coefficients, s.indptr, s.indices, s.data)
         return hashlib.sha1(b"".join(np.ascontiguousarray(a).tobytes() for a in parts)).hexdigest()
 
     def same_unknowns(self, other: Reduction | None) -> bool:
-        """Whether another reduction has the same unknowns and S, so that matrices are alike."""
+        """Whether another reduction has the same unknowns and S, so that matrices are alike.
+
+        A collective call.
+        """
+        differs = np.array([not self._same_here(other)])
+        return not ranks.any_of(self._comm, differs)[0]
+
+    def _same_here(self, other: Reduction | None) -> bool:
+        """The same on this rank."""
         if other is None or other.size != self.size or not self.layout.same_cells(other.layout):
             return False
         if self._places is not None and other._places is not None:
-            return np.array_equal(self._number_of, other._number_of)
+            return np.array_equal(self.number_of, other.number_of)
         mine, others = self.selection, other.selection
         return (
-            np.array_equal(self.unknowns, other.unknowns)
+            np.array_equal(self.number, other.number)
             and np.array_equal(mine.indptr, others.indptr)
             and np.array_equal(mine.indices, others.indices)
             and np.array_equal(mine.data, others.data)
         )
-
-
-def _prescribed(held: Sequence[Held], size: int, tolerance: float) -> tuple[Mask, Array]:
-    """Mask of the prescribed coefficients, and their values."""
-    fixed, total, last = np.zeros(size, dtype=bool), np.zeros(size), np.full(size, -1)
-    for number, support in enumerate(held):
-        change = np.abs(total[support.indices] - support.values) * fixed[support.indices]
-        worst = int(np.argmax(change)) if len(change) else 0
-        if change.max(initial=0.0) > tolerance:
-            other = held[last[support.indices[worst]]]
-            raise SupportError(
-                f"{other.where} and {support.where} prescribe displacements that differ by "
-                f"{change[worst]:.3g} m where they meet (an end of an edge?): expected supports that "
-                "agree there; change or release one. Profiles are projected in L2, which may miss their "
-                "values at an end by the error of the projection"
-            )
-        total[support.indices] = support.values
-        last[support.indices] = number
-        fixed[support.indices] = True
-    return fixed, total
-
-
-def _meet(other: Held | PointHeld, point: PointHeld) -> bool:
-    """Whether a support acts on coefficients of a point."""
-    return bool(np.isin(other.indices, point.indices).any())
-
-
-def _eliminate(
-    points: Sequence[PointHeld],
-    fixed: Mask,
-    total: Array,
-    start: Array,
-    tolerance: float,
-    held: Sequence[Held],
-) -> tuple[Indices, Indices, Array, Array]:
-    """Solve each multi-point constraint for the coefficient with the largest weight.
-
-    Returns:
-        The dependent coefficients, the others involved, and A, b with the increments
-        `c[dependent] = b - A c[others]`.
-    """
-    all_indices = [point.indices for point in points]
-    involved = np.unique(np.concatenate([*all_indices, np.empty(0, dtype=np.int64)]))
-    involved = involved[~fixed[involved]]
-    a = np.zeros((len(points), len(involved)))
-    b = np.zeros(len(points))
-    for k, point in enumerate(points):
-        loose = ~fixed[point.indices]
-        a[k, np.searchsorted(involved, point.indices[loose])] = point.weights[loose]
-        known = np.where(loose, start[point.indices], total[point.indices])
-        b[k] = point.value - point.weights @ known
-    pivots: dict[int, int] = {}
-    for k, point in enumerate(points):
-        pivot = int(np.argmax(np.abs(a[k]))) if len(involved) else -1
-        if pivot < 0 or abs(a[k, pivot]) < NO_PIVOT:
-            if abs(b[k]) > tolerance:
-                given: list[Held | PointHeld] = [*held, *points[:k]]
-                names = ", ".join(dict.fromkeys(one.where for one in given if _meet(one, point)))
-                raise SupportError(
-                    f"{point.where}: {names} already give this point a displacement that differs by "
-                    f"{abs(b[k]):.3g} m: expected supports that agree; change or release one"
-                )
-            continue
-        b[k] /= a[k, pivot]
-        a[k] /= a[k, pivot]
-        for other in set(range(len(points))) - {k}:
-            b[other] -= a[other, pivot] * b[k]
-            a[other] -= a[other, pivot] * a[k]
-        pivots[k] = pivot
-    rows, columns = list(pivots), list(pivots.values())
-    others = np.setdiff1d(np.arange(len(involved)), columns)
-    return involved[columns].astype(np.int64), involved[others], a[rows][:, others], b[rows]

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from tawami import _rust
 from tawami.base.arrays import Array
@@ -41,7 +42,7 @@ class ReferenceAssembly(Assembly):
                 packed = self._pack(integral, nodal, data)
             with self._stopwatch("residual"):
                 self._add_vector(vector, self._forms[id(integral)], integral, packed)
-        forces = self.attachment.summed(extraction.T @ vector)
+        forces = self.layout.sum(extraction.T @ vector)
         return self._ghost.add_forces(forces, coefficients, data)
 
     def magnitude(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
@@ -52,7 +53,7 @@ class ReferenceAssembly(Assembly):
             of_cells = self._of_each_cell(integral, nodal, data)
             for of_nodes, vector in zip(dofs, of_cells, strict=True):
                 sums += np.abs(extraction[of_nodes].T @ vector)
-        return self.attachment.summed(sums)
+        return self.layout.sum(sums)
 
     def tangent(self, coefficients: Array, data: Mapping[Rule, Array], reduction: Reduction) -> Any:
         """See `Assembly.tangent`."""
@@ -63,7 +64,12 @@ class ReferenceAssembly(Assembly):
             else:
                 self._petsc.free("P", "reduced")
                 self.reduction = reduction
-                rows = self.layout.extraction[: self._space.own] @ reduction.selection
+                rows = (self.layout.extraction[: self._space.own] @ reduction.selection).tocoo()
+                places, shape = (
+                    (rows.row, reduction.number[rows.col]),
+                    (rows.shape[0], reduction.size),
+                )
+                rows = sp.csr_matrix((rows.data, places), shape=shape)
                 p = aij(self.layout.grid.comm, rows, reduction.num_own)
                 self._petsc["P"], self._petsc["reduced"] = p, matrix.ptap(p)
         return self._ghost.add_tangent(self._petsc["reduced"], data, reduction)

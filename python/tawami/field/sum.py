@@ -1,4 +1,4 @@
-"""The sum of a reduced tangent and a sparse matrix that is the same on every rank."""
+"""The sum of a reduced tangent and a sparse matrix."""
 
 from __future__ import annotations
 
@@ -18,29 +18,31 @@ class Sum:
     """Adds S^T A S to reduced tangents, A a matrix on all coefficients.
 
     Args:
-        owner: The object whose life ends that of the PETSc matrices.
         comm: Communicator.
     """
 
-    def __init__(self, owner: Any, comm: Any) -> None:
-        self._comm, self._petsc = comm, Handles(owner, comm)
+    def __init__(self, comm: Any) -> None:
+        self._comm, self._petsc = comm, Handles(self, comm)
         #: What is in `_petsc`: the sum of this tangent and this matrix, with its reduced rows.
         self._tangent: Any = None
         self._matrix: sp.csr_matrix | None = None
         self._rows: sp.csr_matrix | None = None
 
-    def of(self, tangent: Any, matrix: sp.csr_matrix, reduction: Reduction) -> Any:
+    def of(
+        self, tangent: Any, matrix: sp.csr_matrix, reduction: Reduction, *, of_grid: bool = False
+    ) -> Any:
         """The sum: the same object as long as the tangent is the same and the matrix has its pattern.
 
         Args:
             tangent: A reduced tangent.
-            matrix: A, the same on every rank. If its values change it must be another object.
+            matrix: A, or the part of this rank. If its values change it must be another object.
             reduction: S.
+            of_grid: Whether it is A, on coefficients of the whole grid.
         """
         known, same = self._petsc, self._tangent is tangent
         if not same or self._matrix is not matrix:
-            rows = reduction.reduced(matrix)
-            differs = not (same and _same_places(self._rows, rows))
+            rows = (reduction.of_grid if of_grid else reduction.of_window)(matrix)
+            differs = not (same and same_places(self._rows, rows))
             same = not ranks.any_of(self._comm, np.array([differs]))[0]
             self._rows = rows
         if same:
@@ -57,7 +59,7 @@ class Sum:
         return known["total"]
 
 
-def _same_places(a: sp.csr_matrix | None, b: sp.csr_matrix) -> bool:
+def same_places(a: sp.csr_matrix | None, b: sp.csr_matrix) -> bool:
     """Whether two matrices have entries in the same places."""
     if a is None or a.nnz != b.nnz:
         return False

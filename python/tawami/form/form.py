@@ -40,7 +40,7 @@ DECLARATIONS = (
 #: The unit at the end of the meaning of data.
 UNIT = re.compile(r"\[([^\[\]]+)\]$")
 #: Keys that a parameter may declare.
-LIMITS = ("default", "minimum", "maximum", "usual", "unit")
+LIMITS = ("default", "minimum", "maximum", "usual", "unit", "stabilises")
 #: Names that every form has.
 RESERVED = frozenset(
     (

@@ -12,13 +12,14 @@ from mpi4py import MPI
 
 from tawami import _rust
 from tawami.base import program, ranks
-from tawami.base.arrays import Array, Indices
+from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.checks import choice, number, one_of, pair, point, room, shown, whole_number
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
-from tawami.base.space import SPACES, Counts, Position
+from tawami.base.space import SPACES, Counts, Position, lattice
 from tawami.base.text import meant, position
 from tawami.fem import mesh
+from tawami.grid.window import Window
 
 Edge = Literal["left", "right", "bottom", "top"]
 EDGES: tuple[Edge, ...] = get_args(Edge)
@@ -141,11 +142,59 @@ class Grid(Unique):
         return self._rectangle
 
     @functools.cached_property
-    def rank_of_cell(self) -> Indices:
-        """The rank that owns each cell and the particles in it, by number of the cell."""
-        rank = np.zeros(self.num_cells, dtype=np.int64)
-        rank[self.cell_numbers(self.rectangle.ij)] = self.comm.rank
-        return ranks.sum_of(self.comm, rank)
+    def window(self) -> Window:
+        """The part of the grid that this rank knows; the first call is one for all ranks."""
+        own = self.rectangle.ij
+        return Window(self.comm, self.origin, self.h, self.cells, self.rust, own)
+
+    def ranks_of(self, cells: Indices) -> Indices:
+        """The ranks that own cells, given by their numbers, and the particles there; a collective call.
+
+        Each rank keeps the owners of an equal share of all cells, and answers for these.
+        """
+        comm = self.comm
+        if comm.size == 1:
+            return np.zeros(len(cells), dtype=np.int64)
+        some, at = np.unique(cells, return_inverse=True)
+        asked = ranks.parts_to(comm, some, some // self._share)
+        first = comm.rank * self._share
+        answers = comm.alltoall([self._owners[numbers - first] for numbers in asked])
+        return np.asarray(np.concatenate(answers)[at])
+
+    @property
+    def _share(self) -> int:
+        """Number of cells whose owners each rank keeps."""
+        return -(-self.num_cells // self.comm.size)
+
+    @functools.cached_property
+    def _owners(self) -> Indices:
+        """Owners of the share of this rank; the first call is one for all ranks."""
+        own = self.cell_numbers(self.rectangle.ij)
+        owners = np.zeros(self._share, dtype=np.int64)
+        for rank, cells in enumerate(ranks.parts_to(self.comm, own, own // self._share)):
+            owners[cells - self.comm.rank * self._share] = rank
+        return owners
+
+    def own_cells(self, lower: Sequence[int], upper: Sequence[int]) -> Indices:
+        """Indices (i, j) of this rank's cells in a box, in the order of their numbers, cells x dim.
+
+        A collective call on several ranks.
+
+        Args:
+            lower: Its first cell along each axis.
+            upper: The cell after its last one.
+        """
+        if self.comm.size == 1:
+            return lattice([np.arange(*ends) for ends in zip(lower, upper, strict=True)])
+        index = self.rectangle.ij
+        index = index[((index >= lower) & (index < upper)).all(axis=1)]
+        return np.asarray(index[np.argsort(self.cell_numbers(index))])
+
+    def owns(self, cell: Indices) -> Mask:
+        """Whether cells, given by their numbers, are this rank's; a collective call on several ranks."""
+        if self.comm.size == 1:
+            return np.ones(len(cell), dtype=bool)
+        return np.isin(cell, self.cell_numbers(self.rectangle.ij))
 
     def function_space(self, element: Any) -> mesh.FunctionSpace:
         """The function space of an element."""

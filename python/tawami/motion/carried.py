@@ -123,7 +123,10 @@ class Carried:
     def state(self) -> dict[str, Any]:
         """The part of the state that is not in the particles, for a checkpoint."""
         stationary = self.on_grid
-        return {"on_grid": None if stationary is None else list(stationary)}
+        if stationary is None:
+            return {"on_grid": None}
+        whole = self._now.domain.layout.whole
+        return {"on_grid": [whole(v.ravel()).reshape(-1, v.shape[1]) for v in stationary]}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`state`, after the particles were restored.
@@ -133,11 +136,15 @@ class Carried:
         """
         on_grid = state["on_grid"]
         if on_grid is not None:
-            shape = (self._now.domain.layout.num_displacement // self._space.dim, self._space.dim)
+            layout, dim = self._now.domain.layout, self._space.dim
+            shape = (layout.num_displacement_of_grid // dim, dim)
             if [np.shape(values) for values in on_grid] != [shape, shape]:
                 raise ValueError("v and a of the grid have another number of functions")
             check_like(on_grid, [np.zeros(shape)] * 2, "v and a of the grid")
-        self._stationary = None if on_grid is None else (*on_grid, *self._given())
+        self._stationary = None
+        if on_grid is not None:
+            v, a = (layout.part(values.ravel()).reshape(-1, dim) for values in on_grid)
+            self._stationary = v, a, *self._given()
 
     def _given(self) -> tuple[Array, Array]:
         """Copies of the velocities and numbers of the particles."""

@@ -84,10 +84,9 @@ class Dynamics(Sealed, Unique):
         self.gamma = checks.number("gamma", gamma, low=0.5, high=1.0)
         self.beta = (self.gamma + 0.5) ** 2 / 4
         self._now = scene.configuration
-        with ranks.raise_together(scene.grid.comm):
-            given = sources.values(
-                self._now.domain, "velocity", velocity, " ".join(scene.grid.space.axes), "m/s"
-            )
+        given = sources.values(
+            self._now.domain, "velocity", velocity, " ".join(scene.grid.space.axes), "m/s"
+        )
         self._carried = Carried(self._now, self.transfer, self.damping)
         self.velocity[:] = given
         self._clock = Clock()

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from tawami.base import ranks
 from tawami.base.errors import EnergyWarning
 from tawami.base.warn import warn
+from tawami.field.layout import Layout
 from tawami.motion.carried import Carried
 from tawami.scene.configuration import Configuration
 from tawami.scene.step import Accepted
@@ -178,7 +179,7 @@ class Balance:
         if not self._now.model.moves:  # the energy of the grid, with the mass that is left
             mass = self._now.domain.lumped_mass
             v, _ = self._carried.mapped(mass)
-            kinetic = e.kinetic - 0.5 * float(mass @ (v**2).sum(axis=1))
+            kinetic = e.kinetic - 0.5 * _weighted(self._now.domain.layout, mass, v)
             kinetic -= self._now.obstacles.kinetic
         left = kinetic + elastic
         self.energies = replace(
@@ -197,17 +198,18 @@ class Balance:
                 step, functions x dim [m/s].
             accepted: The step.
         """
-        mapped, imposed, end = (0.5 * float(mass @ (v**2).sum(axis=1)) for v in velocities)
+        layout = accepted.problem.reduction.layout
+        mapped, imposed, end = (0.5 * _weighted(layout, mass, v) for v in velocities)
         friction, u = accepted.friction, accepted.u
-        parts = [contact.energies(u) for contact in accepted.problem.obstacles]
+        parts = [c.energies(layout.whole(u.ravel())) for c in accepted.problem.obstacles]
         pushed, rubbed, stopped = np.sum(parts, axis=0) if parts else np.zeros(3)
         moving = self._now.obstacles.kinetic
         work = accepted.problem.external[: u.size].reshape(u.shape) + accepted.forces_at_end
         on_border = self._now.domain.assembly.border_work(accepted.step.coefficients)
         return Energies(
             kinetic=end,
-            external=float((work - friction).ravel() @ u.ravel()) + float(pushed) + on_border,
-            friction=-float(friction.ravel() @ u.ravel()) + float(rubbed),
+            external=layout.dot((work - friction).ravel(), u.ravel()) + float(pushed) + on_border,
+            friction=-layout.dot(friction.ravel(), u.ravel()) + float(rubbed),
             transfer=self.energies.kinetic - mapped - moving,
             impact=mapped - imposed + float(stopped),
         )
@@ -267,3 +269,8 @@ class Balance:
         self._stored_kinetic = state["stored_kinetic"]
         self._removed = np.reshape(state["removed"], 2)
         self._statics = self._now.activity.statics
+
+
+def _weighted(layout: Layout, mass: Array, v: Array) -> float:
+    """sum_i m_i v_i . v_i over the functions of all ranks."""
+    return layout.dot(np.repeat(mass, v.shape[1]), (v**2).ravel())

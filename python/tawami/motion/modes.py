@@ -18,6 +18,7 @@ from tawami.base.errors import ConvergenceError, InputError
 from tawami.particles import placement
 from tawami.scene.constraints import constraints
 from tawami.scene.scene import Scene
+from tawami.solve.saddle import PROXIMAL
 
 #: Asymmetry of the tangent that counts as round-off, relative to its largest entry.
 ROUND_OFF = 1e-10
@@ -83,7 +84,7 @@ def modes(scene: Scene, number: int = 6) -> Modes:
 
 
 def _matrices(scene: Scene) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
-    """K and M of the unknowns, and coefficients x unknowns."""
+    """K and M of the unknowns and the multipliers of supports, and coefficients x unknowns."""
     now = scene.configuration
     if scene.grid.comm.size > 1:
         raise InputError(
@@ -103,15 +104,27 @@ def _matrices(scene: Scene) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix
     amounts = constraints(now.supports, domain, lambda support: 0.0, zero, zero, moving=True)
     reduction, _, supports = amounts
     selection = reduction.selection
-    stiffness = sum((support.stiffness() for support in supports), scene.tangent(zero))
-    tangent = (selection.T @ stiffness @ selection).tocsr()
+    tangent = (selection.T @ scene.tangent(zero) @ selection).tocsr()
     largest = np.abs(tangent.data).max(initial=0.0)
     if np.abs((tangent - tangent.T).data).max(initial=0.0) > ROUND_OFF * largest:
         raise InputError(
             f"modes: the tangent of form {scene.form.name} is not symmetric: expected a form with a "
             "symmetric tangent, in which vibrations have real frequencies"
         )
-    return tangent, (selection.T @ sp.diags(mass) @ selection).tocsr(), selection
+    masses = (selection.T @ sp.diags(mass) @ selection).tocsr()
+    if not supports:
+        return tangent, masses, selection
+    # multipliers of constraints, as in `tawami.solve.saddle`
+    rows = sp.vstack([support.gradient @ selection for support in supports])
+    rows *= largest / np.abs(rows.data).max()
+    count = rows.shape[0]
+    tangent = sp.bmat([[tangent, rows.T], [rows, -PROXIMAL * largest * sp.eye(count)]]).tocsr()
+    nothing = sp.csr_matrix((count, count))
+    return (
+        tangent,
+        sp.block_diag([masses, nothing], "csr"),
+        sp.hstack([selection, sp.csr_matrix((size, count))], "csr"),
+    )
 
 
 def _fastest(stiffness: sp.csr_matrix, mass: sp.csr_matrix) -> float:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from tawami.field.impulse import imposed
 from tawami.field.reduction import Reduction
 from tawami.motion.carried import Carried, divided
 from tawami.motion.energy import Balance, Energies
@@ -150,7 +151,7 @@ class NewmarkStep:
         self, values: Array, reduction: Reduction, impulses: Impulses, rate: Prescribed
     ) -> Array:
         """Velocities or accelerations, functions x dim, that obey the supports."""
-        flat = reduction.imposed(values.ravel(), self._masses, rate.edges)
+        flat = imposed(reduction, values.ravel(), self._masses, rate.edges)
         return impulses.imposed(rate.patches, flat).reshape(values.shape)
 
     def _displacement(self, term: Term) -> float:
@@ -168,13 +169,14 @@ class NewmarkStep:
         v, a = self._mapped
         if begins:
             a = self._first_acceleration(a, obstacles)
-        impulses = Impulses(supports, self._masses, reduction.fixed[: self._masses.size])
+        layout = reduction.layout
+        impulses = Impulses(layout, supports, self._masses, reduction.fixed[: self._masses.size])
         v = self._imposed(v, reduction, impulses, self._speed)
         a = self._imposed(a, reduction, impulses, self._speed_rate)
         slope = 1 / (self._beta * dt**2)
         back = (0.5 / self._beta - 1) * a.ravel()
         impulse = self._masses * (v - self._mapped[0]).ravel() / dt
-        inertia = Inertia(self._masses, slope, dt * v.ravel(), back, impulse)
+        inertia = Inertia(self._masses, slope, dt * v.ravel(), back, impulse, layout)
         self._start = Start(v, a, reduction, impulses, inertia)
         return Problem(
             reduction, contact, self._external, inertia, self._guess(dt * v.ravel()), supports,
@@ -207,7 +209,8 @@ class NewmarkStep:
     def _first_acceleration(self, like: Array, obstacles: Sequence[ObstacleContact]) -> Array:
         """Acceleration by the momentum equation: g in free fall, 0 at rest."""
         force = self._first - self._internal + self._on_border
-        force = sum((contact.at_start[0] for contact in obstacles), force)
+        part = self._now.domain.layout.part
+        force = sum((part(contact.at_start[0]) for contact in obstacles), force)
         return divided(force[: like.size].reshape(like.shape), self._mass[:, None])
 
     def _guess(self, u: Array) -> Array:
@@ -230,9 +233,11 @@ class NewmarkStep:
         assert accepted.acceleration is not None
         start, dt, a1 = self._start, self._dt, accepted.acceleration
         self._rotation.check(accepted.u, dt)
+        layout = start.reduction.layout
         v1 = start.v + dt * ((1 - self._gamma) * start.a + self._gamma * a1)
         for contact in accepted.problem.obstacles:
-            jump = divided(contact.jump[: a1.size].reshape(a1.shape), self._mass[:, None])
+            jump = layout.part(contact.jump)[: a1.size].reshape(a1.shape)
+            jump = divided(jump, self._mass[:, None])
             more_a, more_v = Times(self._gamma, self._beta, dt).corrected(jump)
             a1, v1 = a1 + more_a, v1 + more_v
         v1 = self._imposed(v1, start.reduction, start.impulses, self._speed1)
@@ -240,7 +245,7 @@ class NewmarkStep:
         before = self._mapped[0]
         arrays = self._carried.at_end(accepted.u, before, v1, a1, dt)
         energies = self._balance.of_step(self._mass, (before, start.v, v1), accepted)
-        given = float(start.inertia.impulse @ start.v.ravel()) * dt
+        given = layout.dot(start.inertia.impulse, start.v.ravel()) * dt
         energies.external += given
         energies.impact += given
         energies.external += self._work_of_mean(accepted) + self._work_on_border(accepted)
@@ -255,16 +260,20 @@ class NewmarkStep:
         obstacles [J per metre depth].
         """
         problem, u = accepted.problem, accepted.u.ravel()
-        if problem.terms is None or not problem.terms.loads.any():
+        layout = problem.reduction.layout
+        if problem.terms is None or not layout.largest(problem.terms.loads):
             return 0.0
         n, start = u.size, self._start
         last = problem.terms.loads[:n]
-        of_supports = sum((one.on_body[:n] for one in problem.supports), np.zeros(n))
-        followers = 0.5 * (self._followers[:n] + last - of_supports) @ u
+        of_supports = sum((layout.part(one.on_body)[:n] for one in problem.supports), np.zeros(n))
+        followers = 0.5 * layout.dot(self._followers[:n] + last - of_supports, u)
+        if not any(one.prescribed for one in problem.supports):
+            return followers
         # those of supports at the start of the step balance the others, as a was made to obey them
         first = self._internal + np.pad(self._masses * start.a.ravel(), (0, len(self._first) - n))
         first = (first - self._first - self._followers)[:n]
-        return float(followers + 0.5 * of_supports @ u) + start.impulses.work(0.5 * first, u)
+        work = followers + 0.5 * layout.dot(of_supports, u)
+        return work + start.impulses.work(0.5 * first, u)
 
     def _work_of_mean(self, accepted: Accepted) -> float:
         """Work of the mean of the forces at both ends of the step, of loads that follow an amplitude and
@@ -272,8 +281,9 @@ class NewmarkStep:
         """
         start, u, reduction = self._start, accepted.u.ravel(), accepted.problem.reduction
         first = self._first[: u.size]
-        work = float(0.5 * (first - self._external[: u.size]) @ u)
-        if not reduction.offset[: u.size].any():
+        layout = reduction.layout
+        work = 0.5 * layout.dot(first - self._external[: u.size], u)
+        if not layout.largest(reduction.offset[: u.size]):
             return work
         forces = self._internal[: u.size] + self._masses * start.a.ravel() - first
         return work + reactions.work(reduction, 0.5 * (forces - accepted.forces_at_end.ravel()), u)

@@ -16,6 +16,7 @@ from tawami.grid.edges import Component
 from tawami.motion.observer import Recorder, observed
 from tawami.motion.pace import Pace, Steps
 from tawami.motion.stepping import Stop, end_early, march
+from tawami.particles.following import OfParticles
 from tawami.scene.configuration import Configuration
 from tawami.scene.points import check_in_body
 from tawami.scene.scene import Scene
@@ -53,7 +54,9 @@ class Following:
     ) -> None:
         self.scene, self.point, self.component, self.sign = scene, point, component, sign
         self.factor, self.loads = 0.0, list[float]()
-        self.direction = np.zeros((scene.num_particles, scene.grid.space.dim))
+        number, dim = scene.particles.number.astype(np.int64), scene.grid.space.dim
+        zero = np.zeros((len(number), dim))
+        self.direction = OfParticles(scene.grid.comm, number, zero, everywhere=False)
 
     def header(self) -> str:
         """As `Scene.header`."""
@@ -67,7 +70,7 @@ class Following:
         """As `Scene.state`, with the place on the path."""
         own = {
             "factor": self.factor,
-            "direction": self.direction,
+            "direction": self.direction.state(),
             "point": self.point,
             "loads": self.loads,
         }
@@ -77,7 +80,8 @@ class Following:
         """The reverse of :meth:`state`."""
         self.scene.restore(state)
         own = state["path"]
-        self.factor, self.direction = own["factor"], np.asarray(own["direction"])
+        self.factor = own["factor"]
+        self.direction = OfParticles.of_state(self.scene.grid.comm, own["direction"])
         self.point = None if own["point"] is None else (own["point"][0], own["point"][1])
         self.loads[:] = own["loads"]
 
@@ -122,7 +126,7 @@ class PathStep:
         rate = now.external(ends[1]) - now.external(ends[0])
         terms = now.terms(now.moment(factor), static.supports, static.obstacles, ends)
         follows = terms is not None and terms.loads_grow
-        if not (rate.any() or follows):
+        if not (now.domain.layout.largest(rate) or follows):
             raise InputError(
                 "follow(...): there is no new load: expected a traction, a pressure, a force or gravity "
                 "that the scene has not been solved for"
@@ -133,14 +137,12 @@ class PathStep:
     def _control(self) -> controls.Control:
         domain, following = self.configuration.domain, self.following
         if following.point is not None:
-            held = held_point(
-                domain.model.grid, domain.model.basis, domain.active, following.point,
-                following.component, 0.0, domain.layout.active,
-            )  # fmt: skip
-            return controls.PointControl(held.indices, held.weights, following.sign * self.size)
+            held = held_point(domain.layout, following.point, following.component, 0.0)
+            size = following.sign * self.size
+            return controls.PointControl(domain.layout, held.indices, held.weights, size)
         particles, comm, space = domain.particles, domain.model.grid.comm, domain.model.space
         total = ranks.sum_of(comm, np.array([particles.volume.sum()]))[0]
-        last = following.direction[particles.number]
+        last = following.direction.at(particles.number)
 
         def product(a: Array, b: Array) -> float:
             """Mean over the volume of a . b, particles x dim; the same bits on all ranks."""
@@ -163,12 +165,12 @@ class PathStep:
         """The place on the path after the step."""
         following, now = self.following, self.configuration
         domain, point, dim = now.domain, following.point, now.model.space.dim
-        own = np.zeros_like(following.direction)
-        own[domain.particles.number] = domain.at_particles(accepted.u)
-        direction = ranks.sum_of(now.model.grid.comm, own)
+        number, u = domain.particles.number.astype(np.int64), domain.at_particles(accepted.u)
+        direction = OfParticles(now.model.grid.comm, number, u, everywhere=False)
         control = accepted.problem.path.control if accepted.problem.path else None
         if now.model.moves and isinstance(control, controls.PointControl) and point is not None:
-            x, y = point + control.weights @ accepted.u[control.indices // dim]
+            moved = domain.layout.vectors_at(accepted.u, control.indices // dim)
+            x, y = point + control.weights @ moved
             point = (float(x), float(y))
         return PathUpdate(following, now, accepted.step.factor, direction, point)
 
@@ -185,7 +187,7 @@ class PathUpdate:
     following: Following
     configuration: Configuration
     factor: float
-    direction: Array
+    direction: OfParticles
     point: tuple[float, float] | None
 
     def store(self, dissipated: float) -> None:

@@ -13,6 +13,7 @@ from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array, Mask
 from tawami.base.errors import CheckpointError, InputError
+from tawami.base.shared_file import Rows, by_number
 from tawami.grid.grid import EDGES, Edge, Grid
 
 #: Least distance of moving particles from the sides of their cell [cells]. A single particle on a side
@@ -33,7 +34,8 @@ def located(grid: Grid, x: Array, *, moving: bool, moved: bool = True) -> _rust.
         moved: Whether they may have passed a wall a little.
     """
     if moving and moved:
-        x = np.clip(x, grid.origin, grid.upper)
+        on_edge = np.clip(x, grid.origin, grid.upper)
+        x = np.where(np.abs(x - on_edge) <= BEYOND * grid.h, on_edge, x)
     location = grid.rust.locate(x)
     return location.away_from_sides(MARGIN) if moving else location
 
@@ -55,25 +57,35 @@ def outside(grid: Grid, x: Array, walls: Collection[Edge] = ()) -> Mask:
 
 
 def distributed(
-    grid: Grid, body: _rust.Particles, *, moving: bool, moved: bool = False
+    grid: Grid, body: _rust.Particles, moving: bool, *, whole: bool = True, moved: bool = False
 ) -> tuple[_rust.Particles, _rust.Location]:
-    """The particles in this rank's cells, from a body that every rank has; see :func:`located`.
+    """The particles in this rank's cells, which are those of its window; a collective call.
+
+    Args:
+        grid: The grid.
+        body: Particles of the body.
+        moving, moved: As of `located`.
+        whole: Whether every rank has all of them; else each is on one rank.
 
     Raises:
-        InputError: Particles are outside the grid, or the body is not the same on all ranks.
+        InputError: Particles are outside the grid, or a whole body is not the same on all ranks.
     """
+    if not whole:
+        return migrated(grid, body, moving=moving, moved=moved)
     location = located(grid, body.x, moving=moving, moved=moved)
     if grid.comm.size == 1:
-        return body, location
+        return body, grid.window.place(location)
     parts = (body.x, body.volume, body.material)
     digest = hashlib.sha1(b"".join(part.tobytes() for part in parts)).digest()
     if len(set(grid.comm.allgather(digest))) > 1:
         raise InputError(
             "the body is not the same on all ranks: expected the same positions, volumes and "
-            "materials on each. Give random numbers a seed, or make it on one rank and bcast it"
+            "materials on each. Give random numbers a seed, or make it on one rank and bcast it; to "
+            "move or choose particles of box(...) and other shapes, whose ranks have a part each, use "
+            "dataclasses.replace(body, x=...) or body[mask]"
         )
-    mine = np.flatnonzero(grid.rank_of_cell[location.cell] == grid.comm.rank).astype(np.uint32)
-    return body.select(mine), location.select(mine)
+    mine = np.flatnonzero(grid.window.owns(location)).astype(np.uint32)
+    return body.select(mine), grid.window.place(location.select(mine))
 
 
 def columns(particles: _rust.Particles) -> list[tuple[str, int]]:
@@ -91,18 +103,24 @@ def in_order(comm: Any, number: npt.NDArray[Any]) -> Callable[[npt.ArrayLike], A
     return lambda values: ranks.allgathered(comm, np.asarray(values))[order]
 
 
-def gathered(grid: Grid, particles: _rust.Particles) -> dict[str, Array]:
-    """Arrays of the particles of all ranks by name, in the order of their numbers, on every rank."""
-    rows = in_order(grid.comm, particles.number)(particles.rows())
+def arrays(particles: _rust.Particles) -> dict[str, Array]:
+    """Arrays of the particles of this rank by name, each particles x components."""
     names, widths = zip(*columns(particles), strict=True)
-    parts = np.split(rows, np.cumsum(widths)[:-1], axis=1)
+    parts = np.split(particles.rows(), np.cumsum(widths)[:-1], axis=1)
     return dict(zip(names, map(np.ascontiguousarray, parts), strict=True))
 
 
-def scattered(
-    grid: Grid, particles: _rust.Particles, arrays: Mapping[str, Array], *, moving: bool
+def stored(comm: Any, particles: _rust.Particles) -> dict[str, Rows]:
+    """Arrays of the particles of all ranks by name, in the order of their numbers, in equal blocks."""
+    sort = by_number(comm, particles.number)
+    return {name: sort(values) for name, values in arrays(particles).items()}
+
+
+def restored(
+    grid: Grid, particles: _rust.Particles, given: Mapping[str, Rows | Array], *, moving: bool
 ) -> tuple[_rust.Particles, _rust.Location]:
-    """The particles of this rank from gathered arrays, the reverse of :func:`gathered`.
+    """The particles of this rank, the reverse of :func:`stored`; arrays that are whole are those of all
+    ranks.
 
     The result is `particles` itself, with these values, if the particles of this rank are the same.
 
@@ -110,28 +128,48 @@ def scattered(
         CheckpointError: The arrays are not those of the particles.
     """
     wanted = dict(columns(particles))
-    found = {name: array.shape[1] for name, array in arrays.items()}
+    found = {name: array.shape[1] for name, array in given.items()}
     if wanted != found:
         differ = sorted(set(wanted.items()) ^ set(found.items()))
         raise CheckpointError(
             f"its particles have other arrays than those of the scene: {differ[0][0]} is in one of them "
             "only, or has another width. Expected the same form, laws and motion"
         )
-    everything = particles.of_rows(np.hstack([arrays[name] for name in wanted]))
-    mine, location = distributed(grid, everything, moving=moving, moved=True)
+    whole = not isinstance(given["x"], Rows)
+    parts = (given[name] for name in wanted)
+    rows = np.hstack([part.own if isinstance(part, Rows) else part for part in parts])
+    mine, location = distributed(grid, particles.of_rows(rows), moving, whole=whole, moved=True)
     return (particles if particles.assign(mine) else mine), location
 
 
-def migrated(grid: Grid, particles: _rust.Particles) -> tuple[_rust.Particles, _rust.Location]:
-    """Move particles to the rank of their cell, in the order of their numbers."""
+def numbered(particles: _rust.Particles, number: npt.NDArray[Any]) -> _rust.Particles:
+    """The same particles with other numbers."""
+    names, widths = zip(*columns(particles), strict=True)
+    rows = particles.rows()
+    rows[:, sum(widths[: names.index("number")])] = number
+    return particles.of_rows(rows)
+
+
+def migrated(
+    grid: Grid, particles: _rust.Particles, *, moving: bool = True, moved: bool = True
+) -> tuple[_rust.Particles, _rust.Location]:
+    """Move particles to the rank of their cell, in the order of their numbers; a collective call.
+
+    Returns:
+        The particles of this rank, and their cells in its window.
+
+    Raises:
+        InputError: Particles are outside the grid.
+    """
     comm = grid.comm
     while True:
-        location = located(grid, particles.x, moving=True)
+        with ranks.raise_together(comm):
+            location = located(grid, particles.x, moving=moving, moved=moved)
         if comm.size == 1:
-            return particles, location
-        rank = grid.rank_of_cell[location.cell]
+            return particles, grid.window.place(location)
+        rank = grid.ranks_of(location.cell.astype(np.int64))
         if not ranks.any_of(comm, np.array([(rank != comm.rank).any()]))[0]:
-            return particles, location
+            return particles, grid.window.place(location)
         particles = particles.of_rows(ranks.exchanged(comm, particles.rows(), rank))
         particles = particles.select(np.argsort(particles.number).astype(np.uint32))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from tawami.base.timing import Stopwatch
 from tawami.fem.rules import Rule
 from tawami.form.compilation import CompiledForm
 from tawami.form.quantities import Density, LawQuantity, ParticleScalar
+from tawami.grid.grid import Grid
 from tawami.particles.numpy_stage import NumpyStage
 
 #: K/mu beyond which a larger bulk modulus makes forces no larger.
@@ -34,7 +34,7 @@ class Responses:
         location: Their cells and positions in them.
         stage: Their material laws.
         values: Numbers of the particles by name, K and mu [Pa] among them.
-        comm: Communicator.
+        grid: The grid.
         stopwatch: Measures the time of the laws.
 
     Attributes:
@@ -56,20 +56,20 @@ class Responses:
         location: _rust.Location,
         stage: _rust.Stage | NumpyStage,
         values: Mapping[str, Array],
-        comm: Any,
+        grid: Grid,
         stopwatch: Stopwatch,
     ) -> None:
         self.form, self.stage, self.values = compiled.form, stage, values
         self.constants = {name: values[name] for name in ("K", "mu")}
         self.particles, self.location = particles, location
-        self._comm, self._stopwatch = comm, stopwatch
+        self._comm, self._window, self._stopwatch = grid.comm, grid.window, stopwatch
         self.data: dict[Rule, Array] = {
             rule: np.zeros((len(particles), compiled.columns(rule))) for rule in compiled.densities
         }
         requests: dict[Rule, list[Request]] = {rule: [] for rule in self.data}
         #: Numbers that may change between steps, with their arrays and columns.
         self._varying = list[tuple[ParticleScalar, Array, int]]()
-        with ranks.raise_together(comm):
+        with ranks.raise_together(self._comm):
             for rule, densities in compiled.densities.items():
                 for density, column in densities.items():
                     quantity = density.quantity
@@ -85,7 +85,7 @@ class Responses:
         mu = self.constants["mu"]
         softer = np.minimum(self.constants["K"], LOCKED * mu)
         self.stiffest, self.largest_mu = (
-            ranks.largest(comm, float(modulus.max(initial=0.0))) for modulus in (softer, mu)
+            ranks.largest(self._comm, float(modulus.max(initial=0.0))) for modulus in (softer, mu)
         )
 
     def _request(self, density: Density, column: int) -> Request:
@@ -143,20 +143,8 @@ class Responses:
                     self.stage.evaluate(u, volumetric, self._requests, self._written)
         return self.data
 
-    def sums(self, columns: Array, *, squared: bool = False) -> Array:
-        """Volume-weighted sums over all particles of the body on bilinear functions, or their squares.
-
-        A collective call.
-
-        Args:
-            columns: Values of this rank's particles, particles x columns.
-        """
-        volume = self.particles.volume
-        sums = _rust.nodal_sums(self.location, volume, columns, "bilinear", squared)
-        return ranks.sum_of(self._comm, sums)
-
     def cell_sums(self, columns: Array) -> Array:
-        """Sums over all particles of the body in each cell of the grid, cells x columns.
+        """Sums over all particles of the body in each cell of the window, cells x columns.
 
         A collective call.
 
@@ -164,9 +152,9 @@ class Responses:
             columns: Values of this rank's particles, particles x columns.
         """
         once = np.ones(len(self.particles))
-        return ranks.sum_of(self._comm, _rust.cell_sums(self.location, once, columns))
+        return self._window.of_cells.update(_rust.cell_sums(self.location, once, columns))
 
     @property
     def particles_per_cell(self) -> Indices:
-        """Number of particles in each cell, x fastest; a collective call."""
+        """Number of particles in each cell of the window, x fastest; a collective call."""
         return self.cell_sums(np.ones((len(self.particles), 1)))[:, 0].astype(np.int64)

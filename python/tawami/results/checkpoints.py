@@ -16,7 +16,7 @@ from tawami.base import archive, checks
 from tawami.base.errors import CheckpointError, CheckpointWarning, OutputError, TawamiError
 from tawami.base.files import writing
 from tawami.base.identity import differences, not_compared
-from tawami.base.ranks import raise_together
+from tawami.base.ranks import raise_together, same
 from tawami.motion.observer import Subject
 from tawami.motion.pace import check as check_pace
 
@@ -97,16 +97,14 @@ class Checkpoints:
         if not self.resumes:
             return None
         state: dict[str, Any] | None = None
-        problems, files, unknown = list[str](), list[Path](), list[str]()
-        if self._comm.rank == 0:
-            files = self._files()[0]
-            for path in reversed(files):
-                try:
-                    state, unknown = self._read(path, like)
-                    break
-                except CheckpointError as error:
-                    problems.append(str(error))
-        state, problems, files, unknown = self._comm.bcast((state, problems, files, unknown))
+        problems, unknown = list[str](), list[str]()
+        files = same(self._comm, self._files()[0] if self._comm.rank == 0 else [])
+        for path in reversed(files):
+            try:
+                state, unknown = self._read(path, like)
+                break
+            except CheckpointError as error:
+                problems.append(str(error))
         for problem in problems[: len(files) - 1]:
             self._warn(f"{problem}. The checkpoint before it is tried")
         if state is None and problems:
@@ -133,19 +131,21 @@ class Checkpoints:
 
     def _read(self, path: Path, like: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
         """The state of a checkpoint of this run, and the names of values that could not be compared."""
-        written, state = archive.read(path)
+        written, state = archive.read(path, self._comm)
         for name, other, own in differences(written, self._identity):
             raise CheckpointError(
                 f"checkpoint '{path}' belongs to another run: {name} is {_short(other)} there and "
                 f"{_short(own)} here. Expected the same scene; start a new run with existing='replace'"
             )
-        try:
-            archive.check_particles(state["scene"]["particles"])
-            archive.check_like({name: state[name] for name in like}, like, "")
-            check_pace(state["pace"], state["steps"])
-            archive.check_like(state["outputs"], {name: {} for name in state["outputs"]}, "outputs")
-        except (AttributeError, LookupError, TypeError, ValueError) as error:
-            raise archive.unusable(path, error) from error
+        with raise_together(self._comm):
+            try:
+                archive.check_particles(state["scene"]["particles"])
+                archive.check_like({name: state[name] for name in like}, like, "")
+                check_pace(state["pace"], state["steps"])
+                outputs: dict[str, Any] = {name: {} for name in state["outputs"]}
+                archive.check_like(state["outputs"], outputs, "outputs")
+            except (AttributeError, LookupError, TypeError, ValueError) as error:
+                raise archive.unusable(path, error) from error
         return state, list(dict.fromkeys(not_compared(written, self._identity)))
 
     def restart(self, steps: int) -> None:
@@ -167,9 +167,9 @@ class Checkpoints:
             OutputError: It cannot be written.
         """
         path = self.folder / archive.FOLDER / archive.name_of(self.number, self.phase, steps)
+        archive.write(path, self._identity, state, self._comm)
         with raise_together(self._comm):
             if self._comm.rank == 0:
-                archive.write(path, self._identity, state)
                 own, later = self._files()
                 with writing(path.parent):
                     for old in [*own[: -self.schedule.keep], *later]:

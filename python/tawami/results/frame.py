@@ -9,11 +9,12 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from tawami.motion.observer import Snapshot
+from tawami.base.shared_file import Rows, by_number
+from tawami.motion.observer import Snapshot, Subject
 from tawami.results.grid_quantities import GridQuantity
 from tawami.results.projection import vertices
 from tawami.scene.outline import Outline
-from tawami.scene.quantities import Arrays, Quantity
+from tawami.scene.quantities import Arrays, Quantity, local_arrays, own_values
 
 Array = npt.NDArray[Any]
 
@@ -28,6 +29,8 @@ class Frame:
         cells: Numbers of their points, cells x 1, 2 or 4.
         on_points: Fields by label, points or points x components.
         on_cells: Fields of the cells, likewise.
+        first, total: Rows of other ranks before those of this rank, and rows of all; None where every
+            rank has all.
     """
 
     points: Array
@@ -35,13 +38,32 @@ class Frame:
     cells: Array
     on_points: dict[str, Array] = field(default_factory=dict)
     on_cells: dict[str, Array] = field(default_factory=dict)
+    first: int = 0
+    total: int | None = None
+
+    def rows(self, comm: Any, array: Array) -> Rows:
+        """The rows of an array that this rank writes."""
+        if self.total is None:
+            return Rows.of_first_rank(comm, array)
+        return Rows(array, self.first, self.total)
 
 
-def particle_frame(quantities: Sequence[Quantity], arrays: Arrays) -> Frame:
-    """Particles as vertices."""
-    x = arrays["x"]
-    data = {quantity.label: _spatial(quantity.values(arrays)) for quantity in quantities}
-    return Frame(with_z(x), "vertex", np.arange(len(x))[:, None], data)
+def particle_frame(
+    quantities: Sequence[Quantity], subject: Subject, own: Arrays | None = None
+) -> Frame:
+    """Particles as vertices, in the order of their numbers; a call for all ranks.
+
+    Args:
+        quantities: Fields of the particles.
+        subject: Scene or motion.
+        own: Arrays of this rank's particles; those of the subject by default.
+    """
+    own = local_arrays(subject) if own is None else own
+    sort = by_number(subject.scene.grid.comm, own["number"])
+    x = sort(own["x"])
+    data = {one.label: _spatial(sort(own_values(one, subject, own)).own) for one in quantities}
+    cells = x.first + np.arange(len(x.own))[:, None]
+    return Frame(with_z(x.own), "vertex", cells, data, first=x.first, total=x.total)
 
 
 def grid_frame(quantities: Sequence[GridQuantity], snapshot: Snapshot) -> Frame:

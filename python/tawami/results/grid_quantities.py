@@ -21,10 +21,10 @@ from tawami.scene.quantities import (
     PARTICLES,
     Given,
     Quantity,
-    body_arrays,
     local_arrays,
     of_particles,
     of_scene,
+    own_values,
     unknown,
 )
 from tawami.scene.scene import Scene
@@ -113,10 +113,8 @@ def _projected_own(quantity: Quantity, projection: Projection) -> GridQuantity:
         )
 
     def of(now: Snapshot) -> Array:
-        arrays = body_arrays(now.subject)
-        values = quantity.values(arrays)
-        mine = np.searchsorted(arrays["number"], np.asarray(now.scene.particles.number))
-        return nodal(now.scene, values[mine], projection)
+        values = own_values(quantity, now.subject, local_arrays(now.subject))
+        return nodal(now.scene, values, projection)
 
     return GridQuantity(quantity.label, of)
 
@@ -126,10 +124,16 @@ def _at_vertices(scene: Scene, coefficients: Array) -> Array:
     return np.asarray(matrix @ scene.grid.space.vectors(coefficients))
 
 
+def _before(scene: Scene) -> Array:
+    """Coefficients of the whole grid since the start."""
+    return scene.configuration.domain.layout.whole(scene.configuration.before)
+
+
 def _displacement(now: Snapshot) -> Array:
     """Displacement since the start; at finite strain, of the last step."""
     scene, solution = now.scene, now.solution
-    u = scene.split(scene.configuration.before)[0] if solution is None else solution.u
+    u = _before(scene)[: scene.configuration.domain.layout.num_displacement_of_grid]
+    u = u if solution is None else solution.u
     return _at_vertices(scene, u)
 
 
@@ -138,9 +142,9 @@ def _bilinear(name: str) -> Callable[[Snapshot], Array]:
 
     def of(now: Snapshot) -> Array:
         configuration = now.scene.configuration
-        part = configuration.domain.layout.fields[name].slice
+        part = configuration.domain.layout.of_grid[name].slice
         solution = now.solution
-        of_all = configuration.before if solution is None else solution.coefficients
+        of_all = _before(now.scene) if solution is None else solution.coefficients
         return np.asarray(of_all[part])
 
     return of
@@ -150,15 +154,16 @@ def _velocity(now: Snapshot) -> Array:
     """Velocity of the particles, weighted by mass, with its gradient; NaN without particles around."""
     motion, attached = now.subject.motion, now.scene.configuration.domain
     assert motion is not None
-    kept = motion.on_grid
+    kept, functions, basis = motion.on_grid, attached.layout.functions, attached.layout.basis
     if kept is not None:  # a grid that is not reset has its own velocity
-        return _at_vertices(now.scene, kept[0])
+        return _at_vertices(now.scene, functions.whole(basis, kept[0]).ravel())
     fields = [(motion.velocity, motion.velocity_gradient)]
     (momentum,) = to_grid(attached, motion.mass, fields)
     mass = attached.sums(motion.mass, np.ones((len(motion.mass), 1)))
     v = np.divide(momentum, mass, out=np.zeros_like(momentum), where=mass > 0)
-    near = attached.sums(motion.mass, np.ones((len(motion.mass), 1)), "bilinear") > 0
-    return np.where(near, _at_vertices(now.scene, v), np.nan)
+    sums = attached.sums(motion.mass, np.ones((len(motion.mass), 1)), "bilinear")
+    near = functions.whole("bilinear", sums) > 0
+    return np.where(near, _at_vertices(now.scene, functions.whole(basis, v).ravel()), np.nan)
 
 
 def _reaction(now: Snapshot) -> Array:

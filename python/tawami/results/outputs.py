@@ -11,14 +11,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tawami.base.errors import NotModelledError
-from tawami.base.ranks import raise_together
+from tawami.base.ranks import raise_together, same
 from tawami.motion.observer import Snapshot, Subject
 from tawami.results.frame import Frame, border_frame, grid_frame, particle_frame
 from tawami.results.grid_quantities import on_grid, usual_on_grid
 from tawami.results.output import Output
 from tawami.results.projection import Projection, check_projection
 from tawami.results.series import Series
-from tawami.scene.quantities import Given, body_arrays, of_particles, usual_of_particles
+from tawami.results.vtu import write_vtu
+from tawami.scene.quantities import Given, of_particles, usual_of_particles
 
 
 class _SeriesOutput(Output):
@@ -30,9 +31,11 @@ class _SeriesOutput(Output):
 
     def _write(self, snapshot: Snapshot, size: float) -> None:
         frame, comm = self._frame(snapshot), snapshot.scene.grid.comm
+        path = self._series.path(snapshot.step) if comm.rank == 0 else Path()
+        write_vtu(same(comm, path), frame, comm)
         with raise_together(comm):
             if comm.rank == 0:
-                self._series.write(snapshot.step, snapshot.time, frame)
+                self._series.add(snapshot.step, snapshot.time)
 
     def _frame(self, snapshot: Snapshot) -> Frame:
         raise NotImplementedError
@@ -65,7 +68,7 @@ class ParticleOutput(_SeriesOutput):
         self._quantities = of_particles(self.names or usual_of_particles(subject), subject)
 
     def _frame(self, snapshot: Snapshot) -> Frame:
-        return particle_frame(self._quantities, body_arrays(snapshot.subject))
+        return particle_frame(self._quantities, snapshot.subject)
 
 
 class BorderOutput(_SeriesOutput):

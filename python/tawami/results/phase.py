@@ -177,7 +177,7 @@ class Phase:
     def accepted(self, solution: Solution, *, last: bool) -> None:
         """Report the step; the outputs observe it."""
         steps, self._last = self._steps, last
-        particles = len(solution.number)
+        particles = solution.num_particles
         self._progress.step(len(steps), self._pace.at, steps[-1], particles, last=last)
         self._observe(solution, last=last)
         self._seen = len(steps)

@@ -73,6 +73,8 @@ def nodal(scene: Scene, values: Array, method: Projection = "lumped") -> Array:
     found = np.divide(right, weight, out=np.zeros_like(right), where=near)
     if method == "consistent":
         found = _conjugate_gradients(scene, found, weight, right)
+    whole = scene.configuration.domain.layout.functions.whole
+    found, near = whole("bilinear", found), whole("bilinear", weight) > 0
     return np.where(near, found, np.nan).reshape(-1, *np.shape(values)[1:])
 
 
@@ -84,9 +86,13 @@ def _sums(scene: Scene, data: Array) -> Array:
 def _conjugate_gradients(scene: Scene, start: Array, weight: Array, right: Array) -> Array:
     """Consistent projection of each column, preconditioned by the lumped matrix.
 
-    Every rank has complete vectors and does the same iterations.
+    All ranks do the same iterations.
     """
-    location = scene.configuration.domain.location
+    domain = scene.configuration.domain
+    location, functions = domain.location, domain.layout.functions
+
+    def dot(a: Array, b: Array) -> Array:
+        return np.array([functions.dot("bilinear", *of) for of in zip(a.T, b.T, strict=True)])
 
     def product(f: Array) -> Array:
         at_particles = [
@@ -100,15 +106,15 @@ def _conjugate_gradients(scene: Scene, start: Array, weight: Array, right: Array
 
     f, r = start.copy(), right - product(start)
     z = divide(r, np.broadcast_to(weight, r.shape))
-    d, rz = z.copy(), (r * z).sum(axis=0)
-    enough = SMALL**2 * (right * start).sum(axis=0)  # below this it is round-off
+    d, rz = z.copy(), dot(r, z)
+    enough = SMALL**2 * dot(right, start)  # below this it is round-off
     for _ in range(MOST):
         if (rz <= enough).all():
             break
         q = product(d)
-        step = np.where(rz > enough, divide(rz, (d * q).sum(axis=0)), 0.0)
+        step = np.where(rz > enough, divide(rz, dot(d, q)), 0.0)
         f, r = f + step * d, r - step * q
         z = divide(r, np.broadcast_to(weight, r.shape))
-        before, rz = rz, (r * z).sum(axis=0)
+        before, rz = rz, dot(r, z)
         d = z + divide(rz, before) * d
     return f

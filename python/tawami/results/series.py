@@ -15,7 +15,6 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
-from tawami.base import checks
 from tawami.base.errors import OutputError
 from tawami.base.files import atomic_file, reason, result_folder, unreadable, writing
 from tawami.results.frame import Frame
@@ -30,23 +29,6 @@ TAIL = "</Collection>\n</VTKFile>"
 NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
 #: Time, and path of the file from the folder of the index.
 Entry = tuple[float, str]
-
-
-def write_vtu(path: str | Path, frame: Frame) -> None:
-    """Write a VTU file. It is not compressed: zlib takes eight times as long (`cases/costs/writing.py`).
-
-    Raises:
-        OutputError: The file cannot be written, or has another ending.
-    """
-    import meshio  # here: a scene without output does not need it
-
-    if checks.path("path", path).suffix != ".vtu":
-        raise OutputError(f"'{path}': expected a file name ending in .vtu")
-    cells = [(frame.kind, frame.cells)]
-    on_cells = {name: [values] for name, values in frame.on_cells.items()}
-    mesh = meshio.Mesh(frame.points, cells, point_data=frame.on_points, cell_data=on_cells)
-    with atomic_file(path) as part:
-        meshio.vtu.write(part, mesh, compression=None)
 
 
 class Series:
@@ -85,14 +67,17 @@ class Series:
         number = path.stem.rpartition("-")[2]
         return os.path.isfile(path) and number.isdecimal() and int(number) <= (last or 0)
 
-    def write(self, step: int, time: float, frame: Frame) -> None:
-        """Add a file.
+    def path(self, step: int) -> Path:
+        """Path of the file of a step."""
+        return self.files / f"{self.name}-{step:06d}.vtu"
+
+    def add(self, step: int, time: float) -> None:
+        """Add the file of a step to the index.
 
         Raises:
             OutputError: It cannot be written; the series is unchanged.
         """
-        path = self.files / f"{self.name}-{step:06d}.vtu"
-        write_vtu(path, frame)
+        path = self.path(step)
         self._entries.append((float(time), f"{self.name}/{path.name}"))
         try:
             self._write_index()

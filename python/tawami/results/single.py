@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from tawami.base import checks
-from tawami.base.ranks import raise_together
 from tawami.motion.observer import Snapshot
 from tawami.results.frame import Frame, grid_frame, particle_frame
 from tawami.results.grid_quantities import on_grid, usual_on_grid
-from tawami.results.series import write_vtu
+from tawami.results.vtu import write_vtu
 from tawami.scene.quantities import of_particles
 from tawami.scene.solution import Solution
 
@@ -32,7 +31,7 @@ def write_particles(path: str | Path, solution: Solution) -> None:
     scene = solution.scene
     names = ["displacement", "stress", "mean stress", "volume"]
     names += ["eps_v"] if scene.form.kinematics.has_eps_v else []
-    frame = particle_frame(of_particles(names, scene), solution.arrays)
+    frame = particle_frame(of_particles(names, scene), scene, solution.own)
     _write(path, frame, scene.grid.comm)
 
 
@@ -55,6 +54,4 @@ def write_grid(path: str | Path, solution: Solution) -> None:
 
 
 def _write(path: str | Path, frame: Frame, comm: Any) -> None:
-    with raise_together(comm):
-        if comm.rank == 0:
-            write_vtu(path, frame)
+    write_vtu(path, frame, comm)

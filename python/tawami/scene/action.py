@@ -14,12 +14,12 @@ import numpy as np
 
 from tawami.base.errors import CheckpointError, InputError
 from tawami.base.identity import text
-from tawami.base.meaning import fingerprint
+from tawami.particles.following import OfParticles
 from tawami.scene.activity import Activity
 from tawami.scene.factor import Factor, InTime
 from tawami.scene.share import Moment, Share
 
-#: A component of a value: a number, a function of position, or an array with a number for each particle.
+#: A component of a value: a number, a function of position, or a number for each particle.
 Value = Any
 Acts = TypeVar("Acts", bound="Action")
 
@@ -222,9 +222,7 @@ class Action:
                 "number": term.number,
                 "since": term.since,
                 "share": term.share.state(),
-                "values": [
-                    [] if callable(value) else np.ravel(value).tolist() for value in term.values
-                ],
+                "values": [_stored(value) for value in term.values],
                 "factor": term.factor.constant,
             }
             for term in self.terms
@@ -232,6 +230,10 @@ class Action:
         return {
             "number": self.number, "made": self._made, "released": self.released, "terms": terms
         }  # fmt: skip
+
+    def _restored(self, stored: Any) -> Value:
+        """A value of a checkpoint."""
+        return stored[0]
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`state`.
@@ -253,7 +255,7 @@ class Action:
                     f"{name} was changed to a function or another velocity during the run (each=): "
                     "expected such changes between two phases, or an amplitude"
                 )
-            given = (value[0] if len(value) == 1 else np.array(value) for value in values)
+            given = (self._restored(value) for value in values)
             term = term or Term(number, tuple(given), factor, since)
             term.share.restore(stored["share"])
             self.terms.append(term)
@@ -262,10 +264,17 @@ class Action:
         self._made, self.released = state["made"], state["released"]
 
 
+def _stored(value: Value) -> Any:
+    """A value for a checkpoint; nothing of a function."""
+    if isinstance(value, OfParticles):
+        return value.state()
+    return [] if callable(value) else [float(value)]
+
+
 def _fact(value: Value) -> Any:
     """A value as JSON holds it, to compare it."""
-    if isinstance(value, np.ndarray):
-        return fingerprint(value, float(np.abs(value).max(initial=0.0)))
+    if isinstance(value, OfParticles):
+        return value.identity()
     return text(value) if callable(value) else float(value)
 
 

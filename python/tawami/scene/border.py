@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami import _rust
-from tawami.base import checks, stored
+from tawami.base import checks, ranks, stored
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import CheckpointError, InputError
 from tawami.base.text import meant, quoted
@@ -58,7 +58,7 @@ class SceneBorder:
 
     Args:
         model: Grid, form and laws of the scene; its border is None for a body without one.
-        particles: The particles of the whole body.
+        particles: The particles of this rank.
 
     Attributes:
         points: All points; None for a body without a border.
@@ -220,18 +220,16 @@ class SceneBorder:
             of = halve(self._ends, self._grid.h)
             self._left, self._shares = self._left[of], self._shares[of]
         all_points = [points for points in self.all if points is not self._ends]
-        if not any(points.is_stretched for points in all_points):
-            return
-        kept = {points: points.divide() for points in all_points}
-        for user in self.users:
-            user.keep(kept)
+        if any(points.is_stretched for points in all_points):
+            kept = {points: points.divide() for points in all_points}
+            for user in self.users:
+                user.keep(kept)
 
     def excavate(self, excavation: Excavation) -> None:
         """Drop the border where particles are removed; a call for all ranks."""
         if self._pieces_at_lines is not None:
             self._excavate_pieces(excavation, self._pieces_at_lines)
-        all_points = [points for points in self.all if points is not self._ends]
-        kept = {points: points.excavate(excavation) for points in all_points}
+        kept = {part: part.excavate(excavation) for part in self.all if part is not self._ends}
         for user in self.users:
             user.keep(kept)
 
@@ -293,10 +291,12 @@ class SceneBorder:
 def check_fits(grid: Grid, points: BorderPoints, x: Array, area: Array) -> None:
     """Check that a closed border encloses the particles: area and centroid by the divergence theorem.
 
+    A call for all ranks.
+
     Args:
         grid: The grid.
         points: Points of the border.
-        x: Positions of all particles [m], particles x dim.
+        x: Positions of the particles of this rank [m], particles x dim.
         area: Their areas in the plane [m2].
 
     Raises:
@@ -311,8 +311,8 @@ def check_fits(grid: Grid, points: BorderPoints, x: Array, area: Array) -> None:
     middle[:axis] = 0.0
     enclosed = ((points.x - middle) * flux).sum() / grid.space.dim
     centroid = ((points.x - middle) ** 2 * flux).sum(axis=0) / 2 / enclosed
-    total = area.sum()
-    away = float(np.linalg.norm(centroid - area @ (x - middle) / total))
+    total, *moments = ranks.sum_of(grid.comm, np.array([area.sum(), *(area @ (x - middle))]))
+    away = float(np.linalg.norm(centroid - np.array(moments) / total))
     if abs(enclosed - total) > FITS * total or away > FITS * max(grid.h, np.sqrt(total)):
         raise InputError(
             f"the border of the body encloses {enclosed:.6g} m2 and its particles have {total:.6g} m2, "

@@ -13,7 +13,7 @@ from tawami.base.text import quoted
 from tawami.border.shapes import Shape
 from tawami.grid.edges import Profile
 from tawami.grid.grid import Edge
-from tawami.scene import selection, wall_gap
+from tawami.scene import wall_gap
 from tawami.scene.border import Part, label
 from tawami.scene.configuration import Configuration
 from tawami.scene.factor import InTime
@@ -295,8 +295,7 @@ class Conditions:
                 amplitude that is not a finite number at the present time.
         """
         now = self.configuration
-        chosen = selection.numbers(now.domain, "load(...): particles", particles)
-        return now.loads.add_forces(chosen, force, amplitude)
+        return now.loads.add_forces(now.domain, particles, force, amplitude)
 
     def gravity(self, acceleration: Sequence[float], *, amplitude: InTime | None = None) -> Load:
         """Load the body by its weight. As all loads, a second call adds to the first.

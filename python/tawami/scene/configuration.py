@@ -17,11 +17,11 @@ from tawami import _rust
 from tawami.base import checks, ranks, signals
 from tawami.base.arrays import Array
 from tawami.base.errors import CheckpointError
-from tawami.base.meaning import fingerprint
 from tawami.base.process import check_process
 from tawami.base.program import leave_together
 from tawami.base.timing import Stopwatch
 from tawami.particles import placement
+from tawami.particles.following import fingerprints
 from tawami.scene import (
     coverage,
     fitting,
@@ -63,7 +63,7 @@ class Configuration:
 
     Args:
         model: Grid, form and laws of the scene.
-        particles: The particles of the whole body, on every rank.
+        particles: The particles of the body that the driver script has on this rank.
         numerics: Numerical settings of a step.
 
     Attributes:
@@ -82,19 +82,20 @@ class Configuration:
 
     def __init__(self, model: Model, particles: _rust.Particles, numerics: Numerics) -> None:
         self.model, self.numerics, self.stopwatch = model, numerics, Stopwatch()
-        mine, location = placement.distributed(model.grid, particles, moving=model.moves)
+        whole = model.part is None
+        mine, location = placement.distributed(model.grid, particles, model.moves, whole=whole)
         if model.form.kinematics.has_eps_v:
             mine.add_eps_v()
         mine.add_strain(model.moves, model.grid.geometry)
         own_fields.carry(model.form, mine, model.space.dim)
-        self.border = SceneBorder(model, particles)
+        self.border = SceneBorder(model, mine)
         self.border_sums = BorderSums(model, self.border, lambda: self.total)
         self._attach(mine, location)
         self.activity = Activity()
         own = model.form.own_fields
         self.supports = Supports(model.grid, model.basis, own, self.border, self.activity)
         self.obstacles = Obstacles(self.border, self.activity)
-        self.loads = Loads(model.grid, np.array(particles.volume), self.activity)
+        self.loads = Loads(model.grid, self.activity)
         self.border.users += [self.supports, self.obstacles, self.border_sums]
         self.total = np.zeros(self.domain.layout.size)
         self.inputs = FormInputs(model, self.activity.time, self.border_sums)
@@ -167,7 +168,7 @@ class Configuration:
             ends: Load factors 0 and 1 of a path.
         """
         found: list[Term] = [*self.loads.following(self.domain, now, ends), *supports, *obstacles]
-        return Terms(found, self.model.grid.comm) if found else None
+        return Terms(found, self.domain.layout, supports, obstacles) if found else None
 
     def external(self, now: Moment | None = None) -> Array:
         """External forces on all coefficients [N per metre depth], under all loads by default."""
@@ -261,7 +262,7 @@ class Configuration:
         if moved is None:
             coefficients = self.total = self.total + coefficients
             return self._outcome(accepted, coefficients)
-        self.supports.follow(accepted.u, accepted.problem.reduction.points)
+        self.supports.follow(self.domain.layout, accepted.u, accepted.problem.reduction.points)
         projects = self._travel.must_project(self.domain, moved.particles)
         self.domain.particles.move_to(moved.particles)
         with left_edges.taken_over(self.domain, self.supports.all, accepted.forces):
@@ -279,8 +280,8 @@ class Configuration:
 
     def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:
         self.obstacles.warn(self.domain, coefficients)
-        wall_gap.warn_of_distant(self.supports.walls, self.domain, accepted.forces)
-        arrays = quantities.of_body(self.model.grid.comm, self.domain.particles)
+        wall_gap.warn_of_distant(self.supports.walls, self.domain, accepted)
+        arrays = quantities.copies(self.domain.particles)
         return Outcome(accepted, coefficients, Reactions.of(accepted, self.supports), arrays)
 
     # -- checkpoints ---------------------------------------------------------
@@ -289,11 +290,8 @@ class Configuration:
         """Facts that identify it, for checkpoints; a call for all ranks."""
         grid = self.model.grid
         sizes = {"stress": self.domain.responses.stiffest} | dict.fromkeys(LENGTHS, grid.h)
-        arrays = placement.gathered(grid, self.domain.particles)
-        particles = {
-            f"'{name}' of the particles at its start": fingerprint(values, sizes.get(name, 1.0))
-            for name, values in arrays.items()
-        }
+        found = fingerprints(grid.comm, self.domain.particles, sizes)
+        particles = {f"'{name}' of the particles at its start": one for name, one in found.items()}
         facts = {
             "tolerance": self.numerics.tolerance,
             "supports": self.supports.identity(),
@@ -305,17 +303,17 @@ class Configuration:
     def state(self) -> dict[str, Any]:
         """State that passes from one step to the next, of all ranks; a call for all ranks."""
         return {
-            "particles": placement.gathered(self.model.grid, self.domain.particles),
+            "particles": placement.stored(self.model.grid.comm, self.domain.particles),
             "time": self.activity.time,
             "inputs": self.inputs.state(),
-            "total": self.total,
+            "total": self.domain.layout.whole(self.total),
             "left": self.left,
             "removed": [*self.removed],
             "laws": self.model.texts,
             "travel": self._travel.cells,
             "coverage_checked": self._coverage_checked,
             "supports": self.supports.state(),
-            "loads": self.loads.state(),
+            "loads": self.loads.state(self.domain.layout),
             "obstacles": self.obstacles.state(),
             "border": self.border.state(),
             "newton": self.domain.newton.state(),
@@ -327,14 +325,13 @@ class Configuration:
         Raises:
             CheckpointError: Particles or fields with other arrays.
         """
-        particles, location = placement.scattered(
-            self.model.grid, self.domain.particles, state["particles"], moving=self.model.moves
-        )
+        given = self.model.grid, self.domain.particles, state["particles"]
+        particles, location = placement.restored(*given, moving=self.model.moves)
         sizes = {np.shape(state["total"]), np.shape(state["loads"]["unbalanced"])}
-        if sizes - {(0,)} != {self.total.shape}:
+        if sizes - {(0,)} != {(self.domain.layout.size_of_grid,)}:
             raise CheckpointError("its fields have another number of coefficients than the scene")
         self.model.check_same_laws(state["laws"])
-        self.activity.time, self.total = state["time"], state["total"]
+        self.activity.time, self.total = state["time"], self.domain.layout.part(state["total"])
         self.activity.statics += 1
         self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
         self.removed = np.reshape(state["removed"], 2)
@@ -343,7 +340,7 @@ class Configuration:
         self.inputs.restore(state["inputs"])
         self.border.restore(state["border"])
         self.supports.restore(state["supports"])
-        self.loads.restore(state["loads"])
+        self.loads.restore(state["loads"], self.domain.layout)
         self.obstacles.restore(state["obstacles"])
         self._attach(particles, location)
         self.domain.newton.record()

@@ -72,17 +72,13 @@ def constraints(
             mine = support.weak & ~others_hold(support, border, given)
             if mine.any():
                 border.append(_on_patches(domain, support, amount, start, fields, mine))
-    fixed = np.zeros(layout.size, dtype=bool)
-    for one in held:
-        fixed[one.indices] = True
-    prescribed, walls = [], on_functions(supports.walls, domain)
+    fixed, prescribed = [one.indices for one in held], []
+    walls = on_functions(supports.walls, domain)
     for wall, of_border in walls.items():
-        by_others = fixed.copy()
-        for other in walls:
-            by_others[other.stopped if other is not wall else []] = True
-        prescribed.append(wall.prescribed(by_others) | of_border[:, None])
-        held += wall.held(layout.active, prescribed[-1], start, before)
-    contact = ActiveSet([*walls], prescribed)
+        by_others = [other.stopped for other in walls if other is not wall]
+        prescribed.append(wall.prescribed([*fixed, *by_others]) | of_border[:, None])
+        held += wall.held(layout, prescribed[-1], start, before)
+    contact = ActiveSet(layout, [*walls], prescribed)
     rows = [row for one in border for row in one.rows] if not moving else []
     rows += also
     may_move = moving or domain.model.compiled.may_hold
@@ -117,15 +113,18 @@ def _on_patches(
     chosen: Mask,
 ) -> HeldBorder:
     """A support on points of the border, held by tractions on patches."""
+    start = domain.layout.whole(start)
     if not support.is_field:
         return HeldBorder(domain, support, step_values.at_points(support, amount), start, chosen)
     assert isinstance(support.place, MovingPoints)
-    place = domain.layout.fields[str(support.component)]
+    place = domain.layout.of_grid[str(support.component)]
     values = support.place.cells(domain).values(place.basis)
     now = values @ start[place.slice]
     if fields is None:
         return HeldBorder(domain, support, now, start, chosen)
-    missing = step_values.at_points(support, fields.amount) - values @ fields.old[place.slice]
+    missing = step_values.at_points(support, fields.amount) - (
+        values @ domain.layout.whole(fields.old)[place.slice]
+    )
     return HeldBorder(domain, support, now + fields.share * missing, start, chosen)
 
 

@@ -18,11 +18,11 @@ from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import InputError
 from tawami.particles import assignment, placement
 from tawami.particles.assignment import Law
-from tawami.scene import selection
+from tawami.scene import locking, selection
 from tawami.scene.configuration import Configuration
 from tawami.scene.domain import Domain
 from tawami.scene.excavation import Excavation
-from tawami.scene.model import Model, warn_of_locking, with_laws
+from tawami.scene.model import Model, with_laws
 from tawami.scene.selection import Where
 
 #: Share of the internal forces below which what is out of balance is round-off.
@@ -73,8 +73,7 @@ class Construction:
         """
         now = self.configuration
         now.activity.check_between_steps("remove(...)")
-        chosen = selection.numbers(now.domain, "remove(...): where", where)
-        return _remove(now, np.isin(now.domain.particles.number, chosen))
+        return _remove(now, selection.present(now.domain, "remove(...): where", where))
 
     def change_material(self, where: Where, material: Law) -> None:
         """Replace the material law of particles.
@@ -97,10 +96,9 @@ class Construction:
         """
         now = self.configuration
         now.activity.check_between_steps("change_material(...)")
-        chosen = selection.numbers(now.domain, "change_material(...): where", where)
-        mask = np.isin(now.domain.particles.number, chosen)
+        mask = selection.present(now.domain, "change_material(...): where", where)
         _check_any(now, "change_material(...)", mask)
-        _change_material(now, mask, material, int(chosen[0]))
+        _change_material(now, mask, material)
 
 
 def _check_any(now: Configuration, what: str, mask: Mask) -> None:
@@ -125,6 +123,7 @@ def _remove(now: Configuration, mask: Mask) -> Removed:
     kinetic = 0.5 * mass @ (velocity**2).sum(axis=1) if moving else 0.0
     kept, gone = placement.removed(model.grid, particles, mask)
     location = placement.located(model.grid, kept.x, moving=model.moves)
+    location = model.grid.window.place(location)
     after = Domain.attach(model, kept, location, now.numerics, now.stopwatch)
     excavation = Excavation(comm, kept.x, particles.x[mask])
     now.supports.check_reach(before, after, excavation)
@@ -166,14 +165,17 @@ def _replace(now: Configuration, after: Domain, excavation: Excavation | None = 
     forces[after.layout.num_displacement :] = 0.0
     forces[~after.layout.active] = 0.0
     now.model, now.domain = after.model, after
-    if np.abs(forces).max() > ROUND_OFF * np.abs(internal).max():
+    layout = after.layout
+    if layout.largest(forces) > ROUND_OFF * layout.largest(internal):
         now.loads.keep_balance(forces)
     now.loads.changed()
 
 
-def _change_material(now: Configuration, mask: Mask, material: Law, number: int) -> None:
-    """Replace the law of particles of this rank, given a mask and a number of one of all ranks."""
+def _change_material(now: Configuration, mask: Mask, material: Law) -> None:
+    """Replace the law of particles of this rank, given a mask."""
     model, particles = now.model, now.domain.particles
+    mine = particles.number[mask].min(initial=np.iinfo(np.uint32).max)
+    number = int(ranks.least_of(model.grid.comm, np.array([mine]))[0])
     if not isinstance(material, Law):
         raise InputError(
             f"change_material(...): material = {checks.shown(material)}: expected a material as "
@@ -184,7 +186,7 @@ def _change_material(now: Configuration, mask: Mask, material: Law, number: int)
     changed = _with_numbers(model, particles, numbers, mask, new)
     other = with_laws(model, changed, laws, of, now.numerics.assembly)
     after = Domain.attach(other, changed, now.domain.location, now.numerics, now.stopwatch)
-    warn_of_locking(model.grid, model.form, new.bulk_modulus / new.shear_modulus, number)
+    locking.warn_of(model.grid, model.form, new.bulk_modulus / new.shear_modulus, number)
     _replace(now, after)
     now.activity.statics += 1
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from tawami.field.layout import Layout
 from tawami.scene.walls import Wall
 
 Array = npt.NDArray[np.float64]
@@ -19,33 +20,42 @@ class ActiveSet:
     """The walls of a scene, and the components that other supports prescribe along them.
 
     Attributes:
+        layout: Places of the coefficients.
         walls: The walls; :meth:`adapt` changes their states.
         prescribed: For each wall whether other supports prescribe its components, functions x dim.
     """
 
+    layout: Layout
     walls: Sequence[Wall] = ()
     prescribed: Sequence[Mask] = ()
 
     def friction(self, forces: Array) -> Array:
-        """Friction on the body (functions x dim) from the forces that supports and walls exert on it."""
-        pairs = zip(self.walls, self.prescribed, strict=True)
-        parts = (wall.friction_of(forces, prescribed) for wall, prescribed in pairs)
-        return sum(parts, np.zeros_like(forces))
+        """Friction on the body (functions x dim) from the forces that supports and walls exert on it.
 
-    def adapt(self, forces: Array, u: Array, before: Array, active: Mask) -> bool:
-        """Change the states of the walls that a solution contradicts.
+        A call for all ranks.
+        """
+        friction, dim = np.zeros_like(forces), forces.shape[1]
+        for wall, prescribed in zip(self.walls, self.prescribed, strict=True):
+            found = wall.friction_of(self.layout.vectors_at(forces, wall.functions), prescribed)
+            places = self.layout.places(dim * wall.functions) // dim
+            friction[places[places >= 0]] += found[places >= 0]
+        return friction
+
+    def adapt(self, forces: Array, u: Array, before: Array) -> bool:
+        """Change the states of the walls that a solution contradicts; a call for all ranks.
 
         Args:
             forces: Forces of supports and walls on the body, functions x dim.
             u: Increments of the displacement, functions x dim.
             before: Displacement before them since the body touched the walls, functions x dim.
-            active: Whether each function has particles.
 
         Returns:
             Whether any state was changed.
         """
-        changed = [
-            wall.adapt(forces, u, before, active, prescribed)
-            for wall, prescribed in zip(self.walls, self.prescribed, strict=True)
-        ]
+        changed = []
+        for wall, prescribed in zip(self.walls, self.prescribed, strict=True):
+            f, layout = wall.functions, self.layout
+            push, moved, since = (layout.vectors_at(values, f) for values in (forces, u, before))
+            active = layout.at(layout.active.astype(float), u.shape[1] * f) > 0
+            changed.append(wall.adapt(push, moved, since, active, prescribed))
         return any(changed)

@@ -42,7 +42,9 @@ def lines(now: Configuration, motion: str = "") -> dict[str, str]:
 
 
 def _grid(now: Configuration) -> str:
-    filled = int(np.count_nonzero(now.domain.active))
+    domain, grid = now.domain, now.model.grid
+    filled = int(np.count_nonzero(domain.active.ravel() & grid.window.own))
+    filled = int(ranks.sum_of(grid.comm, np.array([filled]))[0])
     return f"{now.model.grid.line}, {filled} with particles; basis {now.model.basis}"
 
 
@@ -60,7 +62,10 @@ def _particles(now: Configuration) -> str:
 
 def _unknowns(now: Configuration) -> str:
     layout = now.domain.layout
-    numbers = {name: int(layout.active[place.slice].sum()) for name, place in layout.fields.items()}
+    mine = layout.active & layout.own
+    counts = np.array([np.count_nonzero(mine[place.slice]) for place in layout.fields.values()])
+    counts = ranks.sum_of(now.model.grid.comm, counts)
+    numbers = dict(zip(layout.fields, counts.tolist(), strict=True))
     fields = ", ".join(f"{n} of {name}" for name, n in numbers.items())
     free = num_free(now.supports, now.domain)
     return f"{free}: {fields}, minus {sum(numbers.values()) - free} prescribed by supports"

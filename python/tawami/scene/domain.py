@@ -16,6 +16,7 @@ from tawami.base.timing import Stopwatch
 from tawami.base.warn import warn
 from tawami.field.assembly import Assembly
 from tawami.field.attachment import Attachment
+from tawami.field.border import BorderInCells
 from tawami.field.layout import Layout
 from tawami.field.points import PointAssembly
 from tawami.field.reference import ReferenceAssembly
@@ -88,7 +89,7 @@ class Domain:
             return Responses(
                 model.compiled, particles, location, stage,
                 ParticleValues(model.form, particles, model.moduli, model.density),
-                model.grid.comm, stopwatch,
+                model.grid, stopwatch,
             )  # fmt: skip
 
         def elastic() -> Responses:
@@ -123,7 +124,7 @@ class Domain:
 
     @property
     def active(self) -> npt.NDArray[np.bool_]:
-        """Whether each cell holds particles, on any rank, ny x nx."""
+        """Whether each cell of the window holds particles, on any rank, ny x nx."""
         return self.assembly.attachment.active
 
     @property
@@ -137,17 +138,24 @@ class Domain:
         mask: npt.NDArray[np.bool_] = self.model.without_history[self.particles.material]
         return mask
 
-    @functools.cached_property
-    def moduli_of_cells(self) -> tuple[Array, Array]:
-        """Mean K and mu of the particles in each cell [Pa], 0 without any; a call for all ranks.
+    def moduli_at(self, cells: BorderInCells) -> tuple[Array, Array]:
+        """Mean K and mu of the particles in the cells of points [Pa]; a call for all ranks.
 
         An incompressible material counts with a K that is not infinite.
         """
+        found = np.zeros((2, len(cells)))
+        found[:, cells.own] = [of[cells.here[cells.own]] for of in self._moduli_of_cells]
+        K, mu = ranks.sum_of(self.model.grid.comm, found)
+        return K, mu
+
+    @functools.cached_property
+    def _moduli_of_cells(self) -> tuple[Array, Array]:
+        """Mean K and mu of the particles in each cell of this rank [Pa], 0 without any."""
         bulk, shear = self.constants["K"], self.constants["mu"]
         bulk = np.where(np.isfinite(bulk), bulk, INCOMPRESSIBLE * shear)
         columns = np.column_stack([np.ones(len(self.particles)), bulk, shear])
         sums = _rust.cell_sums(self.location, self.particles.volume, columns)
-        volume, *weighted = ranks.sum_of(self.model.grid.comm, sums).T
+        volume, *weighted = sums.T
         K, mu = (
             np.divide(one, volume, out=np.zeros_like(volume), where=volume > 0) for one in weighted
         )
@@ -181,13 +189,15 @@ class Domain:
     def sums(self, weight: Array, data: Array, basis: Basis | None = None) -> Array:
         """Sums over all particles of the body, sum_p weight_p data_p N_i: functions x columns.
 
+        The functions are those of the window. A call for all ranks.
+
         Args:
             weight: One number per particle of this rank.
             data: Particles x columns.
             basis: Whose functions N_i are; that of the displacement by default.
         """
-        sums = _rust.nodal_sums(self.location, weight, data, basis or self.layout.basis)
-        return ranks.sum_of(self.model.grid.comm, sums)
+        basis = basis or self.layout.basis
+        return self.layout.functions.sums(self.location, weight, data, basis)
 
     def at_particles(self, values: Array) -> Array:
         """A displacement field (functions x dim) at this rank's particles, particles x dim."""
@@ -208,7 +218,7 @@ class Domain:
 
     @property
     def particles_per_cell(self) -> npt.NDArray[np.int64]:
-        """Number of particles in each cell, x fastest; a call for all ranks."""
+        """Number of particles in each cell of the window, x fastest; a call for all ranks."""
         return self.responses.particles_per_cell
 
     def warn_of_partial_cells(self) -> None:
@@ -226,11 +236,12 @@ class Domain:
         areas = self.responses.cell_sums(self.areas[:, None])[:, 0]
         shares = np.where(areas > 0, areas / self.model.space.measure(grid.h), 1.0)
         c = int(shares.argmin())
-        if shares[c] < WHOLE and not grid.comm.rank:
-            i, j = c % grid.cells[0], c // grid.cells[0]
+        i, j = grid.window.indices(c)
+        share, j, i = min(grid.comm.allgather((float(shares[c]), int(j), int(i))))
+        if share < WHOLE and not grid.comm.rank:
             warn(
                 f"'{option}' is not stable in partially filled cells: cell ({i}, {j}) holds "
-                f"{shares[c]:.2g} of its area, expected at least {WHOLE:g}; use another option of the "
+                f"{share:.2g} of its area, expected at least {WHOLE:g}; use another option of the "
                 "form, or a grid whose lines follow the body",
                 InstabilityWarning,
             )

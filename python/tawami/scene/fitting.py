@@ -6,7 +6,6 @@ import numpy as np
 
 from tawami.base.errors import SupportError
 from tawami.field import fitted_volumes
-from tawami.field.border import PointsInCells
 from tawami.scene.border import SceneBorder
 from tawami.scene.domain import Domain
 
@@ -33,6 +32,5 @@ def fit(domain: Domain, border: SceneBorder) -> None:
         gradient = np.asarray(particles.displacement_gradient)
         now = volume * np.linalg.det(np.eye(gradient.shape[-1]) + gradient)
     area = points.area * model.space.thickness(points.x)[:, None]
-    own = PointsInCells(model.grid, domain.location)
-    c = fitted_volumes.corrections(cells, area, own, now, model.basis)
+    c = fitted_volumes.corrections(cells, area, domain.location, now, domain.layout)
     domain.assembly.integrate_with(volume * (1 + c))

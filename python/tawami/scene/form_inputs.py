@@ -84,8 +84,8 @@ class FormInputs:
                 f"expected one of {known}{meant(str(name), declared)}"
             )
         unit = self._form.data_unit(name)
+        found = sources.values(domain, name, source, "value", unit, f"data '{name}'")
         with ranks.raise_together(domain.model.grid.comm):
-            found = sources.values(domain, name, source, "value", unit, f"data '{name}'")
             self._border.set(name, source, f"data '{name}'")
         domain.particles.carry(name, 1)
         domain.particles.carried(name)[:, 0] = found[:, 0]
@@ -123,8 +123,8 @@ class FormInputs:
         self._in_time.pop(name, None)
 
     def _to_particles(self, domain: Domain, name: str, source: Any) -> None:
+        found = sources.values(domain, name, source, "value", "", f"parameter '{name}'")[:, 0]
         with ranks.raise_together(domain.model.grid.comm):
-            found = sources.values(domain, name, source, "value", "", f"parameter '{name}'")[:, 0]
             for value in (found.min(), found.max()) if len(found) else ():
                 self._checked(name, float(value), domain.model)
             self._border.set(name, source, f"parameter '{name}'")

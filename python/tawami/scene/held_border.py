@@ -1,50 +1,49 @@
 """Supports off the lines of the grid: means over patches of the border are held by tractions.
 
-The tractions are multipliers of an augmented Lagrangian. They need no stress at the border, so that they
-serve for all laws, forms and strain measures, and each pass leaves about a hundredth of the error.
+On a patch of area A, whose points have the weights w and the held directions d:
+
+    error    e = mean of d . u - g
+    forces   f = -w lambda d on each point, so that on all coefficients f = -(A de/dc)^T lambda
+
+The tractions lambda are unknowns of the linear systems (`tawami.solve.saddle`): the errors vanish in one
+iteration. They need no stress at the border, so that they serve for all laws, forms and strain measures.
 """
 
 from __future__ import annotations
-
-from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from tawami.base.arrays import Array, Mask, of_components
+from tawami.base.errors import SupportWarning
+from tawami.base.warn import warn
 from tawami.border.patches import patches
-from tawami.border.tied import Tied, means
+from tawami.border.tied import means
 from tawami.field.constraints import PointHeld
 from tawami.scene.domain import Domain
 from tawami.scene.moving_points import MovingPoints
 from tawami.scene.support import Support
 
-#: Penalty of a patch per cell, in shear moduli (besides K), or in diagonal entries of the tangent.
-PENALTY = 200.0
-#: Change of the tractions by a pass, relative to the largest, below which no other is needed.
-SETTLED = 1e-4
-#: Share of the error that a pass may leave, factor of the penalty if it leaves more, and largest factor.
-SLOW, STIFFER, STIFFEST = 0.3, 10.0, 1e4
-#: Error of a held displacement that is round-off, relative to the displacement.
-ALIKE = 1e-6
-#: Displacement that is round-off [cells].
-ROUND_OFF_OF_GRID = 1e-13
+#: Error of a held displacement that is round-off, relative to the largest displacement, and [cells].
+ALIKE, ROUND_OFF = 1e-10, 1e-13
+#: Distance of a point from the place that the mean of its patch prescribes, above which the body does
+#: not follow its border [cells].
+BENT = 0.2
 
 
 class HeldBorder:
-    """A support on points of the border, in one step (`tawami.solve.terms`).
+    """A support on points of the border, in one step (`tawami.solve.terms`, `tawami.solve.bordered`).
 
     Args:
         domain: The particles at its start.
         support: The support.
         values: Prescribed values at its points at the end of the step, counted as `before`: all of
             those at small strain, the increments where particles move.
-        before: Coefficients at the start, which the values include.
+        before: Coefficients of the whole grid at the start, which the values include.
         chosen: Mask of the points that it holds; by default all that it holds by tractions.
     """
 
-    smooth, implicit = True, False
+    smooth, implicit, first_work = True, False, 0.0
 
     def __init__(
         self,
@@ -57,10 +56,11 @@ class HeldBorder:
         assert isinstance(support.place, MovingPoints)
         self._support, self._domain = support, domain
         self._weak = weak = np.flatnonzero(support.weak if chosen is None else chosen)
-        place, fields, h = support.place, domain.layout.fields, domain.model.grid.h
+        place, fields, h = support.place, domain.layout.of_grid, domain.model.grid.h
         field = fields[str(support.component)] if support.is_field else next(iter(fields.values()))
         cells = place.cells(domain)
         numbers, functions, _ = cells.tabulated(field.basis)
+        self._field = slice(field.start, field.stop)
         #: Functions at the points, and their coefficients, points x functions x components.
         self._functions = functions[weak]
         self._places = field.start + of_components(numbers[weak], field.components)
@@ -73,18 +73,38 @@ class HeldBorder:
             self._groups, self._weights, along, self._places.reshape(len(weak), -1), len(before)
         )
         #: Prescribed values at its points, and their means over the patches.
-        self.values = (values + support.missing)[weak]
-        self._given, self._target = values[weak], self._mean(self.values)
+        self.values = values[weak]
+        self._target = self._groups.means(self._weights, self.values)
         self.prescribed = float(np.abs(self.values).max(initial=0.0))
-        self._before, self._held = before, self._mean(support.held[weak])
-        self._largest, self._stiffened = np.inf, 1.0
-        K, mu = (m[cells.location.cell] for m in domain.moduli_of_cells)
-        self._elastic = (K + PENALTY * mu)[weak]
-        self._tied = self._with_penalty(self._elastic)
+        areas = self._groups.sums(self._weights)
+        #: Derivative of the residual by all coefficients.
+        self.gradient = sp.diags(areas) @ self.means
+        self._areas, self._before = areas, before
+        self._check_bent()
+        self._change = np.zeros(len(areas))
+        self._tractions = self._held = self._groups.means(self._weights, support.held[weak])
 
-    def _mean(self, values: Array) -> Array:
-        """Means over the patches."""
-        return self._groups.means(self._weights, values)
+    def _check_bent(self) -> None:
+        """Warn, once, of a border whose points have moved far from the means of their patches."""
+        support, place = self._support, self._support.place
+        assert isinstance(place, MovingPoints)
+        if support.told or not isinstance(support.component, int) or not support.is_uniform:
+            return
+        moved = (place.x - place.made.x)[self._weak, support.component]
+        means = self._groups.means(self._weights, moved)
+        h = self._domain.model.grid.h
+        bent = float(np.abs(moved - means[self._groups.number]).max(initial=0.0)) / h
+        if bent <= BENT:
+            return
+        support.told = True
+        if self._domain.model.grid.comm.rank == 0:
+            warn(
+                f"{support}: the border bends by {bent:.2g} h within its patches, because the particles "
+                "near it leave functions of the grid with little stiffness; the body does not follow "
+                "the support there. Expected more particles per cell (per_axis=...), volumes='fitted' "
+                "and ghost_penalty='on'",
+                SupportWarning,
+            )
 
     @property
     def x(self) -> Array:
@@ -103,54 +123,60 @@ class HeldBorder:
         """The support."""
         return self._support
 
-    def _with_penalty(self, penalty: Array) -> Tied:
-        """Ties with a penalty, given at each point [Pa]."""
-        areas, h = self._groups.sums(self._weights), self._domain.model.grid.h
-        return Tied(self.means, areas, self._mean(penalty) / h)
-
-    def begin(self, diagonal: Callable[[], Array], inertia: Array | None) -> None:
-        """See `Term`. The penalty of a field has the size of its tangent, and in dynamics that of a
-        displacement contains inertia.
-        """
-        if self._support.is_field:
-            self._tied = self._with_penalty(PENALTY * self._near(diagonal()))
-        elif inertia is not None:
-            self._tied = self._with_penalty(self._elastic + PENALTY * self._near(inertia))
-
-    def _near(self, diagonal: Array) -> Array:
-        """Stiffness that the diagonal of a matrix stands for at each point [Pa]."""
-        assert isinstance(self._support.place, MovingPoints)
-        h, dim = self._domain.model.grid.h, self._domain.model.space.dim
-        thickness = (self._support.place.weight / self._support.place.length)[self._weak]
-        near = np.einsum("pf,pf->p", np.abs(self._functions), diagonal[self._places[..., 0]])
-        return np.asarray(near / thickness / h ** (dim - 2))
-
     def forces(self, coefficients: Array) -> Array:
         """See `Term`."""
         self._last = self._before + coefficients
         self._error = self.means @ self._last - self._target
-        self._tractions = self._tied.multipliers(self._error, self._held)
-        self.on_body = self._tied.forces(self._tractions)
+        self.on_body = np.asarray(-(self.gradient.T @ self._tractions))
         return self.on_body
 
-    def stiffness(self) -> sp.csr_matrix:
-        """See `Term`; the same object until the penalty changes."""
-        return self._tied.stiffness
+    def stiffness(self) -> None:
+        """See `Term`: the forces do not depend on the displacement."""
+
+    # -- the tractions as unknowns, see `tawami.solve.bordered` ---------------
+
+    @property
+    def num_unknowns(self) -> int:
+        """Number of patches."""
+        return self._groups.count
+
+    @property
+    def residual(self) -> Array:
+        """Errors times areas."""
+        return np.asarray(self._areas * self._error)
+
+    @property
+    def measure(self) -> float:
+        """Largest error, relative to the displacement of the functions that reach the border."""
+        error = float(np.abs(self._error).max(initial=0.0))
+        least = 0.0 if self._support.is_field else ROUND_OFF * self._domain.model.grid.h
+        if error <= max(ALIKE * np.abs(self._last[self._field]).max(initial=0.0), least):
+            return 0.0
+        near = np.abs(self._last[self._places]).max(initial=0.0)
+        return error / max(self.prescribed, float(near))
+
+    def restart(self) -> None:
+        """Go back to the tractions of the last step."""
+        self._tractions = self._held
+
+    def add(self, change: Array) -> None:
+        """Go to the next iterate of the tractions."""
+        self.first_work = -float(change @ self.residual)
+        self._begun, self._change = self._tractions, change
+        self._tractions = self._begun + change
+
+    def shorten(self, share: float) -> None:
+        """Take a share of the last change of the tractions."""
+        self._tractions = self._begun + share * self._change
+
+    @property
+    def work(self) -> float:
+        """Work of the errors on the last change; the energy is largest in the tractions."""
+        return -float(self._change @ self.residual)
 
     def improve(self) -> bool:
-        """See `Term`."""
-        change = np.abs(self._tractions - self._held).max(initial=0.0)
-        self._held = self._tractions
-        u = np.einsum("pf,pfi->pi", self._functions, self._last[self._places])
-        size = max(self.prescribed, float(np.abs(u).max(initial=0.0)))
-        error, before = np.abs(self._error).max(initial=0.0), self._largest
-        if error > SLOW * before and self._stiffened < STIFFEST:
-            self._stiffened *= STIFFER
-            self._tied = replace(self._tied, penalty=STIFFER * self._tied.penalty)
-        self._largest = error
-        least = 0.0 if self._support.is_field else ROUND_OFF_OF_GRID * self._domain.model.grid.h
-        noise = error <= max(ALIKE * size, least)
-        return bool(change > SETTLED * np.abs(self._held).max(initial=0.0) and not noise)
+        """See `Term`: there is nothing to improve."""
+        return False
 
     @property
     def unsettled(self) -> str:
@@ -163,11 +189,8 @@ class HeldBorder:
         )
 
     def accept(self) -> None:
-        """Keep the tractions, and what is missing of the prescribed displacement, for later steps."""
-        support, number = self._support, self._groups.number
-        support.held[self._weak] = self._tractions[number]
-        if self._domain.model.moves:
-            support.missing[self._weak] = -self._error[number]
+        """Keep the tractions for later steps."""
+        self._support.held[self._weak] = self._tractions[self._groups.number]
 
     @property
     def resultants(self) -> dict[str, Array]:
@@ -185,7 +208,7 @@ class HeldBorder:
     @property
     def prescribed_means(self) -> Array:
         """Mean of the prescribed values over each patch."""
-        return self._mean(self._given)
+        return self._target
 
     @property
     def rows(self) -> list[PointHeld]:

@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from tawami.base.arrays import Array, Mask
+from tawami.field.layout import Layout
 from tawami.scene.held_border import HeldBorder
 
 
@@ -18,21 +19,26 @@ class Impulses:
     the impulses. Fixed coefficients stay.
 
     Args:
+        layout: Places of the coefficients.
         held: The supports; those of fields are ignored.
         mass: Mass of each displacement coefficient [kg per metre depth].
         fixed: Whether other supports prescribe each of them.
     """
 
-    def __init__(self, held: Sequence[HeldBorder], mass: Array, fixed: Mask) -> None:
+    def __init__(
+        self, layout: Layout, held: Sequence[HeldBorder], mass: Array, fixed: Mask
+    ) -> None:
+        self._layout = layout
         self._chosen = [k for k, one in enumerate(held) if not one.support.is_field]
         if not self._chosen:
             return
+        mass, fixed = layout.whole(mass), layout.whole(fixed.astype(float)) > 0
         n = len(mass)
         self._means = sp.vstack([held[k].means[:, :n] for k in self._chosen]).tocsr()
-        inverse = np.divide(1.0, mass, out=np.zeros(n), where=(mass > 0) & ~fixed)
+        self._loose = (mass > 0) & ~fixed
+        inverse = np.divide(1.0, mass, out=np.zeros(n), where=self._loose)
         self._weighted = (sp.diags(inverse) @ self._means.T).tocsr()
-        matrix = (self._means @ self._weighted).toarray()
-        self._inverse = np.linalg.pinv(matrix, rcond=len(matrix) * np.finfo(float).eps)
+        self._inverse = _inverse(self._means @ self._weighted)
 
     def imposed(self, rates: Sequence[Array], values: Array) -> Array:
         """Velocities after the impulses.
@@ -44,18 +50,26 @@ class Impulses:
         if not self._chosen:
             return values
         prescribed = np.concatenate([rates[k] for k in self._chosen]) if rates else 0.0
-        impulse = self._inverse @ (prescribed - self._means @ values)
-        return np.asarray(values + self._weighted @ impulse)
+        impulse = self._inverse @ (prescribed - self._means @ self._layout.whole(values))
+        return np.asarray(values + self._layout.part(self._weighted @ impulse))
 
     def work(self, forces: Array, u: Array) -> float:
         """Work of the supports, given the forces out of balance without them.
 
         Args:
             forces: On the displacement coefficients [N per metre depth]; the part that the supports
-                cannot exert does no work.
+                cannot exert does no work. Theirs is the nearest by least squares: the inverse mass as
+                a weight would let functions with little mass decide.
             u: Increments of the displacement coefficients [m].
         """
         if not self._chosen:
             return 0.0
-        multipliers = self._inverse @ (self._weighted.T @ forces)
-        return float(multipliers @ (self._means @ u))
+        whole, loose = self._layout.whole, self._means @ sp.diags(self._loose.astype(float))
+        multipliers = _inverse(loose @ loose.T) @ (loose @ whole(forces))
+        return float(multipliers @ (self._means @ whole(u)))
+
+
+def _inverse(matrix: sp.spmatrix) -> Array:
+    """Pseudo-inverse of a symmetric matrix: patches that others hold too have no forces."""
+    dense = matrix.toarray()
+    return np.asarray(np.linalg.pinv(dense, rcond=len(dense) * np.finfo(float).eps))

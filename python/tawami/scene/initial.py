@@ -43,14 +43,13 @@ def set_field(now: Configuration, name: str, given: Source, beyond: Beyond) -> N
     domain = now.domain
     if name in now.model.form.own_fields:
         unit = now.model.form.own_fields[name].unit
-        with ranks.raise_together(domain.model.grid.comm):
-            found = sources.values(domain, name, given, "value", unit)[:, 0]
+        found = sources.values(domain, name, given, "value", unit)[:, 0]
         coefficients = own_fields.start(domain, name, found)
         if not now.model.moves:
             now.total[domain.layout.fields[name].slice] = coefficients
         return
+    found = sources.values(domain, name, given, *COMPONENTS.get(name, ("value", "")))
     with ranks.raise_together(domain.model.grid.comm):
-        found = sources.values(domain, name, given, *COMPONENTS.get(name, ("value", "")))
         if name == "eps_v" and not isinstance(given, Earlier):
             _check_volume(domain, found[:, 0])
         if name in ("plastic_strain", "preconsolidation") and (found < 0).any():

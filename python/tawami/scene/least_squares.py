@@ -30,7 +30,7 @@ def least_squares(
         values: Their values.
 
     Returns:
-        The coefficients, the same on all ranks, and the field at the particles of this rank.
+        The coefficients in the window, and the field at the particles of this rank.
     """
 
     def at_particles(coefficients: Array) -> Array:
@@ -39,21 +39,24 @@ def least_squares(
     def sums(of_particles: Array) -> Array:
         return domain.sums(weight, of_particles.reshape(-1, 1), basis)[:, 0]
 
+    def dot(a: Array, b: Array) -> float:
+        return domain.layout.functions.dot(basis, a, b)
+
     lumped = sums(np.ones_like(values))
     inverse = np.divide(1.0, lumped, out=np.zeros_like(lumped), where=lumped > 0.0)
     residual = sums(values)
     found, at_found = np.zeros_like(residual), np.zeros_like(values)
     direction = preconditioned = inverse * residual
-    size = start = residual @ preconditioned
+    size = start = dot(residual, preconditioned)
     for _ in range(MOST_ITERATIONS):
         if not size > TOLERANCE**2 * start:
             break
         at_direction = at_particles(direction)
         image = sums(at_direction)
-        step = size / (direction @ image)
+        step = size / dot(direction, image)
         found, at_found = found + step * direction, at_found + step * at_direction
         residual = residual - step * image
         preconditioned = inverse * residual
-        before, size = size, residual @ preconditioned
+        before, size = size, dot(residual, preconditioned)
         direction = preconditioned + size / before * direction
     return found, at_found

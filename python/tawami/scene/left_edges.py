@@ -53,5 +53,6 @@ def taken_over(domain: Domain, supports: Iterable[Support], forces: Array) -> It
         cells = BorderInCells(grid, domain.active, x, normal, f"{support}")
         functions = cells.values(domain.layout.basis)
         sums = functions.T @ support.place.weight[mask]
-        tractions = np.divide(forces[:, axis], sums, out=np.zeros_like(sums), where=sums > 0)
+        in_grid = domain.layout.whole(forces.ravel()).reshape(-1, forces.shape[1])
+        tractions = np.divide(in_grid[:, axis], sums, out=np.zeros_like(sums), where=sums > 0)
         support.held[mask] = -sign * (functions @ tractions)

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tawami.base import checks
+from tawami.base import checks, ranks
 from tawami.base.arrays import Array, Indices
 from tawami.base.errors import InputError
 from tawami.grid.edges import evaluate
 from tawami.grid.grid import Grid
+from tawami.particles.following import OfParticles
 from tawami.scene.action import Action, Owner, Term, Value
 from tawami.scene.domain import Domain
 from tawami.scene.factor import Factor
@@ -116,7 +116,8 @@ class Traction(OnBorder):
     def on(self, domain: Domain, term: Term) -> Array:
         """Forces of the whole traction, functions x dim [N per metre depth]."""
         forces = self.points.reference[:, None] * self.at_points(term)
-        return self.points.cells(domain).sums(domain.layout.basis, forces)
+        of = domain.layout.functions, domain.layout.basis
+        return self.points.cells(domain).sums(*of, forces)
 
 
 class Pressure(OnBorder):
@@ -136,7 +137,8 @@ class Pressure(OnBorder):
         """Forces of the whole pressure where the border is, functions x dim [N per metre depth]."""
         thickness = self.points.space.thickness(self.points.x)
         forces = -self.at_points(term) * thickness[:, None] * self.points.area
-        return self.points.cells(domain).sums(domain.layout.basis, forces)
+        of = domain.layout.functions, domain.layout.basis
+        return self.points.cells(domain).sums(*of, forces)
 
 
 class Flux(OnBorder):
@@ -172,7 +174,8 @@ class Flux(OnBorder):
         """Coefficients of the field, and the integrals of the whole flux times their functions."""
         place = domain.layout.fields[self.field]
         flux = self.points.weight[:, None] * self.at_points(term)
-        return place.slice, self.points.cells(domain).sums(place.basis, flux)[:, 0]
+        sums = self.points.cells(domain).sums(domain.layout.functions, place.basis, flux)
+        return place.slice, sums[:, 0]
 
     def __str__(self) -> str:
         return f"{super().__str__()} of {self.field}"
@@ -180,35 +183,49 @@ class Flux(OnBorder):
 
 class Forces(Load):
     """Forces on particles of the body [N per metre depth]; its values are the components of one force
-    that they share by volume, or arrays of the components on each particle of the body.
+    that they share by volume, or the components of the force on each of them.
+
+    Args:
+        owner, value, factor: As of `Action`.
+        domain: The particles where they are.
+        chosen: Numbers of the particles on which it acts, in the order of the rows of a value.
+        everywhere: Whether every rank has all of these numbers.
 
     Attributes:
-        chosen: Numbers of the particles.
-        shares: Share of each particle of the body in one force.
+        count: Number of particles on which it acts.
+        shares: Share of each particle in one force.
     """
 
-    __slots__ = ("_dim", "chosen", "shares")
+    __slots__ = ("_chosen", "_comm", "_dim", "_everywhere", "count", "shares")
 
     def __init__(
         self,
         owner: Owner[Any],
-        dim: int,
+        domain: Domain,
         chosen: Indices,
-        volume: Array,
+        everywhere: bool,
         value: Any,
         factor: Factor,
     ) -> None:
-        self._dim = dim
-        self.chosen, self.shares = chosen, np.zeros(len(volume))
-        self.shares[chosen] = volume[chosen] / volume[np.unique(chosen)].sum()
+        self._dim, self._comm = domain.model.space.dim, domain.model.grid.comm
+        self._chosen, self._everywhere = chosen, everywhere
+        number = np.asarray(domain.particles.number)
+        mask = self._following(chosen, np.ones(len(chosen))).at(number) > 0
+        volume = np.asarray(domain.particles.volume)[mask]
+        total, count = ranks.sum_of(self._comm, np.array([volume.sum(), mask.sum()]))
+        self.count, mine = int(count), number[mask].astype(np.int64)
+        self.shares = OfParticles(self._comm, mine, volume / total, everywhere=False)
         super().__init__(owner, value, factor)
+
+    def _following(self, number: Indices, values: Array) -> OfParticles:
+        return OfParticles(self._comm, number, values, everywhere=self._everywhere)
 
     def _checked(self, value: Any) -> tuple[Value, ...]:
         given = checks.any_array("load(...): force", value)
         if given.ndim != 2:
             return checks.point("load(...): force", value)
         forces = checks.array("load(...): force", given, 2)
-        n, dim = len(self.chosen), self._dim
+        n, dim = len(self._chosen), self._dim
         if forces.shape != (n, dim):
             raise InputError(
                 f"load(...): force has shape {forces.shape}: expected ({n}, {dim}), one row for each of "
@@ -217,26 +234,35 @@ class Forces(Load):
         if not np.isfinite(forces).all():
             k = int(np.flatnonzero(~np.isfinite(forces).all(axis=1))[0])
             raise InputError(f"load(...): force[{k}] = {forces[k]}: expected finite numbers")
-        if len(np.unique(self.chosen)) < n:
+        if len(np.unique(self._chosen)) < n:
             raise InputError(
                 "load(...): a particle is given twice, with a force for each: expected each once"
             )
-        on_body = np.zeros((dim, len(self.shares)))
-        on_body[:, self.chosen] = forces.T
-        return tuple(on_body)
+        return (forces,)
+
+    def _begin(self, values: tuple[Value, ...], factor: Factor) -> None:
+        """As of `Action`; forces on each particle follow them."""
+        if isinstance(values[0], np.ndarray):
+            values = tuple(self._following(self._chosen, of_axis) for of_axis in values[0].T)
+        super()._begin(values, factor)
+
+    def _restored(self, stored: Any) -> Value:
+        """As of `Action`."""
+        one = isinstance(stored, list)
+        return stored[0] if one else OfParticles.of_state(self._comm, stored)
 
     def on(self, term: Term, number: Numbers) -> Array:
-        """Forces of a term on the particles of these numbers, particles x dim."""
+        """Forces of a term on the particles of these numbers, particles x dim; a call for all ranks."""
         return np.column_stack(
             [
-                v[number] if isinstance(v, np.ndarray) else v * self.shares[number]
+                v.at(number) if isinstance(v, OfParticles) else v * self.shares.at(number)
                 for v in term.values
             ]
         )
 
     def place(self) -> list[Any]:
-        """A hash of the shares."""
-        return [hashlib.sha256(self.shares.tobytes()).hexdigest()]
+        """The shares; a call for all ranks."""
+        return [self.shares.identity()]
 
     def __str__(self) -> str:
-        return f"force on {np.count_nonzero(self.shares)} particles"
+        return f"force on {self.count} particles"

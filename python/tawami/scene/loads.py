@@ -10,11 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from tawami.base.arrays import Array, Indices
+from tawami.base.arrays import Array
 from tawami.base.errors import SupportError
 from tawami.base.text import listed
 from tawami.field.follower import FollowerPressure
+from tawami.field.layout import Layout
 from tawami.grid.grid import Grid
+from tawami.scene import selection
 from tawami.scene.action import Owner, Term, restored
 from tawami.scene.activity import Activity
 from tawami.scene.domain import Domain
@@ -22,6 +24,7 @@ from tawami.scene.excavation import Excavation
 from tawami.scene.factor import Factor
 from tawami.scene.load import Flux, Forces, Load, OnBorder, Pressure, Traction, Weight
 from tawami.scene.moving_points import MovingPoints
+from tawami.scene.selection import Where
 from tawami.scene.share import Moment
 
 
@@ -30,7 +33,6 @@ class Loads(Owner[Load]):
 
     Args:
         grid: The grid.
-        volume: Volume of each particle of the body [m2].
         activity: Time and activity of the scene.
 
     Attributes:
@@ -40,9 +42,9 @@ class Loads(Owner[Load]):
         version: A number that changes with every change of a load.
     """
 
-    def __init__(self, grid: Grid, volume: Array, activity: Activity) -> None:
+    def __init__(self, grid: Grid, activity: Activity) -> None:
         super().__init__(activity)
-        self.grid, self._volume = grid, volume
+        self.grid = grid
         self.unbalanced: Array | None = None
 
     def remove(self, action: Load) -> None:
@@ -88,10 +90,11 @@ class Loads(Owner[Load]):
         self.all.append(flux)
         return flux
 
-    def add_forces(self, particles: Indices, force: Any, amplitude: Any) -> Load:
-        """Load particles of the body, given by their numbers."""
+    def add_forces(self, domain: Domain, particles: Where, force: Any, amplitude: Any) -> Load:
+        """Load particles of the body; a call for all ranks."""
+        chosen = selection.in_order(domain, "load(...): particles", particles)
         factor = self._factor("load(...)", amplitude)
-        forces = Forces(self, self.grid.space.dim, particles, self._volume, force, factor)
+        forces = Forces(self, domain, *chosen, force, factor)
         self.all.append(forces)
         return forces
 
@@ -205,7 +208,7 @@ class Loads(Owner[Load]):
         """All external forces, with those of pressures that follow the border."""
         total = self.external(domain, now)
         for term in self.following(domain, now):
-            total += term.forces(np.zeros_like(total))
+            total += domain.layout.part(term.forces(np.zeros(domain.layout.size_of_grid)))
         return total
 
     def keep_balance(self, forces: Array) -> None:
@@ -242,17 +245,18 @@ class Loads(Owner[Load]):
         """Facts that decide the results of a run, in the types of JSON."""
         return [[type(load).__name__, *load.place(), *load.identity()] for load in self.all]
 
-    def state(self) -> dict[str, Any]:
-        """Share of each load that the body carries, and the forces that fade."""
-        unbalanced = np.zeros(0) if self.unbalanced is None else self.unbalanced
+    def state(self, layout: Layout) -> dict[str, Any]:
+        """Share of each load that the body carries, and the forces that fade; a call for all ranks."""
+        unbalanced = np.zeros(0) if self.unbalanced is None else layout.whole(self.unbalanced)
         return {"all": [load.state() for load in self.all], "unbalanced": unbalanced}
 
-    def restore(self, state: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Any], layout: Layout) -> None:
         """The reverse of :meth:`state`, for the same loads.
 
         Raises:
             CheckpointError: The script has made others.
         """
         self.all = restored("load", self.all, state["all"])
-        self.unbalanced = state["unbalanced"] if len(state["unbalanced"]) else None
+        unbalanced = state["unbalanced"]
+        self.unbalanced = layout.part(unbalanced) if len(unbalanced) else None
         self.changed()

@@ -14,14 +14,14 @@ import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks, ranks
-from tawami.base.errors import CheckpointError, InputError, LockingWarning, ParameterWarning
+from tawami.base.errors import CheckpointError, InputError, ParameterWarning
 from tawami.base.identity import text
 from tawami.base.meaning import meaning
 from tawami.base.sealed import Settings
 from tawami.base.space import Space
 from tawami.base.warn import warn
-from tawami.body import rings
 from tawami.body.body import Body
+from tawami.body.part import Part
 from tawami.border.pieces import Border
 from tawami.field import fitted_volumes
 from tawami.form.compilation import CompiledForm, check_used, compile_form
@@ -29,15 +29,13 @@ from tawami.form.form import Form
 from tawami.form.symbols import Assembly
 from tawami.grid.basis import BASES, Basis
 from tawami.grid.grid import Grid
-from tawami.particles import assignment
+from tawami.particles import assignment, making
 from tawami.particles.assignment import Law
+from tawami.scene import locking
 from tawami.scene.parameters import by_kind, check_names
 
 Array = npt.NDArray[np.float64]
 Leaving = Literal["stop", "remove"]
-#: K/mu from which displacement-only forms lock: nu = 0.49. At 0.495 the mean stress of the cantilever
-#: has 4 times the error that it has at 0.3, at 0.49995 70 times (`python -m cases.extremes`).
-LOCKS = 50.0
 
 #: Arguments of `Scene` that are not parameters of the form.
 KEYWORDS = (
@@ -65,6 +63,8 @@ class Model:
         names: Name of the group of each material; empty if the body has no names.
         leaving: 'stop' or 'remove', for particles that leave the grid.
         num_particles: Particles of the body, on all ranks.
+        part: The part of the body that the driver script has on this rank, whose order arrays of the
+            script have; None if it has the whole body.
         fits: Whether the form integrates with volumes that fit the border of the body.
         border: The border of the body; None if it has none.
     """
@@ -83,6 +83,7 @@ class Model:
     names: tuple[str, ...]
     leaving: Leaving
     num_particles: int
+    part: Part | None
     fits: bool
     border: Border | None
 
@@ -90,6 +91,20 @@ class Model:
     def space(self) -> Space:
         """Everything that follows from the dimension."""
         return self.grid.space
+
+    @property
+    def along_body(self) -> int:
+        """Length of the arrays of a driver script: the particles of its body on this rank."""
+        return self.num_particles if self.part is None else len(self.part.number)
+
+    def of_script(self, rows: npt.NDArray[Any], number: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Rows of some particles, from an array of a driver script; a collective call.
+
+        Args:
+            rows: Row of each particle of the body of the script.
+            number: Numbers of the particles.
+        """
+        return rows[number] if self.part is None else self.part.at(rows, number)
 
     @property
     def moves(self) -> bool:
@@ -182,7 +197,8 @@ def build(
     assembly: Assembly,
     parameters: Mapping[str, Any],
 ) -> tuple[Model, _rust.Particles]:
-    """The model of a scene and the particles of its whole body; the arguments are those of `Scene`.
+    """The model of a scene and the particles of its body on this rank; the arguments are those of
+    `Scene`.
 
     Raises:
         InputError, FormError: As `Scene`.
@@ -201,11 +217,11 @@ def build(
     values, options = loaded.settings(numbers, static=density is None, others=KEYWORDS)
     for message in [] if grid.comm.rank else loaded.unusual(values):
         warn(message, ParameterWarning)
-    particles, laws = _particles(grid, body, material, material_of, loaded)
+    with ranks.raise_together(grid.comm):
+        particles, laws = making.particles(grid, body, material, material_of, loaded)
     materials = assignment.materials_of(laws)
     densities = assignment.densities(density, len(materials), body.names)
-    ratios = np.array([m.bulk_modulus / m.shear_modulus for m in materials])[particles.material]
-    warn_of_locking(grid, loaded, float(ratios.max()), int(ratios.argmax()))
+    locking.warn_of_first(grid, loaded, materials, particles)
     compiled = _compiled(grid, loaded, options, assembly, laws, in_space)
     check_names(loaded, in_space, materials)
     if "rho" in compiled.used and densities is None:
@@ -213,14 +229,16 @@ def build(
             f"form {loaded.name} reads the density rho: expected Scene(..., density=...) [kg/m3]"
         )
     check_used(compiled, options, parameters)
-    _check_plastic_volume(compiled, laws, particles)
+    with ranks.raise_together(grid.comm):
+        _check_plastic_volume(compiled, laws, particles)
     fixed = "options of the form are fixed when a scene is made: Scene(..., stabilisation=...)"
     changing = {*in_time, *in_space}
     used = {n: value for n, value in values.items() if n in compiled.used and n not in changing}
     model = Model(
         grid, loaded, compiled, basis, values,
         used, in_time, in_space, Settings(options, fixed),
-        laws, densities, _names(body, len(materials)), leaving, len(particles),
+        laws, densities, _names(body, len(materials)), leaving,
+        len(particles) if body.part is None else body.part.total, body.part,
         fitted_volumes.chosen(volumes, body.border),
         body.border,
     )  # fmt: skip
@@ -285,24 +303,6 @@ def _names(body: Body, materials: int) -> tuple[str, ...]:
     return tuple(body.names) if len(body.names) == materials else ()
 
 
-def _particles(
-    grid: Grid,
-    body: Body,
-    material: assignment.Given,
-    material_of: npt.ArrayLike | None,
-    form: Form,
-) -> tuple[_rust.Particles, list[Law]]:
-    """All particles of the body with their materials and history variables."""
-    x, volume = checks.array("x", body.x, 2), checks.array("volume", body.volume, 1)
-    volume = rings.volumes(grid, x, volume)
-    assigned = assignment.assigned(material, material_of, body, len(x))
-    particles = _rust.Particles(x, volume, assigned.number)
-    materials = assignment.materials_of(assigned.laws)
-    particles.check_materials(materials, form.kinematics.name, form.strain.finite)
-    particles.add_history(materials)
-    return particles, assigned.laws
-
-
 def _check_plastic_volume(
     compiled: CompiledForm,
     laws: Sequence[Law],
@@ -326,22 +326,3 @@ def _check_plastic_volume(
             f"volume, and form {form.name} has no term for that: expected eps_p in its volume equation, "
             "as - sum_p(K * eps_p, q) in 'u_epsv'"
         )
-
-
-def warn_of_locking(grid: Grid, form: Form, ratio: float, number: int) -> None:
-    """Warn of a nearly incompressible material in a form without a field for the volume.
-
-    Args:
-        grid: The grid.
-        form: The form.
-        ratio: Largest K/mu of a particle.
-        number: Of this particle.
-    """
-    if not form.kinematics.locks or grid.comm.rank or ratio < LOCKS:
-        return
-    warn(
-        f"form {form.name} has no field for the volume, and K/mu = {ratio:.3g} at particle {number}: it "
-        f"locks, and its mean stress is useless where K/mu is large. Expected K/mu below {LOCKS:g} "
-        "(nu < 0.49); use form 'u_epsv' or 'u_epsv_finite'",
-        LockingWarning,
-    )

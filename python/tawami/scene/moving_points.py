@@ -117,7 +117,7 @@ class MovingPoints:
             SupportError: A point has no particles near it.
         """
         if self._located is None or self._located[0] is not domain:
-            of = self._grid, domain.active, self.x, self.normal, self.what
+            of = domain.model.grid, domain.active, self.x, self.normal, self.what
             self._located = domain, BorderInCells(*of, torn=torn)
         return self._located[1]
 
@@ -296,7 +296,7 @@ def halve(ends: MovingPoints, longest: float) -> Indices:
 def moved(
     all_points: Sequence[MovingPoints], domain: Domain, u: Array
 ) -> list[tuple[Array, Array]]:
-    """Positions and areas of points after a step.
+    """Positions and areas of points after a step; a call for all ranks.
 
     Points without particles near them, as after a body broke, stay where they are; loads and supports
     on them raise an error.
@@ -315,7 +315,7 @@ def moved(
     normal = area / np.linalg.norm(area, axis=1)[:, None]
     cells = BorderInCells(grid, domain.active, x, normal, torn=True)
     location, near = cells.location, ~cells.lost[:, None]
-    flat = np.ascontiguousarray(u).ravel()
+    flat = domain.layout.whole(np.ascontiguousarray(u).ravel())
     gradient = space.in_space(space.gradients(_rust.gradients(location, basis, flat)))
     f = gradient + np.eye(space.dim)
     x = x + np.where(near, _rust.interpolate(location, basis, space.dim, flat), 0.0)

@@ -11,9 +11,10 @@ from tawami.border.patches import Patches, patches
 from tawami.border.rigid import Pose
 from tawami.border.shapes import Shape
 from tawami.scene.domain import Domain
-from tawami.scene.held_border import PENALTY
 from tawami.scene.moving_points import MovingPoints
 
+#: Penalty of a patch per cell, in shear moduli.
+PENALTY = 200.0
 #: Lengths of patches that stay, unless they were made so [cells].
 SHORTEST, LONGEST = 0.7, 2.2
 #: Share of the largest area that a point has on an axis of symmetry, or without particles near it.
@@ -34,7 +35,7 @@ class BorderNear:
 
     Attributes:
         h: Side of a cell [m].
-        n, size: Number of coefficients of the displacement, and of all fields.
+        n, size: Number of coefficients of the displacement in the whole grid, and of all fields.
         x: Positions of all points at the start [m], points x dim.
         start: The same in the frame of the obstacle.
         distance: Their distances from it [m].
@@ -60,7 +61,7 @@ class BorderNear:
         groups: Patches | None = None,
     ) -> None:
         self.h, self._dim = domain.model.grid.h, domain.model.space.dim
-        self.n, self.size = domain.layout.num_displacement, domain.layout.size
+        self.n, self.size = domain.layout.num_displacement_of_grid, domain.layout.size_of_grid
         cells = place.cells(domain, torn=True)
         self._numbers, self._values, _ = cells.tabulated(domain.layout.basis)
         self.x = place.x
@@ -70,7 +71,7 @@ class BorderNear:
         weight = place.weight
         least = NO_WEIGHT * weight.max()
         self.weights = np.where(cells.lost, least, np.maximum(weight, least))
-        shear = np.where(cells.lost, 0.0, domain.moduli_of_cells[1][cells.location.cell])
+        shear = np.where(cells.lost, 0.0, domain.moduli_at(cells)[1])
         self.penalty = PENALTY / self.h * self.groups.means(self.weights, shear)
         self.distance = shape.evaluate(self.start).distance
         self.chosen = np.zeros(self.groups.count, dtype=bool)

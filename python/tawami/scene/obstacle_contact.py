@@ -7,7 +7,6 @@ the penalty alone: below 5e-6 h times the largest pressure over mu.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -45,7 +44,8 @@ class ObstacleContact:
         domain: The particles at its start.
         obstacle: The obstacle.
         motion: Its motion in the step.
-        before: Displacement coefficients since the start where particles do not move, else 0.
+        before: Displacement coefficients of the whole grid since the start where particles do not move,
+            else 0.
     """
 
     smooth, implicit, first_work = False, True, 0.0
@@ -119,10 +119,6 @@ class ObstacleContact:
     def prescribed(self) -> float:
         """The largest displacement that the obstacle prescribes in this step [m]."""
         return float(np.abs(self.motion.change[: self._dim]).max(initial=0.0))
-
-    def begin(self, diagonal: Callable[[], Array], inertia: Array | None) -> None:
-        """See `Term`."""
-        self.restart()
 
     def restart(self) -> None:
         """See `Term`."""
@@ -229,7 +225,7 @@ class ObstacleContact:
         """Work on body and obstacle from outside, dissipation by friction, and loss by impact.
 
         Args:
-            u: Increments of the displacement.
+            u: Increments of the displacement, in the whole grid.
         """
         q, free, resultant = self.motion.unknown, self.motion.free, self.now.resultant
         external = float(self.motion.force[free] @ q[free] - resultant[~free] @ q[~free])

@@ -20,7 +20,7 @@ class Outcome:
         coefficients: Of all fields: since the start where particles do not move, of the step where
             they do.
         reactions: Forces of supports and walls.
-        particles: Arrays of the whole body at the end of the step, in the order of the numbers.
+        particles: Arrays of this rank's particles at the end of the step.
     """
 
     accepted: Accepted

@@ -6,8 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tawami import _rust
+from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.border.curves import left
+from tawami.border.points import BorderPoints
 from tawami.field.border import BorderInCells
 from tawami.scene.domain import Domain
 from tawami.scene.moving_points import MovingPoints
@@ -19,10 +22,12 @@ ENDS = np.array([-0.5, 0.5])
 class Outline:
     """The border of a body as it is now: one side for each of its points, as long as the point counts.
 
+    Making it is a call for all ranks.
+
     Args:
         points: All points of the border.
         domain: The particles at the end of the step.
-        u: Coefficients of the displacement since the start, where particles do not move.
+        coefficients: Of all fields since the start, where particles do not move.
 
     Attributes:
         x: Positions of the points, at small strain those at the start [m].
@@ -30,11 +35,13 @@ class Outline:
         part: Number of the part of the border of each point.
     """
 
-    def __init__(self, points: MovingPoints, domain: Domain, u: Array) -> None:
+    def __init__(self, points: MovingPoints, domain: Domain, coefficients: Array) -> None:
         self._made, self.x, self.area = points.made, points.x, points.area
         self.part = self._made.tag
-        vectors = u.reshape(-1, domain.model.space.dim)
-        self._static = None if domain.model.moves else (domain, vectors)
+        #: Displacements of the points and their gradients, where particles do not move.
+        self._static = (
+            None if domain.model.moves else _at_points(domain, self.x, self._made, coefficients)
+        )
 
     def sides(self, deformed: float = 1.0) -> Array:
         """Ends of the sides with enlarged displacements [m], points x 2 x dim.
@@ -53,13 +60,9 @@ class Outline:
     def _displacements(self, start: Array) -> Array:
         if self._static is None:
             return _sides(self.x, self.area) - start
-        domain, u = self._static
-        normal = self._made.normal
-        cells = BorderInCells(domain.model.grid, domain.active, self.x, normal)
-        basis = domain.layout.basis
-        gradient = np.stack([slope @ u for slope in cells.slopes(basis)], axis=2)
+        displacement, gradient = self._static
         offset = np.einsum("nij,nkj->nki", gradient, start - self.x[:, None])
-        return np.asarray((cells.values(basis) @ u)[:, None] + offset)
+        return np.asarray(displacement[:, None] + offset)
 
     def tractions(self, acting: Sequence[tuple[MovingPoints, Array]]) -> Array:
         """Sum of tractions of loads and supports at the points [Pa], points x dim.
@@ -82,3 +85,21 @@ class Outline:
 def _sides(x: Array, area: Array) -> Array:
     """Straight sides through points, across their normals, points x 2 x dim."""
     return np.asarray(x[:, None] + ENDS[:, None] * left(area)[:, None])
+
+
+def _at_points(
+    domain: Domain, x: Array, made: BorderPoints, coefficients: Array
+) -> tuple[Array, Array]:
+    """Displacements at points of the border, and their gradients; a call for all ranks."""
+    grid, layout, dim = domain.model.grid, domain.layout, domain.model.space.dim
+    cells = BorderInCells(grid, domain.active, x, made.normal, torn=True)
+    u = np.ascontiguousarray(coefficients[: layout.num_displacement])
+    found = np.zeros((len(x), dim + dim**2))
+    location = cells.of_rank
+    gradients = domain.model.space.in_space(
+        domain.model.space.gradients(_rust.gradients(location, layout.basis, u))
+    )
+    found[cells.own, :dim] = _rust.interpolate(location, layout.basis, dim, u)
+    found[cells.own, dim:] = gradients.reshape(len(location), dim**2)
+    ranks.sum_of(grid.comm, found)
+    return found[:, :dim], found[:, dim:].reshape(-1, dim, dim)

@@ -18,7 +18,7 @@ import numpy as np
 from tawami import _rust
 from tawami.base.arrays import Array
 from tawami.form.form import Form
-from tawami.grid.basis import Basis, greville
+from tawami.grid.basis import Basis
 from tawami.scene.domain import Domain
 from tawami.scene.least_squares import least_squares
 
@@ -43,7 +43,7 @@ def at_particles(domain: Domain, basis: Basis, coefficients: Array) -> Array:
 def on_grid(domain: Domain) -> Array:
     """The fields at the particles as coefficients, 0 for other fields; a call for all ranks."""
     coefficients = np.zeros(domain.layout.size)
-    grid, particles = domain.model.grid, domain.particles
+    particles = domain.particles
     for name in domain.model.form.own_fields:
         place = domain.layout.fields[name]
         column = particles.carried(name)
@@ -51,7 +51,7 @@ def on_grid(domain: Domain) -> Array:
         at_origin = value - (gradient * particles.x).sum(axis=1)
         data = np.column_stack([np.ones(len(value)), at_origin, gradient])
         sums = domain.sums(particles.volume, data, place.basis)
-        points = greville(place.basis, grid.origin, grid.h, grid.cells)
+        points = domain.layout.window.greville(place.basis)
         total = sums[:, 1] + (sums[:, 2:] * points).sum(axis=1)
         coefficients[place.slice] = np.divide(
             total, sums[:, 0], out=np.zeros_like(total), where=sums[:, 0] > 0

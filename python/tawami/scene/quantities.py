@@ -19,6 +19,7 @@ from tawami import _rust
 from tawami.base import checks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError, NotModelledError
+from tawami.base.ranks import raise_together
 from tawami.base.space import PLANE, Space
 from tawami.base.text import meant
 from tawami.particles import assignment, placement
@@ -68,6 +69,8 @@ class Quantity:
         of: Function that returns its values, particles or particles x components, from the arrays of the
             particles, :class:`Arrays`: `lambda p: p.stress[:, 0] - p.stress[:, 1]`.
         nodal: Whether it can be projected on the grid.
+        whole: Whether its function needs the arrays of the particles of all ranks; else each rank
+            calls it for its own particles.
 
     Raises:
         InputError: A label without a unit in brackets, or something that is not a function.
@@ -76,6 +79,7 @@ class Quantity:
     label: str
     of: Callable[[Arrays], Any]
     nodal: bool = True
+    whole: bool = True
 
     def __post_init__(self) -> None:
         if not isinstance(self.label, str) or not re.fullmatch(r".*\S \[[^\[\]]+\]", self.label):
@@ -116,7 +120,8 @@ class Quantity:
                 f"{what}: its function returned an array of shape {found.shape}: expected ({n},) or "
                 f"({n}, components), one row for each particle"
             )
-        wrong = np.flatnonzero(~np.isfinite(found.reshape(n, -1)).all(axis=1))
+        axes = tuple(range(1, found.ndim))
+        wrong = np.flatnonzero(~np.isfinite(found).all(axis=axes))
         if len(wrong):
             p = wrong[0]
             raise InputError(
@@ -146,21 +151,26 @@ def _volume(space: Space) -> str:
     return f"volume [{space.unit(space.volume)}]"
 
 
+def _own(label: str, of: Callable[[Arrays], Any], *, nodal: bool = True) -> Quantity:
+    """A quantity of each particle that depends on this particle only."""
+    return Quantity(label, of, nodal, whole=False)
+
+
 #: Quantities that follow from arrays of the particles.
 DERIVED = {"mean stress": _mean_stress, "deviatoric stress q": _deviatoric_stress}
 #: Quantities of the particles. History variables of the laws, which are strains, are added to them.
 PARTICLES = {
-    "displacement": Quantity("displacement [m]", _stored("displacement"), nodal=False),
-    "stress": Quantity(f"stress {TENSOR} [Pa]", _stored("stress")),
-    "mean stress": Quantity("mean stress [Pa]", _mean_stress),
-    "deviatoric stress q": Quantity("deviatoric stress q [Pa]", _deviatoric_stress),
-    "strain": Quantity(f"strain {TENSOR} [-]", _stored("strain")),
-    "volume": Quantity(_volume(PLANE), _stored("volume"), nodal=False),
-    "eps_v": Quantity("eps_v [-]", _stored("eps_v")),
-    "velocity": Quantity("velocity [m/s]", _stored("velocity"), nodal=False),
-    "acceleration": Quantity("acceleration [m/s2]", _stored("acceleration"), nodal=False),
-    "material": Quantity("material [-]", _stored("material"), nodal=False),
-    "number": Quantity("number [-]", _stored("number"), nodal=False),
+    "displacement": _own("displacement [m]", _stored("displacement"), nodal=False),
+    "stress": _own(f"stress {TENSOR} [Pa]", _stored("stress")),
+    "mean stress": _own("mean stress [Pa]", _mean_stress),
+    "deviatoric stress q": _own("deviatoric stress q [Pa]", _deviatoric_stress),
+    "strain": _own(f"strain {TENSOR} [-]", _stored("strain")),
+    "volume": _own(_volume(PLANE), _stored("volume"), nodal=False),
+    "eps_v": _own("eps_v [-]", _stored("eps_v")),
+    "velocity": _own("velocity [m/s]", _stored("velocity"), nodal=False),
+    "acceleration": _own("acceleration [m/s2]", _stored("acceleration"), nodal=False),
+    "material": _own("material [-]", _stored("material"), nodal=False),
+    "number": _own("number [-]", _stored("number"), nodal=False),
 }
 #: History variables of the laws of tawami, and their units.
 HISTORY = {"plastic_strain": "-", "dilatancy": "-", "preconsolidation": "Pa"}
@@ -184,11 +194,11 @@ def of_scene(scene: Any) -> dict[str, Quantity]:
         units |= law.units
     found = {name: history(name, units.get(name, "-")) for name in particles.history_names}
     found |= {
-        name: Quantity(f"{name} [{field.unit}]", _stored(name))
+        name: _own(f"{name} [{field.unit}]", _stored(name))
         for name, field in form.own_fields.items()
     }
     given = {name: form.data_unit(name) for name in form.data if name in dict(particles.arrays)}
-    found |= {n: Quantity(f"{n} [{unit}]", _stored(n)) for n, unit in given.items()}
+    found |= {n: _own(f"{n} [{unit}]", _stored(n)) for n, unit in given.items()}
     if scene.grid.space != PLANE:  # the same name, with its unit there
         found["volume"] = replace(PARTICLES["volume"], label=_volume(scene.grid.space))
     return found
@@ -196,7 +206,7 @@ def of_scene(scene: Any) -> dict[str, Quantity]:
 
 def history(name: str, unit: str = "-") -> Quantity:
     """The quantity of a history variable."""
-    return Quantity(f"{name} [{unit}]", _stored(name))
+    return _own(f"{name} [{unit}]", _stored(name))
 
 
 # -- arrays of particles -----------------------------------------------------
@@ -235,10 +245,9 @@ def array_of(particles: _rust.Particles, name: str) -> npt.NDArray[Any]:
     return np.asarray(getattr(particles, name))
 
 
-def of_body(comm: Any, particles: _rust.Particles) -> dict[str, npt.NDArray[Any]]:
-    """All arrays of the particles of the body, in the order of the numbers; a call for all ranks."""
-    in_order = placement.in_order(comm, particles.number)
-    return {name: in_order(array_of(particles, name)) for name in arrays_of(particles)}
+def copies(particles: _rust.Particles) -> dict[str, npt.NDArray[Any]]:
+    """Copies of all arrays of the particles of this rank."""
+    return {name: np.array(array_of(particles, name)) for name in arrays_of(particles)}
 
 
 def local_arrays(subject: Subject) -> Arrays:
@@ -257,6 +266,18 @@ def body_arrays(subject: Subject) -> Arrays:
     """Arrays of the particles of all ranks in the order of their numbers; calls for all ranks."""
     gather = placement.in_order(subject.scene.grid.comm, _present(subject, "number"))
     return Arrays(lambda name: gather(_present(subject, name)))
+
+
+def own_values(quantity: Quantity, subject: Subject, own: Arrays) -> Array:
+    """Values of a quantity for this rank's particles, given their arrays; a call for all ranks."""
+    comm = subject.scene.grid.comm
+    if not quantity.whole or comm.size == 1:
+        with raise_together(comm):
+            return quantity.values(own)
+    arrays = body_arrays(subject)
+    with raise_together(comm):
+        values = quantity.values(arrays)
+    return np.asarray(values[np.searchsorted(arrays["number"], own["number"])])
 
 
 # -- by name -----------------------------------------------------------------

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from tawami.base import checks
-from tawami.base.arrays import Array
+from tawami.base.arrays import Array, of_components
 from tawami.base.errors import InputError
 from tawami.base.text import quoted
+from tawami.field.owned import Owned
 from tawami.field.reduction import Reduction
 from tawami.grid import edges
 from tawami.grid.grid import EDGES, Edge
@@ -46,33 +47,40 @@ def _check_known(place: str, edges_held: Collection[str], names: Collection[str]
 
 def divided(reduction: Reduction, forces: Array) -> tuple[Array, Array]:
     """Forces of supports: those of edges and walls on all displacement coefficients, and the multipliers
-    of points, which carry as much as possible.
+    of points, which carry as much as possible; a call for all ranks.
 
     Args:
         reduction: The supports.
         forces: Of all supports on the displacement coefficients [N per metre depth].
     """
-    fixed, points, rest = reduction.fixed[: len(forces)], reduction.points, forces
-    multipliers = np.zeros(len(points))
+    layout, points = reduction.layout, reduction.points
+    fixed, rest, multipliers = reduction.fixed[: len(forces)], forces, np.zeros(len(points))
     if points:
-        weights = np.zeros((len(forces), len(points)))
+        some = np.unique(np.concatenate([point.indices for point in points]))
+        weights = np.zeros((len(some), len(points)))
         for k, point in enumerate(points):
-            weights[point.indices, k] = point.weights
-        multipliers = np.linalg.lstsq(weights[~fixed], forces[~fixed], rcond=None)[0]
-        rest = forces - weights @ multipliers
+            weights[np.searchsorted(some, point.indices), k] = point.weights
+        loose = layout.at(fixed.astype(float), some) == 0
+        carried = layout.at(forces, some)[loose]
+        multipliers = np.linalg.lstsq(weights[loose], carried, rcond=None)[0]
+        place, rest = layout.places(some), forces.copy()
+        rest[place[place >= 0]] -= (weights @ multipliers)[place >= 0]
     return np.where(fixed, rest, 0.0), multipliers
 
 
 def work(reduction: Reduction, forces: Array, u: Array) -> float:
     """Work of forces of supports on increments of the displacement [J per metre depth].
 
+    A call for all ranks.
+
     Args:
         reduction: The supports.
         forces, u: On all displacement coefficients [N per metre depth], [m].
     """
     held, multipliers = divided(reduction, forces)
-    moved = [point.weights @ u[point.indices] for point in reduction.points]
-    return float(held @ u + multipliers @ np.array(moved))
+    layout = reduction.layout
+    moved = [point.weights @ layout.at(u, point.indices) for point in reduction.points]
+    return layout.dot(held, u) + float(multipliers @ np.array(moved))
 
 
 @dataclass(frozen=True)
@@ -96,8 +104,9 @@ class Reactions:
     its length.
 
     Attributes:
-        on_edges: Of edges, and of walls that hold functions, functions x dim [N per metre depth].
-        on_walls: Of other walls, functions x dim [N per metre depth].
+        on_edges: Of edges, and of walls that hold functions, on the displacement coefficients
+            [N per metre depth].
+        on_walls: Of other walls, on those of the whole grid.
         at_points: Of points.
         on_border: Of patches of the border [N per metre depth], by the names of its parts.
         on_obstacles: Contact with obstacles.
@@ -105,7 +114,7 @@ class Reactions:
         names: Parts of the border with supports, each with the edges of the grid that it is held on.
     """
 
-    on_edges: Array
+    on_edges: Owned
     on_walls: Array
     at_points: Sequence[AtPoint] = field(default_factory=list)
     on_border: Sequence[tuple[str, Array]] = ()
@@ -115,7 +124,7 @@ class Reactions:
 
     @classmethod
     def of(cls, accepted: Accepted, supports: Supports) -> Reactions:
-        """Points by their multipliers, the rest to edges and walls.
+        """Points by their multipliers, the rest to edges and walls; a call for all ranks.
 
         Args:
             accepted: The step.
@@ -130,7 +139,8 @@ class Reactions:
             assert not isinstance(support.component, str)
             places = (support.given, support.place, point.place)
             at_points.append(AtPoint(places, support.component, float(force)))
-        on_edges = held.reshape(accepted.u.shape) + accepted.friction
+        layout, friction = reduction.layout, accepted.friction
+        on_edges = layout.owned(held + friction.ravel())
         on_border = [
             part
             for held in accepted.problem.supports
@@ -140,10 +150,10 @@ class Reactions:
         held_edges = accepted.problem.held_edges
         contacts = [contact.result() for contact in accepted.problem.obstacles]
         walls = {wall.obstacle for wall in supports.walls}
-        on_walls = np.zeros_like(on_edges)
+        on_walls = np.zeros(layout.num_displacement_of_grid)
         for contact in accepted.problem.obstacles:
             if contact.obstacle in walls:
-                on_walls += contact.at_end[: on_walls.size].reshape(on_walls.shape)
+                on_walls += contact.at_end[: len(on_walls)]
         return cls(on_edges, on_walls, at_points, on_border, contacts, held_edges, supports.names)
 
     def contact(self, obstacle: Any) -> ContactResult:
@@ -159,7 +169,7 @@ class Reactions:
         )
 
     def at(self, model: Model, place: str | Sequence[float] | Obstacle) -> Array:
-        """Force (x, y) [N per metre depth] of a support; see `Solution.reaction`."""
+        """Force (x, y) [N per metre depth] of a support, a call for all ranks; see `Solution`."""
         force, found = np.zeros(model.space.dim), False
         if isinstance(place, Obstacle) or any(place == one.name for one in self.on_obstacles):
             return -self.contact(place).force
@@ -170,7 +180,8 @@ class Reactions:
                 on_edges.add(checks.choice("reaction(...)", place, EDGES))
             for edge in sorted(on_edges):
                 functions = edges.edge_functions(model.grid, model.basis, edge)
-                force = force + self.on_edges[functions].sum(axis=0)
+                places = of_components(functions, model.space.dim)
+                force = force + self.on_edges.at(places).sum(axis=0)
                 force -= sum(c.force for c in self.on_obstacles if c.name == name_of(edge))
             parts = [part for name, part in self.on_border if name == place]
             return np.asarray(sum(parts, force))

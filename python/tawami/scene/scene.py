@@ -202,7 +202,8 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
     @property
     def particles_per_cell(self) -> npt.NDArray[np.int64]:
         """Number of particles in each cell, x fastest; a call for all ranks."""
-        return self.configuration.domain.particles_per_cell
+        domain = self.configuration.domain
+        return self.grid.window.whole(domain.particles_per_cell)
 
     def initial(self, name: str, source: Source, *, beyond: initial.Beyond = "stop") -> None:
         """Give the particles an initial field, before anything is solved; loads and supports act on
@@ -354,7 +355,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
     @property
     def num_coefficients(self) -> int:
         """Number of coefficients of all fields, supports and empty cells included."""
-        return self.configuration.domain.layout.size
+        return self.configuration.domain.layout.size_of_grid
 
     def split(self, coefficients: Array) -> tuple[Array, Array | None]:
         """Coefficients of the displacement, and of eps_v or p (None if the form has neither).
@@ -362,7 +363,10 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         Raises:
             InputError: Not the coefficients of all fields.
         """
-        return self.configuration.domain.layout.split(self._coefficients(coefficients))
+        given, layout = self._coefficients(coefficients), self.configuration.domain.layout
+        names = [name for name, place in layout.fields.items() if place is layout.volumetric]
+        volumetric = given[layout.of_grid[names[0]].slice] if names else None
+        return given[: layout.num_displacement_of_grid], volumetric
 
     def reduction(self) -> Reduction:
         """Unknowns that the supports leave free: coefficients = selection @ unknowns + offset."""
@@ -383,13 +387,15 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         """
         self.configuration.activity.check_between_steps("residual(...)")
         self.configuration.prepare(self.configuration.moment(), dt)
-        return self.configuration.domain.newton.internal(self._coefficients(coefficients))
+        domain, given = self.configuration.domain, self._coefficients(coefficients)
+        return domain.layout.whole(domain.newton.internal(domain.layout.part(given)))
 
     def tangent(self, coefficients: Array, *, dt: float | None = None) -> sp.csr_matrix:
         """Derivative of :meth:`residual` as the form's tangent gives it, without loads and supports."""
         self.configuration.activity.check_between_steps("tangent(...)")
         self.configuration.prepare(self.configuration.moment(), dt)
-        coefficients, domain = self._coefficients(coefficients), self.configuration.domain
+        domain = self.configuration.domain
+        coefficients = domain.layout.part(self._coefficients(coefficients))
         domain.newton.internal(coefficients)
         return domain.assembly.unreduced_tangent(coefficients, domain.responses.data)
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from tawami import _rust
-from tawami.base import checks, html
+from tawami.base import checks, html, ranks
+from tawami.base.arrays import of_components
 from tawami.base.errors import InputError, NotModelledError
 from tawami.base.process import Unique
 from tawami.base.sealed import Sealed
@@ -17,11 +18,15 @@ from tawami.base.text import meant, quoted
 from tawami.field.constraints import LEAST_SHARE
 from tawami.form.kinematics import KINEMATICS
 from tawami.grid import edges
+from tawami.particles.gathered import Gathered
 from tawami.scene import presentation, quantities
 from tawami.scene.absent import Elsewhere
 from tawami.scene.configuration import Configuration
 from tawami.scene.contact_result import ContactResult
+from tawami.scene.error import ErrorEstimate, estimate
+from tawami.scene.goal import Goal
 from tawami.scene.obstacle import Obstacle
+from tawami.scene.of_all_particles import OfAllParticles
 from tawami.scene.outcome import Outcome
 from tawami.scene.outline import Outline
 from tawami.scene.points import ROUND_OFF, outside
@@ -41,17 +46,15 @@ class Solved(Protocol):
         """Its particles, supports and loads."""
 
 
-class Solution(Elsewhere, Sealed, Unique):
+class Solution(OfAllParticles, Elsewhere, Sealed, Unique):
     """Equilibrium of a scene, or the end of a step.
 
-    On several ranks every rank has the complete solution. Arrays of particles are in the order of their
-    numbers.
+    Arrays of particles are in the order of their numbers. On several ranks a solution holds the
+    particles and coefficients of this rank. An array of all (`x`, `stress`, `u`, ...) is gathered when
+    it is first read, and kept: this is a call for all ranks. `own` has the particles of this rank.
 
     Attributes:
         scene: The scene.
-        coefficients: Of all fields, one after the other, as `u`.
-        u: Coefficients of the displacement [m], two per function, x fastest: since the start, and of
-            the last step where strains are finite.
         unknowns: Number of reduced unknowns.
         load: Share of the new loads and displacements that it is in equilibrium with; NaN in dynamics.
         iterations: Newton iterations of the last step.
@@ -59,16 +62,12 @@ class Solution(Elsewhere, Sealed, Unique):
             role, the largest of theirs as well.
         krylov: FGMRES iterations of every linear solve of the last step; 0 where the tangent was
             factorised.
-        number: Numbers of the particles in the body, ascending: all, unless some have left.
-        x: Positions of the particles [m].
-        volume: Their volumes [m2] at the start.
-        stress: Their stress [Pa] (xx, yy, zz, xy) at the end of this step.
-        displacement_of_particles: Their displacement [m] since the start.
+        num_particles: Number of particles, on all ranks.
+        own: Arrays of the particles of this rank by name, as `own.stress`.
         condition: Estimate of the condition number of the scaled tangent that was factorised last: its
             Frobenius norm over the square root of its size, times that of its inverse as random
             vectors show it.
         symmetric: Whether that tangent was symmetric.
-        on_edges: Forces of edges and walls on the body, functions x 2 [N per metre depth].
     """
 
     def __init__(self, scene: Solved, outcome: Outcome) -> None:
@@ -76,37 +75,49 @@ class Solution(Elsewhere, Sealed, Unique):
         self.scene: Any = scene
         self._model = scene.configuration.model
         layout, step = outcome.accepted.problem.reduction.layout, outcome.accepted.step
-        self.coefficients = outcome.coefficients
-        self.u, self._volumetric = layout.split(outcome.coefficients)
-        self._active = layout.active[: layout.num_displacement].astype(float)
+        self._coefficients, self._of_grid = layout.owned(outcome.coefficients), layout.of_grid
+        self._active = layout.owned(layout.active.astype(float))
         self.unknowns, self.iterations = outcome.accepted.problem.reduction.size, step.iterations
         self.load, self.history = outcome.accepted.load, step.history
         self.krylov = tuple(step.krylov)
         self.condition, self.symmetric = step.condition, step.symmetric
         self._reactions = outcome.reactions
-        self.on_edges = outcome.reactions.on_edges + outcome.reactions.on_walls
-        particles = outcome.particles
-        now = scene.configuration
-        #: The border of the body; None if it has none.
-        self._outline = None
-        if now.border.points is not None:
-            self._outline = Outline(now.border.points, now.domain, self.u)
-        #: Arrays of the particles by name, for quantities.
-        self.arrays = Arrays(self._array)
-        self.number = particles["number"]
-        self.x, self.volume = particles["x"], particles["volume"]
-        self.stress = particles["stress"]
-        self.displacement_of_particles = particles["displacement"]
-        self._eps_v = particles.get("eps_v")
-        self._arrays = particles
+        points, domain = scene.configuration.border.points, scene.configuration.domain
+        self._outline = None if points is None else Outline(points, domain, outcome.coefficients)
+        self._arrays = Gathered(self._model.grid.comm, outcome.particles)
+        self.arrays = Arrays(lambda name: self._array(name, self._arrays))
+        self.own = Arrays(lambda name: self._array(name, self._arrays.own))
+        self.num_particles = self._arrays.num_particles
         self._seal()
 
     def __repr__(self) -> str:
         momentum = self.history[-1][0]
         return (
-            f"Solution({self._model.form.name}: {len(self.number)} particles, {self.unknowns} unknowns, "
-            f"{self.iterations} Newton iterations to {momentum:.1e})"
+            f"Solution({self._model.form.name}: {self.num_particles} particles, "
+            f"{self.unknowns} unknowns, {self.iterations} Newton iterations to {momentum:.1e})"
         )
+
+    @property
+    def coefficients(self) -> Array:
+        """Coefficients of all fields, one after the other, as `u`; gathered from the ranks when they are
+        first read.
+        """
+        return self._coefficients.whole
+
+    @property
+    def u(self) -> Array:
+        """Coefficients of the displacement [m], two per function, x fastest: since the start, and of the
+        last step where strains are finite; gathered as `coefficients`.
+        """
+        return self.coefficients[next(iter(self._of_grid.values())).slice]
+
+    @property
+    def on_edges(self) -> Array:
+        """Forces of edges and walls on the body, functions x 2 [N per metre depth]; gathered as
+        `coefficients`.
+        """
+        forces = self._reactions.on_edges.whole + self._reactions.on_walls
+        return forces.reshape(-1, self._model.space.dim)
 
     @property
     def volumetric(self) -> Array:
@@ -115,7 +126,12 @@ class Solution(Elsewhere, Sealed, Unique):
         Raises:
             InputError: The form has neither.
         """
-        return self._of_form("volumetric", self._volumetric, "has_mean_stress")
+        volumetric = [
+            self.coefficients[self._of_grid[name].slice]
+            for name, field in self._model.form.fields.items()
+            if field.role in ("volumetric_strain", "pressure")
+        ]
+        return self._of_form("volumetric", next(iter(volumetric), None), "has_mean_stress")
 
     @property
     def eps_v(self) -> Array:
@@ -124,7 +140,8 @@ class Solution(Elsewhere, Sealed, Unique):
         Raises:
             InputError: The form does not have that field.
         """
-        return self._of_form("eps_v", self._eps_v, "has_eps_v")
+        values = self.arrays["eps_v"] if "eps_v" in self._arrays.own else None
+        return self._of_form("eps_v", values, "has_eps_v")
 
     def field(self, name: str) -> Array:
         """A field of the form at the particles, in its unit: the value, not the increment of the step.
@@ -142,20 +159,20 @@ class Solution(Elsewhere, Sealed, Unique):
                 f"field({checks.shown(name)}): form {form.name} has {quoted(known) or 'no such field'}: "
                 f"displacement_of_particles and stress have the rest{meant(str(name), known)}"
             )
-        return np.asarray(self._array(name))
+        return self.arrays[name]
 
-    def _array(self, name: str) -> npt.NDArray[Any]:
-        """An array of the particles by its name."""
-        if name == "strain" and quantities.GRADIENT in self._arrays:
-            gradient = self._arrays[quantities.GRADIENT]
+    def _array(self, name: str, of: Mapping[str, npt.NDArray[Any]]) -> npt.NDArray[Any]:
+        """An array by its name, of the particles of this rank or of all."""
+        if name == "strain" and quantities.GRADIENT in self._arrays.own:
+            gradient = of[quantities.GRADIENT]
             return _rust.logarithmic_strain(gradient.reshape(len(gradient), -1))
-        if name not in self._arrays:
+        if name not in self._arrays.own:
             with quantities.not_modelled():  # the error says how to model it
                 quantities.array_of(self.scene.particles, name)
             raise NotModelledError(
                 f"{name}: this solution is older than this quantity of the scene"
             )
-        return self._arrays[name]
+        return of[name]
 
     def _of_form(self, name: str, values: Array | None, having: str) -> Array:
         if values is None:
@@ -175,13 +192,8 @@ class Solution(Elsewhere, Sealed, Unique):
         """
         return self.arrays["strain"]
 
-    @property
-    def mean_stress(self) -> Array:
-        """Mean stress [Pa] at the particles, (xx + yy + zz)/3, tension positive."""
-        return np.asarray(self.stress[:, :3].mean(axis=1))
-
     def displacement(self, point: Sequence[float]) -> Array:
-        """Displacement (u_x, u_y) [m] of the grid at a point.
+        """Displacement (u_x, u_y) [m] of the grid at a point; a call for all ranks.
 
         At small strain it is the displacement since the start. At finite strain, where the grid is reset
         after each step, it is the increment of the last step only: `displacement_of_particles` has the
@@ -196,18 +208,19 @@ class Solution(Elsewhere, Sealed, Unique):
         """
         what = f"displacement({checks.shown(point)})"
         location = edges.locate_point(self._model.grid, point, what)
-        fields = np.column_stack([self.u, self._active])
-        value, share = (
-            np.asarray(
-                _rust.interpolate(location, self._model.basis, self._model.space.dim, field)[0]
-            )
-            for field in np.ascontiguousarray(fields.T)
-        )
+        functions, shares, _ = _rust.functions_at(location, self._model.basis)
+        places = of_components(functions[0], self._model.space.dim)
+        value, share = (shares[0] @ of.at(places) for of in (self._coefficients, self._active))
         reached = float(share.min())
         if reached < LEAST_SHARE:
-            distance = np.linalg.norm(self.x - np.asarray(point), axis=1).min(initial=np.inf)
-            raise outside(what, float(distance))
-        return value if reached > 1 - ROUND_OFF else value / reached
+            distances = np.linalg.norm(self.own["x"] - np.asarray(point), axis=1)
+            nearest = np.array([distances.min(initial=np.inf)])
+            raise outside(what, float(ranks.least_of(self._model.grid.comm, nearest)[0]))
+        return np.asarray(value if reached > 1 - ROUND_OFF else value / reached)
+
+    def error(self, goal: Goal) -> ErrorEstimate:
+        """The estimated error of a quantity, by source; see `tawami.scene.error.estimate`."""
+        return estimate(self.scene.configuration, goal, self.coefficients, self.load)
 
     # -- in a notebook -------------------------------------------------------
 
@@ -273,7 +286,7 @@ class Solution(Elsewhere, Sealed, Unique):
     def _usual(self) -> tuple[list[str], dict[str, Quantity]]:
         """Quantities of a table without names, and those of the laws and the form among them."""
         more = quantities.of_scene(self.scene)
-        known = {*self._arrays, "strain"} - {"number"}
+        known = {*self._arrays.own, "strain"} - {"number"}
         stored = [name for name in quantities.PARTICLES if name in known]
         return [*dict.fromkeys([*stored, *quantities.DERIVED, *more])], more
 
@@ -281,7 +294,7 @@ class Solution(Elsewhere, Sealed, Unique):
         momentum, volume, *others = zip(*self.history, strict=True)
         rows = {
             "form": self._model.form_line,
-            "particles": str(len(self.number)),
+            "particles": str(self.num_particles),
             "unknowns": str(self.unknowns),
             "load": "" if np.isnan(self.load) else f"{100 * self.load:g} %",
             "Newton": f"{self.iterations} iterations",

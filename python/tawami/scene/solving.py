@@ -31,14 +31,14 @@ def solved(
         ConvergenceError: Contact and friction do not settle, or Newton's method fails.
     """
     n, step, space = domain.layout.num_displacement, None, domain.model.space
-    active, vectors = domain.layout.active[: n : space.dim], space.vectors(before[:n])
+    vectors = space.vectors(before[:n])
     for wall in supports.walls:
         wall.begin()
     for _ in range(PASSES):
         problem = kind.problem()
         step = _newton(domain, problem, step, old)
         forces, u = (space.vectors(part[:n]) for part in (step.forces, step.coefficients))
-        if not problem.contact.adapt(forces, u, vectors, active):
+        if not problem.contact.adapt(forces, u, vectors):
             a = step.acceleration
             return Accepted(problem, step, u, None if a is None else space.vectors(a))
     assert step is not None

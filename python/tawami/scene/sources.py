@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tawami.base import checks
+from tawami.base import checks, ranks
 from tawami.base.errors import InputError
 from tawami.scene.domain import Domain
 from tawami.scene.scattered import Scattered
@@ -24,7 +24,7 @@ Source = npt.ArrayLike | Callable[[Array, Array], Any] | Scattered
 def values(
     domain: Domain, name: str, source: Any, components: str, unit: str, label: str | None = None
 ) -> Array:
-    """A field of this rank's particles.
+    """A field of this rank's particles; a collective call.
 
     Args:
         domain: The particles.
@@ -41,21 +41,22 @@ def values(
         InputError: Another shape, numbers that are not finite, or an error of the source.
     """
     x, number = np.asarray(domain.particles.x), np.asarray(domain.particles.number)
-    width, said = len(components.split()), label or name
+    width, said, model = len(components.split()), label or name, domain.model
     at_positions = isinstance(source, Scattered) or callable(source)
-    if at_positions and not len(x):  # a rank without particles
-        return np.empty((0, width))
-    if isinstance(source, Scattered):
-        columns = components.split() if width > 1 else [""]
-        found = source.at(name, columns, unit or "-", x, number, domain.model.grid.h)
-    elif callable(source):
-        found = _of_function(source, x, said, components)
-    else:
-        of_body = _of_numbers(source, domain.model.num_particles, width, said)
-        _check_finite(of_body, np.arange(len(of_body)), said, unit)
-        found = of_body[number]
-    _check_finite(found, number, said, unit)
-    return found
+    found = np.empty((0, width))
+    with ranks.raise_together(model.grid.comm):
+        if not at_positions:
+            found = _of_numbers(source, model.along_body, width, said)
+            of = np.arange(len(found)) if model.part is None else model.part.number
+            _check_finite(found, of, said, unit)
+        elif len(x):  # else a rank without particles
+            if isinstance(source, Scattered):
+                columns = components.split() if width > 1 else [""]
+                found = source.at(name, columns, unit or "-", x, number, model.grid.h)
+            else:
+                found = _of_function(source, x, said, components)
+            _check_finite(found, number, said, unit)
+    return found if at_positions else model.of_script(found, number)
 
 
 def _of_numbers(source: Any, n: int, width: int, name: str) -> Array:

@@ -46,32 +46,35 @@ def of_field(
 ) -> Held:
     """Prescribed values of a field on an edge of the grid, counted as the coefficients at the start."""
     held = on_edge(domain, support, edge, cells, fields.amount if fields else lambda _: 0.0)
-    at_start = start[held.indices]
+    at_start = domain.layout.at(start, held.indices)
     if fields is None:
         return Held(held.indices, at_start, held.where)
-    increments = fields.share * (held.values - fields.old[held.indices])
+    old = domain.layout.at(fields.old, held.indices)
+    increments = fields.share * (held.values - old)
     return Held(held.indices, at_start + increments, held.where)
 
 
 def touched(domain: Domain, border: SceneBorder, support: Support, edge: Edge) -> Indices:
-    """Numbers along an edge of the grid of the cells in which the body touches it.
+    """Numbers along an edge of the grid of the cells in which the body touches it; a call for all ranks.
 
     Where particles move, other points of the border than the support's own may have come to the edge.
     A body without a border touches it with each of its cells there.
     """
-    grid, active = domain.model.grid, domain.active
+    grid = domain.model.grid
     axis, end = grid.edge(edge)
-    row = grid.cells[axis] - 1 if end else 0
+    along = 1 - axis
+    cells = np.zeros((grid.cells[along], grid.space.dim), dtype=np.int64)
+    cells[:, axis], cells[:, along] = grid.cells[axis] - 1 if end else 0, np.arange(len(cells))
+    active = domain.layout.has_particles(cells)
     if not isinstance(support.place, MovingPoints) or border.points is None:
-        return np.flatnonzero(np.take(active, row, axis=1 - axis))
+        return np.flatnonzero(active)
     own = support.place
     near = [own.x[own.edge(edge)]]
     if domain.model.moves:
         near.append(border.points.x[border.points.edge(edge, NEAR)])
-    along = 1 - axis
     scaled = (np.concatenate(near)[:, along] - grid.origin[along]) / grid.h
-    cells = np.unique(np.clip(scaled, 0, grid.cells[along] - 1).astype(np.int64))
-    return np.asarray(cells[np.take(active, row, axis=1 - axis)[cells]])
+    near_edge = np.unique(np.clip(scaled, 0, grid.cells[along] - 1).astype(np.int64))
+    return np.asarray(near_edge[active[near_edge]])
 
 
 def on_edge(
@@ -79,7 +82,7 @@ def on_edge(
 ) -> Held:
     """Values along an edge of the grid, where the body touches it in some cells along it."""
     indices, values = np.empty(0, dtype=np.int64), np.zeros(1)
-    places, grid = domain.layout.fields, domain.model.grid
+    places, grid = domain.layout.of_grid, domain.model.grid
     place, component, sign = next(iter(places.values())), 0, 1.0
     if support.is_field:
         place = places[str(support.component)]
@@ -104,10 +107,8 @@ def at_point(domain: Domain, support: Support, amount: Callable[[Term], float]) 
     """The displacement of a point."""
     assert isinstance(support.place, tuple)
     assert not isinstance(support.component, str)
-    return held_point(
-        domain.model.grid, domain.model.basis, domain.active, support.place, support.component,
-        total(support, amount), domain.layout.active,
-    )  # fmt: skip
+    value = total(support, amount)
+    return held_point(domain.layout, support.place, support.component, value)
 
 
 def total(support: Support, amount: Callable[[Term], float]) -> float:

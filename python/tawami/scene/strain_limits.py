@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from tawami.base.arrays import Array
-from tawami.scene import softening, strain_limit
+from tawami.scene import softening, spacing, strain_limit
 from tawami.scene.domain import Domain
 from tawami.scene.tangents import warn_of_differences
 
 
 class StrainLimits:
-    """Displacement gradients beyond small strain, softening, and laws without a tangent.
+    """Displacement gradients beyond small strain, particles far apart, softening, and laws without a
+    tangent.
 
     Args:
         small: Whether the strains of the scene are small.
     """
 
     def __init__(self, *, small: bool) -> None:
-        self._small, self._softens = small, False
+        self._small, self._softens, self._apart = small, False, small
         self._without_tangent = set[str]()
 
     def warn(self, domain: Domain, total: Array, coefficients: Array) -> None:
@@ -33,6 +34,8 @@ class StrainLimits:
             if large is not None:
                 self._small = False
                 strain_limit.warn_of(domain, *large)
+        if not self._apart:
+            self._apart = spacing.warned(domain)
         if not self._softens:
             self._softens = softening.warned(domain, coefficients)
         warn_of_differences(domain, self._without_tangent)

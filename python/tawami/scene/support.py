@@ -38,11 +38,10 @@ class Support(Action):
         component: Number of the component of the displacement, 'normal', 'tangent', or name of a field.
         unit: Unit of its values.
         held: Tractions that held each other point in the last step [Pa], as multipliers.
-        missing: Displacement by which each of these lagged behind the prescribed one [m].
-        told: Whether a warning was issued that it holds nothing.
+        told: Whether a warning was issued that it does not hold what it should.
     """
 
-    __slots__ = ("_whole", "component", "given", "held", "missing", "place", "told", "unit")
+    __slots__ = ("_whole", "component", "given", "held", "place", "told", "unit")
 
     def __init__(
         self,
@@ -59,7 +58,7 @@ class Support(Action):
         self.component, self.unit, self.told = component, unit, False
         self._whole: Mapping[Edge, Mask] = {} if whole is None else whole
         count = len(place) if isinstance(place, MovingPoints) else 0
-        self.held, self.missing = np.zeros(count), np.zeros(count)
+        self.held = np.zeros(count)
         super().__init__(owner, value, factor)
 
     @property
@@ -138,7 +137,7 @@ class Support(Action):
 
     def keep(self, kept: Indices) -> None:
         """Keep some of its points of the border; those of removed particles are lost, others divided."""
-        self.held, self.missing = self.held[kept], self.missing[kept]
+        self.held = self.held[kept]
 
     def _checked(self, value: Any) -> tuple[Profile, ...]:
         check = checks.number if isinstance(self.place, tuple) else checks.profile
@@ -177,6 +176,11 @@ class Support(Action):
         return None
 
     @property
+    def is_uniform(self) -> bool:
+        """Whether it prescribes the same value everywhere."""
+        return not any(callable(value) for term in self.terms for value in term.values)
+
+    @property
     def has_velocity(self) -> bool:
         """Whether it prescribes a velocity."""
         return self.terms[-1].factor.has_velocity
@@ -206,8 +210,7 @@ class Support(Action):
     def state(self) -> dict[str, Any]:
         """Position of a point, multipliers, and the share of its values that the body carries."""
         place = self.place if isinstance(self.place, tuple) else ()
-        held, missing = np.array(self.held), np.array(self.missing)
-        return super().state() | {"place": place, "held": held, "missing": missing}
+        return super().state() | {"place": place, "held": np.array(self.held)}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`state`.
@@ -220,9 +223,7 @@ class Support(Action):
             x, y = stored.values(f"{self}: place", state["place"], (len(self.place),))
             self.place = (float(x), float(y))
         shape = (len(self.place) if isinstance(self.place, MovingPoints) else 0,)
-        self.held, self.missing = (
-            stored.values(f"{self}: {name}", state[name], shape) for name in ("held", "missing")
-        )
+        self.held = stored.values(f"{self}: held", state["held"], shape)
 
     def __str__(self) -> str:
         if isinstance(self.place, tuple):

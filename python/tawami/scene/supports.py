@@ -10,6 +10,7 @@ from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import InputError, SupportError
 from tawami.base.text import listed, quoted
 from tawami.field.constraints import PointHeld
+from tawami.field.layout import Layout
 from tawami.form.fields import Field
 from tawami.grid import edges
 from tawami.grid.basis import Basis
@@ -253,15 +254,17 @@ class Supports(Owner[Support]):
 
     # -- where particles move ------------------------------------------------
 
-    def follow(self, u: Array, points: Sequence[PointHeld]) -> None:
-        """Move the points with the body.
+    def follow(self, layout: Layout, u: Array, points: Sequence[PointHeld]) -> None:
+        """Move the points with the body; a call for all ranks.
 
         Args:
+            layout: Places of the coefficients.
             u: Increments of the displacement, functions x dim.
             points: The constraints of the step, in the order of the supports.
         """
         for support, point in zip(self.at_points, points, strict=True):
-            x, y = point.place + point.weights @ u[point.indices // self.grid.space.dim]
+            moved = layout.vectors_at(u, point.indices // self.grid.space.dim)
+            x, y = point.place + point.weights @ moved
             support.place = (float(x), float(y))
 
     @property

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from tawami.base.arrays import Array
 from tawami.base.errors import SupportWarning
 from tawami.base.warn import warn
 from tawami.scene.domain import Domain
 from tawami.scene.points import reach
+from tawami.scene.step import Accepted
 from tawami.scene.walls import FORCE, Wall
 
 
@@ -31,24 +31,27 @@ def warn_of_new(wall: Wall, domain: Domain) -> None:
         _warn(wall, gap, "the wall acts already")
 
 
-def warn_of_distant(walls: Iterable[Wall], domain: Domain, forces: Array) -> None:
-    """Warn, once for each wall, of one that pushed the particles in a step at a distance from them; a
-    call for all ranks.
+def warn_of_distant(walls: Iterable[Wall], domain: Domain, accepted: Accepted) -> None:
+    """Warn, once for each wall, of one that pushed the particles in a step at a distance from them.
+
+    A call for all ranks.
 
     Args:
         walls: The walls.
         domain: The particles at the end of the step.
-        forces: Forces of supports and walls on the body, functions x dim [N per metre depth].
+        accepted: The step.
 
     Warns:
         SupportWarning: A wall did.
     """
+    layout, forces = accepted.problem.reduction.layout, accepted.forces
     for wall in walls:
         if wall.told or wall.obstacle is not None:
             continue
         across, _, inward = wall.axes
-        push = inward * forces[wall.functions[wall.state.touching], across]
-        if push.max(initial=0.0) <= FORCE * abs(forces).max(initial=0.0):
+        on_wall = layout.vectors_at(forces, wall.functions[wall.state.touching])
+        push = inward * on_wall[:, across]
+        if push.max(initial=0.0) <= FORCE * layout.largest(forces):
             continue
         gap = reach(domain, wall.edge)
         if gap > 0:

@@ -21,10 +21,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tawami.base.arrays import of_components
+from tawami.base.arrays import Indices, of_components
 from tawami.base.errors import InputError
 from tawami.border.shapes import HalfPlane, half_plane
 from tawami.field.constraints import Held
+from tawami.field.layout import Layout
 from tawami.grid.basis import Basis
 from tawami.grid.edges import edge_functions
 from tawami.grid.grid import Edge, Grid
@@ -75,7 +76,7 @@ class Wall:
 
     Attributes:
         obstacle: The obstacle; None for a body without a border.
-        functions: Displacement functions along it.
+        functions: Displacement functions of the whole grid along it.
         state: Their states of contact.
         returns: Number of times that each came back to the wall or to rest in this step.
         told: Whether a warning was issued that it acts at a distance from the border.
@@ -175,32 +176,34 @@ class Wall:
 
     @property
     def stopped(self) -> npt.NDArray[np.int64]:
-        """Coefficients that it stops from passing through."""
+        """Coefficients of the whole grid that it stops from passing through."""
         across, _, _ = self.axes
         return self.grid.space.dim * self.functions[self.state.touching] + across
 
     def of_border(self, domain: Domain) -> Mask:
         """Mask of its functions that the border of the body reaches: they belong to the obstacle."""
-        reached = np.zeros(domain.layout.num_displacement // self.grid.space.dim, dtype=bool)
+        num, dim = domain.layout.num_displacement_of_grid, self.grid.space.dim
+        reached = np.zeros(num // dim, dtype=bool)
         if self.obstacle is not None:
             cells = self.obstacle.place.cells(domain, torn=True)
             reached[cells.tabulated(self.basis)[0][~cells.lost]] = True
         return np.asarray(reached[self.functions])
 
-    def prescribed(self, fixed: Mask) -> Mask:
+    def prescribed(self, fixed: Sequence[Indices]) -> Mask:
         """Whether other supports prescribe its components, functions x dim.
 
         Args:
-            fixed: Whether other supports prescribe each displacement coefficient.
+            fixed: Coefficients of the whole grid that other supports prescribe.
         """
-        mask: Mask = fixed[of_components(self.functions, self.grid.space.dim)]
+        components = of_components(self.functions, self.grid.space.dim)
+        mask: Mask = np.isin(components, np.concatenate([components[:0, 0], *fixed]))
         return mask
 
-    def held(self, active: Mask, prescribed: Mask, start: Array, before: Array) -> list[Held]:
-        """Values that the wall prescribes in the present states.
+    def held(self, layout: Layout, prescribed: Mask, start: Array, before: Array) -> list[Held]:
+        """Values that the wall prescribes in the present states; a call for all ranks.
 
         Args:
-            active: Whether each displacement coefficient has particles.
+            layout: Places of the coefficients.
             prescribed: As :meth:`prescribed` gives it; the wall leaves these to the other supports.
             start: Coefficients at the start of the step, which the values include.
             before: Displacement coefficients since the body touched the wall.
@@ -210,19 +213,24 @@ class Wall:
         for axis, mask in ((across, touching), (along, touching & (self.state.slip == 0))):
             chosen = self.functions[mask & ~prescribed[:, axis]]
             indices = self.grid.space.dim * chosen + axis
-            indices = indices[active[indices]]
-            values = start[indices] - (before[indices] if axis == across else 0.0)
+            indices = indices[layout.at(layout.active.astype(float), indices) > 0]
+            values = layout.at(start, indices)
+            if axis == across:
+                values = values - layout.at(before, indices)
             supports.append(Held(indices, values, str(self)))
         return supports
 
     def friction_of(self, forces: Array, prescribed: Mask) -> Array:
-        """Friction on the body (functions x dim) from the forces with which the wall would hold it."""
+        """Friction on the body from the forces with which the wall would hold it.
+
+        Both are those of the functions of the wall, functions x dim.
+        """
         across, along, inward = self.axes
         friction = np.zeros_like(forces)
         sliding = self.state.touching & (self.state.slip != 0) & ~prescribed[:, along]
-        f = self.functions[sliding]
-        push = np.maximum(inward * forces[f, across], 0.0)
-        friction[f, along] = self.friction * push * self.state.slip[sliding] if self.friction else 0
+        push = np.maximum(inward * forces[sliding, across], 0.0)
+        slip = self.state.slip[sliding]
+        friction[sliding, along] = self.friction * push * slip if self.friction else 0
         return friction
 
     def adapt(self, forces: Array, u: Array, before: Array, active: Mask, prescribed: Mask) -> bool:
@@ -232,18 +240,18 @@ class Wall:
         keeps its state: otherwise the search could repeat the same states forever.
 
         Args:
-            forces: Forces of supports and walls on the body, functions x dim.
-            u: Displacement increments, functions x dim.
-            before: Displacement before them since the body touched the wall, functions x dim.
-            active: Whether each function has particles.
+            forces: Forces of supports and walls on the body, functions of the wall x dim.
+            u: Displacement increments, likewise.
+            before: Displacement before them since the body touched the wall, likewise.
+            active: Whether each function of the wall has particles.
             prescribed: As :meth:`prescribed` gives it.
         """
         across, along, inward = self.axes
-        f, state, no_distance = self.functions, self.state, GAP * self.grid.h
-        here, free_of_supports = active[f], ~prescribed
-        push, moved = inward * forces[f, across], u[f, along]
-        no_force = FORCE * np.abs(forces[f]).max(initial=0.0)
-        below = inward * (before + u)[f, across] < -no_distance
+        state, no_distance = self.state, GAP * self.grid.h
+        here, free_of_supports = active, ~prescribed
+        push, moved = inward * forces[:, across], u[:, along]
+        no_force = FORCE * np.abs(forces).max(initial=0.0)
+        below = inward * (before + u)[:, across] < -no_distance
         free = here & free_of_supports[:, across]
         leaves = free & state.touching & self.separates & (push < -no_force)
         meets = free & ~state.touching & below & (self.returns < RETURNS)
@@ -251,21 +259,24 @@ class Wall:
         if self.friction > 0:
             held = here & state.touching & ~leaves & free_of_supports[:, along]
             bound = self.friction * np.maximum(push, 0.0) if np.isfinite(self.friction) else np.inf
-            slides = held & (state.slip == 0) & (np.abs(forces[f, along]) > bound + no_force)
+            slides = held & (state.slip == 0) & (np.abs(forces[:, along]) > bound + no_force)
             sticks = held & (state.slip * moved > no_distance) & (self.returns < RETURNS)
         self.returns += meets | sticks
         state.touching = (state.touching & ~leaves) | meets
-        state.slip[slides] = np.sign(forces[f, along][slides]).astype(np.int8)
+        state.slip[slides] = np.sign(forces[slides, along]).astype(np.int8)
         if self.friction > 0:
             state.slip[sticks | meets] = 0
         return bool((leaves | meets | slides | sticks).any())
 
 
 def on_functions(walls: Sequence[Wall], domain: Domain) -> dict[Wall, Mask]:
-    """The walls that hold functions of the grid, with masks of those that belong to their obstacles."""
-    found = {}
+    """The walls that hold functions of the grid, with masks of those that belong to their obstacles; a
+    call for all ranks.
+    """
+    found, layout = {}, domain.layout
     for wall in walls:
         of_border = wall.of_border(domain)
-        if (domain.layout.active[wall.grid.space.dim * wall.functions] & ~of_border).any():
+        active = layout.at(layout.active.astype(float), wall.grid.space.dim * wall.functions) > 0
+        if (active & ~of_border).any():
             found[wall] = of_border
     return found

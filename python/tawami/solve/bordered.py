@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.linalg import block_diag
 
 from tawami.base.arrays import Array
@@ -35,8 +36,7 @@ class Blocks:
     own: Array
 
 
-@runtime_checkable
-class Bordering(Protocol):
+class OwnUnknowns(Protocol):
     """A term with unknowns of its own.
 
     Attributes:
@@ -57,9 +57,6 @@ class Bordering(Protocol):
     def measure(self) -> float:
         """Size of the residual relative to the terms of its equations."""
 
-    def blocks(self) -> Blocks:
-        """Derivatives at the last forces."""
-
     def add(self, change: Array) -> None:
         """Go to the next iterate."""
 
@@ -72,6 +69,28 @@ class Bordering(Protocol):
 
     def restart(self) -> None:
         """Go back to the first guess."""
+
+
+class Tie(OwnUnknowns, Protocol):
+    """A term with linear constraints: its unknowns are the multipliers, and its residual the errors.
+
+    Its forces are minus the transposed gradient times the multipliers.
+    """
+
+    @property
+    def gradient(self) -> sp.csr_matrix:
+        """Derivative of the residual by all coefficients, constraints x coefficients."""
+
+    @property
+    def unsettled(self) -> str:
+        """Message if the errors do not vanish: what is wrong, and what to do."""
+
+
+class Bordering(OwnUnknowns, Protocol):
+    """A term whose unknowns are few, and are eliminated."""
+
+    def blocks(self) -> Blocks:
+        """Derivatives at the last forces."""
 
     def check_held(self, matrix: Array) -> None:
         """Check that its equations can be solved.
@@ -90,22 +109,29 @@ class Elimination:
 
     Args:
         terms: The terms.
-        solve: Gives the coefficients K^-1 f for forces f on all coefficients.
+        solve: Gives K^-1 f, all coefficients and multipliers, for forces f on all coefficients.
+        size: Number of coefficients and multipliers.
     """
 
-    def __init__(self, terms: Sequence[Bordering], solve: Callable[[Array], Array]) -> None:
+    def __init__(
+        self, terms: Sequence[Bordering], solve: Callable[[Array], Array], size: int
+    ) -> None:
         self._terms, blocks = terms, [term.blocks() for term in terms]
         of_body = np.hstack([block.of_body for block in blocks])
         self._by_body = np.vstack([block.by_body for block in blocks])
-        solved = [solve(column) if column.any() else 0 * column for column in of_body.T]
+        solved = [solve(column) if column.any() else np.zeros(size) for column in of_body.T]
         self._columns = np.column_stack(solved)
         own = block_diag(*(block.own for block in blocks))
-        self._matrix = own - self._by_body @ self._columns
+        self._matrix = own - self._on_terms(self._columns)
         start = 0
         for term in terms:
             mine = slice(start, start + term.num_unknowns)
             term.check_held(self._matrix[mine, mine])
             start = mine.stop
+
+    def _on_terms(self, change: Array) -> Array:
+        """C x, where x may be followed by multipliers."""
+        return np.asarray(self._by_body @ change[: self._by_body.shape[1]])
 
     def solve(self, change: Array, residual: Array) -> tuple[Array, Array]:
         """x and q.
@@ -114,7 +140,7 @@ class Elimination:
             change: x0.
             residual: s.
         """
-        q = np.linalg.solve(self._matrix, -residual - self._by_body @ change)
+        q = np.linalg.solve(self._matrix, -residual - self._on_terms(change))
         return change - self._columns @ q, q
 
     @property

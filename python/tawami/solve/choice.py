@@ -2,10 +2,12 @@
 
 Costs are counted in iterations of multigrid, not in seconds, so that a run repeats to the bit:
 
-- below `SMALL` unknowns, and where multigrid does not suit the form, the tangent is factorised;
-- otherwise multigrid solves. Once its iterations for the same unknowns have cost as much as two
+- below `SMALL` unknowns, and where multigrid does not suit the form, the tangent is factorised. A scene
+  that names multigrid has it for every size, and a warning where it does not suit;
+- otherwise multigrid solves. Once its iterations for the same unknowns have cost as much as three
   factorisations, some tangents are solved with a factorisation, which later ones use. Then the method
-  whose last solves cost less is taken;
+  whose last solves cost less is taken, and multigrid at once where it costs less than a solve with an
+  old factorisation;
 - where multigrid stalls, the direct solver takes over, with a warning.
 """
 
@@ -25,6 +27,7 @@ from tawami.solve.direct import DirectSolver
 from tawami.solve.linear_solver import LinearSolver, System
 from tawami.solve.multigrid import MultigridSolver, StalledError
 from tawami.solve.numerics import SMALL, Numerics
+from tawami.solve.operators import LOCKING
 
 #: Iterations of multigrid that cost as much as a factorisation of 1e5 unknowns, and the exponent with
 #: which this number grows with the unknowns (`cases.costs.solvers`).
@@ -36,9 +39,12 @@ KEPT = 2.3
 #: Solves with a factorisation before its mean cost counts, and solves after which older ones count half.
 TRIAL, MEMORY = 4, 32
 #: Iterations that the operators of multigrid cost.
-SET_UP = 15
+SET_UP = 18
+#: Factorisations that the iterations for the same unknowns may cost before one is tried: the functions
+#: of a moving body change after a few steps, and its factorisation would not be kept for long.
+PATIENCE = 3
 #: Attributes that a checkpoint stores.
-STATE = ("spent", "stalled", "stalls")
+STATE = ("spent", "stalled", "stalls", "kept_cost")
 
 
 def price(unknowns: int) -> float:
@@ -53,22 +59,30 @@ class ChosenSolver(LinearSolver):
         comm: Communicator.
         stopwatch: Measures the time of each stage.
         numerics: Numerical settings: 'auto', or 'multigrid' for tangents of every size.
+        cells: Number of cells along each axis of the grid.
         unsuited: Reason for which multigrid does not suit the form; empty if it does.
     """
 
     def __init__(
-        self, comm: Any, stopwatch: Stopwatch, numerics: Numerics, unsuited: str = ""
+        self,
+        comm: Any,
+        stopwatch: Stopwatch,
+        numerics: Numerics,
+        cells: tuple[int, ...],
+        unsuited: str = "",
     ) -> None:
         super().__init__(comm, stopwatch)
-        self._comm, self._unsuited = comm, unsuited
+        self._comm, self._unsuited, self._warned = comm, unsuited, False
         self._auto = numerics.linear_solver == "auto"
         always = numerics.factorise == "always"
         self._direct = DirectSolver(comm, stopwatch, always=always)
-        self._multigrid = MultigridSolver(comm, stopwatch)
+        self._multigrid = MultigridSolver(comm, stopwatch, cells)
         self._last: LinearSolver = self._direct
         #: The matrix of the last solves, iterations of multigrid for it, and whether it stalled.
         self._matrix: Any = None
         self._spent, self._stalled, self._stalls = 0, False, 0
+        #: Cost of the last solve with an old factorisation; 0 before the first.
+        self._kept_cost = 0.0
         #: Cost and number of the last solves of each solver.
         self._costs = np.zeros((2, 2))
 
@@ -94,11 +108,11 @@ class ChosenSolver(LinearSolver):
 
     def method(self, unknowns: int) -> str:
         """See `LinearSolver.method`."""
-        if not self._auto:
-            return self._multigrid.method(unknowns)
         direct, multigrid = (solver.method(unknowns) for solver in self._solvers)
         if self._unsuited:
-            return f"{direct} (auto: {self._unsuited})"
+            return f"{direct} ({'auto' if self._auto else 'multigrid'}: {self._unsuited})"
+        if not self._auto:
+            return multigrid
         if unknowns < SMALL:
             return f"{direct} (auto: {unknowns} unknowns, fewer than {SMALL})"
         return f"{multigrid} while it costs less than a factorisation (auto: {unknowns} unknowns)"
@@ -150,6 +164,7 @@ class ChosenSolver(LinearSolver):
             self._switch(self._direct)
             found = self._direct.solve(system)
             again = KEPT * self._direct.iterations
+            self._kept_cost = again or self._kept_cost
             factor = 1.0 if self._direct.symmetric else UNSYMMETRIC
             self._count(self._direct, again or factor * price(matrix.getSize()[0]))
         for name in ("symmetric", "condition", "weak", "iterations"):
@@ -171,6 +186,17 @@ class ChosenSolver(LinearSolver):
             self._last.forget()
         self._last = solver
 
+    def _warn(self) -> None:
+        """Warn once if multigrid was asked for and does not suit the form."""
+        if not (self._auto or self._warned):
+            warn(
+                f"multigrid does not suit this form ({self._unsuited}); a factorisation by MUMPS solves "
+                "it. Expected: a form with a field for the volume and alpha > 0, or K/mu up to "
+                f"{LOCKING:g}. linear_solver='direct' gives no warning",
+                SolverWarning,
+            )
+        self._warned = True
+
     def _count(self, solver: LinearSolver, cost: float) -> None:
         """Count a solve."""
         mine = self._costs[self._solvers.index(solver)]
@@ -180,7 +206,10 @@ class ChosenSolver(LinearSolver):
 
     def _suits(self, matrix: Any) -> bool:
         """Whether multigrid solves the next tangent; the same on all ranks."""
-        if self._stalled or (self._auto and self._unsuited):
+        if self._unsuited:
+            self._warn()
+            return False
+        if self._stalled:
             return False
         if not self._auto:
             return True
@@ -188,9 +217,12 @@ class ChosenSolver(LinearSolver):
         if unknowns < SMALL:
             return False
         (_, tried), (cost, solves) = self._costs
-        cheaper = self._spent <= 2 * price(unknowns)
-        if tried >= TRIAL and solves:
-            cheaper = cost / solves <= self._costs[0, 0] / tried
+        cheaper = self._spent <= PATIENCE * price(unknowns)
+        if tried and solves:
+            mine = cost / solves
+            cheaper = mine <= self._kept_cost or (
+                mine <= self._costs[0, 0] / tried if tried >= TRIAL else cheaper
+            )
         if cheaper:
             return True
         need = memory.of_factors(unknowns, symmetric=self._direct.symmetric)

@@ -18,7 +18,7 @@ from tawami.particles.responses import Responses
 from tawami.solve.direct import DirectSolver
 from tawami.solve.equations import Equations
 from tawami.solve.linear_solver import LinearSolver, System
-from tawami.solve.measures import History, text
+from tawami.solve.measures import History, out_of_reach, text
 from tawami.solve.scaling import Scaling
 
 #: K/mu from which forms without a field for the volume lose all digits.
@@ -95,7 +95,7 @@ class Diagnosis:
         """
         reduction, condition = equations.reduction, solver.condition
         size = "infinite" if np.isinf(condition) else f"about {condition:.1e}"
-        weak = solver.weak if len(solver.weak) == reduction.num_own else np.empty(0)
+        weak = solver.weak[: reduction.num_own]
         cells = ", ".join(self._weakest_cells(reduction, weak)) if error is None else ""
         what = str(error) if error is not None else (
             f"the tangent is singular (condition number of the scaled matrix: {size}; from its "
@@ -147,12 +147,18 @@ class Diagnosis:
         attachment = self._assembly.attachment
         off = not attachment.compiled.penalises and "ghost_penalty" in form.options
         moves = form.strain.finite  # elsewhere full cells have no penalty
-        if off and moves and not lagrange and not attachment.active.all():
+        inactive = np.array([not attachment.active.all()])
+        partly = ranks.any_of(self._comm, inactive)[0]
+        if off and moves and not lagrange and partly:
             advice.append("use ghost_penalty='on', which ties partial cells to their neighbours")
         return (
             "some functions of the grid get no stiffness from the particles. Support every part of the "
             f"body; {'; '.join(advice)}"
         )
+
+    def advice(self, history: History) -> str:
+        """Advice on what keeps the measures from the tolerance; empty if that is not known."""
+        return self.material() or out_of_reach(history)
 
     def material(self) -> str:
         """Advice on materials that cost all digits; empty if there is none. A collective call."""
@@ -191,18 +197,17 @@ class Diagnosis:
         """
         grid = self._layout.grid
         own = np.argsort(-np.abs(direction))[:ENTRIES]
-        entries = ranks.allgathered(self._comm, np.abs(direction[own]))
-        unknowns = ranks.allgathered(self._comm, reduction.own.start + own)
-        counts = self._responses.particles_per_cell
-        found: list[str] = []
-        for unknown in unknowns[np.argsort(-entries, kind="stable")][:ENTRIES]:
-            coefficient = int(reduction.unknowns[unknown])
+        counts, mine = self._responses.particles_per_cell, []
+        for unknown in own:
+            coefficient = int(reduction.coefficients[unknown])
             cells, name = self._layout.cells_of(coefficient), self._layout.name_of(coefficient)
-            number = counts[grid.cell_numbers(cells)]
+            number = counts[grid.window.numbers(cells)]
             i, j = cells[number.argmin()]
             text = f"({i}, {j}) with {number.min()} particles"
             if name in self._responses.form.own_fields:
                 text += f" in field '{name}'"
-            if text not in found:
-                found.append(text)
-        return found[:CELLS]
+            mine.append((-abs(float(direction[unknown])), text))
+        every = sorted(
+            (one for part in self._comm.allgather(mine) for one in part), key=lambda one: one[0]
+        )
+        return list(dict.fromkeys(text for _, text in every[:ENTRIES]))[:CELLS]

@@ -84,6 +84,8 @@ class Equations:
     @property
     def advice(self) -> str:
         """Advice for a step that does not converge."""
+        if self.terms is not None and self.terms.contradiction:
+            return self.terms.contradiction
         if self.inertia is not None:
             return DYNAMIC
         return STATIC if self.path is None else ALONG_PATH

@@ -18,6 +18,7 @@ import scipy.sparse as sp
 
 from tawami.base.arrays import Array
 from tawami.base.petsc import add_diagonal, add_rows
+from tawami.field.layout import Layout
 from tawami.field.reduction import Reduction
 
 #: Distance from 1 to the next floating-point number.
@@ -35,6 +36,7 @@ class Inertia:
         back: Part of the acceleration that comes from the beginning of the step [m/s2].
         impulse: Impulse by which the supports impose their velocities at the beginning of the step,
             divided by the length of the step [N per metre depth].
+        layout: Places of the coefficients.
     """
 
     mass: Array
@@ -42,14 +44,15 @@ class Inertia:
     coasting: Array
     back: Array
     impulse: Array
+    layout: Layout
 
     def deviation(self, coefficients: Array) -> Array:
-        """u - dt v of the first iterate.
+        """u - dt v of the first iterate; a collective call.
 
         It is 0 where the difference is only round-off, as in functions that constraints tie to others.
         """
         deviation = coefficients[: len(self.mass)] - self.coasting
-        round_off = 8 * EPSILON * np.abs(self.coasting).max(initial=0.0)
+        round_off = 8 * EPSILON * self.layout.largest(self.coasting)
         deviation[np.abs(deviation) <= round_off] = 0.0
         return np.asarray(deviation)
 
@@ -68,7 +71,7 @@ class Inertia:
         mass = self.force(np.full(len(self.mass), self.slope), len(reduction.offset))
         diagonal = reduction.diagonal(mass)
         if diagonal is not None:
-            return functools.partial(add_diagonal, values=diagonal[reduction.own])
-        selection = reduction.selection
-        rows = (selection.T @ sp.diags(mass) @ selection).tocsr()[reduction.own]
-        return functools.partial(add_rows, rows=rows)
+            return functools.partial(add_diagonal, values=diagonal)
+        own = sp.diags(np.where(self.layout.own, mass, 0.0)).tocsr()
+
+        return functools.partial(add_rows, rows=reduction.of_window(own))

@@ -60,7 +60,7 @@ class Iterate:
         factor: float = np.nan,
     ) -> None:
         self.factor = factor
-        unknowns = np.zeros(reduction.size) if guess is None else guess[reduction.unknowns]
+        unknowns = np.zeros(reduction.num_own) if guess is None else guess[reduction.coefficients]
         self._inertia, self._layout = inertia, reduction.layout
         self.coefficients: Array = reduction.expanded(unknowns) + reduction.offset
         #: u - dt v, which is updated by itself to keep its digits.

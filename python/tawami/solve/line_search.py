@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -45,7 +44,7 @@ class LineSearch:
     """The work of the unbalance along one change of the increments.
 
     Args:
-        comm: Communicator; all ranks get the same bits.
+        dot: Scalar product of vectors of coefficients, the same on all ranks.
         change: Change of all increments by a full step.
         residual: Forces out of balance at its beginning.
         signs: Sign of each coefficient in g: 1, -1 or 0.
@@ -55,7 +54,7 @@ class LineSearch:
 
     def __init__(
         self,
-        comm: Any,
+        dot: Callable[[Array, Array], float],
         change: Array,
         residual: Array,
         signs: Array,
@@ -65,7 +64,7 @@ class LineSearch:
         terms = equations.terms
         self._is_kinked = not equations.is_smooth and number >= PATIENCE
         self._is_static = equations.inertia is None
-        self._comm, self._change, self._residual = comm, change, residual
+        self._dot, self._change, self._residual = dot, change, residual
         self._signs, self._terms = signs, terms
 
     @functools.cached_property
@@ -79,7 +78,7 @@ class LineSearch:
         return self._work(self._residual, of_terms)
 
     def _work(self, residual: Array, of_terms: float) -> float:
-        return float(self._comm.bcast(float(self._weights @ residual) + of_terms))
+        return self._dot(self._weights, residual) + of_terms
 
     def _at_last_forces(self, residual: Array) -> float:
         return self._work(residual, 0.0 if self._terms is None else self._terms.work)

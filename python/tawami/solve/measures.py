@@ -40,13 +40,13 @@ STRAIN_FLOOR = 1e-7
 NO_FORCE, NO_STRAIN = 1e-14, 1e-10
 #: Share of NO_FORCE below which the residual of a body with forces on its border is round-off.
 SHARE = 1e-2
+#: Bound of the measures after the solve of a linear problem: the solutions of all linear solvers then
+#: agree to 1e-9.
+LINEAR = 1e-8
+#: Measures that may be round-off, and the number of them that do not decrease then.
+ROUND_OFF, STAYS = 1e-9, 5
 #: Share of the diagonal times a field below which a residual of its equation is round-off.
 NO_RESIDUAL = 1e-7
-
-
-def norm(values: Array) -> float:
-    """Euclidean norm of an array of one dimension."""
-    return math.sqrt(values @ values)
 
 
 def worst(measures: Measured) -> float:
@@ -71,25 +71,36 @@ def measured(momentum: float, volume: float, *others: float) -> Measured:
 def forcing(history: History, tolerance: float, *, linear: bool = False) -> float:
     """Tolerance of the next linear solve.
 
-    That of a linear problem reaches Newton's own tolerance at once. Otherwise it
+    That of a linear problem reaches Newton's own tolerance at once, and at least `LINEAR`. Otherwise it
     follows the rate of convergence (choice 2 of Eisenstat and Walker 1996), as far as Newton's own
     tolerance needs it.
     """
     now = worst(history[-1])
     if linear:
-        return min(0.3 * tolerance / now, 1e-3)
+        return min(0.3 * min(tolerance, LINEAR) / now, 1e-3)
     rate = now / worst(history[-2]) if len(history) > 1 else 1.0
     return min(max(0.1 * rate**2, min(0.1 * tolerance / now, 1e-3)), 1e-3)
+
+
+def out_of_reach(history: History) -> str:
+    """Advice if the last measures are round-off; empty if they are larger, or decrease."""
+    last = [worst(measures) for measures in history[-STAYS:]]
+    if len(last) < STAYS or not max(last) < min(ROUND_OFF, 10 * last[-1]):
+        return ""
+    expected = 10.0 ** math.ceil(math.log10(2 * max(last)))
+    return (
+        f"The measures stay at {max(last):.1e}, which is the round-off of this problem: expected a "
+        f"tolerance of {expected:g} or more"
+    )
 
 
 def diagonal_of(tangent: Any, reduction: Reduction) -> Array:
     """Sizes of the diagonal of a reduced tangent, on all coefficients; a collective call."""
     vector = tangent.getDiagonal()
-    diagonal = ranks.allgathered(reduction.layout.grid.comm, vector.array)
-    vector.destroy()
     on_all = np.zeros(reduction.layout.size)
-    on_all[reduction.unknowns] = np.abs(diagonal)
-    return on_all
+    on_all[reduction.coefficients] = np.abs(vector.array)
+    vector.destroy()
+    return reduction.layout.exchange.update(on_all)
 
 
 class Measures:
@@ -129,7 +140,7 @@ class Measures:
         self._at_start = 0.0
         if internal is not None and squares > 0:
             forces = internal(np.zeros(self._layout.size))
-            self._at_start = float(np.linalg.norm(forces[: self._layout.num_displacement]))
+            self._at_start = self._layout.norm(forces[: self._layout.num_displacement])
 
     def of(self, forces: Forces, coefficients: Array, equations: Equations) -> Measured:
         """Measures of the residuals, the same on all ranks; a collective call.
@@ -144,22 +155,26 @@ class Measures:
         of_u = reduction.of_displacement
         parts = [forces.internal, forces.external]
         parts += [part for part in (forces.border, forces.inertia) if part is not None]
-        scale = max(self._at_start, *(norm(part[:n]) for part in parts))
-        residual = norm(free[of_u])
-        at_rest = not forces.external.any() and self._is_at_rest(
-            scale, residual, coefficients[:n], equations
-        )
+        scale = max(self._at_start, *(self._layout.norm(part[:n]) for part in parts))
+        residual = self._norm(free[of_u])
+        loaded = self._layout.largest(forces.external) > 0
+        at_rest = not loaded and self._is_at_rest(scale, residual, coefficients[:n], equations)
         momentum = 0.0 if at_rest or scale == 0 else residual / scale
         if equations.terms is not None:
             momentum = max(momentum, equations.terms.measure)
         volume = None
         if self._responses.form.kinematics.has_mean_stress:
-            sums = self._responses.sums(self._volume_scale(coefficients)[:, None])
+            location, weight = self._responses.location, self._responses.particles.volume
+            sums = self._layout.functions.sums(
+                location, weight, self._volume_scale(coefficients)[:, None], "bilinear"
+            )
             assert self._layout.volumetric is not None
-            of_volume = self._layout.volumetric.holds(reduction.unknowns)
-            volume = float(
-                np.divide(norm(free[of_volume]), norm(sums.ravel()))
-            )  # NaN without any scale
+            of_volume = self._layout.volumetric.holds(reduction.coefficients)
+            mine = self._layout.own[self._layout.volumetric.slice]
+            with np.errstate(invalid="ignore", divide="ignore"):  # NaN without any scale
+                volume = float(
+                    np.divide(self._norm(free[of_volume]), self._norm(sums.ravel()[mine]))
+                )
         measured: Measured = (momentum, volume)
         if self._own:
             fields = self._of_fields(free, forces, coefficients, reduction)
@@ -180,10 +195,10 @@ class Measures:
         magnitude = self._assembly.magnitude(coefficients, self._responses.data)
         magnitude += np.abs(forces.external)
         round_off = NO_RESIDUAL * self._diagonal * (np.abs(self._values) + np.abs(coefficients))
-        measures = {}
+        measures, norm = {}, self._norm
         for name in self._own:
             mine = reduction.of_field(name)
-            unknowns = reduction.unknowns[mine]
+            unknowns = reduction.coefficients[mine]
             self._largest[name] = max(self._largest[name], norm(magnitude[unknowns]))
             scale, residual = max(self._largest[name], norm(round_off[unknowns])), norm(free[mine])
             measures[name] = residual / scale if scale > 0 else residual
@@ -197,16 +212,17 @@ class Measures:
         iterate that went farther than supports and velocities take the body.
         """
         offset, inertia = equations.reduction.offset[: len(u)], equations.inertia
-        prescribed = float(np.abs(offset).max())
+        prescribed = self._layout.largest(offset)
         if equations.terms is not None:
             prescribed = max(prescribed, equations.terms.prescribed)
         distance = prescribed
         if inertia is not None:
-            distance = max(prescribed, float(np.abs(inertia.coasting).max(initial=0.0)))
+            distance = max(prescribed, self._layout.largest(inertia.coasting))
         grid = self._layout.grid
-        distance = 10 * min(distance, float(np.abs(u).max())) + grid.h
+        distance = 10 * min(distance, self._layout.largest(u)) + grid.h
         (thickness,) = grid.space.thickness(np.array([grid.upper]))
-        largest = NO_FORCE * self._responses.stiffest * distance * thickness * np.sqrt(len(u))
+        largest = NO_FORCE * self._responses.stiffest * distance * thickness
+        largest *= np.sqrt(next(iter(self._layout.of_grid.values())).stop)
         # positions of border points have no more digits
         round_off = equations.terms is not None and residual <= SHARE * largest
         # the same branch on all ranks
@@ -227,6 +243,11 @@ class Measures:
         )
         largest = self._comm.allreduce(float(np.abs(strain).max(initial=0.0)), op=MPI.MAX)
         return bool(prescribed == 0 or largest <= NO_STRAIN * prescribed / self._layout.grid.h)
+
+    def _norm(self, own: Array) -> float:
+        """Euclidean norm of vectors of this rank's own entries; a collective call."""
+        square = float(own @ own)
+        return math.sqrt(square if self._comm.size == 1 else self._comm.allreduce(square))
 
     def _volume_scale(self, coefficients: Array) -> Array:
         """Reference value of the volume equation of each particle, without its volume."""

@@ -13,8 +13,9 @@ from tawami.base.errors import SolverError
 #: Bytes of the factors of MUMPS for n unknowns, divided by n log2(n), and their growth without symmetry
 #: (`cases.costs.solvers` measures them).
 FACTORS, UNSYMMETRIC = 300.0, 1.6
-#: Bytes that multigrid needs for each entry of the tangent, without those of the tangent.
-OPERATORS = 13.0
+#: Bytes that multigrid needs for each entry of the tangent, without those of the tangent: operators, and
+#: the vectors of 30 iterations.
+OPERATORS = 24.0
 #: Memory that is not checked [bytes].
 LITTLE = 1e8
 

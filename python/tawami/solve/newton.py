@@ -10,7 +10,6 @@ from typing import Any, NoReturn
 import numpy as np
 
 from tawami import _rust
-from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import CheckpointError, SingularError
 from tawami.base.files import reason
@@ -28,12 +27,13 @@ from tawami.solve.failures import reported
 from tawami.solve.inertia import Inertia
 from tawami.solve.iterate import Forces, Friction, Iterate
 from tawami.solve.line_search import LineSearch
-from tawami.solve.linear_solver import LinearSolver, System
-from tawami.solve.measures import History, Measured, Measures, diagonal_of, forcing, worst
+from tawami.solve.linear_solver import LinearSolver
+from tawami.solve.measures import History, Measured, Measures, forcing, worst
 from tawami.solve.numerics import Numerics
 from tawami.solve.operators import Operators
 from tawami.solve.path import Path
 from tawami.solve.scaling import Scaling
+from tawami.solve.tangents import Tangents
 from tawami.solve.terms import Terms
 from tawami.solve.unknowns import complete
 
@@ -99,23 +99,25 @@ class Newton:
         self._linear = linear
         self._assembly, self._responses = assembly, responses
         self.numerics, self._stopwatch = numerics, stopwatch
-        self._comm = assembly.layout.grid.comm
+        self._layout, self._comm = assembly.layout, assembly.layout.grid.comm
         self._measures = Measures(assembly, responses)
         self._scaling = Scaling(assembly.layout, responses)
         self._operators = Operators(assembly, responses)
+        self._tangents = Tangents(self._comm, self._scaling, self._operators)
         self._diagnosis = Diagnosis(assembly, responses, self._scaling, elastic)
         self._solver: LinearSolver
         if numerics.linear_solver == "direct":
             always = numerics.factorise == "always"
             self._solver = DirectSolver(self._comm, stopwatch, always=always)
         else:
-            unsuited = self._operators.unsuited
-            self._solver = ChosenSolver(self._comm, stopwatch, numerics, unsuited)
+            cells, unsuited = assembly.layout.grid.cells, self._operators.unsuited
+            self._solver = ChosenSolver(self._comm, stopwatch, numerics, cells, unsuited)
         self._stored: Mapping[str, Any] | None = None
 
     def follow(self, earlier: Newton) -> None:
         """Keep the objects of an earlier solver that do not depend on values of the problem."""
         self._solver = earlier._solver.successor() or self._solver
+        self._tangents.follow(earlier._tangents)
 
     def method(self, unknowns: int) -> str:
         """The linear solver for a number of unknowns in words, and the reason for it."""
@@ -196,7 +198,7 @@ class Newton:
         self._measures.begin(self.internal if inertia is None else None, values)
         equations = Equations(reduction, external, inertia, friction, path, terms)
         if terms is not None:
-            terms.begin(functools.partial(self._diagonal, reduction), inertia)
+            terms.begin()
         iterate, history, krylov = equations.first(guess), History(), list[int]()
         add_mass = None if inertia is None else inertia.adder(reduction)
         search, most = None, self.numerics.max_iterations
@@ -229,12 +231,12 @@ class Newton:
                     self._solver.condition, self._solver.symmetric, iterate.factor,
                 )  # fmt: skip
             if len(history) > most:
-                advice = self._diagnosis.material()
+                advice = self._diagnosis.advice(history)
                 self._fail(history, advice or equations.advice)
             with reported():
                 change, of_factor = self._change(iterate, forces, equations, add_mass, history)
             if equations.is_searched(self._responses.form.strain.finite):
-                of = self._comm, change, forces.residual, self._signs
+                of = self._layout.dot, change, forces.residual, self._signs
                 search = LineSearch(*of, equations, len(history))
             iterate.add(change, of_factor)
             krylov.append(self._solver.iterations)
@@ -277,23 +279,17 @@ class Newton:
         tangent = self._assembly.tangent(iterate.coefficients, data, reduction)
         if add_mass is not None:
             add_mass(tangent)
-        if equations.terms is not None:
-            with self._stopwatch("reduction"):
-                tangent = equations.terms.add_tangent(tangent, reduction)
-        if self._stored is not None:
-            self._restore(tangent, reduction)
+        with self._stopwatch("reduction"):
+            tangent = self._tangents.with_terms(tangent, equations)
         self._measures.observe(tangent, reduction)
         tolerance = ON_PATH
         if equations.path is None and not (equations.terms and equations.terms.bordering):
             linear = self._linear and equations.is_smooth and equations.friction is None
             tolerance = forcing(history, self.numerics.tolerance, linear=linear)
-        system = System(
-            tangent,
-            functools.partial(self._scaling.factors, tangent, reduction),
-            -reduction.restricted(forces.residual)[reduction.own],
-            tolerance,
-            functools.partial(self._operators.parts, equations),
-        )
+        with self._stopwatch("reduction"):
+            system = self._tangents.system(tangent, equations, forces.residual, tolerance)
+        if self._stored is not None:
+            self._restore(system.matrix, reduction)
         singular: SingularError | None = None
         try:
             found = solver.solve(system)
@@ -308,12 +304,12 @@ class Newton:
             self._diagnosis.report_singular(solver, equations, history, singular)
 
         def again(right: Array) -> Array:
-            mine = reduction.restricted(right)[reduction.own]
-            return self._on_all(reduction, solver.again(mine, tolerance))
+            mine = self._tangents.right(equations, right)
+            return self._tangents.on_all(equations, solver.again(mine, tolerance))
 
         try:
             change, of_factor = complete(
-                equations, iterate.u, self._on_all(reduction, found), again
+                equations, iterate.u, self._tangents.on_all(equations, found), again
             )
         except GivesWayError as error:
             self._fail(history, f"Then {error}. {equations.advice}")
@@ -330,17 +326,6 @@ class Newton:
         if layout.volumetric is not None:
             signs[layout.volumetric.slice] = -1.0
         return signs
-
-    def _diagonal(self, reduction: Reduction) -> Array:
-        """Diagonal of the tangent at the start of a step, on all coefficients."""
-        size = self._assembly.layout.size
-        self.internal(np.zeros(size))
-        tangent = self._assembly.tangent(np.zeros(size), self._responses.data, reduction)
-        return diagonal_of(tangent, reduction)
-
-    def _on_all(self, reduction: Reduction, unknowns: Array) -> Array:
-        """All coefficients from this rank's unknowns."""
-        return reduction.expanded(ranks.allgathered(self._comm, unknowns))
 
     def _fail(self, history: History, advice: str) -> NoReturn:
         field = self._measures.worst_field

@@ -16,6 +16,7 @@ from typing import Protocol
 import numpy as np
 
 from tawami.base.arrays import Array, Indices
+from tawami.field.layout import Layout
 
 #: Displacement of a control point per load factor, relative to the largest, that is ignored.
 NO_MOTION = 1e-12
@@ -44,21 +45,24 @@ class PointControl:
     """The displacement of a point.
 
     Attributes:
-        indices, weights: Coefficients of one component, and values of their functions at the point.
+        layout: Places of the coefficients.
+        indices, weights: Coefficients of one component in the whole grid, and values of their functions
+            at the point.
         size: Displacement in the step [m].
     """
 
+    layout: Layout
     indices: Indices
     weights: Array
     size: float
 
     def _at(self, u: Array) -> float:
-        return float(self.weights @ u[self.indices])
+        return float(self.weights @ self.layout.at(u, self.indices))
 
     def change(self, u: Array, residual: Array, rate: Array) -> float:
         """See `Control`; exact, because the displacement is linear."""
         moved = self._at(rate)
-        if abs(moved) <= NO_MOTION * np.abs(rate).max():
+        if abs(moved) <= NO_MOTION * self.layout.largest(rate):
             return np.nan
         return (self.size - self._at(u) - self._at(residual)) / moved
 
@@ -83,7 +87,7 @@ class ArcLength:
 
     def change(self, u: Array, residual: Array, rate: Array) -> float:
         """See `Control`: a step along the tangent of the path, then consistent linearisation."""
-        if not u.any():
+        if self.inner(u, u) == 0:
             length = np.sqrt(self.inner(rate, rate))
             return float(np.copysign(self.size / length, self.ahead(rate))) if length else np.nan
         slope = 2 * self.inner(u, rate)

@@ -10,7 +10,7 @@ import numpy as np
 
 from tawami.base import ranks
 from tawami.base.arrays import Array, Indices
-from tawami.base.petsc import rows_of
+from tawami.base.petsc import aij, rows_of
 from tawami.field.layout import Layout
 from tawami.field.reduction import Reduction
 from tawami.particles.responses import Responses
@@ -39,7 +39,7 @@ class Scaling:
         displacement, or of their diagonal if that is larger. Other fields are multiplied by the scale
         that they declare, or divided by the square root of their diagonal, or of that coupling.
         """
-        own = reduction.unknowns[reduction.own]
+        own = reduction.coefficients
         of_u = own < self._layout.num_displacement
         vector = matrix.getDiagonal()
         diagonal = vector.array.copy()
@@ -74,16 +74,21 @@ class Scaling:
         Args:
             of_u: Factors of this rank's unknowns that belong to the displacement; zero for others.
         """
-        comm, rows = self._layout.grid.comm, rows_of(matrix)
-        squares = rows.multiply(rows).tocsr()
-        columns = ranks.sum_of(comm, np.asarray(squares.T @ of_u**2))
-        along = squares @ ranks.allgathered(comm, of_u) ** 2
-        return np.asarray(np.sqrt(along * columns[reduction.own]))
+        rows = rows_of(matrix)
+        squares = aij(self._layout.grid.comm, rows.multiply(rows), reduction.num_own)
+        scales, along, columns = (squares.createVecLeft() for _ in range(3))
+        scales.setArray(of_u**2)
+        squares.mult(scales, along)
+        squares.multTranspose(scales, columns)
+        found = np.sqrt(along.array * columns.array)
+        for handle in (scales, along, columns, squares):
+            handle.destroy()
+        return np.asarray(found)
 
     def _of_volume(self, functions: Indices, diagonal: Array) -> Array:
         """Factors of eps_v or p of some bilinear functions."""
         bulk, mu = (self._responses.constants[name] for name in ("K", "mu"))
-        sums = self._responses.sums(np.column_stack([np.ones_like(mu), 1 / bulk, 1 / mu]))
+        sums = self._sums(np.column_stack([np.ones_like(mu), 1 / bulk, 1 / mu]))
         volume, over_bulk, over_mu = sums[functions].T
         grid = self._layout.grid
         least = LEAST * grid.space.measure(grid.h)
@@ -92,7 +97,13 @@ class Scaling:
         has_eps_v = self._responses.form.kinematics.has_eps_v
         to_field = mu_i * over_bulk / volume if has_eps_v else mu_i
         to_field = np.where(to_field > 0, to_field, 1)
-        squares = self._responses.sums(np.ones((len(mu), 1)), squared=True)[functions, 0]
+        squares = self._sums(np.ones((len(mu), 1)), squared=True)[functions, 0]
         # in a cell with little of the body the stabilisation is larger than that volume
         size = np.maximum(mu_i * np.maximum(squares, least), to_field**2 * np.abs(diagonal))
         return np.asarray(to_field / np.sqrt(size))
+
+    def _sums(self, columns: Array, *, squared: bool = False) -> Array:
+        """Volume-weighted sums over the body on bilinear functions, or their squares."""
+        location, volume = self._responses.location, self._responses.particles.volume
+        of = self._layout.functions
+        return of.sums(location, volume, columns, "bilinear", squared=squared)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import operator
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,17 +13,20 @@ import scipy.sparse as sp
 from tawami.base.arrays import Array
 from tawami.base.places import Added
 from tawami.field.follower import FollowerPressure
-from tawami.field.reduction import Reduction
-from tawami.field.sum import Sum
-from tawami.solve.bordered import Bordering, Elimination
-from tawami.solve.inertia import Inertia
+from tawami.field.layout import Layout
+from tawami.solve.bordered import Bordering, Elimination, OwnUnknowns, Tie
 
 #: Passes with better multipliers in one step.
 PASSES = 20
+#: Error of a constraint, relative to the displacement, that no change of it can remove.
+APART = 1e-3
 
 
 class Term(Protocol):
-    """Forces of one action on the border; the same on every rank."""
+    """Forces of one action on the border.
+
+    They are the same on every rank: coefficients are all those of the whole grid.
+    """
 
     @property
     def prescribed(self) -> float:
@@ -37,26 +40,18 @@ class Term(Protocol):
     def implicit(self) -> bool:
         """Whether the forces are those of contact, with weights of their own in dynamics."""
 
-    def begin(self, diagonal: Callable[[], Array], inertia: Array | None) -> None:
-        """Start a step.
-
-        Args:
-            diagonal: Gives the diagonal of the tangent at its start, on all coefficients.
-            inertia: Diagonal of the inertia, on the displacement coefficients; None in statics.
-        """
-
     def forces(self, coefficients: Array) -> Array:
         """Forces on the body, on all coefficients [N per metre depth], at increments of all fields."""
 
-    def stiffness(self) -> sp.csr_matrix:
-        """Derivative of the last forces, with the opposite sign."""
+    def stiffness(self) -> sp.csr_matrix | None:
+        """Derivative of the last forces, with the opposite sign; None if there is none."""
 
     def improve(self) -> bool:
         """Improve the multipliers at a solution; whether another solve is needed."""
 
     @property
     def unsettled(self) -> str:
-        """Message if the multipliers do not settle: what is wrong, and what to do."""
+        """Message if multipliers or constraints do not settle: what is wrong, and what to do."""
 
     def accept(self) -> None:
         """Keep what later steps need, once a step is stored."""
@@ -67,18 +62,27 @@ class Terms:
 
     Args:
         terms: The actions.
-        comm: Communicator.
+        layout: Places of the coefficients.
+        tied: Those with constraints, whose unknowns are multipliers.
+        bordering: Those with a few unknowns of their own, or none.
 
     Attributes:
         stuck: Message if the multipliers do not settle.
-        stiffness: That of the last tangent, on all coefficients.
+        stiffness: That of the last tangent, on all coefficients of the whole grid.
     """
 
-    def __init__(self, terms: Sequence[Term], comm: Any) -> None:
-        self._terms, self._sum, self._added = terms, Sum(self, comm), Added()
+    def __init__(
+        self,
+        terms: Sequence[Term],
+        layout: Layout,
+        tied: Sequence[Tie] = (),
+        bordering: Sequence[Bordering] = (),
+    ) -> None:
+        self._terms, self._layout, self._added = terms, layout, Added()
+        self.tied, self._bordering = tied, bordering
         self._following = [term for term in terms if isinstance(term, FollowerPressure)]
         #: Stiffness of each term when they were last added, and their sum.
-        self._stiffnesses: list[sp.csr_matrix] = [None] * len(terms)
+        self._stiffnesses: list[sp.csr_matrix] = []
         self.stiffness: sp.csr_matrix | None = None
 
     def load(self, share: float) -> None:
@@ -93,8 +97,8 @@ class Terms:
 
     @property
     def rate(self) -> Array | float:
-        """Derivative of the last forces by the load factor of a path."""
-        return sum(term.rate for term in self._following)
+        """Derivative of the last forces by the load factor of a path, in the window."""
+        return sum(self._layout.part(term.rate) for term in self._following)
 
     @property
     def prescribed(self) -> float:
@@ -106,70 +110,98 @@ class Terms:
         """Whether all of them are."""
         return all(term.smooth for term in self._terms)
 
-    def begin(self, diagonal: Callable[[], Array], inertia: Inertia | None) -> None:
-        """Start a step; see `Term.begin`."""
-        of_mass = None if inertia is None else inertia.slope * inertia.mass
+    def begin(self) -> None:
+        """Start a step."""
         self._passes, self.stuck = 0, ""
-        for term in self._terms:
-            term.begin(diagonal, of_mass)
+        self.restart()
 
     def restart(self) -> None:
-        """Go back to the first guess of the unknowns of their own."""
-        for term in self.bordering:
+        """Go back to the first guess of the unknowns of their own, and of the states of contact."""
+        for term in [*self.tied, *self._bordering]:
             term.restart()
 
     def shorten(self, share: float) -> None:
         """Take a share of the last change of the unknowns of their own."""
-        for term in self.bordering:
+        for term in self._own:
             term.shorten(share)
 
     @property
     def first_work(self) -> float:
         """Work of the residuals of their own equations on the last change, at its beginning."""
-        return sum(term.first_work for term in self.bordering)
+        return sum(term.first_work for term in self._own)
 
     @property
     def work(self) -> float:
         """The same at the last forces."""
-        return sum(term.work for term in self.bordering)
+        return sum(term.work for term in self._own)
 
     def forces(self, coefficients: Array) -> Array:
-        """Their sum, as `Term.forces`."""
+        """Their sum, on the coefficients of the window; a collective call.
+
+        Args:
+            coefficients: Increments of all fields, in the window.
+        """
+        in_grid = self._layout.whole(coefficients)
         #: Of all that are no contact.
         self.loads = np.zeros_like(coefficients)
         total = np.zeros_like(coefficients)
         for term in self._terms:
-            forces = term.forces(coefficients)
+            forces = self._layout.part(term.forces(in_grid))
             total += forces
             if not term.implicit:
                 self.loads += forces
         return total
 
-    def add_tangent(self, tangent: Any, reduction: Reduction) -> Any:
-        """A reduced tangent with their stiffness."""
-        parts = [term.stiffness() for term in self._terms]
-        if not all(map(operator.is_, parts, self._stiffnesses)):
+    def update_stiffness(self) -> sp.csr_matrix | None:
+        """Their stiffness at the last forces; the same object if no part has changed."""
+        all_parts = [term.stiffness() for term in self._terms]
+        parts = [part for part in all_parts if part is not None]
+        same = len(parts) == len(self._stiffnesses)
+        if parts and not (same and all(map(operator.is_, parts, self._stiffnesses))):
             self._stiffnesses, self.stiffness = parts, self._added.of(parts)
-        return self._sum.of(tangent, self.stiffness, reduction)
+        return self.stiffness
+
+    @property
+    def _own(self) -> list[OwnUnknowns]:
+        return [*self.bordering, *self.tied]
 
     @functools.cached_property
     def bordering(self) -> list[Bordering]:
-        """The terms with unknowns of their own."""
-        return [t for t in self._terms if isinstance(t, Bordering) and t.num_unknowns]
+        """The terms with a few unknowns of their own."""
+        return [term for term in self._bordering if term.num_unknowns]
+
+    def add(self, multipliers: Array) -> None:
+        """Go to the next iterate of the multipliers of all constraints."""
+        ends = np.cumsum([tie.num_unknowns for tie in self.tied])[:-1]
+        for tie, change in zip(self.tied, np.split(multipliers, ends), strict=True):
+            tie.add(change)
 
     @property
     def measure(self) -> float:
         """The largest of the measures of their own equations."""
-        return max((term.measure for term in self.bordering), default=0.0)
+        return max((term.measure for term in self._own), default=0.0)
 
     def elimination(self, solve: Callable[[Array], Array]) -> Elimination | None:
         """The elimination of their own unknowns; None if there are none.
 
         Args:
-            solve: As in `Elimination`.
+            solve: As in `Elimination`, with coefficients of the window.
         """
-        terms = self.bordering
-        return Elimination(terms, solve) if terms else None
+        if not self.bordering:
+            return None
+        part = self._layout.part
+        size = self._layout.size_of_grid + sum(tie.num_unknowns for tie in self.tied)
+        return Elimination(self.bordering, lambda right: self.in_grid(solve(part(right))), size)
+
+    def in_grid(self, change: Array) -> Array:
+        """Coefficients of the grid and multipliers, from those of the window; a collective call."""
+        size = self._layout.size
+        return np.concatenate([self._layout.whole(change[:size]), change[size:]])
+
+    def in_window(self, change: Array) -> Array:
+        """Coefficients of the window and multipliers, from those of the grid."""
+        size = self._layout.size_of_grid
+        return np.concatenate([self._layout.part(change[:size]), change[size:]])
 
     def improve(self) -> bool:
         """Improve all multipliers; whether another solve is needed."""
@@ -178,6 +210,11 @@ class Terms:
         if pending and self._passes >= PASSES:
             self.stuck = pending[0].unsettled
         return bool(pending)
+
+    @property
+    def contradiction(self) -> str:
+        """Message if constraints contradict others; empty if the last iterate fulfils all."""
+        return next((tie.unsettled for tie in self.tied if tie.measure > APART), "")
 
     def accept(self) -> None:
         """Keep what later steps need, once a step is stored."""

@@ -3,20 +3,23 @@
 The knob with the largest effect is refined first: lines of runs along it are extrapolated, see
 `tawami.study.limit`, with each value of the other knobs. Errors that vanish with this knob, such as that
 of the particles or of a stabilisation that scales with h, do not count twice. The limits are then a
-sequence in each other knob.
+sequence in each other knob. Knobs with equally accurate values, as shifts of the grid, give several
+values for each size, whose spread measures the noise.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 from tawami.study.knobs import Knob
 from tawami.study.limit import Limit, limit_of, sizes_of
-from tawami.study.row import value_text
+from tawami.study.row import shortened, value_text
 
+T = TypeVar("T")
 #: Value of a quantity for the values of all knobs, in their order.
 Points = Mapping[tuple[Any, ...], float]
 
@@ -58,10 +61,19 @@ def replaced(setting: tuple[Any, ...], k: int, value: Any) -> tuple[Any, ...]:
     return (*setting[:k], value, *setting[k + 1 :])
 
 
-def line(points: Points, knobs: Sequence[Knob], k: int, base: tuple[Any, ...]) -> dict[Any, float]:
+def line(
+    points: Mapping[tuple[Any, ...], T], knobs: Sequence[Knob], k: int, base: tuple[Any, ...]
+) -> dict[Any, T]:
     """Values along a knob through a setting, from coarse to fine."""
     places = {value: replaced(base, k, value) for value in knobs[k].values}
     return {value: points[place] for value, place in places.items() if place in points}
+
+
+def repeated(knobs: Sequence[Knob], base: tuple[Any, ...]) -> Iterator[tuple[Any, ...]]:
+    """A setting with all values of the knobs that repeat."""
+    return itertools.product(
+        *(k.values if k.repeats else (v,) for k, v in zip(knobs, base, strict=True))
+    )
 
 
 def leading(points: Points, knobs: Sequence[Knob]) -> int:
@@ -74,31 +86,43 @@ def leading(points: Points, knobs: Sequence[Knob]) -> int:
     return max((k for k, knob in enumerate(knobs) if knob.refines), key=effect)
 
 
-def estimate(name: str, knobs: Sequence[Knob], points: Points) -> Estimate:
+def estimate(
+    name: str,
+    knobs: Sequence[Knob],
+    points: Points,
+    failures: Mapping[tuple[Any, ...], str] | None = None,
+) -> Estimate:
     """Estimate the limit of a quantity.
 
     Args:
         name: Of the quantity.
         knobs: Knobs, of which at least one refines.
-        points: Values of the runs.
+        points: Values of the runs that succeeded.
+        failures: Error messages of runs that failed.
     """
     first, centre = leading(points, knobs), centre_of(knobs)
     main_line = line(points, knobs, first, centre)
+    finer = _failed(knobs[first], main_line, line(failures or {}, knobs, first, centre))
+    if finer is not None:
+        value = next(reversed([*points.values(), *main_line.values()]))
+        return Estimate(value, math.inf, remarks=(_fails(name, knobs[first], finer),))
     if len(main_line) < 2:
         return Estimate(
             next(iter(points.values())), math.inf, remarks=(_too_few(name, knobs[first]),)
         )
-    main = _limit(main_line)
+    main = _limit(points, knobs, first, centre)
     if not main.exists:
         remark = _no_limit(name, knobs[first], main_line)
         return Estimate(main.value, math.inf, remarks=(remark,))
     orders = {} if main.order is None else {knobs[first].name: main.order}
     value, uncertainty, remarks, moves = main.value, main.uncertainty, list[str](), list[float]()
     for k, knob in enumerate(knobs):
-        if k == first:
+        if k == first or knob.repeats:
             continue
         limits = _limits(points, knobs, first, k)
-        found = _other(name, knob, limits, main, line(points, knobs, k, centre))
+        at_default = line(points, knobs, k, centre)
+        rest = _limit(points, knobs, k, centre) if knob.refines and at_default else main
+        found = _other(name, knob, limits, main, at_default, rest)
         moves.append(abs(found.value))
         value, uncertainty = value + found.value, uncertainty + found.uncertainty
         orders |= found.orders
@@ -107,8 +131,22 @@ def estimate(name: str, knobs: Sequence[Knob], points: Points) -> Estimate:
     return Estimate(value, uncertainty, orders, tuple(remarks))
 
 
-def _limit(found: Mapping[Any, float]) -> Limit:
-    return limit_of(sizes_of(list(found)), list(found.values()))
+def _limit(points: Points, knobs: Sequence[Knob], k: int, base: tuple[Any, ...]) -> Limit:
+    """Limit along knob k; all repetitions of a size count."""
+    lines = [line(points, knobs, k, setting) for setting in repeated(knobs, base)]
+    values = [v for v in knobs[k].values if any(v in found for found in lines)]
+    sizes = sizes_of(values)
+    pairs = [(s, f[v]) for s, v in zip(sizes, values, strict=True) for f in lines if v in f]
+    return limit_of(*map(list, zip(*pairs, strict=True)))
+
+
+def _failed(
+    knob: Knob, succeeded: Mapping[Any, float], failed: Mapping[Any, Any]
+) -> tuple[Any, str] | None:
+    """The coarsest value that failed, with its message, if all finer ones failed too."""
+    last = max((knob.values.index(v) for v in succeeded), default=-1)
+    finer = [v for v in failed if knob.values.index(v) > last]
+    return (finer[0], failed[finer[0]]) if finer else None
 
 
 def _limits(points: Points, knobs: Sequence[Knob], first: int, k: int) -> dict[Any, Limit]:
@@ -117,19 +155,23 @@ def _limits(points: Points, knobs: Sequence[Knob], first: int, k: int) -> dict[A
     for value in knobs[k].values:
         along = line(points, knobs, first, replaced(centre, k, value))
         if len(along) > 2 or value == centre[k]:
-            limit = _limit(along)
+            limit = _limit(points, knobs, first, replaced(centre, k, value))
             if limit.exists:
                 found[value] = limit
     return found
 
 
 def _other(
-    name: str, knob: Knob, limits: Mapping[Any, Limit], main: Limit, at_default: Mapping[Any, float]
+    name: str,
+    knob: Knob,
+    limits: Mapping[Any, Limit],
+    main: Limit,
+    at_default: Mapping[Any, float],
+    rest: Limit,
 ) -> Estimate:
     """Effect of another knob on the limit: shift, uncertainty, order, remarks."""
     values = {value: limit.value for value, limit in limits.items()}
     if len(values) < 2 and knob.refines:  # only its effect at the defaults is known
-        rest = _limit(at_default) if at_default else main
         if not rest.exists:
             return Estimate(0.0, math.inf, remarks=(_no_limit(name, knob, at_default),))
         here = at_default.get(knob.default, rest.value)
@@ -146,7 +188,7 @@ def _other(
     known = max(limit.uncertainty for limit in finest)
     if spread <= known:  # nothing but the uncertainty of the limits themselves
         return Estimate(0.0, 0.0)
-    limit = _limit(values)
+    limit = limit_of(sizes_of(list(values)), list(values.values()))
     if not limit.exists and spread <= 3 * known:
         return Estimate(0.0, spread)
     if not limit.exists:
@@ -161,6 +203,14 @@ def _no_limit(name: str, knob: Knob, found: Mapping[Any, float]) -> str:
     return (
         f"'{name}' does not converge with '{knob.name}' ({steps}): the problem has no limit, or "
         f"'{knob.name}' changes the problem instead of its accuracy."
+    )
+
+
+def _fails(name: str, knob: Knob, finer: tuple[Any, str]) -> str:
+    value, message = finer
+    return (
+        f"'{name}' does not converge with '{knob.name}': runs with {value_text(value)} and finer fail "
+        f"({shortened(message)})."
     )
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from tawami.picture import style
 from tawami.picture.figure import new_figure, save
+from tawami.study.peers import Peer
 from tawami.study.row import Row, text_of
 from tawami.study.table import Table
 
@@ -34,6 +37,8 @@ def picture(
     cost: str = "wall_s",
     quantities: Sequence[str] | None = None,
     title: str | None = None,
+    marks: Mapping[str, Mapping[str, Any]] | None = None,
+    peers: Sequence[Peer] = (),
 ) -> None:
     """Draw a study: a panel for each quantity, a marker for each series, the fronts as lines.
 
@@ -44,6 +49,8 @@ def picture(
         cost: Quantity of the abscissa: 'wall_s', 'cpu_s', 'peak_MB', ...
         quantities: Quantities to draw; by default all that have errors.
         title: Above the panels; the name of the study by default.
+        marks: Name -> setting that is marked; `...` as a value stands for any.
+        peers: Runs of other codes, in pictures over wall time.
 
     Raises:
         MissingDependencyError: matplotlib is not installed.
@@ -63,6 +70,9 @@ def picture(
     colours = {value: style.LINES[k % len(style.LINES)] for k, value in enumerate(values)}
     for axes, quantity in zip(panels, quantities, strict=True):
         _panel(axes, table, quantity, cost, colour, colours)
+        _mark(axes, table, quantity, cost, marks or {})
+        if cost == "wall_s":
+            _add_peers(axes, quantity, peers)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4)
     figure.suptitle(title or table.name)
@@ -109,3 +119,34 @@ def _panel(
     axes.set_xlabel(LABELS[cost] + "\n\n" + "\n".join(lines), loc="left")
     axes.set_ylabel(f"error of {quantity} [-]")
     axes.grid(which="both")
+
+
+def _mark(
+    axes: Axes, table: Table, quantity: str, cost: str, marks: Mapping[str, Mapping[str, Any]]
+) -> None:
+    """Draw lines through the runs of marked settings."""
+    shades = (style.VERMILION, style.BLUE, style.GREEN)
+    for (name, setting), shade in zip(marks.items(), shades, strict=False):
+        rows = [
+            row
+            for row in table.of(table.series[0])
+            if row.knobs.keys() == setting.keys()
+            and all(setting[knob] in (..., value) for knob, value in row.knobs.items())
+        ]
+        rows.sort(key=lambda row: row.costs[cost])
+        axes.plot([r.costs[cost] for r in rows], [r.errors[quantity] for r in rows], "s-", color=shade,
+                  markersize=9, fillstyle="none", markeredgewidth=1.8, label=name)  # fmt: skip
+
+
+def _add_peers(axes: Axes, quantity: str, peers: Sequence[Peer]) -> None:
+    """Draw runs of other codes; an error without a time is a horizontal line."""
+    shown = [peer for peer in peers if quantity in peer.errors]
+    for number, label in enumerate(dict.fromkeys(peer.label for peer in shown)):
+        mine = [peer for peer in shown if peer.label == label]
+        timed = [peer for peer in mine if np.isfinite(peer.wall_s)]
+        for peer in mine:
+            if peer not in timed:
+                axes.axhline(peer.errors[quantity], color=style.GRAY, linestyle=":", label=label)
+        axes.plot([p.wall_s for p in timed], [p.errors[quantity] for p in timed],
+                  MARKERS[-1 - number % len(MARKERS)], color=style.GRAY, markersize=8,
+                  label=label if timed else None)  # fmt: skip

@@ -15,7 +15,7 @@ from tawami.base import checks
 from tawami.base.errors import InputError
 from tawami.study.estimate import Estimate, centre_of, leading, line
 from tawami.study.knobs import Knob
-from tawami.study.row import text_of, value_text
+from tawami.study.row import shortened, text_of, value_text
 
 #: Rows of the printed table.
 MOST = 8
@@ -134,7 +134,7 @@ class Trade:
             parts += [f"{text} gains nothing here." for text in self._useless()]
         failed = [run for run in self.runs if run.failure is not None]
         if failed:
-            first = f"{text_of(failed[0].knobs)}: {failed[0].failure}"
+            first = f"{text_of(failed[0].knobs)}: {shortened(str(failed[0].failure))}"
             parts.append(f"{len(failed)} of {len(self.runs)} runs failed, the first with {first}.")
         return " ".join(parts)
 

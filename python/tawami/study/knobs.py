@@ -1,4 +1,7 @@
-"""Knobs of a function: arguments with a default and a list of values from coarse to fine."""
+"""Knobs of a function: arguments with a default and a list of values from coarse to fine.
+
+Values in a set are equally accurate repetitions, as shifts of the grid.
+"""
 
 from __future__ import annotations
 
@@ -30,16 +33,19 @@ class Knob:
         name: Of the argument.
         values: Its values, from coarse to fine; alternatives in any order if they are not numbers.
         default: One of them.
+        repeats: Whether the values are equally accurate, as shifts of the grid, so that their spread
+            measures the noise.
     """
 
     name: str
     values: tuple[Any, ...]
     default: Any
+    repeats: bool = False
 
     @property
     def refines(self) -> bool:
         """Whether the values are positive numbers in order, so that they may have a limit."""
-        return is_ladder(self.values)
+        return not self.repeats and is_ladder(self.values)
 
 
 def is_ladder(values: Sequence[Any]) -> bool:
@@ -95,17 +101,26 @@ def _annotated(build: Run) -> dict[str, Any]:
     except (NameError, TypeError) as error:
         raise InputError(f"annotations cannot be read: {error}") from error
     found = {name: getattr(hint, "__metadata__", ()) for name, hint in hints.items()}
-    lists = {name: [m for m in metadata if is_list(m)] for name, metadata in found.items()}
+    lists = {
+        name: [m for m in metadata if is_list(m) or _is_set(m)] for name, metadata in found.items()
+    }
     return {name: metadata[0] for name, metadata in lists.items() if metadata}
 
 
+def _is_set(values: Any) -> bool:
+    return isinstance(values, set | frozenset)
+
+
 def _knob(name: str, values: Any, default: Any) -> Knob:
+    repeats = _is_set(values)
+    if repeats:
+        values = sorted({*values, default}, key=lambda v: (v != default, repr(v)))
     listed = list(dict.fromkeys(knob_values(name, values)))
     if default not in listed:
         listed = _with_default(name, listed, default)
     if len(listed) < 2:
         raise InputError(f"knob '{name}' = {checks.shown(values)}: expected at least two values")
-    return Knob(name, tuple(listed), default)
+    return Knob(name, tuple(listed), default, repeats)
 
 
 def _with_default(name: str, values: list[Any], default: Any) -> list[Any]:

@@ -1,21 +1,29 @@
-"""A ladder of runs within a budget, cheapest first: the runs that an estimate of the limit needs."""
+"""A ladder of runs within a budget, cheapest first: the runs that an estimate of the limit needs.
+
+Runs are processes, as many at a time as there are cores. With several cores each uses one thread.
+"""
 
 from __future__ import annotations
 
+import itertools
 import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from mpi4py import MPI
+
 from tawami.base.errors import InputError
 from tawami.base.lock import hold
 from tawami.base.text import meant, quoted
+from tawami.solve.memory import available
 from tawami.study import process
 from tawami.study.estimate import centre_of, leading, replaced
 from tawami.study.knobs import Knob
-from tawami.study.row import text_of
+from tawami.study.row import shortened, text_of
 from tawami.study.stored import store, stored_runs
 
 #: Time of a run that starts a process [s], and the ratio of times of two values of a refining knob,
@@ -23,6 +31,8 @@ from tawami.study.stored import store, stored_runs
 START, RATIO = 1.0, 4.0
 #: Failures without a success after which a ladder ends.
 HOPELESS = 3
+#: A run starts next to others if the free memory is this many times that of the largest run so far.
+ROOM = 3.0
 Setting = tuple[Any, ...]
 
 
@@ -37,9 +47,10 @@ class Ladder:
         quantities: Names of quantities; empty for all numbers that it returns.
         folder: Folder of the stored runs.
         budget: Wall time of all runs together, including stored ones [s].
+        jobs: Runs at a time.
 
     Attributes:
-        runs: Outcome of each setting that was run.
+        runs: Outcome of each setting that was run, in the order of the values of the knobs.
         quantities: Names of quantities.
     """
 
@@ -52,8 +63,10 @@ class Ladder:
         quantities: Sequence[str],
         folder: Path,
         budget: float,
+        jobs: int = 1,
     ) -> None:
         self.name, self.knobs, self.folder, self.budget = name, knobs, folder, budget
+        self.jobs = 1 if "threads" in (knob.name for knob in knobs) else jobs
         self.quantities = list(quantities)
         self.runs: dict[Setting, dict[str, Any]] = {}
         self._run, self._fingerprint = run, fingerprint
@@ -67,12 +80,40 @@ class Ladder:
         lock = hold(self.folder, f"trade '{self.name}' in '{self.folder}'")
         try:
             self._load()
-            while (setting := self._next()) is not None:
-                self._measure(setting, quiet)
+            self._end = perf_counter() + self.budget - self.spent / self.jobs
+            with ThreadPoolExecutor(self.jobs) as pool:
+                self._climb(pool, quiet)
         finally:
             lock.release()
+        self.runs = {s: self.runs[s] for s in self._all() if s in self.runs}
         if len(self.succeeded) < 2:
             raise InputError(self._too_few())
+
+    def _climb(self, pool: ThreadPoolExecutor, quiet: bool) -> None:
+        """Keep all jobs busy until no setting is wanted."""
+        running: dict[Future[dict[str, Any]], Setting] = {}
+        while True:
+            while len(running) < self.jobs:
+                setting = self._next(list(running.values()))
+                if setting is None or (running and not self._has_room()):
+                    break
+                running[pool.submit(self._measure, setting)] = setting
+            if not running:
+                return
+            for done in wait(running, return_when=FIRST_COMPLETED).done:
+                setting, outcome = running.pop(done), done.result()
+                knobs = self.named(setting)
+                head = {"label": self.name, "knobs": knobs, "fingerprint": self._fingerprint}
+                store(self.folder, head | outcome)
+                self._take(setting, outcome)
+                if not quiet:
+                    said = outcome.get("failure") or f"{outcome['wall_s']:.3g} s"
+                    print(f"{text_of(knobs)}: {said}", file=sys.stderr, flush=True)
+
+    def _has_room(self) -> bool:
+        """Whether another run fits into the memory."""
+        largest = max((run["peak_MB"] for run in self.succeeded.values()), default=0.0)
+        return available(MPI.COMM_SELF) > ROOM * largest * 2**20
 
     @property
     def succeeded(self) -> dict[Setting, dict[str, Any]]:
@@ -80,8 +121,14 @@ class Ladder:
         return {setting: run for setting, run in self.runs.items() if "failure" not in run}
 
     @property
+    def failures(self) -> dict[Setting, str]:
+        """Error messages of runs that failed within the budget."""
+        runs = self.runs.items()
+        return {s: run["failure"] for s, run in runs if "failure" in run and "cut" not in run}
+
+    @property
     def spent(self) -> float:
-        """Wall time of all runs [s]."""
+        """Wall time of all runs, one after the other [s]."""
         return float(sum(run["spent_s"] for run in self.runs.values()))
 
     def points(self, quantity: str) -> dict[Setting, float]:
@@ -94,19 +141,23 @@ class Ladder:
 
     # -- order of runs -------------------------------------------------------------
 
-    def _next(self) -> Setting | None:
-        """The cheapest setting that is wanted and fits into the budget."""
-        left = self.budget - self.spent
-        failed = len(self.runs) - len(self.succeeded)
+    def _next(self, running: Sequence[Setting] = ()) -> Setting | None:
+        """The cheapest setting that is wanted and fits into the budget; some are running."""
+        left = self._end - perf_counter()
+        failed, begun = len(self.runs) - len(self.succeeded), {*self.runs, *running}
         if left <= 0 or (failed >= HOPELESS and not self.succeeded):
             return None
-        first = [s for s in self._star(centre_of(self.knobs)) if s not in self.runs]
-        cheap = [s for s in first if len(self.runs) < 2 or self._cost(s) <= left / 2]
-        wanted = cheap or [s for s in self._wanted() if s not in self.runs]
+        first = [s for s in self._star(centre_of(self.knobs)) if s not in begun]
+        cheap = [s for s in first if len(begun) < 2 or self._cost(s) <= left / 2]
+        wanted = cheap or [s for s in self._wanted() if s not in begun]
         if not wanted:
             return None
         setting = min(wanted, key=lambda s: (self._cost(s), wanted.index(s)))
-        return setting if len(self.runs) < 2 or self._cost(setting) <= left else None
+        return setting if len(begun) < 2 or self._cost(setting) <= left else None
+
+    def _all(self) -> Iterator[Setting]:
+        """All settings, in the order of the values of the knobs."""
+        return itertools.product(*(knob.values for knob in self.knobs))
 
     def _star(self, base: Setting) -> Iterator[Setting]:
         """A setting, and those that differ from it in one knob."""
@@ -157,16 +208,13 @@ class Ladder:
             ):
                 self._take(setting, run)
 
-    def _measure(self, setting: Setting, quiet: bool) -> None:
-        begin, knobs = perf_counter(), self.named(setting)
-        outcome = process.measure(self._run, knobs, max(self.budget - self.spent, 0.1))
-        outcome["spent_s"] = perf_counter() - begin
-        head = {"label": self.name, "knobs": knobs, "fingerprint": self._fingerprint}
-        store(self.folder, head | outcome)
-        self._take(setting, outcome)
-        if not quiet:
-            said = outcome.get("failure") or f"{outcome['wall_s']:.3g} s"
-            print(f"{text_of(knobs)}: {said}", file=sys.stderr, flush=True)
+    def _measure(self, setting: Setting) -> dict[str, Any]:
+        """Run a setting in its own process."""
+        begin = perf_counter()
+        threads = 1 if self.jobs > 1 else None
+        limit = max(self._end - begin, 0.1)
+        outcome = process.measure(self._run, self.named(setting), limit, threads)
+        return outcome | {"spent_s": perf_counter() - begin}
 
     def _take(self, setting: Setting, run: dict[str, Any]) -> None:
         """Keep a run after a check of its quantities."""
@@ -191,11 +239,11 @@ class Ladder:
         self.runs[setting] = run
 
     def _too_few(self) -> str:
-        failed = [run for run in self.runs.values() if "failure" in run]
-        failures = [run["failure"] for run in failed if "cut" not in run]
+        failures = list(self.failures.values())
         if failures:
             return (
-                f"trade '{self.name}': {len(failures)} runs failed, the first with: {failures[0]}"
+                f"trade '{self.name}': no limit is found, as {len(failures)} runs failed, the first "
+                f"with: {shortened(failures[0])}"
             )
         longest = max(run["spent_s"] for run in self.runs.values())
         return (

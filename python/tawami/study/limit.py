@@ -1,33 +1,57 @@
 """Limit of a sequence under refinement, with its uncertainty; no reference is needed.
 
-Regular sequences are extrapolated with their observed order p, q(s) = q* + C s^p (Richardson, 1911;
-Roache, Annu. Rev. Fluid Mech. 29, 1997, for the observed order on unequal refinements). Others have the
-finest value as the limit and the spread of the finest three as the uncertainty. The uncertainty of a
-regular sequence is the largest of the last change of the extrapolated value, the effect of rounding the
-order to a whole number, and a part of the extrapolation.
+The model of a value q_i at size s_i is a power law with a deviation,
+
+    q_i = q* + C s_i^p + e_i,      e_i normal with the standard deviation  eta D s_i^r,
+
+where D is the range of the values. The deviation represents terms of higher order, cut cells, and
+particles that cross cells. The order p, the size eta of the deviation and its rate r are unknown. All of
+them are considered, with their probability given the values (Bayes' rule; q* and C are integrated
+exactly). The interval of the uncertainty contains q* with a probability of 90 %. A regular sequence
+leaves one order and a small deviation, as in Richardson's extrapolation (1911). An irregular one leaves
+many orders, and the uncertainty is large. Several values of one size, as from shifted grids, measure the
+deviation.
+
+A sequence has no limit if orders below `SLOWEST` are probable: 0 is a logarithm, and with negative
+orders the values grow. It has no limit either if the deviation probably grows with refinement, r < 0.
+
+The priors: a limit exists with a probability of 70 %, and then ln p is normal (90 % of the orders are
+between 0.6 and 4); eta is uniform in its logarithm, r is one of `RATES` and rarely negative, and the
+change over the sizes is normal with a standard deviation of 2 D.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 from scipy.optimize import brentq
+from scipy.special import ndtr
 
-#: Observed orders of a regular sequence; below the first one there is no sign of a limit.
-SLOWEST, FASTEST = 0.3, 8.0
-#: Largest difference of two observed orders of a regular sequence.
-APART = 1.5
+Array = npt.NDArray[np.float64]
+
+#: Orders p, sizes eta and rates r of deviations. The range is about twice the deviation of pure noise.
+ORDERS = np.linspace(-1.0, 6.0, 71)
+DEVIATIONS = 10.0 ** np.arange(-2.5, -0.24, 0.25)
+RATES = np.array([-1.0, 0.0, 1.0, 2.0, 3.0])
+#: Probability of each rate before values are known.
+LIKELY = np.array([0.05, 0.2, 0.25, 0.25, 0.25])
+#: Smallest deviation, as a part of the range.
+LEAST = 1e-5
+#: Orders below this one are no sign of a limit; their probability before values are known.
+SLOWEST, WITHOUT = 0.3, 0.3
+#: Median of the orders of other sequences, and standard deviation of its logarithm.
+USUAL, SPREAD = 1.5, 0.6
+#: Probability of the interval, and that above which a sequence of at least `ENOUGH` sizes has no limit.
+INSIDE, SURE, ENOUGH = 0.9, 0.8, 4
 #: Changes below this part of the value are round-off.
 ROUND_OFF = 1e-11
 #: Part of the value that the error of the finest run may have.
 FARTHEST = 0.5
-#: Part of the extrapolation that is always uncertain, and with three values only, of which no second
-#: order confirms the first.
-LEAST, SINGLE = 0.3, 0.5
 
 
 @dataclass(frozen=True)
@@ -37,12 +61,15 @@ class Limit:
     Attributes:
         value: The estimate.
         uncertainty: The limit is expected within value +- uncertainty; infinite without a limit.
-        order: Observed order; None if the sequence is not regular.
+        order: Mean observed order; None if it is not known.
+        deviation: Mean standard deviation of values from a power law at the finest size; NaN if it is
+            not known.
     """
 
     value: float
     uncertainty: float
     order: float | None = None
+    deviation: float = math.nan
 
     @property
     def exists(self) -> bool:
@@ -65,83 +92,92 @@ def limit_of(sizes: Sequence[float], values: Sequence[float]) -> Limit:
     """Estimate the limit of values for a size that goes to 0.
 
     Args:
-        sizes: Decreasing positive sizes.
+        sizes: Positive sizes that do not increase; a size may have several values.
         values: Value for each of them.
     """
-    steps = [b - a for a, b in itertools.pairwise(values)]
-    size = max(map(abs, values))
+    steps = np.abs(np.diff(values))
+    different = len(set(sizes))
     if len(values) == 1:
         return Limit(values[0], 0.0)
-    if all(abs(step) <= ROUND_OFF * size for step in steps[-2:]):
-        return Limit(values[-1], 2 * max(map(abs, steps[-2:])))
-    if len(values) == 2:
-        return Limit(values[-1], abs(steps[-1]))
-    orders = [
-        _order(sizes[k : k + 3], steps[k : k + 2], ROUND_OFF * size) for k in range(len(steps) - 1)
-    ]
-    limit = _limit(sizes, values, steps, orders)
+    if np.all(steps[-2:] <= ROUND_OFF * np.abs(values).max()):
+        return Limit(values[-1], 2 * float(steps[-2:].max()))
+    if different < 3:
+        return Limit(values[-1], float(np.ptp(values)))
+    limit = _Posterior(np.asarray(sizes, float), np.asarray(values, float)).limit()
     far = abs(limit.value - values[-1]) + limit.uncertainty > FARTHEST * abs(limit.value)
     return Limit(values[-1], math.inf) if far else limit
 
 
-def _limit(
-    sizes: Sequence[float],
-    values: Sequence[float],
-    steps: Sequence[float],
-    orders: Sequence[float | None],
-) -> Limit:
-    """Limit of at least three values that differ."""
-    order, last = orders[-1], abs(steps[-1])
-    if order is not None and order < SLOWEST:
-        earlier = [p for p in orders[-3:-1] if p is not None]
-        if all(p < 2 * SLOWEST for p in earlier):
-            return Limit(values[-1], math.inf)
-    if order is None and len(steps) > 2 and _grows(steps[-3:]):
-        return Limit(values[-1], math.inf)
-    before = orders[-2] if len(orders) > 1 else order
-    if order is None or before is None or not _regular(order, before):
-        shrinks = all(abs(b) <= abs(a) / 2 for a, b in itertools.pairwise(steps[-3:]))
-        return Limit(values[-1], last if shrinks else max(values[-3:]) - min(values[-3:]))
-    beyond = _remainder(sizes[-2:], order, steps[-1])
-    if len(orders) == 1:
-        return Limit(values[-1] + beyond, max(SINGLE * abs(beyond), last / 3), order)
-    previous = values[-2] + _remainder(sizes[-3:-1], before, steps[-2])
-    moved = abs(values[-1] + beyond - previous)
-    formal = _remainder(sizes[-2:], max(round(order), 1), steps[-1])
-    return Limit(values[-1] + beyond, max(moved, abs(formal - beyond), LEAST * abs(beyond)), order)
+def _prior() -> Array:
+    """Logarithm of the probability of each order before values are known."""
+    converges = ORDERS >= SLOWEST
+    logs = np.log(ORDERS[converges])
+    density = np.exp(-(((logs - np.log(USUAL)) / SPREAD) ** 2) / 2 - logs)
+    found = np.full(ORDERS.shape, WITHOUT / np.count_nonzero(~converges))
+    found[converges] = (1 - WITHOUT) * density / density.sum()
+    return np.asarray(np.log(found))
 
 
-def _regular(order: float, before: float) -> bool:
-    """Whether two observed orders are possible and nearly the same."""
-    possible = min(order, before) >= SLOWEST and max(order, before) <= FASTEST
-    return possible and max(order, before) <= min(order, before) + APART
+class _Posterior:
+    """Probabilities of orders, sizes and rates of deviations, with the limit that each of them implies.
 
+    Arrays have the axes order, size, rate.
 
-def _remainder(sizes: Sequence[float], order: float, step: float) -> float:
-    """Rest of the way to the limit after the last step, Richardson's extrapolation."""
-    return float(step / ((sizes[0] / sizes[1]) ** order - 1))
+    Args:
+        sizes: Sizes; shape (n,).
+        values: Values; shape (n,).
+    """
 
+    def __init__(self, sizes: Array, values: Array) -> None:
+        self.finest, self.range = float(values[-1]), float(np.ptp(values))
+        self.enough = len(np.unique(sizes)) >= ENOUGH
+        y, t = (values - self.finest) / self.range, np.log(sizes / sizes.max())
+        last = float(t.min())  # logarithm of the finest size over the coarsest
+        p = np.where(ORDERS == 0, 1e-9, ORDERS)[:, None]
+        # q = f + A b with b = 1 at the coarsest size and 0 at the finest one; the limit is f - A beyond
+        b = (np.expm1(p * (t - last)) / np.expm1(-p * last))[:, None, None, :]
+        beyond = 1 / np.expm1(-p * last)[:, :, None]
+        rate = RATES[:, None]
+        growth = np.where(rate >= 0, rate * t, rate * (t - last))
+        weight = (
+            np.exp(-2 * growth) / DEVIATIONS[:, None, None] ** 2
+        )  # 1 / variance, (size, rate, n)
+        # weighted regression of y on b, where the prior of A has the standard deviation 2
+        total = weight.sum(-1)
+        centre, mean = (weight * b).sum(-1) / total, (weight * y).sum(-1) / total
+        apart = b - centre[..., None]
+        spread = (weight * apart**2).sum(-1) + 1 / 4
+        change = (weight * apart * y).sum(-1) / spread
+        fitted = mean[..., None] + change[..., None] * apart
+        misfit = (weight * (y - fitted) ** 2).sum(-1) + change**2 / 4
+        log = np.log(weight).sum(-1) - np.log(total * spread) - misfit
+        log = _prior()[:, None, None] + np.log(LIKELY) + log / 2
+        self.probability = np.exp(log - log.max())
+        self.probability /= self.probability.sum()
+        self._mean = mean - change * (beyond + centre)
+        self._deviation = np.sqrt(1 / total + (beyond + centre) ** 2 / spread)
+        self._noise = DEVIATIONS[:, None] * np.where(RATES >= 0, np.exp(RATES * last), 1.0)
 
-def _order(sizes: Sequence[float], steps: Sequence[float], noise: float) -> float | None:
-    """Observed order of three values: None if they go back and forth, 0 if they do not settle."""
-    first, last = steps
-    if abs(last) <= noise:
-        return 2 * FASTEST
-    if first * last <= 0:
-        return None
-    a, b = math.log(sizes[0] / sizes[1]), math.log(sizes[1] / sizes[2])
+    def limit(self) -> Limit:
+        """Median of the limit, with its uncertainty."""
+        converges = ORDERS >= SLOWEST
+        without = self.probability[~converges].sum(), self.probability[:, :, RATES < 0].sum()
+        if self.enough and max(without) > SURE:
+            return Limit(self.finest, math.inf)
+        weight = self.probability[converges] / self.probability[converges].sum()
+        mean, deviation = self._mean[converges], self._deviation[converges]
+        ends = float((mean - 9 * deviation).min()), float((mean + 9 * deviation).max())
 
-    def excess(p: float) -> float:
-        """Logarithm of (s0^p - s1^p) / (s1^p - s2^p) over the ratio that was measured."""
-        model = p * b + math.log(math.expm1(p * a) / math.expm1(p * b))
-        return model - math.log(first / last)
+        def quantile(part: float) -> float:
+            def excess(x: float) -> float:
+                return float((weight * ndtr((x - mean) / deviation)).sum()) - part
 
-    if excess(1e-9) >= 0:
-        return 0.0
-    fastest = 2 * FASTEST
-    return fastest if excess(fastest) <= 0 else float(brentq(excess, 1e-9, fastest))
+            return float(brentq(excess, *ends, xtol=1e-12 * (ends[1] - ends[0])))
 
-
-def _grows(steps: Sequence[float]) -> bool:
-    """Whether each step is clearly larger than the one before."""
-    return all(abs(b) > 1.2 * abs(a) for a, b in itertools.pairwise(steps))
+        low, median, high = map(quantile, ((1 - INSIDE) / 2, 0.5, (1 + INSIDE) / 2))
+        order = float((weight.sum((1, 2)) * ORDERS[converges]).sum())
+        noise = float((weight.sum(0) * self._noise).sum())
+        return Limit(
+            self.finest + self.range * median, self.range * max(high - median, median - low),
+            order, self.range * noise,
+        )  # fmt: skip

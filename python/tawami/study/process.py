@@ -94,21 +94,25 @@ def fingerprint(run: Run) -> str:
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 
-def measure(name: str, knobs: Mapping[str, Any], limit: float) -> dict[str, Any]:
+def measure(
+    name: str, knobs: Mapping[str, Any], limit: float, threads: int | None = None
+) -> dict[str, Any]:
     """Run a function in its own process.
 
     Args:
         name: From :func:`name_of`.
         knobs: Its keyword arguments; 'threads' is not passed to it but sets the threads of Rust.
         limit: Wall time after which the process is ended [s].
+        threads: Threads of Rust; None for those of the environment.
 
     Returns:
         values, wall_s, cpu_s, peak_MB, newton_iterations, steps, unknowns; or failure, a message, with
         `cut` if the process did not finish.
     """
     environment, knobs = own_environment() | {MARK: "1"}, dict(knobs)
-    if "threads" in knobs:
-        environment["RAYON_NUM_THREADS"] = str(knobs.pop("threads"))
+    threads = knobs.pop("threads", threads)
+    if threads is not None:
+        environment["RAYON_NUM_THREADS"] = str(threads)
     environment["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
     with _temporary_folder() as folder:
         job, result = Path(folder) / "job.json", Path(folder) / "result.json"

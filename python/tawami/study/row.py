@@ -38,6 +38,11 @@ def value_text(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
+def shortened(message: str, most: int = 160) -> str:
+    """Beginning of a message."""
+    return message if len(message) <= most else f"{message[:most].rstrip()} ..."
+
+
 @dataclass(frozen=True)
 class Row:
     """One run.
@@ -88,22 +93,12 @@ class Change:
     cost: float
     pairs: int
 
-    def __str__(self) -> str:
-        """The change in a line."""
-        pairs = "1 pair" if self.pairs == 1 else f"{self.pairs} pairs"
-        return f"{self.step} (error x {self.error:.2g}, time x {self.cost:.2g}; {pairs})"
-
     def towards_accuracy(self) -> Change:
         """The change, or its reverse if that costs more, or costs the same and has a smaller error."""
         same = 1 / NOISE <= self.cost <= NOISE
         if self.error <= 1 if same else self.cost >= 1:
             return self
         return Change(self.knob, self.after, self.before, 1 / self.error, 1 / self.cost, self.pairs)
-
-    @property
-    def step(self) -> str:
-        """Knob and values."""
-        return f"{self.knob} {value_text(self.before)} to {value_text(self.after)}"
 
 
 def mean_ratio(pairs: Sequence[tuple[float, ...]]) -> float:

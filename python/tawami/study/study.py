@@ -19,6 +19,7 @@ from tawami.base.errors import InputError
 from tawami.base.files import atomic_file
 from tawami.base.lock import hold
 from tawami.study import figure, process
+from tawami.study.peers import read_peers
 from tawami.study.row import COSTS, Row, error_of, text_of
 from tawami.study.series import Grid, Key, Knobs, Series, is_list, knob_values
 from tawami.study.stored import store, stored_runs
@@ -42,6 +43,8 @@ class Study:
         finest: Knobs of the run that the others are compared with.
         beside: Other series, compared with the same reference.
         colour: Knob whose values have colours in the picture.
+        marks: Name -> setting that is marked in the picture; `...` as a value stands for any.
+        peers: CSV file with results of other codes, see `tawami.study.peers`.
         folder: Folder of the stored runs and the results; results/study/NAME by default.
 
     Raises:
@@ -55,6 +58,8 @@ class Study:
     finest: Knobs | None = None
     beside: Sequence[Series] = ()
     colour: str | None = None
+    marks: Mapping[str, Knobs] = field(default_factory=dict)
+    peers: str | Path | None = None
     folder: str | Path | None = None
 
     def __post_init__(self) -> None:
@@ -89,6 +94,8 @@ class Study:
             ("reference", Mapping, "a mapping from quantities to values"),
             ("finest", Mapping | None, "the knobs of a run, or None"),
             ("colour", str | None, "the name of a knob, or None"),
+            ("marks", Mapping, "a mapping from names to settings"),
+            ("peers", str | Path | None, "a path, or None"),
             ("folder", str | Path | None, "a path, or None"),
         ):
             checks.instance(f"study {name}: {what}", getattr(self, what), kind, expected)
@@ -219,10 +226,15 @@ class Study:
         if not table.quantities:
             print(f"study '{self.name}': no run succeeded", file=sys.stderr)
         elif importlib.util.find_spec("matplotlib") is not None:
-            figure.picture(table, folder / f"{self.name}.png", colour=self.colour)
+            self.draw(table, folder / f"{self.name}.png")
         elif not quiet:
             print(f"study '{self.name}': no picture without matplotlib", file=sys.stderr)
         return table
+
+    def draw(self, table: Table, path: str | Path) -> None:
+        """Draw a table with the colours, marks and peers of the study."""
+        peers = read_peers(self.peers) if self.peers is not None else []
+        figure.picture(table, path, colour=self.colour, marks=self.marks, peers=peers)
 
     def _work(self, sample: int | None, seed: int) -> list[tuple[Series, dict[str, Any]]]:
         work = [(series, setting) for series in self.series for setting in series.settings()]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -15,7 +15,7 @@ import numpy as np
 from tawami.base import checks, csv_file
 from tawami.base.errors import InputError
 from tawami.base.files import readable_file, reason
-from tawami.study.row import COSTS, NOISE, Change, Row, mean_ratio, value_text
+from tawami.study.row import COSTS, Change, Row, mean_ratio
 
 
 @dataclass(frozen=True)
@@ -104,28 +104,6 @@ class Table:
                     changes.append(Change(knob, before, after, error, price, len(pairs)))
         return changes
 
-    def dominated(self, quantity: str, *, cost: str = "wall_s") -> list[tuple[str, Any]]:
-        """Values of knobs that another value of the same knob beats in every pair of runs that are
-        equal otherwise: as good in one of error and cost, and better by more than noise in the other.
-        """
-        self.check(quantity, cost)
-
-        def beaten(row: Row, others: Iterable[Row]) -> bool:
-            def ratios(other: Row) -> tuple[float, float]:
-                error = mean_ratio([(row.errors[quantity], other.errors[quantity])])
-                return error, mean_ratio([(row.costs[cost], other.costs[cost])])
-
-            return any(max(r) <= NOISE and min(r) * NOISE < 1 for r in map(ratios, others))
-
-        found = []
-        for knob, groups in self._groups().items():
-            compared = [group for group in groups if len(group) > 1]
-            for value in dict.fromkeys(v for group in compared for v in group):
-                rows = [(group[value], group.values()) for group in compared if value in group]
-                if all(beaten(row, others) for row, others in rows):
-                    found.append((knob, value))
-        return found
-
     def _groups(self) -> dict[str, list[dict[Any, Row]]]:
         """Of each knob, groups of runs that are equal in all other knobs, by its value."""
         rows = self.of(self.series[0])
@@ -138,27 +116,6 @@ class Table:
                     groups.setdefault(others, {})[row.knobs[knob]] = row
             found[knob] = list(groups.values())
         return found
-
-    def in_words(self, quantity: str, *, cost: str = "wall_s") -> str:
-        """A paragraph: changes that reduce the error, changes that only cost time, dominated values,
-        and the knee.
-        """
-        turned = [change.towards_accuracy() for change in self.changes(quantity, cost=cost)]
-        buys = [c for c in turned if c.error * NOISE < 1]
-        wastes = [c for c in turned if c.cost > NOISE and c.error * NOISE >= 1]
-        neutral = [c for c in turned if c not in buys and c not in wastes]
-        dominated = self.dominated(quantity, cost=cost)
-        parts = [
-            ("Changes that reduce the error:", [str(c) for c in buys]),
-            ("Changes that only cost time:", [str(c) for c in wastes]),
-            ("Changes without effect:", [c.step for c in neutral]),
-            ("Dominated:", [f"{k} {value_text(v)}" for k, v in dominated]),
-        ]
-        sentences = [f"{head} {'; '.join(items)}." for head, items in parts if items]
-        sentences.append(f"The knee: {self.knee(quantity, cost=cost, series=self.series[0])}.")
-        if self.failed:
-            sentences.append(f"{len(self.failed)} of {len(self.rows)} runs failed.")
-        return f"{self.name}, {quantity}: " + " ".join(sentences)
 
     def check(self, quantity: str, cost: str) -> None:
         """Check names.

@@ -32,24 +32,28 @@ def trade(
     knobs: Mapping[str, Sequence[Any]] | None = None,
     tolerance: float = 0.01,
     folder: str | Path | None = None,
+    jobs: int | None = None,
     quiet: bool = False,
 ) -> Trade:
     """Measure error and time of a script for the values of its knobs, within a budget.
 
     The errors need no reference: values that converge regularly are extrapolated with their observed
-    order, others have the spread of the finest runs as uncertainty. Each run has its own process, one
-    after the other, cheapest first. Stored runs are not repeated, and count in the budget.
+    order, others have a larger uncertainty. Each run has its own process, cheapest first. With several
+    jobs each has one thread, which its time is measured with; a knob `threads` means one job. Stored
+    runs are not repeated, and count in the budget.
 
     Args:
         build: Function at the top level of a file, or the path of a script with a function `build`. All
             its arguments have defaults; knobs are annotated with their values from coarse to fine,
-            `h: Annotated[float, (1/4, 1/8, 1/16)] = 1/8`. It returns a mapping from names of
-            quantities to numbers.
+            `h: Annotated[float, (1/4, 1/8, 1/16)] = 1/8`. A set instead, `{0.0, 0.3, 0.6}`, has values
+            that are equally accurate, as shifts of the grid: their spread measures the noise. It
+            returns a mapping from names of quantities to numbers.
         quantities: Name of a quantity, or names; all numbers by default.
         budget: Wall time of all runs together [s].
         knobs: Values of knobs by name, instead of annotations. A script may declare them as `knobs`.
         tolerance: Relative error that the recommended setting stays below.
         folder: Folder of runs, table and picture; results/trade/NAME by default.
+        jobs: Runs at a time; as many as there are processors by default.
         quiet: Do not print a line for each run.
 
     Returns:
@@ -71,9 +75,11 @@ def trade(
     tolerance = checks.number("tolerance", tolerance, low=checks.LEAST)
     name, run_name, function, declared = _function(build)
     found = knobs_of(function, declared if knobs is None else knobs)
-    path = checks.path("folder", folder or Path("results") / "trade" / name)
+    path = checks.path("folder", folder or default_folder(name))
+    processors = len(os.sched_getaffinity(0))
+    jobs = processors if jobs is None else checks.whole_number("jobs", jobs, low=1)
     fingerprint = process.fingerprint(function)
-    ladder = Ladder(name, run_name, fingerprint, found, _names(quantities), path, budget)
+    ladder = Ladder(name, run_name, fingerprint, found, _names(quantities), path, budget, jobs)
     ladder.climb(quiet=quiet)
     result = result_of(name, found, ladder, tolerance)
     with atomic_file(path / f"{name}.csv") as part:
@@ -83,9 +89,14 @@ def trade(
     return result
 
 
+def default_folder(name: str) -> Path:
+    """Folder of a trade unless another one is given."""
+    return Path("results") / "trade" / name
+
+
 def result_of(name: str, knobs: Sequence[Knob], ladder: Ladder, tolerance: float) -> Trade:
     """Estimate limits and errors from the runs of a ladder."""
-    limits = {q: estimate(q, knobs, ladder.points(q)) for q in ladder.quantities}
+    limits = {q: estimate(q, knobs, ladder.points(q), ladder.failures) for q in ladder.quantities}
     runs = []
     for setting, run in ladder.runs.items():
         knob_values = ladder.named(setting)

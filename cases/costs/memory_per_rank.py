@@ -1,0 +1,192 @@
+"""Memory of a rank at fixed work per rank: resident memory, and the NumPy arrays of a scene by holder.
+
+A block of cells full of particles for each rank, solved once by multigrid, on 1, 2, 4 and 8 ranks (which
+share the processors of this machine). A holder is an attribute, or a path of attributes, from the scene.
+The table has the largest holders of the last run, in bytes on the rank with most. `growth` is the ratio
+of the last run to the first: about 1 where a rank holds its own part, and the number of ranks where it
+holds what is as long as the grid or the body.
+
+python -m cases.costs.memory_per_rank
+python -m cases.costs.memory_per_rank --cells 64 --ranks 1,4
+"""
+
+from __future__ import annotations
+
+import functools
+import gc
+import json
+import resource
+import subprocess
+import sys
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from types import FunctionType, MethodType, ModuleType
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+import tawami
+from cases.common.program import Program, numbers
+from cases.common.table import as_csv, as_text
+from tawami.base.program import mpirun
+
+PROGRAM = Program("cases.costs.memory_per_rank", __doc__)
+WHOLE = numbers(int, lambda n: n > 0, "whole numbers separated by commas, such as 1,2,4")
+PROGRAM.option("--ranks", type=WHOLE, default="1,2,4,8", help="numbers of ranks")
+PROGRAM.option("--cells", type=int, default=48, help="cells of a rank along each axis")
+PROGRAM.option("--solver", default="multigrid", help="linear solver")
+PROGRAM.option("--rows", type=int, default=25, help="holders in the table")
+#: Holders that are counted together, and objects that are no holders.
+SHORT, SKIPPED = 4096, (type, ModuleType, str, bytes, int, float, bool, complex)
+
+
+@dataclass(frozen=True)
+class Row:
+    """A holder: bytes in the last run, its growth, and its name."""
+
+    bytes: int
+    growth: float
+    holder: str
+
+
+def scene_of(n: int, comm: Any, solver: str) -> tawami.Scene:
+    """A block of n x n cells for each rank, on rollers under a pressure."""
+    across = 2 ** ((comm.size.bit_length()) // 2)
+    cells = (n * across, n * (comm.size // across))
+    grid = tawami.Grid(comm, origin=(0, 0), h=1 / n, cells=cells)
+    body = tawami.box(grid, (0, 0), grid.upper)
+    law = tawami.linear_elastic(E=1e6, nu=0.4)
+    scene = tawami.Scene(grid, body, law, alpha=0.01, linear_solver=solver)
+    scene.fix("left", "x")
+    scene.fix("bottom", "y")
+    scene.pressure("top", lambda x, y: 1e3 * (x < 0.5))
+    return scene
+
+
+def held(start: Any) -> dict[str, int]:
+    """Bytes of all arrays that can be reached from an object, by the shortest path of names."""
+    found: dict[str, int] = {}
+    seen, waiting = {id(start)}, deque([("scene", start)])
+    for cache in _caches():
+        waiting.append((f"cache of {cache.__module__}.{cache.__qualname__}", cache))
+    while waiting:
+        path, value = waiting.popleft()
+        if isinstance(value, np.ndarray):
+            while isinstance(value.base, np.ndarray):
+                value = value.base
+            if id(value) not in seen or path == "scene":
+                seen.add(id(value))
+                found[path] = found.get(path, 0) + value.nbytes
+            continue
+        for name, part in _parts(value):
+            mine = isinstance(part, np.ndarray) or not isinstance(part, SKIPPED)
+            if mine and part is not None and id(part) not in seen:
+                if not isinstance(part, np.ndarray):
+                    seen.add(id(part))
+                waiting.append((path + name, part))
+    return found
+
+
+def _caches() -> Iterator[Any]:
+    """Functions of the package that keep their results."""
+    for name, module in list(sys.modules.items()):
+        if name.startswith("tawami"):
+            yield from (f for f in vars(module).values() if hasattr(f, "cache_info"))
+
+
+def _parts(value: Any) -> Iterator[tuple[str, Any]]:
+    """Parts of an object, with their names."""
+    if isinstance(value, dict):
+        yield from ((f"[{key!s:.30}]", part) for key, part in list(value.items()))
+    elif isinstance(value, (list, tuple, set, frozenset, deque)):
+        yield from (("[]", part) for part in value)
+    elif isinstance(value, FunctionType):
+        cells = value.__closure__ or ()
+        yield from (
+            (f".{n}", c.cell_contents)
+            for n, c in zip(value.__code__.co_freevars, cells, strict=True)
+        )
+    elif isinstance(value, MethodType):
+        yield ".__self__", value.__self__
+    elif isinstance(value, functools.partial):
+        yield ".args", (value.func, value.args, value.keywords)
+    elif hasattr(value, "cache_info"):
+        yield from (("", part) for part in gc.get_referents(value) if isinstance(part, dict))
+    else:
+        yield from (
+            ((f".{name}", part) for name, part in vars(value).items())
+            if hasattr(value, "__dict__")
+            else ()
+        )
+        for kind in type(value).__mro__:
+            for name in getattr(kind, "__slots__", ()):
+                if hasattr(value, name):
+                    yield f".{name}", getattr(value, name)
+
+
+def resident() -> int:
+    """Resident memory of this process [bytes]."""
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * resource.getpagesize()
+
+
+def of_rank(cells: int, solver: str) -> None:
+    """Solve on all ranks; the first one prints the largest numbers of any rank as JSON."""
+    comm = MPI.COMM_WORLD
+    scene_of(2, comm, solver).solve()  # loads libraries and compiles the form
+    before = resident()
+    scene = scene_of(cells, comm, solver)
+    solution = scene.solve()
+    mine = {"resident": resident() - before, "holders": held([scene, solution])}
+    parts = comm.gather(mine)
+    if comm.rank == 0:
+        names = {name for part in parts for name in part["holders"]}
+        most = {name: max(part["holders"].get(name, 0) for part in parts) for name in names}
+        total = max(sum(part["holders"].values()) for part in parts)
+        resident_ = max(part["resident"] for part in parts)
+        print(json.dumps({"resident": resident_, "total": total, "holders": most}))
+
+
+def measured(ranks: int, cells: int, solver: str) -> dict[str, Any]:
+    """The numbers of a run on several ranks."""
+    words = [sys.executable, "-m", "cases.costs.memory_per_rank", "--rank", str(cells), solver]
+    command, environment = mpirun(ranks, words)
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    if run.returncode:
+        raise RuntimeError(run.stderr)
+    found: dict[str, Any] = json.loads(run.stdout.splitlines()[-1])
+    return found
+
+
+def rows_of(first: dict[str, int], last: dict[str, int]) -> list[Row]:
+    """The holders of the last run, the largest first."""
+    rows = [Row(size, size / max(first.get(name, 0), 1), name) for name, size in last.items()]
+    return sorted((row for row in rows if row.bytes > SHORT), key=lambda row: -row.bytes)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Measure, and print both tables."""
+    options = PROGRAM.start(arguments)
+    runs = [measured(ranks, options.cells, options.solver) for ranks in options.ranks]
+    print(f"\n{options.cells} x {options.cells} cells for each rank, {options.solver}")
+    print("ranks  resident MB  arrays MB  of these growing MB")
+    first = runs[0]["holders"]
+    for ranks, run in zip(options.ranks, runs, strict=True):
+        growing = [
+            row for row in rows_of(first, run["holders"]) if row.growth > 1 + 0.5 * (ranks - 1)
+        ]
+        sizes = (run["resident"], run["total"], sum(row.bytes for row in growing))
+        print(f"{ranks:5}  " + "  ".join(f"{size / 1e6:11.2f}" for size in sizes))
+    rows = rows_of(first, runs[-1]["holders"])
+    print("\n" + as_text(rows[: options.rows], ("bytes", "growth", "holder")))
+    PROGRAM.write("memory_per_rank.csv", as_csv(rows, ("bytes", "growth", "holder")))
+    PROGRAM.list_results()
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--rank"]:
+        tawami.run(lambda: of_rank(int(sys.argv[2]), sys.argv[3]), "memory_per_rank")
+    else:
+        PROGRAM.run(main)

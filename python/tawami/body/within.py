@@ -1,0 +1,41 @@
+"""Bodies filled from their borders, for other grids than those that they were made for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tawami.base.errors import InputError
+from tawami.body.body import Body
+from tawami.body.polygon import polygon
+from tawami.border.curves import spread
+from tawami.border.pieces import Border
+from tawami.grid.grid import Grid
+
+#: Largest turn of a chord that replaces a part of an arc [rad]: its area is off by 2.4e-5.
+TURN = 1.2e-2
+
+
+def within(grid: Grid, border: Border, per_axis: int) -> Body:
+    """A closed border filled with particles at Gauss points, which integrate over cut cells as well.
+
+    Args:
+        grid: The grid.
+        border: The border; arcs are replaced by short chords.
+        per_axis: Gauss points per full cell and axis.
+
+    Raises:
+        InputError: The border does not close.
+    """
+    import shapely
+
+    count = np.maximum(np.ceil(2 * np.abs(border.half_angle) / TURN), 1).astype(np.int64)
+    of, place = spread(count)
+    x, y = (border.at(of, (place + end) / count[of]) for end in (0, 1))
+    last = place + 1 == count[of]
+    x[place == 0], y[last] = border.start, border.end
+    digits = 1e-9 * max(np.ptp(x, axis=0))
+    lines = np.round(np.stack([x, y], axis=1) / digits) * digits  # ends meet to the bit
+    area = shapely.build_area(shapely.multilinestrings(shapely.linestrings(lines)))
+    if shapely.is_empty(area):
+        raise InputError("the border of the body does not close: expected a closed border")
+    return polygon(grid, area, per_axis=per_axis, gauss=True)

@@ -1,0 +1,178 @@
+"""The part of the grid that a rank knows: its cells and those around them."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tawami import _rust
+from tawami.base import ranks
+from tawami.base.arrays import Array, Indices, Mask
+from tawami.base.exchange import Exchange, Values
+from tawami.base.space import lattice
+from tawami.grid.basis import Basis, greville_1d
+
+#: Cells around those of a rank: a function on a cell next to them has its whole support in the window.
+RING = 3
+
+
+class Window:
+    """The smallest box of cells around those of this rank, with `RING` more on each side.
+
+    Cells and functions of the window have numbers of their own, x fastest, as those of the whole grid.
+    At its ends functions have no meaning, unless the grid ends there too. On one rank it is the grid.
+    Making one is a collective call.
+
+    Args:
+        comm: Communicator.
+        origin, h: Lower left corner [m] and side of a cell [m] of the grid.
+        whole: Numbers of cells of the grid along each axis.
+        rust: The grid for `_rust`.
+        own: Indices (i, j) of this rank's cells, cells x axes.
+
+    Attributes:
+        first: Its first cell along each axis.
+        cells: Its number of cells along each axis.
+        rust: The same for `_rust`.
+        rank_of_cell: Rank that owns each of its cells.
+    """
+
+    def __init__(
+        self,
+        comm: Any,
+        origin: Sequence[float],
+        h: float,
+        whole: Sequence[int],
+        rust: _rust.Grid,
+        own: Indices,
+    ) -> None:
+        self._comm, self._origin, self._h, self._whole = comm, origin, h, tuple(whole)
+        most = np.array(whole)
+        low, high = (own.min(axis=0), own.max(axis=0) + 1) if len(own) else (0 * most, 0 * most + 1)
+        first, end = np.maximum(low - RING, 0), np.minimum(high + RING, most)
+        self.first: tuple[int, ...] = tuple(first.tolist())
+        self.cells: tuple[int, ...] = tuple((end - first).tolist())
+        self.rust = rust.window(list(self.first), list(self.cells))
+        self.rank_of_cell: Indices = np.full(math.prod(self.cells), comm.rank, dtype=np.int64)
+        if comm.size > 1:
+            boxes = comm.allgather((first, end))
+            inside = [((own >= f) & (own < e)).all(axis=1) for f, e in boxes]
+            for rank, cells in enumerate(comm.alltoall([own[mask] for mask in inside])):
+                self.rank_of_cell[self.numbers(cells)] = rank
+        self.of_cells = Exchange.of(
+            comm,
+            self.rank_of_cell,
+            self.cells_in_grid,
+            lambda numbers: self.numbers(_indices(numbers, self._whole)),
+        )
+
+    # -- cells -------------------------------------------------------------------
+
+    def numbers(self, index: Indices) -> Indices:
+        """Numbers in the window of cells, given their indices (i, j) in the grid."""
+        return np.asarray((index - np.array(self.first)) @ _strides(self.cells))
+
+    def indices(self, number: Any) -> Indices:
+        """Indices (i, j) in the grid of cells, given their numbers in the window."""
+        return np.asarray(_indices(number, self.cells) + np.array(self.first))
+
+    def cells_in_grid(self, number: Any) -> Indices:
+        """Numbers in the grid of cells, given their numbers in the window."""
+        return np.asarray(self.indices(number) @ _strides(self._whole))
+
+    def found(self, index: Indices) -> Indices:
+        """Numbers in the window of cells of this rank, given indices (i, j); -1 for other cells."""
+        end = np.add(self.first, self.cells)
+        number = np.full(len(index), -1)
+        inside = np.flatnonzero(((index >= self.first) & (index < end)).all(axis=1))
+        here = self.numbers(index[inside])
+        own = self.own[here]
+        number[inside[own]] = here[own]
+        return number
+
+    def owns(self, location: _rust.Location) -> Mask:
+        """Whether the cell of each point belongs to this rank, given those of the whole grid."""
+        return np.asarray(self.found(_indices(location.cell.astype(np.int64), self._whole)) >= 0)
+
+    def place(self, location: _rust.Location) -> _rust.Location:
+        """The same points in cells of the window, given those in cells of the whole grid."""
+        if self.cells == self._whole:
+            return location
+        index = _indices(location.cell.astype(np.int64), self._whole)
+        return self.rust.place(self.numbers(index).astype(np.uint32), np.asarray(location.xi))
+
+    def whole(self, values: Values) -> Values:
+        """Values of all cells of the grid, on every rank, from those of this rank's cells; a collective
+        call.
+        """
+        if self._comm.size == 1:
+            return values
+        found = np.zeros((math.prod(self._whole), *values.shape[1:]), values.dtype)
+        own = np.flatnonzero(self.own)
+        found[self.cells_in_grid(own)] = values[own]
+        return ranks.sum_of(self._comm, found)  # type: ignore[return-value]
+
+    @functools.cached_property
+    def own(self) -> Mask:
+        """Whether each cell belongs to this rank."""
+        return np.asarray(self.rank_of_cell == self._comm.rank)
+
+    # -- functions ---------------------------------------------------------------
+
+    def shape(self, basis: Basis) -> tuple[int, ...]:
+        """Number of functions of a basis along each axis."""
+        return tuple(_rust.basis_len(basis, n) for n in self.cells)
+
+    def first_function(self, basis: Basis) -> Indices:
+        """Index in the grid of the first function along each axis."""
+        return np.array(self.first) * (2 if basis == "biquadratic" else 1)
+
+    def in_grid(self, basis: Basis, function: Any) -> Indices:
+        """Numbers of functions in the grid, given those in the window."""
+        at = _indices(function, self.shape(basis))
+        whole = [_rust.basis_len(basis, n) for n in self._whole]
+        return np.asarray((at + self.first_function(basis)) @ _strides(whole))
+
+    def functions(self, basis: Basis, number: Any) -> Indices:
+        """Numbers of functions in the window, given those in the grid; -1 outside the window."""
+        whole = [_rust.basis_len(basis, n) for n in self._whole]
+        at = _indices(number, whole) - self.first_function(basis)
+        shape = self.shape(basis)
+        inside = ((at >= 0) & (at < shape)).all(axis=-1)
+        return np.where(inside, at @ _strides(shape), -1)
+
+    def has_support(self, basis: Basis) -> Mask:
+        """Whether the whole support of each function is in the window."""
+        margin = 2 if basis == "quadratic_spline" else 1
+        along = []
+        for n, first, cells, count in zip(
+            self._whole, self.first, self.cells, self.shape(basis), strict=True
+        ):
+            whole = np.ones(count, dtype=bool)
+            whole[: margin if first > 0 else 0] = False
+            whole[count - margin if first + cells < n else count :] = False
+            along.append(whole)
+        return np.asarray(lattice(along).all(axis=1))
+
+    def greville(self, basis: Basis) -> Array:
+        """Greville points [m] of the functions, functions x axes."""
+        along = []
+        of_axes = zip(
+            self._origin, self._whole, self.first_function(basis), self.shape(basis), strict=True
+        )
+        for origin, n, first, count in of_axes:
+            along.append(origin + self._h * greville_1d(basis, n)[first : first + count])
+        return lattice(along)
+
+
+def _strides(shape: Any) -> Indices:
+    return np.cumprod((1, *shape[:-1]))
+
+
+def _indices(number: Any, shape: Sequence[int]) -> Indices:
+    """Positions along each axis of numbers in a lattice of this shape, x fastest."""
+    return np.stack(np.unravel_index(number, shape, order="F"), axis=-1)
