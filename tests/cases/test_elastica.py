@@ -66,12 +66,11 @@ def test_the_tip_under_a_small_pressure_is_that_of_a_straight_beam():
     assert strip.pressed_tip(0.01) == pytest.approx([0.0, -0.01 / 8], abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("n", "steps", "most"), [(2, 5, 1.8), pytest.param(4, 10, 0.7, marks=pytest.mark.slow)]
-)
-def test_a_strip_bends_under_a_pressure_that_follows_its_sides(n, steps, most):
-    """Half of it presses on the top and half pulls at the bottom, which leaves no moment."""
-    load, D, L = 6.0, strip.D, strip.SLENDER * strip.D
+def pressed(n, load):
+    """A strip with a pressure on its sides. Half of it presses on the top and half pulls at the bottom,
+    which leaves no moment.
+    """
+    D, L = strip.D, strip.SLENDER * strip.D
     h, rows = D / n, int(np.ceil(1.4 * L * n / D * 0.65))
     grid = tawami.Grid(
         MPI.COMM_WORLD, origin=(0, -D / 2 - rows * h), h=h, cells=(round(L / h) + 1, n + rows + 2)
@@ -84,6 +83,35 @@ def test_a_strip_bends_under_a_pressure_that_follows_its_sides(n, steps, most):
     p = load * strip.E / (1 - 0.3**2) * D**3 / 12 / L**3
     scene.pressure("top", p / 2)
     scene.pressure("bottom", -p / 2)
+    return scene
+
+
+def follow_tip(scene, size, to):
+    """The path on which a point at the tip goes down by lengths `to`, and its load factors."""
+    steps = tawami.follow(scene, ((0.999 * strip.SLENDER * strip.D, 0.0), "y"), size=size, to=to)
+    return np.array(scene.particles.displacement), steps
+
+
+def test_a_path_scales_pressures_that_follow_the_sides():
+    """One step is that of the pressure with the factor it finds; more agree with a fine ramp."""
+    L = strip.SLENDER * strip.D
+    one, steps = follow_tip(pressed(2, 6.0), 0.2 * L, -0.2 * L)
+    scene = pressed(2, 6.0 * steps.loads[-1])
+    scene.solve()
+    assert scene.particles.displacement == pytest.approx(one, abs=1e-5 * L)
+    assert steps[-1].iterations <= 8
+    path, steps = follow_tip(pressed(2, 6.0), 0.2 * L, -0.4 * L)
+    scene = pressed(2, 6.0 * steps.loads[-1])
+    tawami.ramp(scene, 0.25)
+    assert scene.particles.displacement == pytest.approx(path, abs=5e-3 * L)
+
+
+@pytest.mark.parametrize(
+    ("n", "steps", "most"), [(2, 5, 1.8), pytest.param(4, 10, 0.7, marks=pytest.mark.slow)]
+)
+def test_a_strip_bends_under_a_pressure_that_follows_its_sides(n, steps, most):
+    load, L = 6.0, strip.SLENDER * strip.D
+    scene = pressed(n, load)
     accepted = tawami.ramp(scene, 1 / steps)
     assert accepted[-1].end == 1.0
     assert np.mean([step.iterations for step in accepted]) < 6

@@ -36,11 +36,10 @@ def test_a_drop_falls_and_bounces_with_its_momentum(form):
     motion.run(0.05, 0.01)
     fall = -mass * (SPEED + G * 0.05)
     assert motion.linear_momentum == pytest.approx([0.0, fall], rel=1e-9)
-    with pytest.warns(tawami.SupportWarning, match="the wall pushed it in a step"):
-        motion.run(0.4, 0.01, each=record)
+    motion.run(0.4, 0.01, each=record)
     bounced = motion.linear_momentum[1]
     assert bounced > 0.6 * mass * SPEED
-    assert bounced - fall == pytest.approx(impulses[-1] - mass * G * 0.35, rel=0.03)
+    assert bounced - fall == pytest.approx(impulses[-1] - mass * G * 0.35, rel=0.005)
     # the hoop stretch of a particle is the change of its radius, whatever happened in between
     x, f = np.array(scene.particles.x), np.array(scene.particles.displacement_gradient)
     np.testing.assert_allclose(1 + f[:, 2, 2], x[:, 0] / start[:, 0], rtol=1e-6)

@@ -99,7 +99,7 @@ def slide(folder: Path) -> dict[str, np.ndarray]:
 
 def leave() -> dict[str, np.ndarray]:
     """Particles that leave the grid, until a few are left on the last rank."""
-    motion, told = moving("remove", 1.5 * SPEED), "nothing"
+    motion, told = moving("remove", 1.725 * SPEED), "nothing"
     try:
         motion.run(DT * STEPS, DT)
     except tawami.InputError as error:

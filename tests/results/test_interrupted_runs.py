@@ -39,8 +39,10 @@ def fall(results, *, form, law, transfer, each):
         steps.append(tawami.ramp(scene, 0.5, results=results, each=each))
         scene.release((0.0, -0.75))
     scene.release("bottom")
-    scene.wall("bottom", 0.3)
-    if not finite:
+    if finite:
+        scene.wall("bottom", 0.3)
+    else:
+        scene.fix("bottom", "y")
         scene.hold((0.0, -0.75), "x", velocity=lambda t: 0.02 * t)
     motion = tawami.Dynamics(scene, velocity=(0.3, 0.0), transfer=transfer, gamma=0.6)
     scene.particles.displacement[:, 0] += 1e-7  # a change between two phases

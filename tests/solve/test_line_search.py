@@ -12,7 +12,11 @@ import tawami
 from tawami import _rust
 from tawami.base.timing import tally
 from tawami.solve import line_search
+from tawami.solve.equations import Equations
 from tawami.solve.line_search import LineSearch
+
+#: A static step without contact.
+STATIC = Equations(None, np.zeros(1), None, None, None)
 
 
 def solves(nu: float, up: float) -> tuple[int, int, int]:
@@ -88,7 +92,8 @@ def test_a_run_that_does_not_overshoot_is_the_same_to_the_bit(monkeypatch):
 def advanced(work, search=None, rose=True):
     """Shares of a step that are tried, of which the last is taken, where the residual is work(share)."""
     if search is None:
-        search = LineSearch(np.dot, np.array([1.0]), np.array([-1.0]), np.array([1.0]))
+        one = np.ones(1)
+        search = LineSearch(np.dot, one, -one, one, STATIC, 0)
     tried = []
 
     def evaluate(share):
@@ -131,6 +136,6 @@ def test_a_step_that_inverts_a_particle_is_halved():
 def test_the_volume_counts_with_the_other_sign():
     """At a saddle point, a change of eps_v that lowers the energy is one in the wrong direction."""
     change, residual, signs = np.array([[1.0, 1.0], [-2.0, 1.0], [1.0, -1.0]])
-    search = LineSearch(np.dot, change, residual, signs)
+    search = LineSearch(np.dot, change, residual, signs, STATIC, 0)
     # g(0) = -3, g(1) = 3
     assert len(advanced(lambda t: np.array([-3.0, 0.0]) + t * np.array([3.0, -3.0]), search)) > 1

@@ -30,7 +30,9 @@ class Places:
         """The matrix of these values; all of them share the arrays of their places."""
         zero = self._zero
         data = np.bincount(self._slots, values, zero.nnz)
-        return sp.csr_matrix((data, zero.indices, zero.indptr), shape=zero.shape)
+        made = sp.csr_matrix((data, zero.indices, zero.indptr), shape=zero.shape)
+        made.indices, made.indptr = zero.indices, zero.indptr  # it made others
+        return made
 
 
 class Added:

@@ -19,7 +19,8 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from tawami.base.arrays import Array, Indices, of_components
+from tawami.base.arrays import Array, Indices, Mask, of_components
+from tawami.base.checks import LEAST
 from tawami.border.patches import Patches
 from tawami.border.rigid import Pose, generators
 from tawami.border.shapes import Distance, Shape
@@ -59,6 +60,7 @@ class Contact:
         start: Positions at the start of the step in the frame of the obstacle, `pose.to_local(x)`.
         least: Mean distance at which each patch touches [m]: 0, or negative for one that may stay
             inside the obstacle where it is.
+        stays: Which patches cannot leave the obstacle, and may pull; False for none.
     """
 
     shape: Shape
@@ -68,6 +70,7 @@ class Contact:
     penalty: Array
     start: Array
     least: Array | float = 0.0
+    stays: Mask | bool = False
 
     @cached_property
     def areas(self) -> Array:
@@ -109,13 +112,14 @@ class Contact:
         tangent, turning = tangents(surface)
         gap = self._means(surface.distance) - self.least
         pressure = held.pressure - self.penalty * gap
-        touching = (held.pressure > 0) if tied else (pressure > 0)
+        touching = ((held.pressure > 0) if tied else (pressure > 0)) | self.stays
         pressure[~touching] = 0.0
         slip = self._means(np.einsum("jka,ja->jk", tangent, moved))
         trial = held.traction - self.penalty[:, None] * slip
         size, limit = np.linalg.norm(trial, axis=1), np.zeros_like(pressure)
         if self.friction > 0:
-            limit[pressure > 0] = self.friction * pressure[pressure > 0]
+            sticks = touching if np.isinf(self.friction) else pressure > 0
+            limit[sticks] = self.friction * np.maximum(pressure[sticks], LEAST)
         bound = limit.copy()
         if self.friction > 0:
             if isinstance(sticking, ContactForces):
@@ -196,7 +200,8 @@ class ContactForces:
     @property
     def multipliers(self) -> Multipliers:
         """The multipliers of the next augmented pass, or of the next step."""
-        return Multipliers(np.maximum(self.pressure, 0.0), self.traction)
+        pressure = np.where(self.contact.stays, self.pressure, np.maximum(self.pressure, 0.0))
+        return Multipliers(pressure, self.traction)
 
     @property
     def penetration(self) -> float:

@@ -17,6 +17,9 @@ def transformed(area: Array, f: Array) -> Array:
         area: The same before, points x dim.
         f: Deformation gradient at each point, points x dim x dim.
     """
+    if f.shape[1] == 2:  # cof(F) = tr(F) 1 - F^T
+        trace = f[:, 0, 0] + f[:, 1, 1]
+        return np.asarray(trace[:, None] * area - np.matmul(area[:, None], f)[:, 0])
     inverse = np.linalg.inv(f)
     return np.asarray(np.linalg.det(f)[:, None] * np.einsum("pji,pj->pi", inverse, area))
 

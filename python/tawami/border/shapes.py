@@ -178,7 +178,7 @@ class Function:
         i, j = np.triu_indices(dim, 1)
         cross = [(steps[i] + steps[j]), (steps[i] - steps[j])]
         moves = np.concatenate([np.zeros((1, dim)), steps, -steps, *cross, *(-c for c in cross)])
-        values = self._values(x + moves[:, None]).reshape(len(moves), num)
+        values = self.values(x + moves[:, None]).reshape(len(moves), num)
         here, ahead, behind = values[0], values[1 : dim + 1], values[dim + 1 : 2 * dim + 1]
         same, other, opposite, last = values[2 * dim + 1 :].reshape(4, -1, num)
         gradient = (ahead - behind).T / (2 * self.step)
@@ -196,8 +196,8 @@ class Function:
         gradient[ridge] /= np.maximum(size[ridge], LEAST)[:, None]
         return Distance(here, gradient, curvature)
 
-    def _values(self, x: Array) -> Array:
-        """Values of the function, checked."""
+    def values(self, x: Array) -> Array:
+        """Distances of points [m], points x dim, checked."""
         points = x.reshape(-1, x.shape[-1])
         try:
             values = np.asarray(self.f(*points.T), dtype=float)

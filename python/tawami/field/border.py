@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,7 +17,6 @@ from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import SupportError
-from tawami.base.space import lattice
 from tawami.base.text import position
 from tawami.field.functions import ActiveFunctions
 from tawami.grid.basis import Basis
@@ -165,12 +163,6 @@ def _far_from_particles(grid: Grid, x: Array, lost: Mask, where: str) -> Support
     )
 
 
-@lru_cache
-def _around(dim: int) -> Indices:
-    """Steps to the cells in which one with particles is sought, cells x dim."""
-    return lattice([np.arange(-REACH, REACH + 1)] * dim)
-
-
 def _nearest(grid: Grid, active: Mask, scaled: Array) -> tuple[Indices, Mask]:
     """The nearest active cell of each point, by its position along the axes, and whether there is none.
 
@@ -179,15 +171,32 @@ def _nearest(grid: Grid, active: Mask, scaled: Array) -> tuple[Indices, Mask]:
         active: Whether each cell of the window holds particles, x fastest.
         scaled: Positions [cells], in cells of this rank.
     """
-    window, dim = grid.window, grid.space.dim
-    least, most = np.array(window.first), np.add(window.first, window.cells) - 1
+    index, square = _nearest_within(grid, active, scaled, 1)
+    far = square >= 1  # cells further away may be nearer
+    if far.any():
+        index[far], square[far] = _nearest_within(grid, active, scaled[far], REACH)
+    return index, np.isinf(square)
+
+
+def _nearest_within(grid: Grid, active: Mask, scaled: Array, reach: int) -> tuple[Indices, Array]:
+    """The nearest active cell at most `reach` cells away along each axis, and the distance squared;
+    infinite for none.
+    """
+    window, dim, steps = grid.window, grid.space.dim, np.arange(-reach, reach + 1)
     base = np.clip(np.floor(scaled), 0, np.array(grid.cells) - 1).astype(np.int64)
-    near = base[:, None] + _around(dim)
-    inside = ((near >= least) & (near <= most)).all(axis=2)
-    held = inside & active[window.numbers(np.clip(near, least, most))]
-    outside = np.maximum(np.maximum(near - scaled[:, None], scaled[:, None] - near - 1), 0.0)
-    distance = np.where(held, (outside**2).sum(axis=2), np.inf)
-    best = distance.argmin(axis=1)
-    lost = ~np.isfinite(distance.min(axis=1))
-    chosen = np.where(lost[:, None], base, near[np.arange(len(near)), best])
-    return np.asarray(chosen), np.asarray(lost)
+    square, number, stride = np.zeros(1), np.zeros(1, dtype=np.int64), 1
+    for axis in range(dim):
+        near, count = base[:, axis, None] + steps, window.cells[axis]
+        before = near - scaled[:, axis, None]
+        away = np.maximum(np.maximum(before, 0.0), -1 - before)
+        near -= window.first[axis]
+        away[(near < 0) | (near >= count)] = np.inf
+        along = (-1, *(len(steps) if k == axis else 1 for k in range(dim)))
+        square = square + (away**2).reshape(along)
+        number = number + stride * np.clip(near, 0, count - 1).reshape(along)
+        stride *= count
+    square = np.where(active[number], square, np.inf).reshape(len(base), -1)
+    best = square.argmin(axis=1)
+    least = square[np.arange(len(base)), best]
+    change = np.column_stack(np.unravel_index(best, (len(steps),) * dim)) - reach
+    return np.where(np.isinf(least)[:, None], base, base + change), least

@@ -25,17 +25,29 @@ class FollowerPressure:
         x: Positions at the start of the step [m], points x dim.
         area: Outward normals times lengths in the plane then [m], points x dim.
         pressure: At each point [Pa].
+        rate: Pressure per load factor of a path [Pa].
     """
 
     #: It prescribes no displacement, has one tangent everywhere, and is no contact.
     prescribed, smooth, implicit, unsettled = 0.0, True, False, ""
 
     def __init__(
-        self, layout: Layout, cells: BorderInCells, x: Array, area: Array, pressure: Array
+        self,
+        layout: Layout,
+        cells: BorderInCells,
+        x: Array,
+        area: Array,
+        pressure: Array,
+        rate: Array | float = 0.0,
     ) -> None:
         self._layout, self._space = layout, layout.grid.space
         self._x, self._area, self._pressure = x, area, pressure
+        self._start, self._rate = pressure, rate
         self._tabulated = cells.tabulated(layout.basis)
+
+    def load(self, share: float) -> None:
+        """Add a share of the loads of a path to the pressure at the start of the step."""
+        self._pressure = self._start + share * self._rate
 
     def improve(self) -> bool:
         """See `Term`: there are no multipliers."""
@@ -55,13 +67,27 @@ class FollowerPressure:
 
     def forces(self, coefficients: Array) -> Array:
         """See `Term`."""
-        numbers, values, _ = self._tabulated
         self._inverse, self._now, self._thickness = self._at(coefficients)
-        on_points = -(self._pressure * self._thickness)[:, None] * self._now
-        forces = np.zeros_like(coefficients)
-        parts = values[:, :, None] * on_points[:, None]
-        places = of_components(numbers, self._space.dim)
-        np.add.at(forces, places, parts)
+        return self._of(self._pressure)
+
+    @property
+    def grows(self) -> bool:
+        """Whether it changes along a path."""
+        return bool(np.any(self._rate))
+
+    @property
+    def rate(self) -> Array:
+        """Derivative of the last forces by the load factor of a path."""
+        return self._of(self._rate)
+
+    def _of(self, pressure: Array | float) -> Array:
+        """Forces of a pressure at the last displacement, on all coefficients."""
+        numbers, values, _ = self._tabulated
+        on_points = -(pressure * self._thickness)[:, None] * self._now
+        forces = np.zeros(self._layout.size_of_grid)
+        np.add.at(
+            forces, of_components(numbers, self._space.dim), values[:, :, None] * on_points[:, None]
+        )
         return forces
 
     def stiffness(self) -> sp.csr_matrix:

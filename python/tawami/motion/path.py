@@ -122,19 +122,17 @@ class PathStep:
         now, factor = self.configuration, self.following.factor
         stressed = now.model.moves and bool(self.following.loads)
         static = StaticStep(now, now.moment(factor), stressed).problem()
-        rate = now.external(now.moment(1.0)) - now.external(now.moment(0.0))
-        if now.loads.follower_changes(now.domain, now.moment(0.0), now.moment(1.0)):
+        ends = now.moment(0.0), now.moment(1.0)
+        rate = now.external(ends[1]) - now.external(ends[0])
+        terms = now.terms(now.moment(factor), static.supports, static.obstacles, ends)
+        follows = terms is not None and terms.loads_grow
+        if not (now.domain.layout.largest(rate) or follows):
             raise InputError(
-                "follow(...): a new pressure follows the border, and a path scales dead loads only: "
-                "expected traction(...), or scene.solve() or ramp(scene) before for the pressure"
-            )
-        if not now.domain.layout.largest(rate):
-            raise InputError(
-                "follow(...): there is no new load: expected a traction, a force or gravity that the "
-                "scene has not been solved for"
+                "follow(...): there is no new load: expected a traction, a pressure, a force or gravity "
+                "that the scene has not been solved for"
             )
         path = controls.Path(factor, rate, self._control())
-        return replace(static, path=path, load=np.nan)
+        return replace(static, path=path, terms=terms, load=np.nan)
 
     def _control(self) -> controls.Control:
         domain, following = self.configuration.domain, self.following

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,45 +14,65 @@ from tawami.base import ranks
 from tawami.base.arrays import Array, Mask
 from tawami.base.errors import CheckpointError, InputError
 from tawami.base.shared_file import Rows, by_number
-from tawami.grid.grid import Grid
+from tawami.grid.grid import EDGES, Edge, Grid
 
 #: Least distance of moving particles from the sides of their cell [cells]. A single particle on a side
 #: would leave functions beyond it without stiffness and mass.
 MARGIN = 1e-5
+#: Distance beyond a wall at which a particle that moves is taken as on it [cells]: contact acts on means
+#: over patches of the border, so that a corner or a curved border may pass it a little.
+BEYOND = 0.5
 
 
-def located(grid: Grid, x: Array, *, moving: bool) -> _rust.Location:
-    """Cells of particles; moving particles are placed away from the sides of their cells."""
+def located(grid: Grid, x: Array, *, moving: bool, moved: bool = True) -> _rust.Location:
+    """Cells of particles; moving particles are placed away from the sides of their cells.
+
+    Args:
+        grid: The grid.
+        x: Positions [m], particles x dim.
+        moving: Whether particles move.
+        moved: Whether they may have passed a wall a little.
+    """
+    if moving and moved:
+        on_edge = np.clip(x, grid.origin, grid.upper)
+        x = np.where(np.abs(x - on_edge) <= BEYOND * grid.h, on_edge, x)
     location = grid.rust.locate(x)
     return location.away_from_sides(MARGIN) if moving else location
 
 
-def outside(grid: Grid, x: Array) -> Mask:
-    """Whether each position is outside the grid, by more than the round-off that Rust accepts."""
-    margin = 1e-9 * grid.h
-    gone = np.zeros(len(x), dtype=bool)
-    for along, low, high in zip(x.T, grid.origin, grid.upper, strict=True):
-        gone |= ~((along >= low - margin) & (along <= high + margin))
-    return gone
+def outside(grid: Grid, x: Array, walls: Collection[Edge] = ()) -> Mask:
+    """Whether each position is outside the grid, by more than the round-off that Rust accepts, or than
+    a particle may be beyond a wall.
+
+    Args:
+        grid: The grid.
+        x: Positions [m], points x dim.
+        walls: Edges with walls.
+    """
+    inside = np.ones(len(x), dtype=bool)
+    for edge in EDGES:
+        margin = BEYOND if edge in walls else 1e-9
+        inside &= grid.inwards(edge, x) >= -margin * grid.h
+    return ~inside
 
 
 def distributed(
-    grid: Grid, body: _rust.Particles, moving: bool, *, whole: bool = True
+    grid: Grid, body: _rust.Particles, moving: bool, *, whole: bool = True, moved: bool = False
 ) -> tuple[_rust.Particles, _rust.Location]:
     """The particles in this rank's cells, which are those of its window; a collective call.
 
     Args:
         grid: The grid.
         body: Particles of the body.
-        moving: As of `located`.
+        moving, moved: As of `located`.
         whole: Whether every rank has all of them; else each is on one rank.
 
     Raises:
         InputError: Particles are outside the grid, or a whole body is not the same on all ranks.
     """
     if not whole:
-        return migrated(grid, body, moving=moving)
-    location = located(grid, body.x, moving=moving)
+        return migrated(grid, body, moving=moving, moved=moved)
+    location = located(grid, body.x, moving=moving, moved=moved)
     if grid.comm.size == 1:
         return body, grid.window.place(location)
     parts = (body.x, body.volume, body.material)
@@ -118,7 +138,7 @@ def restored(
     whole = not isinstance(given["x"], Rows)
     parts = (given[name] for name in wanted)
     rows = np.hstack([part.own if isinstance(part, Rows) else part for part in parts])
-    mine, location = distributed(grid, particles.of_rows(rows), moving, whole=whole)
+    mine, location = distributed(grid, particles.of_rows(rows), moving, whole=whole, moved=True)
     return (particles if particles.assign(mine) else mine), location
 
 
@@ -131,7 +151,7 @@ def numbered(particles: _rust.Particles, number: npt.NDArray[Any]) -> _rust.Part
 
 
 def migrated(
-    grid: Grid, particles: _rust.Particles, *, moving: bool = True
+    grid: Grid, particles: _rust.Particles, *, moving: bool = True, moved: bool = True
 ) -> tuple[_rust.Particles, _rust.Location]:
     """Move particles to the rank of their cell, in the order of their numbers; a collective call.
 
@@ -144,7 +164,7 @@ def migrated(
     comm = grid.comm
     while True:
         with ranks.raise_together(comm):
-            location = located(grid, particles.x, moving=moving)
+            location = located(grid, particles.x, moving=moving, moved=moved)
         if comm.size == 1:
             return particles, grid.window.place(location)
         rank = grid.ranks_of(location.cell.astype(np.int64))
@@ -154,10 +174,16 @@ def migrated(
         particles = particles.select(np.argsort(particles.number).astype(np.uint32))
 
 
-def check_staying(
-    grid: Grid, particles: _rust.Particles, x: Array, time: float, *, stop: bool
-) -> None:
-    """Check that a step may move the particles to x.
+def leaving(
+    grid: Grid,
+    particles: _rust.Particles,
+    x: Array,
+    time: float,
+    *,
+    stop: bool,
+    walls: Collection[Edge] = (),
+) -> Mask:
+    """Mask of the particles of this rank that leave the grid when a step moves them to x.
 
     Args:
         grid: The grid.
@@ -165,11 +191,12 @@ def check_staying(
         x: Their new positions [m].
         time: Time at the end of the step [s]; NaN in a static scene.
         stop: Whether it is an error if any particle leaves the grid.
+        walls: Edges with walls.
 
     Raises:
         InputError: A particle leaves the grid, or the last one does.
     """
-    gone = outside(grid, x)
+    gone = outside(grid, x, walls)
     with ranks.raise_together(grid.comm):
         if gone.any() and stop:
             p = np.flatnonzero(gone)[0]
@@ -182,6 +209,7 @@ def check_staying(
     staying = ranks.sum_of(grid.comm, np.array([np.sum(~gone)]))
     if not staying[0]:
         raise InputError("the last particle would leave the grid, and no body would remain")
+    return gone
 
 
 def removed(

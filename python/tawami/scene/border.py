@@ -219,16 +219,17 @@ class SceneBorder:
         if self._ends is not None:
             of = halve(self._ends, self._grid.h)
             self._left, self._shares = self._left[of], self._shares[of]
-        kept = {points: points.divide() for points in self.all if points is not self._ends}
-        for user in self.users:
-            user.keep(kept)
+        all_points = [points for points in self.all if points is not self._ends]
+        if any(points.is_stretched for points in all_points):
+            kept = {points: points.divide() for points in all_points}
+            for user in self.users:
+                user.keep(kept)
 
     def excavate(self, excavation: Excavation) -> None:
         """Drop the border where particles are removed; a call for all ranks."""
         if self._pieces_at_lines is not None:
             self._excavate_pieces(excavation, self._pieces_at_lines)
-        all_points = [points for points in self.all if points is not self._ends]
-        kept = {points: points.excavate(excavation) for points in all_points}
+        kept = {part: part.excavate(excavation) for part in self.all if part is not self._ends}
         for user in self.users:
             user.keep(kept)
 

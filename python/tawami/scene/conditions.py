@@ -100,7 +100,11 @@ class Conditions:
         return self.configuration.supports.hold(point, component, value, amplitude, velocity)
 
     def wall(self, edge: Edge, friction: float = 0.0, *, separates: bool = True) -> Wall:
-        """Put a wall with Coulomb friction along an edge of the grid.
+        """Put a wall with Coulomb friction along an edge of the grid: the half-plane behind the edge.
+
+        Contact is that of an obstacle (:meth:`obstacle`): it starts where the border comes to the edge.
+        For bodies without a border the wall holds functions of the grid, which reach up to a cell far.
+        A call for all ranks.
 
         Args:
             edge: 'left', 'right', 'bottom' or 'top'.
@@ -111,13 +115,22 @@ class Conditions:
             InputError: An unknown edge, a negative friction, or an edge that has a wall already.
 
         Warns:
-            SupportWarning: The border of the body is away from the edge, now or in a step in which the
-                wall pushes it: a wall holds functions of the grid, which reach up to a cell far.
+            SupportWarning: A body without a border is away from the edge, now or in a step in which the
+                wall pushes it.
         """
         now = self.configuration
-        made = now.supports.wall(edge, friction, separates)
-        wall_gap.warn_of_new(made, now.border.points, moves=now.model.moves)
-        return made
+
+        def make(wall: Wall) -> Obstacle | None:
+            if now.border.points is None:
+                wall_gap.warn_of_new(wall, now.domain)
+                return None
+            return now.obstacles.add(
+                now.domain, now.before, wall.half_plane, wall.friction, None, name=wall.name,
+                displacement=None, amplitude=None, velocity=None, free=None, force=None, mass=None,
+                inertia=None, separates=wall.separates,
+            )  # fmt: skip
+
+        return now.supports.wall(edge, friction, separates, make)
 
     def obstacle(
         self,

@@ -12,10 +12,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks, ranks, signals
+from tawami.base.arrays import Array
 from tawami.base.errors import CheckpointError
 from tawami.base.process import check_process
 from tawami.base.program import leave_together
@@ -54,7 +54,6 @@ from tawami.scene.supports import Supports
 from tawami.solve.numerics import Numerics
 from tawami.solve.terms import Term, Terms
 
-Array = npt.NDArray[np.float64]
 #: Arrays of particles of lengths, or lengths per time.
 LENGTHS = ("x", "displacement", "velocity", "acceleration")
 
@@ -158,6 +157,7 @@ class Configuration:
         now: Moment,
         supports: Sequence[HeldBorder],
         obstacles: Sequence[ObstacleContact] = (),
+        ends: Sequence[Moment] = (),
     ) -> Terms | None:
         """Forces on the border that depend on the solution of a step; None without any.
 
@@ -165,8 +165,9 @@ class Configuration:
             now: The end of the step.
             supports: Supports on patches of the border.
             obstacles: Contact with obstacles.
+            ends: Load factors 0 and 1 of a path.
         """
-        found: list[Term] = [*self.loads.following(self.domain, now), *supports, *obstacles]
+        found: list[Term] = [*self.loads.following(self.domain, now, ends), *supports, *obstacles]
         return Terms(found, self.domain.layout, supports, obstacles) if found else None
 
     def external(self, now: Moment | None = None) -> Array:
@@ -249,12 +250,11 @@ class Configuration:
         """Positions at the end of the step; None where particles do not move."""
         if not self.model.moves:
             return None
-        particles = self.domain.particles
+        particles, walls = self.domain.particles, self.supports.edges_with_walls
         moved = np.asarray(particles.x + self.domain.at_particles(accepted.u))
-        placement.check_staying(
-            self.model.grid, particles, moved, time, stop=self.model.leaving == "stop"
-        )
-        return Moved(moved, self.border.moved(self.domain, accepted.u))
+        stop = self.model.leaving == "stop"
+        gone = placement.leaving(self.model.grid, particles, moved, time, stop=stop, walls=walls)
+        return Moved(moved, gone, self.border.moved(self.domain, accepted.u))
 
     def _store(self, accepted: Accepted, moved: Moved | None, time: float) -> Outcome:
         """Store a step that the laws have committed, and move the particles."""
@@ -269,7 +269,7 @@ class Configuration:
             self.border.move(moved.border)
         outcome, particles = self._outcome(accepted, coefficients), self.domain.particles
         self.border.divide()
-        particles, gone = placement.removed(grid, particles, placement.outside(grid, particles.x))
+        particles, gone = placement.removed(grid, particles, moved.gone)
         self.left += [(number, x, time) for number, x in gone]
         self._attach(*placement.migrated(grid, particles))
         with self.stopwatch("commit"):
@@ -280,7 +280,7 @@ class Configuration:
 
     def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:
         self.obstacles.warn(self.domain, coefficients)
-        wall_gap.warn_of_distant(self.supports.walls, self.border.points, accepted)
+        wall_gap.warn_of_distant(self.supports.walls, self.domain, accepted)
         arrays = quantities.copies(self.domain.particles)
         return Outcome(accepted, coefficients, Reactions.of(accepted, self.supports), arrays)
 

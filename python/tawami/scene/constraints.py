@@ -20,6 +20,7 @@ from tawami.scene.held_border import HeldBorder
 from tawami.scene.moving_points import MovingPoints
 from tawami.scene.support import Support
 from tawami.scene.supports import Supports
+from tawami.scene.walls import on_functions
 
 
 def constraints(
@@ -72,11 +73,12 @@ def constraints(
             if mine.any():
                 border.append(_on_patches(domain, support, amount, start, fields, mine))
     fixed, prescribed = [one.indices for one in held], []
-    for wall in supports.walls:
-        by_others = [other.stopped for other in supports.walls if other is not wall]
-        prescribed.append(wall.prescribed([*fixed, *by_others]))
+    walls = on_functions(supports.walls, domain)
+    for wall, of_border in walls.items():
+        by_others = [other.stopped for other in walls if other is not wall]
+        prescribed.append(wall.prescribed([*fixed, *by_others]) | of_border[:, None])
         held += wall.held(layout, prescribed[-1], start, before)
-    contact = ActiveSet(layout, supports.walls, prescribed)
+    contact = ActiveSet(layout, [*walls], prescribed)
     rows = [row for one in border for row in one.rows] if not moving else []
     rows += also
     may_move = moving or domain.model.compiled.may_hold

@@ -8,7 +8,9 @@ from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import SupportWarning
 from tawami.base.warn import warn
-from tawami.border.shapes import Shape
+from tawami.border.shapes import Function, Shape
+from tawami.border.thin import thinnest
+from tawami.grid.grid import Grid
 from tawami.scene.domain import Domain
 from tawami.scene.moving_points import MovingPoints
 from tawami.scene.obstacle import Obstacle
@@ -19,20 +21,26 @@ DEEP = 0.3
 SAME = 1e-6
 
 
-def warn_of_small(what: str, shape: Shape, h: float) -> None:
+def warn_of_small(what: str, shape: Shape, grid: Grid) -> None:
     """Warn of an obstacle that is narrower somewhere than a cell.
+
+    Of a distance function only parts that are so narrow that no particle can be deep inside them, and
+    longer than wide, are found.
 
     Args:
         what: The obstacle, for messages.
         shape: Its shape.
-        h: Side of a cell [m].
+        grid: The grid.
 
     Warns:
         SupportWarning: It is.
     """
-    if shape.width < h * (1 - 1e-9):
+    h, width = grid.h, shape.width
+    if isinstance(shape, Function):
+        width = thinnest(shape.values, grid.origin, grid.upper, 2 * DEEP * h)
+    if width < h * (1 - 1e-9):
         warn(
-            f"{what}: its shape is {shape.width:.3g} m wide at its narrowest place, less than a cell: "
+            f"{what}: its shape is {width:.3g} m wide at its narrowest place, less than a cell: "
             "it may enter the body between patches of the border, which are about as long as a cell. "
             f"Expected {h:.3g} m at least: a finer grid, or a larger radius",
             SupportWarning,

@@ -5,7 +5,7 @@ Loads that are new since the last full solve grow with a part from 0 to 1; the o
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -150,28 +150,28 @@ class Loads(Owner[Load]):
             external += (1 - now.part) * self.unbalanced
         return external
 
-    def following(self, domain: Domain, now: Moment) -> list[FollowerPressure]:
-        """Pressures that follow the border within a step."""
-        return [
-            FollowerPressure(
-                domain.layout,
-                load.points.cells(domain),
-                load.points.x,
-                load.points.area,
-                factor * load.at_points(term)[:, 0],
-            )
-            for load, term, factor in self._acting(now)
-            if isinstance(load, Pressure) and self._follows(load, domain)
-        ]
+    def following(
+        self, domain: Domain, now: Moment, ends: Sequence[Moment] = ()
+    ) -> list[FollowerPressure]:
+        """Pressures that follow the border within a step.
 
-    def follower_changes(self, domain: Domain, first: Moment, last: Moment) -> bool:
-        """Whether a pressure that follows the border differs between two moments."""
-        return any(
-            isinstance(load, Pressure) and term.at(first) != term.at(last) and not term.is_zero
-            for load in self.all
-            if self._follows(load, domain)
-            for term in load.terms
-        )
+        Args:
+            domain: The particles where they are.
+            now: Part of the loads that are new, and time.
+            ends: Moments with load factors 0 and 1 of a path, if the step is on one.
+        """
+        found = []
+        for load in self.all:
+            if not isinstance(load, Pressure) or not self._follows(load, domain):
+                continue
+            for term in load.terms:
+                factor, rate = term.at(now), term.at(ends[1]) - term.at(ends[0]) if ends else 0.0
+                if term.is_zero or not (factor or rate):
+                    continue
+                points, pressure = load.points, load.at_points(term)[:, 0]
+                place = domain.layout, points.cells(domain), points.x, points.area
+                found.append(FollowerPressure(*place, factor * pressure, rate * pressure))
+        return found
 
     @staticmethod
     def _follows(load: Load, domain: Domain) -> bool:

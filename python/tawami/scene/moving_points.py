@@ -64,6 +64,8 @@ class MovingPoints:
         self.reference = self.weight
         self.middle = self.now.along - points.along if middle is None else middle
         self._located: tuple[Domain, BorderInCells] | None = None
+        #: Masks of points on edges, at these positions.
+        self._on_edges: tuple[Array, dict[tuple[Edge, float], Mask]] = self.x, {}
 
     def __len__(self) -> int:
         return len(self.x)
@@ -104,16 +106,19 @@ class MovingPoints:
         along[order] = ends - length[order] / 2 - (ends - length[order])[first]
         return replace(made, x=self.x, length=length, normal=self.normal, along=along)
 
-    def cells(self, domain: Domain) -> BorderInCells:
+    def cells(self, domain: Domain, *, torn: bool = False) -> BorderInCells:
         """The points in the cells of a domain.
+
+        Args:
+            domain: The domain.
+            torn: Whether points may have no particles near them.
 
         Raises:
             SupportError: A point has no particles near it.
         """
         if self._located is None or self._located[0] is not domain:
-            grid = domain.model.grid
-            made = BorderInCells(grid, domain.active, self.x, self.normal, self.what)
-            self._located = domain, made
+            of = domain.model.grid, domain.active, self.x, self.normal, self.what
+            self._located = domain, BorderInCells(*of, torn=torn)
         return self._located[1]
 
     def edge(self, edge: Edge, tolerance: float = ON_LINE) -> Mask:
@@ -123,7 +128,13 @@ class MovingPoints:
             edge: Name of the edge.
             tolerance: Distance that is ignored [cells].
         """
-        return np.asarray(self._grid.inwards(edge, self.x) <= tolerance * self._grid.h)
+        if self._on_edges[0] is not self.x:
+            self._on_edges = self.x, {}
+        known = self._on_edges[1]
+        if (edge, tolerance) not in known:
+            inwards = self._grid.inwards(edge, self.x)
+            known[edge, tolerance] = np.asarray(inwards <= tolerance * self._grid.h)
+        return known[edge, tolerance]
 
     def gap(self, edge: Edge) -> float:
         """Distance from an edge of the grid [m] that the nearest place on the border has at least.
@@ -190,6 +201,12 @@ class MovingPoints:
         self.x, self.area, self.reference = self.x[kept], self.area[kept], self.reference[kept]
         self.number, self.made, self.middle = self.number[kept], self.made[kept], self.middle[kept]
         self._located = None
+
+    @property
+    def is_stretched(self) -> bool:
+        """Whether a point is on a longer stretch of the border than `LONGEST`."""
+        longest = LONGEST * self._grid.h * (1 + 1e-9)
+        return bool(np.einsum("ja,ja->j", self.area, self.area).max(initial=0.0) > longest**2)
 
     def divide(self) -> Indices:
         """Divide points on longer stretches of the border than `LONGEST` into equal parts.
@@ -297,12 +314,11 @@ def moved(
     )
     normal = area / np.linalg.norm(area, axis=1)[:, None]
     cells = BorderInCells(grid, domain.active, x, normal, torn=True)
-    location, near = cells.location, ~cells.lost
+    location, near = cells.location, ~cells.lost[:, None]
     flat = domain.layout.whole(np.ascontiguousarray(u).ravel())
     gradient = space.in_space(space.gradients(_rust.gradients(location, basis, flat)))
     f = gradient + np.eye(space.dim)
-    x, area = x.copy(), area.copy()
-    x[near] += _rust.interpolate(location, basis, space.dim, flat)[near]
-    area[near] = transformed(area[near], f[near])
+    x = x + np.where(near, _rust.interpolate(location, basis, space.dim, flat), 0.0)
+    area = np.where(near, transformed(area, f), area)
     ends = np.cumsum([len(p) for p in all_points])[:-1]
     return list(zip(np.split(x, ends), np.split(area, ends), strict=True))

@@ -19,6 +19,7 @@ from tawami.scene.factor import Factor, InTime
 from tawami.scene.moving_points import MovingPoints
 from tawami.scene.obstacle_inputs import (
     check_motions,
+    checked_friction,
     components,
     facts_of,
     motions_of,
@@ -27,7 +28,6 @@ from tawami.scene.obstacle_inputs import (
 )
 from tawami.scene.obstacle_motion import ObstacleMotion, Times
 from tawami.scene.share import Moment
-from tawami.scene.walls import checked_friction
 
 
 class Obstacle(Action):
@@ -41,6 +41,7 @@ class Obstacle(Action):
         shape: Its shape, where it was made.
         place: Points of the border that it may touch.
         friction: Coefficient of friction.
+        separates: Whether the body may leave it.
         free: Which of its motions are unknown: translations, then rotations.
         mass: Mass and moments of inertia of its motions [kg per metre depth], [kg m2 per metre depth].
         pose: Where it is.
@@ -63,6 +64,7 @@ class Obstacle(Action):
         "pose",
         "pressure",
         "rates",
+        "separates",
         "shape",
         "traction",
     )  # fmt: skip
@@ -80,9 +82,11 @@ class Obstacle(Action):
         value: Any,
         factor: Factor,
         speeds: Sequence[Factor],
+        separates: bool = True,
     ) -> None:
         self.place, self.given, self.name, self.shape = place, given, name, shape
         self.friction, self.free, self.mass = friction, free, mass
+        self.separates = separates
         self._speeds, self._changes = list(speeds), 0
         self.pose = Pose.at(shape.centre)
         self.groups: Patches | None = None
@@ -236,7 +240,8 @@ class Obstacle(Action):
             "pose": np.array(self.pose.coordinates), "rates": [*map(np.array, self.rates)],
             "pressure": np.array(self.pressure), "traction": np.array(self.traction),
             "offset": np.array(self.offset),
-            "groups": [] if self.groups is None else np.array(self.groups.number),
+            "groups": np.zeros(0, dtype=np.int64) if self.groups is None
+            else np.array(self.groups.number),
             "friction": self.friction, "changes": self._changes,
             "speeds": [[speed.rates(0.0, 0.0)[0]] if rests(speed) or not speed.is_function else []
                        for speed in self._speeds],

@@ -7,6 +7,8 @@ the penalty alone: below 5e-6 h times the largest pressure over mu.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -61,11 +63,13 @@ class ObstacleContact:
         self._traction = groups.means(weights, obstacle.traction)
         gap = groups.means(weights, self._border.distance)
         self._least = self._offsets(gap)
+        self._stays = (self._pressure != 0) | (gap < TOUCHING * self._border.h)
+        self._stays &= not obstacle.separates
         if motion.times is not None:
             # what pushed such a patch out would give energy to the body
             self._least = np.minimum(gap, self._least)
         reach = REACH * self._border.h + np.abs(motion.unknown[: self._dim]).max(initial=0.0)
-        pressed = (self._pressure > 0)[groups.number]
+        pressed = ((self._pressure != 0) | self._stays)[groups.number]
         self._choose((self._border.distance < reach) | pressed)
         self.at_start = self._forces_at_start()
         if motion.times is None:
@@ -81,7 +85,7 @@ class ObstacleContact:
         near, obstacle = self._border, self.obstacle
         if near.groups is obstacle.groups:
             return near.groups.means(near.weights, obstacle.offset)
-        return np.where(self._pressure > 0, np.maximum(gap, 0.0), 0.0)
+        return np.where(self._pressure != 0, np.maximum(gap, 0.0), 0.0)
 
     def _choose(self, points: Mask) -> None:
         """Evaluate the patches of further points from now on."""
@@ -90,6 +94,7 @@ class ObstacleContact:
         self._contact = Contact(
             self.obstacle.shape, near.patches, near.weights[near.points], self.obstacle.friction,
             near.penalty[near.chosen], near.start[near.points], self._least[near.chosen],
+            self._stays[near.chosen],
         )  # fmt: skip
 
     def _touch(self, gap: Array) -> None:
@@ -145,13 +150,10 @@ class ObstacleContact:
 
     def _forces_at_start(self) -> tuple[Array, Array]:
         """Forces at the start of the step: on all coefficients, and on the obstacle."""
-        pose, x = self.motion.start, self._border.x[self._border.points]
-        now, held = self._contact.evaluate(x, pose, self._held), self._held
-        number = self._contact.patches.number
-        on_points = held.pressure[number, None] * now.surface.normal
-        on_points += np.einsum("jk,jka->ja", held.traction[number], now.tangent)
-        on_points *= self._contact.weights[:, None]
-        return self._border.on_all(on_points), -pose.resultant(x, on_points)
+        x, held = self._border.x[self._border.points], self._held
+        now = self._contact.evaluate(x, self.motion.start, held)
+        now = replace(now, pressure=held.pressure, traction=held.traction)
+        return self._border.on_all(now.forces), now.resultant
 
     def stiffness(self) -> sp.csr_matrix:
         """See `Term`. Its entries are in the same places as long as no patch comes near."""
@@ -161,7 +163,7 @@ class ObstacleContact:
     def improve(self) -> bool:
         """See `Term`."""
         now, penalty = self.now, self._contact.penalty
-        allowed = SETTLED * np.max(now.pressure / penalty, initial=0.0)
+        allowed = SETTLED * np.max(np.abs(now.pressure) / penalty, initial=0.0)
         settled = now.violation <= max(allowed, ROUND_OFF * self._border.h)
         if settled and not now.exceeded and not self._pulls:
             return False
@@ -185,18 +187,17 @@ class ObstacleContact:
         obstacle.groups = self._border.groups
         pressure, traction = self.pressures
         obstacle.pressure, obstacle.traction = pressure, traction
-        obstacle.offset = np.where(pressure > 0, self._least[self._border.groups.number], 0.0)
+        obstacle.offset = np.where(pressure != 0, self._least[self._border.groups.number], 0.0)
         obstacle.pose = self.motion.pose
         obstacle.rates = self.motion.rates_at_end(self.at_start[1], self.now.resultant)
 
     @property
     def pressures(self) -> tuple[Array, Array]:
         """Pressure and friction at all points [Pa]."""
-        number = self._contact.patches.number
+        number, points = self._contact.patches.number, self._border.points
         pressure = np.zeros(len(self._border.x))
         traction = np.zeros((len(self._border.x), self._dim - 1))
-        pressure[self._border.points] = self.now.pressure[number]
-        traction[self._border.points] = self.now.traction[number]
+        pressure[points], traction[points] = self.now.pressure[number], self.now.traction[number]
         return pressure, traction
 
     def result(self) -> ContactResult:
@@ -327,7 +328,7 @@ class ObstacleContact:
         if self.obstacle.friction > 0:
             directions += list(now.tangent.transpose(1, 0, 2))
         shares = now.contact.shares
-        for k in np.flatnonzero(now.pressure > 0):
+        for k in np.flatnonzero(now.pressure):
             mine = now.contact.patches.number == k
             x, y = now.x[mine][0]
             for direction in directions:

@@ -17,6 +17,21 @@ from tawami.border.shapes import Function, Shape
 from tawami.scene.factor import Factor
 
 
+def checked_friction(what: str, friction: Any) -> float:
+    """A coefficient of friction, which may be infinite.
+
+    Raises:
+        InputError: Anything else.
+    """
+    mu = checks.real(f"{what}: friction", friction)
+    if not mu >= 0:
+        raise InputError(
+            f"{what}: friction = {checks.shown(friction)}: expected a number of at least 0, or "
+            "numpy.inf for a surface without sliding"
+        )
+    return mu
+
+
 def motions_of(space: Space) -> tuple[str, ...]:
     """Names of the rigid motions: translations, then rotations."""
     rotations = num_modes(space.dim) - space.dim

@@ -25,7 +25,6 @@ from tawami.scene.obstacle import Obstacle
 from tawami.scene.obstacle_contact import ObstacleContact
 from tawami.scene.obstacle_motion import Times
 from tawami.scene.share import Moment
-from tawami.scene.walls import checked_friction
 
 #: Depth in the body at which an obstacle may begin [cells].
 OVERLAP = 0.1
@@ -59,6 +58,7 @@ class Obstacles(Owner[Obstacle]):
         force: Any,
         mass: Any,
         inertia: Any,
+        separates: bool = True,
     ) -> Obstacle:
         """Put an obstacle into the scene.
 
@@ -67,12 +67,13 @@ class Obstacles(Owner[Obstacle]):
             total: Displacement coefficients since the start where particles do not move, else 0.
             shape, friction, where, name, displacement, amplitude, velocity, free, force, mass, inertia:
                 As in `scene.obstacle`.
+            separates: As in `scene.wall`.
         """
         space, h = domain.model.space, domain.model.grid.h
         name = self._name(name)
         what = f"obstacle '{name}'"
         self.activity.check_between_steps(what)
-        mu = checked_friction(what, friction)
+        mu = inputs.checked_friction(what, friction)
         made = inputs.shape_of(what, shape, space, h)
         given = "the border" if where is None else label(where)
         part = self._border.part(
@@ -87,10 +88,10 @@ class Obstacles(Owner[Obstacle]):
         speeds = inputs.speeds_of(what, velocity, space, self.activity.time)
         inputs.check_motions(what, space, speeds, moves, np.array(by), np.array(forces))
         _check_place(what, made, part, domain, total)
-        warn_of_small(what, made, h)
+        warn_of_small(what, made, domain.model.grid)
         obstacle = Obstacle(
             self, part, given, name, made, mu, moves, masses, np.where(moves, forces, by), factor,
-            speeds,
+            speeds, separates,
         )  # fmt: skip
         self.all.append(obstacle)
         self._border.parts.append(part)

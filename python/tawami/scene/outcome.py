@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from tawami.base.arrays import Array
+from tawami.base.arrays import Array, Mask
 from tawami.scene.reactions import Reactions
 from tawami.scene.step import Accepted
 
@@ -34,8 +34,10 @@ class Moved(NamedTuple):
 
     Attributes:
         particles: Of this rank's particles [m], particles x dim.
+        gone: Mask of those that leave the grid.
         border: Of the points of the border, with their areas.
     """
 
     particles: Array
+    gone: Mask
     border: list[tuple[Array, Array]]

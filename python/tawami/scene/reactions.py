@@ -21,6 +21,7 @@ from tawami.scene.model import Model
 from tawami.scene.obstacle import Obstacle
 from tawami.scene.step import Accepted
 from tawami.scene.supports import Supports
+from tawami.scene.walls import name_of
 
 #: A point is one of a `hold` if it is this near to it [cells].
 SAME_POINT = 1e-8
@@ -103,7 +104,9 @@ class Reactions:
     its length.
 
     Attributes:
-        on_edges: Of edges and walls, on the displacement coefficients [N per metre depth].
+        on_edges: Of edges, and of walls that hold functions, on the displacement coefficients
+            [N per metre depth].
+        on_walls: Of other walls, on those of the whole grid.
         at_points: Of points.
         on_border: Of patches of the border [N per metre depth], by the names of its parts.
         on_obstacles: Contact with obstacles.
@@ -112,6 +115,7 @@ class Reactions:
     """
 
     on_edges: Owned
+    on_walls: Array
     at_points: Sequence[AtPoint] = field(default_factory=list)
     on_border: Sequence[tuple[str, Array]] = ()
     on_obstacles: Sequence[ContactResult] = ()
@@ -145,7 +149,12 @@ class Reactions:
         ]
         held_edges = accepted.problem.held_edges
         contacts = [contact.result() for contact in accepted.problem.obstacles]
-        return cls(on_edges, at_points, on_border, contacts, held_edges, supports.names)
+        walls = {wall.obstacle for wall in supports.walls}
+        on_walls = np.zeros(layout.num_displacement_of_grid)
+        for contact in accepted.problem.obstacles:
+            if contact.obstacle in walls:
+                on_walls += contact.at_end[: len(on_walls)]
+        return cls(on_edges, on_walls, at_points, on_border, contacts, held_edges, supports.names)
 
     def contact(self, obstacle: Any) -> ContactResult:
         """Contact with an obstacle, given by its handle or name."""
@@ -173,6 +182,7 @@ class Reactions:
                 functions = edges.edge_functions(model.grid, model.basis, edge)
                 places = of_components(functions, model.space.dim)
                 force = force + self.on_edges.at(places).sum(axis=0)
+                force -= sum(c.force for c in self.on_obstacles if c.name == name_of(edge))
             parts = [part for name, part in self.on_border if name == place]
             return np.asarray(sum(parts, force))
         place = checks.point("reaction(...)", place)

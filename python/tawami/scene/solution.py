@@ -116,7 +116,8 @@ class Solution(OfAllParticles, Elsewhere, Sealed, Unique):
         """Forces of edges and walls on the body, functions x 2 [N per metre depth]; gathered as
         `coefficients`.
         """
-        return self._reactions.on_edges.whole.reshape(-1, self._model.space.dim)
+        forces = self._reactions.on_edges.whole + self._reactions.on_walls
+        return forces.reshape(-1, self._model.space.dim)
 
     @property
     def volumetric(self) -> Array:

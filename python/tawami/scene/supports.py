@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from tawami.base import checks, stored
@@ -23,10 +23,12 @@ from tawami.scene.domain import Domain
 from tawami.scene.excavation import Excavation
 from tawami.scene.factor import Factor, InTime
 from tawami.scene.moving_points import MovingPoints
+from tawami.scene.obstacle import Obstacle
+from tawami.scene.obstacle_inputs import checked_friction
 from tawami.scene.points import is_in_body, reach
 from tawami.scene.share import Moment
 from tawami.scene.support import LOCAL, Place, Support
-from tawami.scene.walls import Wall, checked_friction
+from tawami.scene.walls import Wall
 
 
 class Supports(Owner[Support]):
@@ -165,8 +167,15 @@ class Supports(Owner[Support]):
             )
         return self.grid.space.axis(component)
 
-    def wall(self, edge: Edge, friction: float, separates: bool) -> Wall:
-        """A wall along an edge."""
+    def wall(
+        self, edge: Edge, friction: float, separates: bool, make: Callable[[Wall], Obstacle | None]
+    ) -> Wall:
+        """A wall along an edge.
+
+        Args:
+            edge, friction, separates: As in `scene.wall`.
+            make: Makes the obstacle that it is; None for a body without a border.
+        """
         what = f"wall(edge='{edge}')"
         self.activity.check_between_steps(what)
         self.grid.edge(edge)
@@ -178,6 +187,7 @@ class Supports(Owner[Support]):
                 f"release('{edge}') first"
             )
         wall = Wall(self.grid, self.basis, edge, mu, separates, self)
+        wall.obstacle = make(wall)
         self.walls.append(wall)
         self.changed()
         return wall
@@ -258,6 +268,11 @@ class Supports(Owner[Support]):
             support.place = (float(x), float(y))
 
     @property
+    def edges_with_walls(self) -> set[Edge]:
+        """The edges with walls."""
+        return {wall.edge for wall in self.walls}
+
+    @property
     def at_points(self) -> list[Support]:
         """The supports that hold a point."""
         return [s for s in self.all if isinstance(s.place, tuple)]
@@ -286,7 +301,7 @@ class Supports(Owner[Support]):
     def supported_edges(self) -> set[str]:
         """Names of the edges of the grid that supports or walls act on."""
         edges_held = {edge for support in self.all for edge in support.edges}
-        return edges_held | {wall.edge for wall in self.walls}
+        return edges_held | self.edges_with_walls
 
     # -- header, identity, checkpoints ---------------------------------------
 

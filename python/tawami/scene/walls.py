@@ -1,7 +1,9 @@
 """Walls with Coulomb friction at the edges of the grid.
 
-A function of the wall is apart from it, or in contact; in contact it sticks, or slides against a
-friction of `mu` times its pressure:
+A wall is an obstacle, the half-plane behind the edge, for the border of the body. Loose particles have
+no border, nor have parts that broke off. For these it holds functions of the grid that no border
+reaches: each is apart from the wall, or in contact; in contact it sticks, or slides against a friction
+of `mu` times its pressure:
 
     g_n >= 0,  r_n >= 0,  g_n r_n = 0;       |r_t| <= mu r_n,  sliding at |r_t| = mu r_n against it
 
@@ -19,15 +21,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tawami.base import checks
 from tawami.base.arrays import Indices, of_components
 from tawami.base.errors import InputError
+from tawami.border.shapes import HalfPlane, half_plane
 from tawami.field.constraints import Held
 from tawami.field.layout import Layout
 from tawami.grid.basis import Basis
 from tawami.grid.edges import edge_functions
 from tawami.grid.grid import Edge, Grid
 from tawami.scene.action import Owner
+from tawami.scene.domain import Domain
+from tawami.scene.obstacle import Obstacle
+from tawami.scene.obstacle_inputs import checked_friction
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -39,19 +44,9 @@ FORCE, GAP = 1e-6, 1e-12
 RETURNS = 4
 
 
-def checked_friction(what: str, friction: Any) -> float:
-    """A coefficient of friction, which may be infinite.
-
-    Raises:
-        InputError: Anything else.
-    """
-    mu = checks.real(f"{what}: friction", friction)
-    if not mu >= 0:
-        raise InputError(
-            f"{what}: friction = {checks.shown(friction)}: expected a number of at least 0, or "
-            "numpy.inf for a surface without sliding"
-        )
-    return mu
+def name_of(edge: str) -> str:
+    """Name of the wall at an edge of the grid."""
+    return f"wall {edge}"
 
 
 @dataclass
@@ -67,7 +62,7 @@ class Contact:
     slip: npt.NDArray[np.int8]
 
 
-@dataclass(repr=False)
+@dataclass(repr=False, eq=False)
 class Wall:
     """A wall along an edge of the grid.
 
@@ -80,6 +75,7 @@ class Wall:
         owner: The supports of the scene that it is one of, if there is a scene.
 
     Attributes:
+        obstacle: The obstacle; None for a body without a border.
         functions: Displacement functions of the whole grid along it.
         state: Their states of contact.
         returns: Number of times that each came back to the wall or to rest in this step.
@@ -92,6 +88,7 @@ class Wall:
     friction: float
     separates: bool
     owner: Owner[Any] | None = None
+    obstacle: Obstacle | None = field(init=False, default=None)
     functions: npt.NDArray[np.int64] = field(init=False)
     state: Contact = field(init=False)
     returns: npt.NDArray[np.int64] = field(init=False)
@@ -122,6 +119,8 @@ class Wall:
         """
         owner = self._owner("change(...)")
         self.friction = checked_friction(f"wall(edge='{self.edge}')", friction)
+        if self.obstacle is not None:
+            self.obstacle.change(friction=friction)
         self._touch(self.state.touching)
         owner.changed()
 
@@ -133,6 +132,8 @@ class Wall:
         """
         self._owner("release()").remove(self)
         self.owner = None
+        if self.obstacle is not None:
+            self.obstacle.release()
 
     def _owner(self, what: str) -> Owner[Any]:
         if self.owner is None:
@@ -156,6 +157,18 @@ class Wall:
         self.returns = np.zeros(len(self.functions), dtype=np.int64)
 
     @property
+    def name(self) -> str:
+        """Its name for `solution.contact(...)`."""
+        return name_of(self.edge)
+
+    @property
+    def half_plane(self) -> HalfPlane:
+        """The half-plane behind the edge."""
+        across, _, inward = self.axes
+        point = self.grid.origin if inward > 0 else self.grid.upper
+        return half_plane(point, inward * np.eye(self.grid.space.dim)[across])
+
+    @property
     def axes(self) -> tuple[int, int, int]:
         """Axis across the wall, axis along it, and the sign of the direction into the grid."""
         axis, end = self.grid.edge(self.edge)
@@ -166,6 +179,15 @@ class Wall:
         """Coefficients of the whole grid that it stops from passing through."""
         across, _, _ = self.axes
         return self.grid.space.dim * self.functions[self.state.touching] + across
+
+    def of_border(self, domain: Domain) -> Mask:
+        """Mask of its functions that the border of the body reaches: they belong to the obstacle."""
+        num, dim = domain.layout.num_displacement_of_grid, self.grid.space.dim
+        reached = np.zeros(num // dim, dtype=bool)
+        if self.obstacle is not None:
+            cells = self.obstacle.place.cells(domain, torn=True)
+            reached[cells.tabulated(self.basis)[0][~cells.lost]] = True
+        return np.asarray(reached[self.functions])
 
     def prescribed(self, fixed: Sequence[Indices]) -> Mask:
         """Whether other supports prescribe its components, functions x dim.
@@ -245,3 +267,16 @@ class Wall:
         if self.friction > 0:
             state.slip[sticks | meets] = 0
         return bool((leaves | meets | slides | sticks).any())
+
+
+def on_functions(walls: Sequence[Wall], domain: Domain) -> dict[Wall, Mask]:
+    """The walls that hold functions of the grid, with masks of those that belong to their obstacles; a
+    call for all ranks.
+    """
+    found, layout = {}, domain.layout
+    for wall in walls:
+        of_border = wall.of_border(domain)
+        active = layout.at(layout.active.astype(float), wall.grid.space.dim * wall.functions) > 0
+        if (active & ~of_border).any():
+            found[wall] = of_border
+    return found

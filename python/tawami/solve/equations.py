@@ -58,8 +58,17 @@ class Equations:
         external = self.external
         if self.path is not None:
             external = self.path.external(external, iterate.factor)
+            if self.terms is not None:
+                self.terms.load(iterate.factor - self.path.start)
         border = None if self.terms is None else self.terms.forces(iterate.coefficients)
         return iterate.forces(internal, external, self.friction, border)
+
+    @property
+    def rate(self) -> Array:
+        """Forces per load factor of a path, at the last forces."""
+        assert self.path is not None
+        following = 0.0 if self.terms is None else self.terms.rate
+        return np.asarray(self.path.rate + following)
 
     @property
     def is_smooth(self) -> bool:

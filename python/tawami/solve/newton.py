@@ -236,7 +236,8 @@ class Newton:
             with reported():
                 change, of_factor = self._change(iterate, forces, equations, add_mass, history)
             if equations.is_searched(self._responses.form.strain.finite):
-                search = LineSearch(self._layout.dot, change, forces.residual, self._signs, terms)
+                of = self._layout.dot, change, forces.residual, self._signs
+                search = LineSearch(*of, equations, len(history))
             iterate.add(change, of_factor)
             krylov.append(self._solver.iterations)
             self._stopwatch.lap()

@@ -109,7 +109,8 @@ class Path:
     Attributes:
         start: Load factor at the beginning, which the external forces of the step belong to.
         guess: Load factor that belongs to a guess of the increments; that at the beginning without.
-        rate: External forces per load factor, on all coefficients [N per metre depth].
+        rate: External forces per load factor, without pressures that follow the border, on all
+            coefficients [N per metre depth].
         control: Control, which gives the load factor.
     """
 

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 
 from tawami.base.arrays import Array
 from tawami.base.places import Added
+from tawami.field.follower import FollowerPressure
 from tawami.field.layout import Layout
 from tawami.solve.bordered import Bordering, Elimination, OwnUnknowns, Tie
 
@@ -79,9 +80,25 @@ class Terms:
     ) -> None:
         self._terms, self._layout, self._added = terms, layout, Added()
         self.tied, self._bordering = tied, bordering
+        self._following = [term for term in terms if isinstance(term, FollowerPressure)]
         #: Stiffness of each term when they were last added, and their sum.
         self._stiffnesses: list[sp.csr_matrix] = []
         self.stiffness: sp.csr_matrix | None = None
+
+    def load(self, share: float) -> None:
+        """Add a share of the loads of a path to pressures that follow the border."""
+        for term in self._following:
+            term.load(share)
+
+    @property
+    def loads_grow(self) -> bool:
+        """Whether such a pressure changes along a path."""
+        return any(term.grows for term in self._following)
+
+    @property
+    def rate(self) -> Array | float:
+        """Derivative of the last forces by the load factor of a path, in the window."""
+        return sum(self._layout.part(term.rate) for term in self._following)
 
     @property
     def prescribed(self) -> float:

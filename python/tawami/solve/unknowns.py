@@ -33,7 +33,7 @@ def complete(
     if elimination is not None:
         change, own = eliminated(change, elimination.residual)
     if path is not None:
-        rate, own_rate = solve(path.rate), 0 * own
+        rate, own_rate = solve(equations.rate), 0 * own
         if elimination is not None:
             rate, own_rate = eliminated(rate, own_rate)
         of_factor = path.control.change(u, change[: len(u)], rate[: len(u)])
