@@ -60,7 +60,10 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
 }
 #: Pages that can be downloaded as notebooks.
 TUTORIALS = ("start", "slope", "collapse", "edit_a_form", "add_a_law", "cam_clay", "ranks")
-TRADE = ("cantilever", "cook", "collapse", "self_weight", "spinning_disc")
+TRADE = (
+    "cantilever", "cook", "ring", "consolidation", "penetration", "collapse", "self_weight",
+    "spinning_disc",
+)  # fmt: skip
 LINK = re.compile(r"https?://[^\s)>\"'`]+")
 #: Elements of HTML that a browser loads with the page.
 LOADED = re.compile(

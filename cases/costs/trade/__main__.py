@@ -10,11 +10,22 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cases.common.program import Program
-from cases.costs.trade import cantilever, collapse, cook, self_weight, spinning_disc
+from cases.costs.trade import (
+    cantilever,
+    collapse,
+    consolidation,
+    cook,
+    penetration,
+    ring,
+    self_weight,
+    spinning_disc,
+)
 from tawami.base.files import atomic_file
 from tawami.study import Table, verdict
 
-CASES = (cantilever, cook, collapse, self_weight, spinning_disc)
+CASES = (
+    cantilever, cook, ring, consolidation, penetration, collapse, self_weight, spinning_disc,
+)  # fmt: skip
 STUDIES = {case.STUDY.name: case.STUDY for case in CASES}
 #: Folder of the results that come with the repository, and of results of other codes.
 SHIPPED = Path(__file__).parent

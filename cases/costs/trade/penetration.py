@@ -12,7 +12,7 @@ from cases.verification import penetration
 
 def run(form: str, n: int, step: float) -> dict[str, float]:
     """Force at the depth of the comparison over s_u B; `step` is that of the depth, over B."""
-    found = penetration.solve(form, n, penetration.COMPARED + 1e-9, step)
+    found = penetration.solve("clay", form, n, penetration.COMPARED + 1e-9, step)
     if found.stopped:
         raise tawami.ConvergenceError(f"ended at {found.depth:.3g} B: {found.stopped}", [])
     return {"force": found.q}
