@@ -10,14 +10,14 @@ from mpi4py import MPI
 import tawami
 
 H = 0.5
+GRID = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=H, cells=(4, 2))
 TIP = tawami.Goal.displacement((2.0, 0.5), "y")
 
 
 def beam(law=None, form="u_epsv", body=None, **options):
-    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=H, cells=(4, 2))
-    body = body or tawami.box(grid, (0, 0), (2, 1))
+    body = body or tawami.box(GRID, (0, 0), (2, 1))
     law = law or tawami.linear_elastic(E=3e6, nu=0.3)
-    scene = tawami.Scene(grid, body, law, form=form, **options)
+    scene = tawami.Scene(GRID, body, law, form=form, **options)
     scene.fix("left", "x")
     scene.fix("left", "y")
     return scene
@@ -30,9 +30,8 @@ def loaded(load=-1e3, **options):
 
 
 def test_a_patch_has_no_error():
-    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=H, cells=(4, 2))
-    body = tawami.box(grid, (0, 0), (2, 1), per_axis=3, gauss=True)
-    scene = tawami.Scene(grid, body, tawami.linear_elastic(E=3e6, nu=0.3))
+    body = tawami.box(GRID, (0, 0), (2, 1), per_axis=3, gauss=True)
+    scene = tawami.Scene(GRID, body, tawami.linear_elastic(E=3e6, nu=0.3))
     scene.fix("left", "x")
     scene.hold((0, 0), "y")
     scene.traction("right", (1e3, 0.0))
@@ -118,6 +117,14 @@ def test_what_is_not_modelled():
     scene = beam()
     scene.load(np.array([0]), (0.0, -1.0))
     with pytest.raises(tawami.NotModelledError, match="forces on particles"):
+        scene.solve().error(TIP)
+    scene = beam(body=tawami.box(GRID, (0, 0), (1.8, 1)))
+    scene.fix("right", "x", 1e-3)
+    with pytest.raises(tawami.NotModelledError, match="supports on edges of the grid"):
+        scene.solve().error(tawami.Goal.displacement((1.8, 0.5), "x"))
+    scene = beam()
+    scene.wall("bottom")
+    with pytest.raises(tawami.NotModelledError, match="has walls"):
         scene.solve().error(TIP)
     moving = tawami.Dynamics(loaded(density=1e3))
     with pytest.raises(tawami.NotModelledError, match="in motion"):
