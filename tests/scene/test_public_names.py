@@ -27,7 +27,7 @@ DYNAMICS = {
 SOLUTION = {
     "scene", "u", "volumetric", "unknowns", "load", "iterations", "history", "krylov", "condition",
     "symmetric", "arrays", "number", "x", "volume", "stress", "strain", "mean_stress",
-    "displacement_of_particles",
+    "displacement_of_particles", "own", "num_particles",
     "eps_v", "field", "coefficients", "displacement", "reaction", "contact", "on_edges", "on_points",
     "plot", "to_pandas", "to_pyvista",
 }  # fmt: skip
