@@ -4,7 +4,7 @@ A block of cells full of particles for each rank, solved once by multigrid, on 1
 share the processors of this machine). A holder is an attribute, or a path of attributes, from the scene.
 The table has the largest holders of the last run, in bytes on the rank with most. `growth` is the ratio
 of the last run to the first: about 1 where a rank holds its own part, and the number of ranks where it
-holds what is as long as the grid or the body.
+holds what is as long as the grid or the body. Times are processor time of the first rank.
 
 python -m cases.costs.memory_per_rank
 python -m cases.costs.memory_per_rank --cells 64 --ranks 1,4
@@ -21,6 +21,7 @@ import sys
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from time import process_time
 from types import FunctionType, MethodType, ModuleType
 from typing import Any
 
@@ -136,9 +137,11 @@ def of_rank(cells: int, solver: str) -> None:
     """Solve on all ranks; the first one prints the largest numbers of any rank as JSON."""
     comm = MPI.COMM_WORLD
     scene_of(2, comm, solver).solve()  # loads libraries and compiles the form
-    before = resident()
+    before, began = resident(), process_time()
     scene = scene_of(cells, comm, solver)
+    made = process_time()
     solution = scene.solve()
+    times = {"making": made - began, "solving": process_time() - made}
     mine = {"resident": resident() - before, "holders": held([scene, solution])}
     parts = comm.gather(mine)
     if comm.rank == 0:
@@ -146,7 +149,8 @@ def of_rank(cells: int, solver: str) -> None:
         most = {name: max(part["holders"].get(name, 0) for part in parts) for name in names}
         total = max(sum(part["holders"].values()) for part in parts)
         resident_ = max(part["resident"] for part in parts)
-        print(json.dumps({"resident": resident_, "total": total, "holders": most}))
+        found = {"resident": resident_, "total": total, "holders": most, **times}
+        print(json.dumps(found | {"iterations": sum(solution.krylov)}))
 
 
 def measured(ranks: int, cells: int, solver: str) -> dict[str, Any]:
@@ -171,14 +175,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = PROGRAM.start(arguments)
     runs = [measured(ranks, options.cells, options.solver) for ranks in options.ranks]
     print(f"\n{options.cells} x {options.cells} cells for each rank, {options.solver}")
-    print("ranks  resident MB  arrays MB  of these growing MB")
+    print("ranks  resident MB    arrays MB   growing MB     making s    solving s  iterations")
     first = runs[0]["holders"]
     for ranks, run in zip(options.ranks, runs, strict=True):
         growing = [
             row for row in rows_of(first, run["holders"]) if row.growth > 1 + 0.5 * (ranks - 1)
         ]
         sizes = (run["resident"], run["total"], sum(row.bytes for row in growing))
-        print(f"{ranks:5}  " + "  ".join(f"{size / 1e6:11.2f}" for size in sizes))
+        columns = [size / 1e6 for size in sizes] + [run["making"], run["solving"]]
+        shown = "  ".join(f"{value:11.2f}" for value in columns)
+        print(f"{ranks:5}  {shown}  {run['iterations']:10}")
     rows = rows_of(first, runs[-1]["holders"])
     print("\n" + as_text(rows[: options.rows], ("bytes", "growth", "holder")))
     PROGRAM.write("memory_per_rank.csv", as_csv(rows, ("bytes", "growth", "holder")))
