@@ -23,6 +23,11 @@ class Gathered(Mapping[str, npt.NDArray[Any]]):
         self._comm, self.own = comm, own
         self._in_order: Callable[[npt.ArrayLike], Any] | None = None
 
+    @property
+    def num_particles(self) -> int:
+        """Number of particles of all ranks; a collective call."""
+        return int(self._comm.allreduce(len(self.own["number"])))
+
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         if self._comm.size == 1:
             return self.own[name]

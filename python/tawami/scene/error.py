@@ -125,8 +125,10 @@ def estimate(now: Configuration, goal: Any, coefficients: Array, load: float) ->
         )
     estimable.check(now, coefficients, load)
     layout = now.domain.layout
-    arrays, model = placement.gathered(now.model.grid, now.domain.particles), with_volume(now.model)
-    x, volume, material = arrays["x"], arrays["volume"].ravel(), arrays["material"].ravel()
+    particles, model = now.domain.particles, with_volume(now.model)
+    in_order = placement.in_order(now.model.grid.comm, particles.number)
+    columns = (particles.x, particles.volume, particles.material)
+    x, volume, material = (in_order(column) for column in columns)
     own = Level(now, now.model, Points(x, volume, material.astype(np.uint32)))
     form, plain = (own.residual(coefficients, stabilised=s) for s in (True, False))
     estimable.check_state(own, form, plain)

@@ -84,11 +84,10 @@ class Solution(OfAllParticles, Elsewhere, Sealed, Unique):
         self._reactions = outcome.reactions
         points, domain = scene.configuration.border.points, scene.configuration.domain
         self._outline = None if points is None else Outline(points, domain, outcome.coefficients)
-        comm, own = self._model.grid.comm, outcome.particles
-        self._arrays = Gathered(comm, own)
+        self._arrays = Gathered(self._model.grid.comm, outcome.particles)
         self.arrays = Arrays(lambda name: self._array(name, self._arrays))
         self.own = Arrays(lambda name: self._array(name, self._arrays.own))
-        self.num_particles = int(ranks.sum_of(comm, np.array([len(own["number"])]))[0])
+        self.num_particles = self._arrays.num_particles
         self._seal()
 
     def __repr__(self) -> str:
