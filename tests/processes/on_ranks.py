@@ -253,6 +253,28 @@ def initial() -> dict[str, np.ndarray]:
     return found | {"initial solved": solution.stress, "initial eps_v": solution.eps_v}
 
 
+def shapes() -> dict[str, np.ndarray]:
+    """Particles and numbers of shapes of which each rank makes its part."""
+    grid = tawami.Grid(COMM, origin=(0, 0), h=0.125, cells=(16, 8))
+    box = tawami.box(grid, (0.01, 0), (1.9, 0.97))
+    hill = tawami.level_set(
+        grid, lambda x, y: y - 0.6 - 0.1 * np.sin(5 * x), ends=("left", "right", "bottom")
+    )
+    few = tawami.Body(np.array([[1.3, 0.4], [1.7, 0.6]]), np.array([1e-3, 2e-3]))
+    left = tawami.box(grid, (0, 0), (1, 1), per_axis=2)
+    bodies = {
+        "box": box, "hill": hill, "chosen": box[box.x[:, 0] > box.x[:, 1]], "mixed": left + few,
+        "joined": left.named("a") + tawami.polygon(grid, [(1, 0), (2, 0), (1.3, 1)]).named("b"),
+    }  # fmt: skip
+    found = {}
+    for name, body in bodies.items():
+        number = allgathered(COMM, body.number)
+        rows = allgathered(COMM, np.column_stack([body.x, body.volume]))[np.argsort(number)]
+        assert np.array_equal(np.sort(number), np.arange(len(number)))
+        found[f"shapes {name}"] = rows
+    return found
+
+
 def whole(motion: tawami.Dynamics) -> dict[str, np.ndarray]:
     """Arrays of the particles in the order of their numbers."""
     particles, comm = motion.scene.particles, motion.scene.grid.comm
@@ -425,7 +447,7 @@ def output(folder: Path) -> dict[str, np.ndarray]:
 def results(folder: Path) -> dict[str, Any]:
     """Results of all scenes; files are written to the folder."""
     found = beams() | random_clouds() | fields() | nonlinear() | singular() | motion() | initial()
-    found |= construction() | border() | contact() | stretched() | wide()
+    found |= construction() | border() | contact() | stretched() | wide() | shapes()
     return found | errors() | inverted() | few_cells() | output(folder)
 
 

@@ -48,7 +48,7 @@ def several(request, tmp_path_factory) -> Found:
 
 @pytest.mark.parametrize("subject", [
     "beam", "cloud", "fields", "nonlinear", "fem", "singular", "motion", "construction", "initial",
-    "inverted", "few", "border", "contact", "stretched", "wide",
+    "inverted", "few", "border", "contact", "stretched", "shapes", "wide",
 ])  # fmt: skip
 def test_results_do_not_depend_on_the_number_of_ranks(alone, several, subject):
     names = [name for name in alone.results if name.startswith(subject)]
