@@ -5,6 +5,10 @@ again: with radii of .3, 1 and 4 m, h = .25 and .125 m, without friction and wit
 0.4999, over the middle of a cell and beside it, and with the base of the block on the edge of the grid
 and .37 h above it. --factor multiplies the steps.
 
+--drag presses a disc, a punch with sharp corners and one with round corners, and drags them sideways, by
+.01 and .03 m at once, with mu = 1, 3 and infinite. `failed` counts the runs in which Newton's method
+does not converge, and `of ramps` those that fail in steps too, as the message advises.
+
 python -m cases.costs.contact
 """
 
@@ -23,11 +27,13 @@ from cases.common.program import Program, progress
 from cases.common.table import as_csv, as_text
 
 PROGRAM = Program("cases.costs.contact", __doc__)
+PROGRAM.option("--drag", action="store_true", help="drag obstacles with friction of 1 and more")
 PROGRAM.option("--factor", type=float, default=1.0, help="factor of the steps")
 
 TOP, WIDTH, E = 0.9, 2.0, 1e6  # of the block [m], [Pa]
 RADII, SIZES, FRICTION, NU = (0.3, 1.0, 4.0), (0.25, 0.125), (0.0, 0.3), (0.3, 0.4999)
 STEPS, BESIDE, GAPS = (0.01, 0.05), (0.0, 0.4), (0.0, 0.37)  # [m], [h], [h]
+DRAGGED = ("form", "runs", "failed", "of_ramps", "iterations")
 COLUMNS = ("form", "runs", "failed", "iterations", "most")
 
 
@@ -40,6 +46,17 @@ class Row:
     failed: int
     iterations: float
     most: int
+
+
+@dataclass(frozen=True)
+class Dragged:
+    """Runs with one form, those that failed at once and in steps, and mean iterations."""
+
+    form: str
+    runs: int
+    failed: int
+    of_ramps: int
+    iterations: float
 
 
 def block(form: str, nu: float, h: float, gap: float) -> tawami.Scene:
@@ -73,6 +90,54 @@ def pressed(
     return [*found, scene.solve().iterations]
 
 
+def dragged(
+    form: str, shape: str, mu: float, nu: float, h: float, down: float, side: float, size: float
+) -> list[int]:
+    """Newton iterations of an obstacle that is pressed and dragged, then dragged as far again.
+
+    Args:
+        form, mu, nu, h: As above.
+        shape: 'disc', 'sharp' or 'round'.
+        down, side: Displacements [m].
+        size: Share of the displacements in a step; 1 solves at once.
+    """
+    x, scene = WIDTH / 2 + 0.03, block(form, nu, h, 0.37)
+    radius = 0.05 if shape == "round" else 0.0
+    low, half = TOP + radius, 0.3 - radius
+    corners = [(x - half, low), (x + half, low), (x + half, low + 0.4), (x - half, low + 0.4)]
+    disc, punch = tawami.rigid_disc((x, TOP + 0.3), 0.3), tawami.rigid_polygon(corners, radius)
+    obstacle = scene.obstacle(disc if shape == "disc" else punch, mu, displacement=(side, -down))
+    found = []
+    for way in (side, 2 * side):
+        obstacle.change((way, -down))
+        if size == 1:
+            found.append(scene.solve().iterations)
+        else:
+            tawami.ramp(scene, size, stop="raise")
+    return found
+
+
+def drag_study(form: str) -> Dragged:
+    """All runs with one form."""
+    settings = list(
+        itertools.product(
+            ("disc", "sharp", "round"), (1.0, 3.0, np.inf), NU, SIZES, (0.01, 0.03), (0.01, 0.03)
+        )
+    )
+    iterations: list[int] = []
+    failed, of_ramps = 0, 0
+    for setting in progress(settings, desc=form):
+        try:
+            iterations += dragged(form, *setting, 1.0)
+        except tawami.ConvergenceError:
+            failed += 1
+            try:
+                dragged(form, *setting, 0.5)
+            except tawami.ConvergenceError:
+                of_ramps += 1
+    return Dragged(form, len(settings), failed, of_ramps, float(np.mean(iterations)))
+
+
 def study(form: str, factor: float) -> Row:
     """All runs with one form."""
     settings = list(itertools.product(GAPS, RADII, SIZES, FRICTION, NU, STEPS, BESIDE))
@@ -88,13 +153,19 @@ def study(form: str, factor: float) -> Row:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Press, print the table."""
-    factor = PROGRAM.start(arguments).factor
+    options = PROGRAM.start(arguments)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", tawami.SmallStrainWarning)
         warnings.simplefilter("ignore", tawami.SupportWarning)
-        rows = [study(form, factor) for form in ("u_epsv", "u_epsv_finite")]
-    print(as_text(rows, COLUMNS))
-    PROGRAM.write("table.csv", as_csv(rows, COLUMNS))
+        warnings.simplefilter("ignore", tawami.QuadratureWarning)
+        forms = ("u_epsv", "u_epsv_finite")
+        rows: list[Row] | list[Dragged]
+        if options.drag:
+            rows, columns = [drag_study(form) for form in forms], DRAGGED
+        else:
+            rows, columns = [study(form, options.factor) for form in forms], COLUMNS
+    print(as_text(rows, columns))
+    PROGRAM.write("table.csv", as_csv(rows, columns))
     PROGRAM.list_results()
 
 

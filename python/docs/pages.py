@@ -40,6 +40,7 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "creep": ("Creep", "verification", ()),
     "fracture": ("Fracture", "verification", ()),
     "ring": ("Ring", "verification", ()),
+    "effectivity": ("Estimated errors", "verification", ()),
     "elastica": ("Elastica", "verification", ("strip",)),
     "footing": ("Footing", "verification", ()),
     "rigid_footing": ("Rigid footing", "verification", ("footing",)),

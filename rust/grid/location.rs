@@ -84,12 +84,20 @@ impl Grid {
     /// its particles, with their gradients.
     fn leave_border_cells(&self, axis: usize, cell: &mut [u32], xi: &mut [Point]) {
         let stride = strides(self.cells)[axis] as u32;
-        let mut inside = vec![false; self.num_cells()];
-        for (&c, t) in cell.iter().zip(xi.iter()) {
-            inside[c as usize] |= t[axis] > BORDER;
+        let on_side = |t: &Point| t[axis] <= BORDER;
+        let mut cells: Vec<u32> =
+            cell.iter().zip(xi.iter()).filter(|(_, t)| on_side(t)).map(|(&c, _)| c).collect();
+        cells.sort_unstable();
+        cells.dedup();
+        let mut inside = vec![false; cells.len()];
+        for (c, _) in cell.iter().zip(xi.iter()).filter(|(_, t)| !on_side(t)) {
+            if let Ok(k) = cells.binary_search(c) {
+                inside[k] = true;
+            }
         }
         for (c, t) in cell.iter_mut().zip(xi) {
-            if !inside[*c as usize] && self.cell_index(*c as usize)[axis] > 0 {
+            let moves = cells.binary_search(c).is_ok_and(|k| !inside[k]);
+            if moves && self.cell_index(*c as usize)[axis] > 0 {
                 *c -= stride;
                 t[axis] = 1.0;
             }
@@ -102,26 +110,16 @@ impl Location {
     /// that its polynomials are continued.
     #[must_use]
     pub fn new(grid: Grid, cell: Vec<u32>, xi: Vec<Point>) -> Self {
-        let mut count = vec![0u32; grid.num_cells()];
-        for &c in &cell {
-            count[c as usize] += 1;
-        }
-        let mut next = vec![0u32; grid.num_cells()];
-        let (mut active, mut start, mut total) = (Vec::new(), vec![0u32], 0);
-        for (c, &m) in count.iter().enumerate() {
-            next[c] = total;
-            if m > 0 {
-                total += m;
-                active.push(c as u32);
-                start.push(total);
+        let mut order: Vec<u32> = (0..cell.len() as u32).collect();
+        order.sort_by_key(|&p| cell[p as usize]); // stable; particles of a cell mostly follow one another
+        let (mut active, mut start) = (Vec::new(), Vec::new());
+        for (at, &p) in order.iter().enumerate() {
+            if active.last() != Some(&cell[p as usize]) {
+                active.push(cell[p as usize]);
+                start.push(at as u32);
             }
         }
-        let mut order = vec![0u32; cell.len()];
-        for (p, &c) in cell.iter().enumerate() {
-            let slot = &mut next[c as usize];
-            order[*slot as usize] = p as u32;
-            *slot += 1;
-        }
+        start.push(cell.len() as u32);
         Self { grid, cell, xi, active, start, order }
     }
 

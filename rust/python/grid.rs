@@ -28,7 +28,9 @@ impl PyGrid {
 
     /// A part of the grid, given by its first cell along each axis and its numbers of cells.
     fn window(&self, first: Index, cells: Index) -> PyResult<Self> {
-        let inside = (0..DIM).all(|k| cells[k] > 0 && first[k] + cells[k] <= self.0.cells[k]);
+        let n = self.0.cells;
+        let inside =
+            (0..DIM).all(|k| cells[k] > 0 && first[k] < n[k] && cells[k] <= n[k] - first[k]);
         require(inside, "a part beyond the grid")?;
         Ok(Self(self.0.window(first, cells)))
     }

@@ -7,6 +7,9 @@ import pytest
 from mpi4py import MPI
 
 import tawami
+from cases.verification.cantilever import mpm
+from cases.verification.cantilever.beam import V_THEORY, L
+from tawami.field import full_cells
 
 LAW = tawami.neo_hookean(E=1e3, nu=0.3)
 
@@ -52,6 +55,32 @@ def test_volumes_are_those_of_the_particles_by_default():
         residuals[name] = scene.residual(np.zeros(scene.num_coefficients))
     np.testing.assert_array_equal(residuals["default"], residuals["own"])
     assert np.abs(residuals["default"] - residuals["fitted"]).max() > 1e-3
+
+
+def test_full_cells_are_integrated_exactly_where_particles_stay():
+    # evenly spaced points with the weights 3/8, 1/4, 3/8 are exact to degree 3
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.5, cells=(2, 2))
+    body = tawami.box(grid, (0.0, 0.0), (1.0, 1.0))
+    location = grid.rust.locate(body.x)
+    factors = full_cells.factors(grid, location, body.volume, np.zeros(36, dtype=np.uint32))
+    along = 3 * np.where(np.abs(2 * body.x % 1 - 0.5) < 0.1, 1 / 4, 3 / 8)
+    np.testing.assert_allclose(factors, along.prod(axis=1), rtol=1e-12)
+    for power in range(4):
+        integral = factors * body.volume @ (body.x[:, 0] ** power * body.x[:, 1])
+        assert integral == pytest.approx(1 / (2 * (power + 1)), rel=1e-12)
+
+
+def test_fitted_volumes_are_as_good_as_gauss_points_at_small_strain():
+    ways = {"own": {}, "fitted": {"volumes": "fitted"}, "Gauss": {"gauss": True}}
+    off = {
+        way: abs(
+            mpm.build("u_epsv", "exact", 4, per_axis=3, **options).solve().displacement((L, 0))[1]
+            + V_THEORY
+        )
+        for way, options in ways.items()
+    }
+    assert off["fitted"] == pytest.approx(off["Gauss"], rel=0.01)
+    assert off["own"] > 2 * off["Gauss"]
 
 
 def test_bodies_without_a_border_are_rejected():

@@ -63,6 +63,7 @@ CALLS: dict[str, Callable[[Sample], tuple[Any, ...]]] = {
     "Grid": lambda s: (_rust.Grid, (0.0, 0.0), 1.0, (2, 3)),
     "Grid.locate": lambda s: (s.grid.locate, s.x),
     "Grid.place": lambda s: (s.grid.place, s.location.cell, s.location.xi),
+    "Grid.window": lambda s: (s.grid.window, (0, 0), (1, 2)),
     "functions_at": lambda s: (_rust.functions_at, s.location, "bilinear"),
     "Location.away_from_sides": lambda s: (s.location.away_from_sides, 1e-5),
     "Location.select": lambda s: (s.location.select, s.few),

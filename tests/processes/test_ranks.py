@@ -88,7 +88,9 @@ def test_the_scenes_are_what_they_are_meant_to_be(alone, several):
 
 def test_multigrid_takes_the_same_iterations(alone, several):
     one, more = (np.asarray(found.results["krylov wide"]) for found in (alone, several))
-    assert np.abs(more - one).max() <= 2
+    assert (
+        np.abs(more - one) <= np.maximum(2, 0.05 * one)
+    ).all()  # ranks smooth their own unknowns
 
 
 def test_an_error_on_one_rank_can_be_caught_on_all(several):

@@ -8,7 +8,7 @@ from mpi4py import MPI
 from pressed import HALF, Pressed
 
 import tawami
-from cases.costs.contact import block
+from cases.costs.contact import block, dragged
 
 E, NU, HEIGHT = 1e6, 0.3, 0.9
 M = E * (1 - NU) / ((1 + NU) * (1 - 2 * NU))
@@ -58,6 +58,14 @@ def test_contact_starts_when_the_gap_closes():
     assert scene.solve().reaction("bottom") == pytest.approx([0.0, 0.0], abs=1e-3)
 
 
+def test_an_obstacle_far_from_the_body_changes_nothing():
+    scene = column()
+    far = scene.obstacle(tawami.rigid_disc((0.5, HEIGHT + 3.0), 0.5))
+    solution = scene.solve()
+    assert not solution.contact(far).pressure.any()
+    assert solution.reaction("bottom") == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
 @pytest.mark.parametrize("nu", [0.3, 0.4999])
 def test_pressure_of_hertz(nu):
     pressed = Pressed(nu, 4, 6, half=True)
@@ -81,6 +89,14 @@ def test_friction_of_cattaneo_and_mindlin():
     assert width == pytest.approx(HALF * np.sqrt(1 - share), rel=0.08)
     assert 0.3 < share < 0.5
     assert pressed.solution.iterations <= 10
+
+
+@pytest.mark.filterwarnings("ignore::tawami.base.errors.SmallStrainWarning")
+def test_a_drag_that_does_not_converge_at_once_does_in_the_steps_of_the_message():
+    setting = ("u_epsv", "disc", 1.0, 0.3, 0.25, 0.03, 0.03)
+    with pytest.raises(tawami.ConvergenceError, match=r"ramp\(scene, 0.5\) moves obstacles"):
+        dragged(*setting, 1.0)
+    dragged(*setting, 0.5)
 
 
 @pytest.mark.parametrize(

@@ -205,13 +205,6 @@ class Coefficients:
             in_grid[self.in_grid[: self.num_displacement if of_displacement else None]]
         )
 
-    def part_of(self, basis: Basis, in_grid: Array) -> Array:
-        """Values of functions of the window, from those of the whole grid, functions x columns."""
-        if self.grid.comm.size == 1:
-            return in_grid
-        count = int(np.prod(self.window.shape(basis)))
-        return np.asarray(in_grid[self.window.in_grid(basis, np.arange(count))])
-
     def sum(self, of_cells: Array) -> Array:
         """The sum over all ranks of vectors of coefficients from their cells; a collective call."""
         return self.exchange.add(np.ascontiguousarray(of_cells))

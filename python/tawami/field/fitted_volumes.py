@@ -24,7 +24,7 @@ from tawami.base import checks, ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.border.pieces import Border
-from tawami.field.border import PointsInCells
+from tawami.field.border import BorderInCells, PointsInCells
 from tawami.field.layout import Layout
 
 #: Weight of the corrections. Less damping makes them larger and the stress noisier.
@@ -62,7 +62,7 @@ def chosen(volumes: Volumes, border: Border | None) -> bool:
 
 
 def corrections(
-    border: PointsInCells,
+    border: BorderInCells,
     area: Array,
     location: _rust.Location,
     volume: Array,
@@ -97,7 +97,7 @@ def corrections(
         mine = np.tile(own, dim)
         return float(ranks.sum_of(grid.comm, np.array([a[mine] @ b[mine]]))[0])
 
-    at_border = layout.part_of(basis, border.values(basis).T @ area)
+    at_border = border.sums(layout.functions, basis, area)
     b = np.concatenate([scale @ of_axis for of_axis in at_border.T])
     b -= summed(rows @ np.ones(len(volume)))
     y = _conjugate_gradients(lambda y: summed(rows @ (rows.T @ y)) + DAMPING**2 * y, b, dot)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +15,6 @@ from tawami.base.space import lattice
 from tawami.field.layout import Layout
 from tawami.grid.basis import greville
 from tawami.grid.grid import Grid
-from tawami.particles import placement
 from tawami.picture import style
 from tawami.picture.figure import lay_out, shown_axes
 from tawami.picture.particles import Squares, draw_border, draw_frame, scale_of, size_of
@@ -126,14 +125,12 @@ def estimate(now: Configuration, goal: Any, coefficients: Array, load: float) ->
     estimable.check(now, coefficients, load)
     layout = now.domain.layout
     particles, model = now.domain.particles, with_volume(now.model)
-    in_order = placement.in_order(now.model.grid.comm, particles.number)
-    columns = (particles.x, particles.volume, particles.material)
-    x, volume, material = (in_order(column) for column in columns)
-    own = Level(now, now.model, Points(x, volume, material.astype(np.uint32)))
+    body = Points(*map(np.array, (particles.x, particles.volume, particles.material)))
+    own = Level(now, now.model, body)
     form, plain = (own.residual(coefficients, stabilised=s) for s in (True, False))
     estimable.check_state(own, form, plain)
     at = coefficients if model is now.model else own.with_volume(model.form, coefficients)
-    ladder = Ladder(now, model, own.body, goal, at)
+    ladder = Ladder(now, replace(model, fits=False), body, goal, at)
     z = ladder.z[: layout.size]
     of_particles = -ladder.residual * ladder.z
     of_particles[: layout.size] += plain * z

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tawami.base.errors import SupportError
-from tawami.field import fitted_volumes
+from tawami.field import fitted_volumes, full_cells
 from tawami.scene.border import SceneBorder
 from tawami.scene.domain import Domain
 
@@ -31,6 +31,10 @@ def fit(domain: Domain, border: SceneBorder) -> None:
     if model.moves:
         gradient = np.asarray(particles.displacement_gradient)
         now = volume * np.linalg.det(np.eye(gradient.shape[-1]) + gradient)
+    else:
+        now = volume = volume * full_cells.factors(
+            model.grid, domain.location, volume, particles.material
+        )
     area = points.area * model.space.thickness(points.x)[:, None]
     c = fitted_volumes.corrections(cells, area, domain.location, now, domain.layout)
     domain.assembly.integrate_with(volume * (1 + c))

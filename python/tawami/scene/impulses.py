@@ -72,4 +72,4 @@ class Impulses:
 def _inverse(matrix: sp.spmatrix) -> Array:
     """Pseudo-inverse of a symmetric matrix: patches that others hold too have no forces."""
     dense = matrix.toarray()
-    return np.asarray(np.linalg.pinv(dense, rcond=len(dense) * np.finfo(float).eps))
+    return np.asarray(np.linalg.pinv(dense, rcond=len(dense) * np.finfo(float).eps, hermitian=True))

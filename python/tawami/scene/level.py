@@ -21,6 +21,7 @@ from tawami.form.compilation import compile_form
 from tawami.form.form import Form
 from tawami.grid.basis import Basis, refinement
 from tawami.particles import assignment, placement
+from tawami.scene import fitting
 from tawami.scene.configuration import Configuration
 from tawami.scene.constraints import constraints
 from tawami.scene.domain import Domain
@@ -71,8 +72,7 @@ class Level:
         body: Its particles.
 
     Attributes:
-        body: As given.
-        domain: Its particles.
+        domain: The particles.
         external: Forces of the loads on all coefficients [N per metre depth].
         on_patches: Supports that no coefficient of an edge or a point expresses.
         reduction: Unknowns that the supports leave free, of the coefficients since the start.
@@ -81,13 +81,13 @@ class Level:
     def __init__(self, now: Configuration, model: Model, body: Points) -> None:
         particles = _rust.Particles(*body)
         particles.add_history(model.materials)
-        model = replace(model, num_particles=len(body.x), fits=False)
+        model = replace(model, num_particles=len(body.x))
         mine, location = placement.distributed(model.grid, particles, moving=False)
         if model.form.kinematics.has_eps_v:
             mine.add_eps_v()
         mine.add_strain(False, model.grid.geometry)
-        self.body = body
         self.domain = Domain.attach(model, mine, location, now.numerics, Stopwatch())
+        fitting.fit(self.domain, now.border)
         attachment, known = self.domain.assembly.attachment, now.domain.assembly.attachment.values
         shared = {n: v for n, v in known.items() if n in attachment.values and n != "h"}
         attachment.change(shared)

@@ -143,7 +143,7 @@ class _Coupled:
 
     def __init__(self, numbers: Indices, values: Array, patches: Patches) -> None:
         points, inside = patches.table
-        of_patch = numbers[points].reshape(patches.count, -1)
+        of_patch = numbers[points].reshape(patches.count, points.shape[1] * numbers.shape[1])
         order = np.argsort(of_patch, axis=1, kind="stable")
         inverse = np.argsort(order, axis=1, kind="stable")
         ranked = np.take_along_axis(of_patch, order, axis=1)
@@ -156,7 +156,7 @@ class _Coupled:
         self._functions[np.broadcast_to(patch, local.shape), local] = of_patch
         #: Values of these at its points, patches x points x functions.
         self._values = np.zeros((*points.shape, width))
-        at = local.reshape(*points.shape, -1)
+        at = local.reshape(*points.shape, numbers.shape[1])
         place = np.arange(points.shape[1])[:, None]
         self._values[patch[..., None], place, at] = values[points] * inside[..., None]
         self._entries: Places | None = None
@@ -165,6 +165,8 @@ class _Coupled:
         """The matrix on all coefficients, of derivatives on the points of each patch."""
         values, dim = self._values, derivatives.shape[2]
         count, num, width = values.shape
+        if not count:
+            return sp.csr_matrix((size, size))
         half = np.matmul(derivatives.transpose(0, 1, 2, 4, 3).reshape(count, -1, num), values)
         half = half.reshape(count, num, -1).transpose(0, 2, 1)
         blocks = np.matmul(half, values).reshape(count, dim, dim, width, width)

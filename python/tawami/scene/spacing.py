@@ -15,11 +15,12 @@ from tawami.base.errors import QuadratureWarning
 from tawami.base.warn import warn
 from tawami.scene.domain import Domain
 
-#: Distance up to which the error of a uniform stress stays below about 10 % [cells]: with volumes of the
-#: particles themselves, and with fitted ones.
+#: Distance up to which the error of a uniform stress stays below about 5 % [cells]: with volumes of the
+#: particles themselves, and with fitted ones (`python -m cases.extremes --only stretch`).
 OWN, FITTED = 0.7, 0.9
-#: Growth of a distance that is no stretch: a body may have few particles from the start.
-GROWN = 1.2
+#: Growth of a distance with the same error, where volumes are not fitted, and growth that is no stretch:
+#: a body may have few particles from the start.
+MOST_GROWN, GROWN = 1.8, 1.2
 #: Share of the body that may be farther apart.
 SHARE = 0.05
 #: Steps of the reduction of a lattice.
@@ -53,25 +54,28 @@ def warned(domain: Domain) -> bool:
     areas = domain.areas  # of volumes at the start of the scene
     largest = ranks.largest(model.grid.comm, float(areas.max(initial=0.0)))
     # no stretch is larger than 1 + dim |grad u|
-    if np.sqrt(largest) * (1 + dim * most) <= limit * h:
+    stretch, grown = 1 + dim * most, np.inf if model.fits else MOST_GROWN
+    if np.sqrt(largest) * stretch <= limit * h and stretch <= grown:
         return False
     f = gradient + np.eye(dim)
     sizes, volume = np.sqrt(areas) / h, particles.volume
     found = spacings(f, sizes)
-    found[found < GROWN * sizes] = 0.0
-    apart, whole = ranks.sum_of(
-        model.grid.comm, np.array([volume[found > limit].sum(), volume.sum()])
+    far = (found > GROWN * sizes) & ((found > limit) | (found > grown * sizes))
+    sums = np.array([volume[far].sum(), volume.sum()])
+    apart, whole = ranks.sum_of(model.grid.comm, sums)
+    farthest, growth = (
+        ranks.largest(model.grid.comm, float(values.max(initial=0.0)))
+        for values in (found[far], (found / sizes)[far])
     )
-    farthest = ranks.largest(model.grid.comm, float(found.max(initial=0.0)))
     if not apart > SHARE * whole:
         return False
     fitted = "" if model.fits else ", or Scene(..., volumes='fitted'), which serves up to 0.9 h"
     if model.grid.comm.rank == 0:
         warn(
-            f"particles are up to {farthest:.2g} h apart where the body is stretched, and more than "
-            f"{limit:g} h in {100 * apart / whole:.2g} % of it: the error of a uniform stress exceeds "
-            "10 % from there on, and at 1 h the body separates. Expected more particles per cell "
-            f"(per_axis=...){fitted}",
+            f"{100 * apart / whole:.2g} % of the body are stretched so far that particles are up to "
+            f"{farthest:.2g} h apart, {growth:.2g} times as far as at the start: the stress may be "
+            "wrong by more than 5 %, soon by far more, and the body separates before 1 h. Expected more "
+            f"particles per cell (per_axis=...){fitted}",
             QuadratureWarning,
         )
     return True

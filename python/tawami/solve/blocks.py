@@ -13,7 +13,7 @@ from tawami.base.petsc import rows_of
 
 PREFIX = "tawami_multigrid_"
 #: Penalty of the constraints in the scaled operators.
-AUGMENTED = 4.0
+AUGMENTED = 2.0
 
 
 def row_sum(matrix: Any) -> float:

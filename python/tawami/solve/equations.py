@@ -18,6 +18,10 @@ STATIC = (
     "The load may be too large for the body, or for one step. ramp(scene) applies it in "
     "steps and returns the share that it reached; follow(scene, ...) passes a limit load"
 )
+CONTACT = (
+    "Patches still change between open, sticking and sliding, mostly with friction of 1 and more. "
+    "ramp(scene, 0.5) moves obstacles and loads in steps, and halves those that fail"
+)
 DYNAMIC = "Use a smaller dt; run(...) does this automatically"
 ALONG_PATH = "Use shorter steps along the path"
 
@@ -79,4 +83,6 @@ class Equations:
             return self.terms.contradiction
         if self.inertia is not None:
             return DYNAMIC
-        return STATIC if self.path is None else ALONG_PATH
+        if self.path is not None:
+            return ALONG_PATH
+        return STATIC if self.is_smooth else CONTACT
