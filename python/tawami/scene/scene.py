@@ -51,8 +51,8 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
 
     Args:
         grid: The background grid.
-        body: Positions and volumes of the particles, as `box(...)` or `Body(x, volume)`; the same on
-            every rank.
+        body: Positions and volumes of the particles, as `box(...)`, or `Body(x, volume)`, which is the
+            same on every rank.
         material: The material law, in Rust or a `NumpyLaw`, or several as a list or, by the names of
             the body, as a dictionary.
         material_of: Number of the law of each particle; that of the body by default.

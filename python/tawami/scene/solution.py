@@ -234,7 +234,7 @@ class Solution(OfAllParticles, Elsewhere, Sealed, Unique):
     ) -> Axes:
         """Draw the particles as squares, coloured by a quantity, with the borders of body and grid.
 
-        On several ranks each rank that calls it draws all particles in a figure of its own.
+        A call for all ranks, each of which draws all particles in a figure of its own.
 
         Args:
             quantity: 'mean stress', 'deviatoric stress q', 'stress xx', 'strain xy', 'displacement' (its
