@@ -33,6 +33,11 @@ def scale(matrix: Any, factors: Array) -> None:
     vector.destroy()
 
 
+def add(part: Any, mass: Any) -> None:
+    """Add a mass matrix to a field's part of a tangent, whose pattern contains it."""
+    part.axpy(1.0, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+
+
 def coupling_of(matrix: Any, place: Any, of_u: Any) -> Array:
     """Diagonal of -K_fu K_uf: what the displacement adds to a field once it is eliminated."""
     forward, back = matrix.createSubMatrix(place, of_u), matrix.createSubMatrix(of_u, place)

@@ -36,6 +36,8 @@ FACTORISATION, EXPONENT = 36.0, 0.16
 UNSYMMETRIC = 1.3
 #: Iterations of multigrid that cost as much as one with an old factorisation.
 KEPT = 2.3
+#: Iterations with an old factorisation that is a good one.
+GOOD = 4
 #: Solves with a factorisation before its mean cost counts, and solves after which older ones count half.
 TRIAL, MEMORY = 4, 32
 #: Iterations that the operators of multigrid cost.
@@ -81,8 +83,8 @@ class ChosenSolver(LinearSolver):
         #: The matrix of the last solves, iterations of multigrid for it, and whether it stalled.
         self._matrix: Any = None
         self._spent, self._stalled, self._stalls = 0, False, 0
-        #: Cost of the last solve with an old factorisation; 0 before the first.
-        self._kept_cost = 0.0
+        #: Cost of the last solve with an old factorisation; before the first, that of a good one.
+        self._kept_cost = KEPT * GOOD
         #: Cost and number of the last solves of each solver.
         self._costs = np.zeros((2, 2))
 
@@ -218,12 +220,10 @@ class ChosenSolver(LinearSolver):
             return False
         (_, tried), (cost, solves) = self._costs
         cheaper = self._spent <= PATIENCE * price(unknowns)
-        if tried and solves:
-            mine = cost / solves
-            cheaper = mine <= self._kept_cost or (
-                mine <= self._costs[0, 0] / tried if tried >= TRIAL else cheaper
-            )
-        if cheaper:
+        mine = cost / max(solves, 1)
+        if tried >= TRIAL:
+            cheaper = mine <= self._costs[0, 0] / tried
+        if cheaper or (solves and mine <= self._kept_cost):
             return True
         need = memory.of_factors(unknowns, symmetric=self._direct.symmetric)
         return need > memory.available(self._comm)

@@ -23,6 +23,7 @@ field, for symmetric tangents too, and its vectors little memory beside the matr
 
 from __future__ import annotations
 
+import math
 from itertools import zip_longest
 from typing import Any
 
@@ -35,7 +36,7 @@ from tawami.base.petsc import Handles
 from tawami.base.timing import Stopwatch
 from tawami.field.prolongation import coarser
 from tawami.solve import memory
-from tawami.solve.blocks import constrained, coupling_of, row_sum, scale, set_options
+from tawami.solve.blocks import add, constrained, coupling_of, row_sum, scale, set_options
 from tawami.solve.linear_solver import LinearSolver, System
 from tawami.solve.numerics import SMALL
 from tawami.solve.operators import Part
@@ -46,6 +47,8 @@ LIMIT, RESTART = 200, 100
 STEPS, RATIO = 7, 12.0
 #: Growth of the number of iterations from which the operators are made again.
 GROWTH, MORE = 1.5, 5
+#: Name of unknowns that belong to no field.
+MULTIPLIERS = "multipliers"
 #: Tolerance for a second right-hand side, relative to that of the first.
 AGAIN = 1e-4
 #: Tolerance of the solve for a random vector, by which a singular tangent is noticed: less than the
@@ -68,14 +71,15 @@ class MultigridSolver(LinearSolver):
         cells: Number of cells along each axis of the grid.
 
     Attributes:
-        first: Iterations of the first solve with the present operators.
+        first: Iterations of the first solve with the present operators, for each digit.
         made: Whether the last solve made them.
     """
 
     def __init__(self, comm: Any, stopwatch: Stopwatch, cells: tuple[int, ...]) -> None:
         super().__init__(comm, stopwatch)
         self._cells, self.symmetric = cells, False  # GMRES makes no use of it
-        self._tested, self._matrix, self.first = False, None, 0
+        self._tested, self._matrix = False, None
+        self.first = self._digits = 0.0
         self.made = False
         self._grids: list[Handles] = []
         self._parts: list[Part] = []
@@ -116,12 +120,12 @@ class MultigridSolver(LinearSolver):
                 is as it was.
         """
         matrix = system.matrix
-        pays = self.iterations <= GROWTH * self.first + MORE
+        pays = self.iterations <= GROWTH * self.first * self._digits + MORE
         if self._matrix is matrix and pays:
             self._multiply(matrix, self._scale)
         else:
             self._begin(matrix, system.scale)
-            self._matrix, self.first = matrix, 0
+            self._matrix, self.first = matrix, 0.0
         with self._stopwatch("factorise"):
             self.made = "ksp" not in self._handles
             if self.made:
@@ -131,6 +135,8 @@ class MultigridSolver(LinearSolver):
                     "Use fewer cells, or more ranks on computers with more memory",
                 )  # fmt: skip
                 self._precondition(matrix, system.parts())
+            else:
+                self._refresh(matrix)
             self._handles["ksp"].setOperators(matrix, self._handles["parts"])
         try:
             with self._stopwatch("solve"):
@@ -143,7 +149,8 @@ class MultigridSolver(LinearSolver):
                 raise
             self._matrix = None  # contact or inertia may have changed since the operators were made
             return self.solve(system)
-        self.first = self.first or self.iterations
+        self._digits = -math.log10(system.tolerance)
+        self.first = self.first or self.iterations / self._digits
         return np.asarray(self._scale * self._handles["x"].array)
 
     def again(self, right: Array, tolerance: float) -> Array:
@@ -202,10 +209,15 @@ class MultigridSolver(LinearSolver):
         handles.free("ksp", "pc", "parts")
         start = matrix.getOwnershipRange()[0]
         numbers = [start + np.flatnonzero(part.block.mine) for part in parts]
+        names = [part.name for part in parts]
         if matrix.getSize()[0] > sum(part.block.size for part in parts):
             own = np.arange(*matrix.getOwnershipRange())
             numbers.append(np.setdiff1d(own, np.concatenate(numbers)))
+            names.append(MULTIPLIERS)
         places = [PETSc.IS().createGeneral(mine.astype(PETSc.IntType), comm) for mine in numbers]
+        handles.update(
+            {f"place of {name}": place for name, place in zip(names, places, strict=True)}
+        )
         operators = [
             self._operator(matrix, part, place, places[0])
             for part, place in zip(parts, places, strict=False)
@@ -219,6 +231,7 @@ class MultigridSolver(LinearSolver):
                 rows[k][k] = operator
                 for j in range(k):
                     rows[k][j] = matrix.createSubMatrix(places[k], places[j])
+                    handles[f"{names[k]} by {names[j]}"] = rows[k][j]
             handles["parts"] = PETSc.Mat().createNest(rows, comm=comm)
         ksp = handles["ksp"] = PETSc.KSP().create(comm)
         ksp.setOperators(matrix, handles["parts"])
@@ -232,31 +245,46 @@ class MultigridSolver(LinearSolver):
         else:
             pc.setType("fieldsplit")
             pc.setFieldSplitType(PETSc.PC.CompositeType.MULTIPLICATIVE)
-            names = [*(part.name for part in parts), "multipliers"]
-            pc.setFieldSplitIS(*zip(names, places, strict=False))
+            pc.setFieldSplitIS(*zip(names, places, strict=True))
             pc.setUp()
             for solver, operator, part in zip_longest(pc.getFieldSplitSubKSP(), operators, parts):
                 if part is not None and part.volume:
-                    self._chebyshev(solver, operator)
+                    handles["chebyshev"] = solver
+                    self._chebyshev(operator)
+                    continue
+                solver.setType("preonly")
+                inner = solver.getPC()
+                if part is None:
+                    inner.setType("jacobi")
                 else:
-                    solver.setType("preonly")
-                    inner = solver.getPC()
-                    if part is None:
-                        inner.setType("jacobi")
-                    else:
-                        self._cycle(inner, operator, part)
-                    inner.destroy()
+                    self._cycle(inner, operator, part)
+                inner.destroy()
                 solver.destroy()
         pc.setReusePreconditioner(True)
-        for place in places:
-            place.destroy()
+
+    def _refresh(self, matrix: Any) -> None:
+        """Take the parts of another tangent, without the V-cycles. They cost little and change much."""
+        handles = self._handles
+        names = [*(part.name for part in self._parts), MULTIPLIERS]
+        for k, name in enumerate(names):
+            for other in names[:k] if f"place of {name}" in handles else ():
+                places = [handles[f"place of {each}"] for each in (name, other)]
+                matrix.createSubMatrix(*places, handles[f"{name} by {other}"])
+        for part in self._parts:
+            place = handles[f"place of {part.name}"]
+            if part.mass is not None:
+                own = handles[f"{part.name} by itself"]
+                matrix.createSubMatrix(place, place, own)
+                add(own, part.mass)
+            if part.volume:
+                self._chebyshev(own)
 
     def _operator(self, matrix: Any, part: Part, place: Any, of_u: Any) -> Any:
         """Scaled operator of a field; `of_u` are the places of the displacement."""
         if part.operator is not None:
             scale(part.operator, self._scale[: len(part.block.mine)][part.block.mine])
             return part.operator
-        own = matrix.createSubMatrix(place, place)
+        own = self._handles[f"{part.name} by itself"] = matrix.createSubMatrix(place, place)
         if part.mass is None:
             return own
         coupling: Any = -1.0  # of the volume, by its scaling
@@ -264,16 +292,17 @@ class MultigridSolver(LinearSolver):
             coupling = part.share * coupling_of(matrix, place, of_u)
         total = np.array([np.sum(coupling)])
         sign = float(np.sign(ranks.sum_of(matrix.comm.tompi4py(), total)[0]))
-        if sign != 0:
-            diagonal = part.mass.getDiagonal()
-            size = np.maximum(diagonal.array, np.finfo(float).tiny)
-            diagonal.destroy()
-            scale(part.mass, np.sqrt(0.5 * np.abs(coupling) / size))
-            own.axpy(sign, part.mass, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        diagonal = part.mass.getDiagonal()
+        size = np.maximum(diagonal.array, np.finfo(float).tiny)
+        diagonal.destroy()
+        scale(part.mass, np.sqrt(0.5 * np.abs(coupling) / size))
+        part.mass.scale(sign)
+        add(own, part.mass)
         return own
 
-    def _chebyshev(self, solver: Any, operator: Any) -> None:
-        """Solve by Chebyshev's iteration with Jacobi's preconditioner."""
+    def _chebyshev(self, operator: Any) -> None:
+        """Set up Chebyshev's iteration with Jacobi's preconditioner for the volume."""
+        solver = self._handles["chebyshev"]
         solver.setType("chebyshev")
         solver.setNormType(PETSc.KSP.NormType.NONE)
         solver.setTolerances(max_it=STEPS)
