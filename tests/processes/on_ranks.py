@@ -411,7 +411,13 @@ def wide() -> dict[str, np.ndarray]:
     motion = tawami.Dynamics(scene)
     for _ in range(2):
         last = motion.step(0.004)
-    return {
+    grid = tawami.Grid(COMM, origin=(0, 0), h=0.25, cells=(6, 27), geometry="axisymmetric")
+    post = tawami.box(grid, (0, 0), (1.4, 5.05), per_axis=2)
+    scene = tawami.Scene(grid, post, law, ghost_penalty="on", tolerance=1e-11)
+    scene.fix("bottom", "y")
+    scene.pressure("top", 1e3)
+    found = {"wide post": scene.solve().u}
+    return found | {
         "wide u": solution.u, "wide force": solution.reaction("4"), "wide x": last.x,
         "wide wall": last.reaction("bottom"), "krylov wide": np.array(solution.krylov),
     }  # fmt: skip

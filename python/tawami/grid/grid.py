@@ -261,8 +261,8 @@ class Grid(Unique):
         return self.origin + self.h * x
 
     def positions(self, location: _rust.Location) -> Array:
-        """Positions [m] of points in cells, points x dim."""
-        return self.in_metres(self.cell_indices(location.cell.astype(np.int64)) + location.xi)
+        """Positions [m] of points in cells of the window, points x dim."""
+        return self.in_metres(self.window.indices(location.cell.astype(np.int64)) + location.xi)
 
     def cell_at(self, x: Array) -> Indices:
         """Indices (i, j) of the cells that hold positions in cells, points x dim."""
