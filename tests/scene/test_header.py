@@ -90,7 +90,7 @@ def test_the_header_shows_a_ghost_penalty_and_a_motion():
     )
     ghost = scene_of(form="u_epsv", ghost_penalty="on").header()
     assert "ghost_penalty 'on'" in line(ghost, "form")
-    assert "k = 0.01" in line(ghost, "form")
+    assert "k = 0.003" in line(ghost, "form")
     assert "ghost" not in line(ghost, "not modelled")
     motion = moving(law=plastic(), form="u_epsv_finite")
     motion.scene.load([0, 1, 2], (0.0, 1.0))

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from tawami.base import shared_file
+from tawami.base import ranks, shared_file
 from tawami.base.errors import CheckpointError
 from tawami.base.files import reason
 from tawami.base.ranks import raise_together
@@ -74,7 +74,9 @@ def write(
     """
     arrays: dict[str, Any] = {}
     about = {"format": FORMAT, "identity": identity, "state": _pack(state, "", arrays)}
-    content = {ABOUT: np.frombuffer(json.dumps(about).encode(), np.uint8), **arrays}
+    # sums of ranks may differ in their last digits, and so may the length of the text
+    text = ranks.same(comm, json.dumps(about))
+    content = {ABOUT: np.frombuffer(text.encode(), np.uint8), **arrays}
     pieces, entries, place = list[tuple[int, Any]](), list[zipfile.ZipInfo](), 0
     for name, array in content.items():
         rows = array if isinstance(array, Rows) else Rows.of_first_rank(comm, array)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
@@ -9,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
+from scipy.linalg.blas import dnrm2
 
 Value = TypeVar("Value")
 
@@ -33,6 +35,12 @@ def same(comm: Any, value: Value) -> Value:
         return value
     received: Value = comm.bcast(value)
     return received
+
+
+def norm_of(comm: Any, own: npt.NDArray[Any]) -> float:
+    """Euclidean norm of a vector of which each rank has its own entries; no square overflows."""
+    of_rank = float(dnrm2(np.ascontiguousarray(own)))
+    return of_rank if comm.size == 1 else math.hypot(*comm.allgather(of_rank))
 
 
 def largest(comm: Any, value: float) -> float:

@@ -108,8 +108,8 @@ class Coefficients:
         return float(self.grid.comm.allreduce(float(a[own] @ b[own])))
 
     def norm(self, a: Array) -> float:
-        """Euclidean norm over all ranks, as :meth:`dot`."""
-        return math.sqrt(self.dot(a, a))
+        """Euclidean norm over all ranks, as :meth:`dot`, whose squares do not overflow."""
+        return ranks.norm_of(self.grid.comm, a[self.own[: len(a)]])
 
     def largest(self, a: Array) -> float:
         """Largest size of the coefficients of all ranks; a collective call."""

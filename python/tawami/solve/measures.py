@@ -246,8 +246,7 @@ class Measures:
 
     def _norm(self, own: Array) -> float:
         """Euclidean norm of vectors of this rank's own entries; a collective call."""
-        square = float(own @ own)
-        return math.sqrt(square if self._comm.size == 1 else self._comm.allreduce(square))
+        return ranks.norm_of(self._comm, own)
 
     def _volume_scale(self, coefficients: Array) -> Array:
         """Reference value of the volume equation of each particle, without its volume."""

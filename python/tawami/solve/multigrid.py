@@ -189,8 +189,7 @@ class MultigridSolver(LinearSolver):
         ksp = self._handles["ksp"]
         ksp.setGMRESRestart(RESTART)
         converged = super()._krylov(right, tolerance, limit)
-        if converged:
-            ksp.setGMRESRestart(1)
+        ksp.setGMRESRestart(1 if converged else RESTART)
         return converged
 
     def _converge(self, right: Array, tolerance: float) -> None:
@@ -207,11 +206,10 @@ class MultigridSolver(LinearSolver):
         """Make the operators of all fields, and GMRES."""
         handles, comm, self._parts = self._handles, matrix.comm, parts
         handles.free("ksp", "pc", "parts")
-        start = matrix.getOwnershipRange()[0]
-        numbers = [start + np.flatnonzero(part.block.mine) for part in parts]
+        own = np.arange(*matrix.getOwnershipRange())
+        numbers = [own[: len(part.block.mine)][part.block.mine] for part in parts]
         names = [part.name for part in parts]
         if matrix.getSize()[0] > sum(part.block.size for part in parts):
-            own = np.arange(*matrix.getOwnershipRange())
             numbers.append(np.setdiff1d(own, np.concatenate(numbers)))
             names.append(MULTIPLIERS)
         places = [PETSc.IS().createGeneral(mine.astype(PETSc.IntType), comm) for mine in numbers]
