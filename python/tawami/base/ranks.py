@@ -39,7 +39,7 @@ def same(comm: Any, value: Value) -> Value:
 
 def norm_of(comm: Any, own: npt.NDArray[Any]) -> float:
     """Euclidean norm of a vector of which each rank has its own entries; no square overflows."""
-    of_rank = float(dnrm2(np.ascontiguousarray(own)))
+    of_rank = float(dnrm2(np.ascontiguousarray(own))) if len(own) else 0.0
     return of_rank if comm.size == 1 else math.hypot(*comm.allgather(of_rank))
 
 

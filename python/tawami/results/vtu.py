@@ -1,6 +1,7 @@
 """VTU files: unstructured grids of VTK, whose arrays are numbers in base64.
 
-Each rank writes its own rows.
+On one rank meshio writes them. It needs all rows, which no rank has on several: there each rank writes
+its own rows into the same file.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from mpi4py import MPI
 
 from tawami.base import checks, shared_file
 from tawami.base.errors import OutputError
+from tawami.base.files import atomic_file
 from tawami.base.shared_file import Rows
 from tawami.results.frame import Frame
 
@@ -37,6 +39,9 @@ def write_vtu(path: str | Path, frame: Frame, comm: Any = MPI.COMM_SELF) -> None
     """
     if checks.path("path", path).suffix != ".vtu":
         raise OutputError(f"'{path}': expected a file name ending in .vtu")
+    if comm.size == 1:
+        _write_by_meshio(path, frame)
+        return
     cells = frame.rows(comm, frame.cells)
     corners = cells.own.shape[1]
     offsets = corners * (1 + cells.first + np.arange(len(cells.own), dtype=np.int64))
@@ -73,6 +78,17 @@ def write_vtu(path: str | Path, frame: Frame, comm: Any = MPI.COMM_SELF) -> None
     if comm.rank == 0:
         pieces.append((place, "".join(words).encode()))
     shared_file.write(comm, path, pieces)
+
+
+def _write_by_meshio(path: str | Path, frame: Frame) -> None:
+    import meshio  # here: a scene without output does not need it
+
+    on_cells = {name: [values] for name, values in frame.on_cells.items()}
+    mesh = meshio.Mesh(
+        frame.points, [(frame.kind, frame.cells)], point_data=frame.on_points, cell_data=on_cells
+    )
+    with atomic_file(path) as part:
+        meshio.vtu.write(part, mesh, compression=None)
 
 
 def _line(name: str, rows: Rows) -> str:
