@@ -33,8 +33,8 @@ Evaluated = tuple[Forces, Measured]
 #: |g(1) / g(0)| from which a step overshoots, the same with contact, and |g(t) / g(0)| at which the
 #: search ends.
 OVERSHOT, KINKED, REDUCED = 0.8, 0.5, 0.5
-#: Iterations of full steps with contact. Steps of a collapse need 7 on average, and with a search from
-#: the first on 8, with twice as many evaluations.
+#: Iterations of full steps with contact in motions. Steps of a collapse need 7 on average, and with a
+#: search from the first on 8, with twice as many evaluations. Large static steps need it at once.
 PATIENCE = 10
 #: Largest number of evaluations, and the shortest step as a share of the full one.
 MOST, SHORTEST = 8, 0.05
@@ -62,8 +62,8 @@ class LineSearch:
         number: int,
     ) -> None:
         terms = equations.terms
-        self._is_kinked = not equations.is_smooth and number >= PATIENCE
         self._is_static = equations.inertia is None
+        self._is_kinked = not equations.is_smooth and (self._is_static or number >= PATIENCE)
         self._dot, self._change, self._residual = dot, change, residual
         self._signs, self._terms = signs, terms
 
