@@ -43,6 +43,6 @@ STUDY = tawami.Study(
             "alpha": alpha,
             "place": "shifted",
         }
-        for name, alpha in (("default", 0.01), ("paper's alpha", 0.1))
+        for name, alpha in (("paper's alpha", 0.1), ("default", 0.01))
     },
 )

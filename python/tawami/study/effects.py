@@ -12,7 +12,9 @@ from tawami.study.table import Table
 
 #: Rows of the table, and the largest number of rows of one kind.
 ROWS, MOST = 5, 3
-REDUCES, COSTS, NEUTRAL = "reduces the error", "only costs time", "no effect"
+REDUCES, MIXED = "reduces the error", "reduces one error and increases another"
+COSTS, NEUTRAL = "only costs time", "no effect"
+KINDS = (REDUCES, MIXED, COSTS, NEUTRAL)
 
 
 @dataclass(frozen=True)
@@ -29,9 +31,9 @@ class Effect:
 
     @property
     def kind(self) -> str:
-        """Whether the change reduces the error, only costs time, or has no effect."""
+        """Whether the change reduces errors, only costs time, or has no effect."""
         if self.change.error * NOISE < 1:
-            return REDUCES
+            return MIXED if max(self.errors.values()) > NOISE else REDUCES
         return COSTS if self.change.cost > NOISE else NEUTRAL
 
     @property
@@ -61,16 +63,14 @@ def effects(table: Table) -> list[Effect]:
     first = [e for kind in (REDUCES, COSTS) for e in [e for e in ordered if e.kind == kind][:MOST]]
     rest = [e for e in ordered if e not in first]
     chosen = [*first, *rest][:ROWS]
-    return [
-        effect for kind in (REDUCES, COSTS, NEUTRAL) for effect in chosen if effect.kind == kind
-    ]
+    return sorted(chosen, key=lambda effect: KINDS.index(effect.kind))
 
 
 def _weight(effect: Effect) -> tuple[int, float]:
-    """Order of effects: accuracy, cost, none; larger ones first."""
+    """Order of effects: as KINDS; larger ones first."""
     kind, change = effect.kind, effect.change
-    size = -np.log(change.error) if kind == REDUCES else np.log(change.cost)
-    return (NEUTRAL, COSTS, REDUCES).index(kind), float(size)
+    size = -np.log(change.error) if kind in (REDUCES, MIXED) else np.log(change.cost)
+    return -KINDS.index(kind), float(size)
 
 
 def as_markdown(table: Table) -> str:
