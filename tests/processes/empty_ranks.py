@@ -60,6 +60,7 @@ def results(folder: Path, **options: Any) -> tawami.Results:
         tawami.ParticleOutput(*OF_PARTICLES, every_steps=4),
         tawami.GridOutput(*OF_GRID, every_steps=4),
         tawami.GridOutput(*FIELDS, every_steps=4, name="consistent", projection="consistent"),
+        tawami.BorderOutput(every_steps=4),
         tawami.TableOutput(*COLUMNS),
     ]
     return tawami.Results(folder, *outputs, checkpoint_steps=1, progress=False, **options)

@@ -92,8 +92,12 @@ def test_what_is_no_quantity():
         solution.error(tawami.Goal.displacement((2.0, 0.5), "z"))
     with pytest.raises(tawami.InputError, match="no part 'rihgt'"):
         solution.error(tawami.Goal.mean_displacement("rihgt", "y"))
-    with pytest.raises(tawami.InputError, match="no part of the body is there"):
+    with pytest.raises(tawami.InputError, match="no particle was chosen"):
         solution.error(tawami.Goal.mean_stress(lambda x, y: x > 9))
+    with pytest.raises(tawami.InputError, match="expected a function f\\(x, y\\)"):
+        tawami.Goal.mean_stress("right")
+    with pytest.raises(tawami.InputError, match="gave float64 of shape"):
+        solution.error(tawami.Goal.mean_stress(lambda x, y: x - 1))
 
 
 def test_a_scene_that_has_changed():
@@ -105,6 +109,11 @@ def test_a_scene_that_has_changed():
     scene.solve()
     with pytest.raises(tawami.InputError, match="has changed since this solution"):
         solution.error(TIP)
+    solution = scene.solve()
+    scene.fix("right", "x", 1e-3)
+    with pytest.raises(tawami.NotModelledError, match="prescribe other displacements"):
+        solution.error(TIP)
+    scene.solve().error(TIP)
 
 
 def test_what_is_not_modelled():

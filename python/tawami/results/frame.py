@@ -81,7 +81,7 @@ def border_frame(snapshot: Snapshot) -> Frame:
     """The border of the body as lines, one for each of its points."""
     now, scene = snapshot.scene.configuration, snapshot.scene
     assert now.border.points is not None
-    outline = Outline(now.border.points, now.domain, scene.split(now.before)[0])
+    outline = Outline(now.border.points, now.domain, now.before)
     length = np.linalg.norm(outline.area, axis=1)
     space, dim = scene.grid.space, outline.x.shape[1]
     traction = outline.tractions([*now.loads.tractions, *now.supports.tractions])

@@ -128,7 +128,7 @@ def estimate(now: Configuration, goal: Any, coefficients: Array, load: float) ->
     body = Points(*map(np.array, (particles.x, particles.volume, particles.material)))
     own = Level(now, now.model, body)
     form, plain = (own.residual(coefficients, stabilised=s) for s in (True, False))
-    estimable.check_state(own, form, plain)
+    estimable.check_state(own, coefficients, form, plain)
     at = coefficients if model is now.model else own.with_volume(model.form, coefficients)
     ladder = Ladder(now, replace(model, fits=False), body, goal, at)
     z = ladder.z[: layout.size]

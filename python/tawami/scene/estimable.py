@@ -61,8 +61,9 @@ def check(now: Configuration, coefficients: Array, load: float) -> None:
         )
 
 
-def check_state(own: Level, form: Array, plain: Array) -> None:
-    """Check that particles which were never loaded are in equilibrium at the solution.
+def check_state(own: Level, coefficients: Array, form: Array, plain: Array) -> None:
+    """Check that the solution obeys the supports, and that particles which were never loaded are in
+    equilibrium there.
 
     Raises:
         NotModelledError: They are not.
@@ -71,6 +72,15 @@ def check_state(own: Level, form: Array, plain: Array) -> None:
         raise NotModelledError(
             f"error(...): {own.on_patches[0].support} holds a border inside of cells: expected supports "
             "on edges of the grid, or hold(...)"
+        )
+    supported = own.reduction.offset + own.reduction.expanded(
+        coefficients[own.reduction.coefficients]
+    )
+    some = own.layout.active
+    if np.abs(supported - coefficients)[some].max() > SAME_STATE * np.abs(supported).max():
+        raise NotModelledError(
+            "error(...): the supports prescribe other displacements than the solution has: expected "
+            "supports as they were in solve(); call solve() again"
         )
     n, tolerance = own.layout.num_displacement, own.domain.newton.numerics.tolerance
     size = max(np.linalg.norm((plain + own.external)[:n]), np.linalg.norm(own.external[:n]))

@@ -17,6 +17,7 @@ from tawami.grid import edges
 from tawami.scene.border import Part, SceneBorder, label
 from tawami.scene.domain import Domain
 from tawami.scene.points import check_in_body
+from tawami.scene.selection import present
 
 #: Derivative of a quantity by all coefficients of a domain with a field for the volume.
 Weights = Callable[[Domain, SceneBorder], Array]
@@ -82,19 +83,22 @@ class Goal:
 
         Args:
             where: A function f(x, y) on arrays of positions that returns a mask; by default the body.
+
+        Raises:
+            InputError: Not a function. Masks of other types raise it in `Solution.error`.
         """
+        if where is not None and not callable(where):
+            raise InputError(
+                f"Goal.mean_stress(where = {checks.shown(where)}): expected a function f(x, y) that "
+                "returns a mask, or none for the whole body"
+            )
         name = "mean stress" + ("" if where is None else " where f(x, y)")
 
         def weights(domain: Domain, border: SceneBorder) -> Array:
             particles, place = domain.particles, domain.layout.volumetric
             assert place is not None
-            inside = np.ones(len(particles), dtype=bool)
-            if where is not None:
-                inside = np.asarray(where(*particles.x.T), dtype=bool)
-            volume = particles.volume[inside].sum()
-            if volume == 0:
-                raise InputError(f"{name}: no part of the body is there: expected some of it")
-            share = np.where(inside, particles.volume, 0.0) / volume
+            inside = np.ones(len(particles)) if where is None else present(domain, name, where)
+            share = inside * particles.volume / (inside @ particles.volume)
             if domain.model.form.kinematics.has_eps_v:
                 share = share * domain.constants["K"]
             found = np.zeros(domain.layout.size)

@@ -21,7 +21,7 @@ from tawami.scene.model import Model
 from tawami.scene.obstacle import Obstacle
 from tawami.scene.step import Accepted
 from tawami.scene.supports import Supports
-from tawami.scene.walls import name_of
+from tawami.scene.walls import Wall, name_of
 
 #: A point is one of a `hold` if it is this near to it [cells].
 SAME_POINT = 1e-8
@@ -168,9 +168,10 @@ class Reactions:
             f"{known or 'none'}"
         )
 
-    def at(self, model: Model, place: str | Sequence[float] | Obstacle) -> Array:
+    def at(self, model: Model, place: str | Sequence[float] | Obstacle | Wall) -> Array:
         """Force (x, y) [N per metre depth] of a support, a call for all ranks; see `Solution`."""
         force, found = np.zeros(model.space.dim), False
+        place = place.edge if isinstance(place, Wall) else place
         if isinstance(place, Obstacle) or any(place == one.name for one in self.on_obstacles):
             return -self.contact(place).force
         if isinstance(place, str):

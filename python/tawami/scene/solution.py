@@ -31,6 +31,7 @@ from tawami.scene.outcome import Outcome
 from tawami.scene.outline import Outline
 from tawami.scene.points import ROUND_OFF, outside
 from tawami.scene.quantities import Arrays, Given, Quantity
+from tawami.scene.walls import Wall
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -318,7 +319,7 @@ class Solution(OfAllParticles, Elsewhere, Sealed, Unique):
         """
         return self._reactions.contact(obstacle)
 
-    def reaction(self, place: str | Sequence[float] | Obstacle) -> Array:
+    def reaction(self, place: str | Sequence[float] | Obstacle | Wall) -> Array:
         """Force (x, y) [N per metre depth] that a support, wall or obstacle exerts on the body.
 
         In dynamics it is the force at the end of the step and the impulse at its beginning over its
@@ -328,7 +329,8 @@ class Solution(OfAllParticles, Elsewhere, Sealed, Unique):
             place: Name of a part of the border or of an edge of the grid. Along an edge of the grid it
                 is the sum over the functions of the edge, so that forces at a corner belong to both
                 edges, and parts of the border on one edge share its force. Or the point (x, y) of a
-                `hold` [m], as it was given or where it is now. Or an obstacle or its name.
+                `hold` [m], as it was given or where it is now. Or an obstacle or its name. Or a wall,
+                which is its edge of the grid.
 
         Raises:
             InputError: No such part or nothing that supports it, or no point held there.
