@@ -59,8 +59,10 @@ class Body:
 
     def __repr__(self) -> str:
         materials = f", materials {', '.join(self.names)}" if self.names else ""
-        of = "" if self.part is None else f" of {self.part.total} on this rank"
-        return f"Body({len(self.x)}{of} particles, {np.sum(self.volume):g} m2{materials})"
+        count = f"{len(self.x)} particles"
+        if self.part is not None:
+            count = f"{len(self.x)} of {self.part.total} particles on this rank"
+        return f"Body({count}, {np.sum(self.volume):g} m2{materials})"
 
     @property
     def number(self) -> Indices:

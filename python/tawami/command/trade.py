@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import re
-import shlex
 from pathlib import Path
 
 from tawami.base import checks
@@ -69,5 +68,5 @@ def run(asked: argparse.Namespace) -> int:
     print(f"{folder / path.stem}.csv and .png are written")
     if asked.apply is not None:
         copy = write_applied(path, result.recommended().knobs, tolerance)
-        print(f"{copy} is written; run it with: tawami run {shlex.quote(str(copy))}")
+        print(f"{copy} is written: {path.name} with the recommended setting as its defaults")
     return 0
