@@ -170,7 +170,8 @@ def _displacement(name: str, point: tuple[float, float], scene: Scene) -> Column
     def of(now: Snapshot, _: float) -> list[float]:
         if moves:
             return list(displacement_near(now.scene, point, name))
-        u = now.scene.split(now.scene.configuration.before)[0]
+        state = now.scene.configuration
+        u = now.scene.split(state.domain.layout.whole(state.before))[0]
         return list(_rust.interpolate(location, now.scene.basis, 2, u)[0])
 
     return Columns((f"{name} x [m]", f"{name} y [m]"), of)
