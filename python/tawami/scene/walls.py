@@ -79,7 +79,7 @@ class Wall:
         functions: Displacement functions of the whole grid along it.
         state: Their states of contact.
         returns: Number of times that each came back to the wall or to rest in this step.
-        told: Whether a warning was issued that it acts at a distance from the border.
+        told: Whether a warning was issued that it acts at a distance from loose particles.
     """
 
     grid: Grid
