@@ -95,6 +95,14 @@ def rows_of(matrix: Any) -> sp.csr_matrix:
     return csr_matrix((np.array(values), columns, start), shape=shape)
 
 
+def diagonal_of(matrix: Any) -> Any:
+    """Diagonal of a PETSc matrix, the entries of this rank; a collective call."""
+    vector = matrix.getDiagonal()
+    entries = vector.array.copy()
+    vector.destroy()
+    return entries
+
+
 def add_rows(matrix: Any, rows: sp.csr_matrix) -> None:
     """Add to a PETSc matrix whose pattern contains that of `rows`, the rows of this rank."""
     start, columns = (part.astype(PETSc.IntType) for part in (rows.indptr, rows.indices))

@@ -123,10 +123,6 @@ class Space:
             raise InputError(f"component {shown(component)}: expected {expected}")
         return self.axes.index(component)
 
-    def other_axes(self, axis: int) -> tuple[int, ...]:
-        """All axes but one: those along an edge that is normal to it."""
-        return tuple(k for k in range(self.dim) if k != axis)
-
 
 #: Plane strain.
 PLANE = Space(axes=("x", "y"), volume="m2", depth=" per m")

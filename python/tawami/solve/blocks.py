@@ -9,7 +9,7 @@ from petsc4py import PETSc
 
 from tawami.base import ranks
 from tawami.base.arrays import Array
-from tawami.base.petsc import rows_of
+from tawami.base.petsc import diagonal_of, rows_of
 
 PREFIX = "tawami_multigrid_"
 #: Penalty of the constraints in the scaled operators.
@@ -18,10 +18,7 @@ AUGMENTED = 2.0
 
 def row_sum(matrix: Any) -> float:
     """Bound of the eigenvalues of D^-1 A, D the diagonal of A: its largest row sum."""
-    diagonal = matrix.getDiagonal()
-    rows = rows_of(matrix)
-    sums = np.asarray(abs(rows).sum(axis=1)).ravel() / np.abs(diagonal.array)
-    diagonal.destroy()
+    sums = np.asarray(abs(rows_of(matrix)).sum(axis=1)).ravel() / np.abs(diagonal_of(matrix))
     return ranks.largest(matrix.comm.tompi4py(), float(sums.max(initial=0.0)))
 
 

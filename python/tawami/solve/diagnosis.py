@@ -166,7 +166,7 @@ class Diagnosis:
 
     def _incompressible(self) -> str:
         K, mu = (self._responses.constants[name] for name in ("K", "mu"))
-        ratio = self._comm.allreduce(float((K / mu).max(initial=0.0)), op=MPI.MAX)
+        ratio = ranks.largest(self._comm, float((K / mu).max(initial=0.0)))
         if ratio < NO_DIGITS or self._responses.form.kinematics.has_mean_stress:
             return ""
         return (
@@ -176,7 +176,7 @@ class Diagnosis:
 
     def _contrast(self) -> str:
         mu = self._responses.constants["mu"]
-        largest = self._comm.allreduce(float(mu.max(initial=0.0)), op=MPI.MAX)
+        largest = ranks.largest(self._comm, float(mu.max(initial=0.0)))
         least = self._comm.allreduce(float(mu.min(initial=np.inf)), op=MPI.MIN)
         if largest < FEW_DIGITS * least:
             return ""

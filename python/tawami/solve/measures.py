@@ -17,11 +17,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array
+from tawami.base.petsc import diagonal_of
 from tawami.field.assembly import Assembly
 from tawami.field.reduction import Reduction
 from tawami.particles.responses import Responses
@@ -92,15 +92,6 @@ def out_of_reach(history: History) -> str:
         f"The measures stay at {max(last):.1e}, which is the round-off of this problem: expected a "
         f"tolerance of {expected:g} or more"
     )
-
-
-def diagonal_of(tangent: Any, reduction: Reduction) -> Array:
-    """Sizes of the diagonal of a reduced tangent, on all coefficients; a collective call."""
-    vector = tangent.getDiagonal()
-    on_all = np.zeros(reduction.layout.size)
-    on_all[reduction.coefficients] = np.abs(vector.array)
-    vector.destroy()
-    return reduction.layout.exchange.update(on_all)
 
 
 class Measures:
@@ -186,7 +177,9 @@ class Measures:
     def observe(self, tangent: Any, reduction: Reduction) -> None:
         """Keep what the measures need of a tangent that is not scaled yet; a collective call."""
         if self._own:
-            self._diagonal = diagonal_of(tangent, reduction)
+            sizes = np.zeros(reduction.layout.size)
+            sizes[reduction.coefficients] = np.abs(diagonal_of(tangent))
+            self._diagonal = reduction.layout.exchange.update(sizes)
 
     def _of_fields(
         self, free: Array, forces: Forces, coefficients: Array, reduction: Reduction
@@ -241,7 +234,7 @@ class Measures:
         strain = self._responses.form.strain.metric_change(
             self._layout.grid.space.gradients(gradient)
         )
-        largest = self._comm.allreduce(float(np.abs(strain).max(initial=0.0)), op=MPI.MAX)
+        largest = ranks.largest(self._comm, float(np.abs(strain).max(initial=0.0)))
         return bool(prescribed == 0 or largest <= NO_STRAIN * prescribed / self._layout.grid.h)
 
     def _norm(self, own: Array) -> float:

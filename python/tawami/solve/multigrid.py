@@ -32,7 +32,7 @@ from petsc4py import PETSc
 
 from tawami.base import ranks
 from tawami.base.arrays import Array
-from tawami.base.petsc import Handles
+from tawami.base.petsc import Handles, diagonal_of
 from tawami.base.timing import Stopwatch
 from tawami.field.prolongation import coarser
 from tawami.solve import memory
@@ -290,9 +290,7 @@ class MultigridSolver(LinearSolver):
             coupling = part.share * coupling_of(matrix, place, of_u)
         total = np.array([np.sum(coupling)])
         sign = float(np.sign(ranks.sum_of(matrix.comm.tompi4py(), total)[0]))
-        diagonal = part.mass.getDiagonal()
-        size = np.maximum(diagonal.array, np.finfo(float).tiny)
-        diagonal.destroy()
+        size = np.maximum(diagonal_of(part.mass), np.finfo(float).tiny)
         scale(part.mass, np.sqrt(0.5 * np.abs(coupling) / size))
         part.mass.scale(sign)
         add(own, part.mass)

@@ -22,7 +22,7 @@ from petsc4py import PETSc
 
 from tawami.base import ranks
 from tawami.base.arrays import Array
-from tawami.base.petsc import aij
+from tawami.base.petsc import aij, diagonal_of
 from tawami.field.assembly import Assembly
 from tawami.field.block import Block
 from tawami.particles.responses import Responses
@@ -121,10 +121,7 @@ class Operators:
             block.assembled("mass", np.ascontiguousarray(weight[:, None]))
             for weight in (mu / (bulk + 4 / 3 * mu), np.ones_like(mu))
         ]
-        diagonals = [mass.getDiagonal() for mass in masses]
-        weighted, plain = (np.array(diagonal.array) for diagonal in diagonals)
-        for diagonal in diagonals:
-            diagonal.destroy()
+        weighted, plain = map(diagonal_of, masses)
         share = 2 * weighted / np.maximum(plain, np.finfo(float).tiny)
         return Part(name, block, mass=masses[1], share=share)
 

@@ -19,7 +19,7 @@ from petsc4py import PETSc
 
 from tawami.base import ranks
 from tawami.base.arrays import Array, Indices, Mask
-from tawami.base.petsc import Handles, aij, rows_of
+from tawami.base.petsc import Handles, aij, diagonal_of, rows_of
 from tawami.field.reduction import Reduction
 from tawami.field.sum import same_places
 
@@ -69,9 +69,7 @@ class Saddle:
         same = self._tangent is tangent and same_places(self._rows, rows)
         same = not ranks.any_of(self._comm, np.array([not same]))[0]
         self._rows, self._tangent = rows, tangent
-        diagonal = tangent.getDiagonal()
-        stiffness = np.abs(diagonal.array)
-        diagonal.destroy()
+        stiffness = np.abs(diagonal_of(tangent))
         largest = ranks.largest(self._comm, float(stiffness.max(initial=0.0)))
         stiffness[stiffness == 0] = largest or 1.0
         self._own = rows[:, reduction.own]

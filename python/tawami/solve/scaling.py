@@ -10,7 +10,7 @@ import numpy as np
 
 from tawami.base import ranks
 from tawami.base.arrays import Array, Indices
-from tawami.base.petsc import aij, rows_of
+from tawami.base.petsc import aij, diagonal_of, rows_of
 from tawami.field.layout import Layout
 from tawami.field.reduction import Reduction
 from tawami.particles.responses import Responses
@@ -41,9 +41,7 @@ class Scaling:
         """
         own = reduction.coefficients
         of_u = own < self._layout.num_displacement
-        vector = matrix.getDiagonal()
-        diagonal = vector.array.copy()
-        vector.destroy()
+        diagonal = diagonal_of(matrix)
         # A softening law makes negative diagonals. The solver reports a zero one (a function without
         # stiffness), in a scale that does not depend on units.
         size = np.abs(np.where(of_u, diagonal, 0.0))

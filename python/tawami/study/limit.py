@@ -40,8 +40,6 @@ DEVIATIONS = 10.0 ** np.arange(-2.5, -0.24, 0.25)
 RATES = np.array([-1.0, 0.0, 1.0, 2.0, 3.0])
 #: Probability of each rate before values are known.
 LIKELY = np.array([0.05, 0.2, 0.25, 0.25, 0.25])
-#: Smallest deviation, as a part of the range.
-LEAST = 1e-5
 #: Orders below this one are no sign of a limit; their probability before values are known.
 SLOWEST, WITHOUT = 0.3, 0.3
 #: Median of the orders of other sequences, and standard deviation of its logarithm.
