@@ -9,14 +9,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from tawami.base import ranks
 from tawami.base.archive import check_like
+from tawami.base.arrays import Array
 from tawami.motion.transfer import Transfer, gradient_of, to_grid
 from tawami.scene.configuration import Configuration
 
-Array = npt.NDArray[np.float64]
 #: Arrays of the particles, with the rank of their values: vectors and tensors.
 ARRAYS = {"velocity": 1, "acceleration": 1, "velocity_gradient": 2, "acceleration_gradient": 2}
 

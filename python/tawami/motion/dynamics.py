@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from tawami.base import checks, html, ranks
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.identity import text
 from tawami.base.process import Unique
@@ -32,7 +32,6 @@ from tawami.scene.sources import Source
 if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation
 
-Array = npt.NDArray[np.float64]
 #: Steps [s] whose squares, and quotients by these, are finite numbers.
 SHORTEST, LONGEST = 1e-100, 1e100
 #: Steps of a run, beyond which it would never end.

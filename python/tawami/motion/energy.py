@@ -13,17 +13,15 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from tawami.base import ranks
+from tawami.base.arrays import Array
 from tawami.base.errors import EnergyWarning
 from tawami.base.warn import warn
 from tawami.field.layout import Layout
 from tawami.motion.carried import Carried
 from tawami.scene.configuration import Configuration
 from tawami.scene.step import Accepted
-
-Array = npt.NDArray[np.float64]
 
 #: Spurious energy is reported from this share of the most energy that the body had.
 GROWN = 0.05

@@ -13,8 +13,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from tawami.base.arrays import Array
 from tawami.field.impulse import imposed
 from tawami.field.reduction import Reduction
 from tawami.motion.carried import Carried, divided
@@ -33,8 +33,6 @@ from tawami.scene.share import Moment
 from tawami.scene.step import Accepted, Problem
 from tawami.scene.step_values import Fields
 from tawami.solve.inertia import Inertia
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass

@@ -18,11 +18,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from tawami.base.arrays import Array
 from tawami.scene.domain import Domain
 
-Array = npt.NDArray[np.float64]
 TransferName = Literal["affine_flip", "flip", "apic", "tpic", "pic"]
 
 

@@ -8,13 +8,12 @@ be wrong by any amount (`python -m cases.extremes --only particles`).
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from tawami.base.arrays import Array
 from tawami.base.errors import QuadratureWarning
 from tawami.base.warn import warn
 from tawami.scene.domain import Domain
 
-Array = npt.NDArray[np.float64]
 #: Part of a cell by which one that counts as filled may miss its area or go beyond it.
 FILLED = 0.05
 #: Centroid off the centre [cells]; a lattice of 2 x 2 that is moved over the grid comes to 1/4.

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import ranks
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError, InstabilityWarning
 from tawami.base.timing import Stopwatch
 from tawami.base.warn import warn
@@ -30,7 +31,6 @@ from tawami.scene.model import Model
 from tawami.solve.newton import Newton
 from tawami.solve.numerics import Numerics
 
-Array = npt.NDArray[np.float64]
 ASSEMBLIES: dict[str, type[PointAssembly | ReferenceAssembly]] = {
     "points": PointAssembly,
     "dolfinx": ReferenceAssembly,

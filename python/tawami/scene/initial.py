@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks, ranks
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.space import PLANE
 from tawami.form import quantities
@@ -24,7 +25,6 @@ from tawami.scene.earlier import Earlier
 from tawami.scene.parameters import misplaced
 from tawami.scene.sources import Source
 
-Array = npt.NDArray[np.float64]
 Beyond = Literal["stop", "return"]
 #: Stress beyond the yield surface by no more than this share is round-off; at finite strain another
 #: share, of mu, is lost in small elastic strains.

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks, ranks
+from tawami.base.arrays import Array
 from tawami.base.errors import CheckpointError, InputError, ParameterWarning
 from tawami.base.identity import text
 from tawami.base.meaning import meaning
@@ -34,7 +35,6 @@ from tawami.particles.assignment import Law
 from tawami.scene import locking
 from tawami.scene.parameters import by_kind, check_names
 
-Array = npt.NDArray[np.float64]
 Leaving = Literal["stop", "remove"]
 
 #: Arguments of `Scene` that are not parameters of the form.

@@ -13,6 +13,7 @@ import scipy.sparse as sp
 
 from tawami import _rust
 from tawami.base import checks, html
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
 from tawami.base.sealed import Sealed, Settings
@@ -38,8 +39,6 @@ from tawami.scene.statics import StaticStep
 from tawami.scene.step import StepKind
 from tawami.scene.support import Support
 from tawami.solve.numerics import Factorise, Numerics, SolverName
-
-Array = npt.NDArray[np.float64]
 
 
 class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):

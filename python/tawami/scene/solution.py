@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from tawami import _rust
 from tawami.base import checks, html, ranks
-from tawami.base.arrays import of_components
+from tawami.base.arrays import Array, of_components
 from tawami.base.errors import InputError, NotModelledError
 from tawami.base.process import Unique
 from tawami.base.sealed import Sealed
@@ -35,8 +35,6 @@ from tawami.scene.walls import Wall
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-Array = npt.NDArray[np.float64]
 
 
 class Solved(Protocol):

@@ -12,11 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami.base import checks, ranks
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.scene.domain import Domain
 from tawami.scene.scattered import Scattered
 
-Array = npt.NDArray[np.float64]
 Numbers = npt.NDArray[Any]
 Source = npt.ArrayLike | Callable[[Array, Array], Any] | Scattered
 

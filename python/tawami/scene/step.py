@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from tawami.base.arrays import Array
 from tawami.field.reduction import Reduction
 from tawami.scene.contact import ActiveSet
 from tawami.scene.held_border import HeldBorder
@@ -18,8 +18,6 @@ from tawami.solve.inertia import Inertia
 from tawami.solve.newton import Converged
 from tawami.solve.path import Path
 from tawami.solve.terms import Terms
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

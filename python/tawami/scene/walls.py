@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tawami.base.arrays import Indices, of_components
+from tawami.base.arrays import Array, Indices, Mask, of_components
 from tawami.base.errors import InputError
 from tawami.border.shapes import HalfPlane, half_plane
 from tawami.field.constraints import Held
@@ -33,9 +33,6 @@ from tawami.scene.action import Owner
 from tawami.scene.domain import Domain
 from tawami.scene.obstacle import Obstacle
 from tawami.scene.obstacle_inputs import checked_friction
-
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 #: Forces and displacements below which they are round-off, relative to the largest force on the wall
 #: and to h.

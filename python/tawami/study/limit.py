@@ -28,11 +28,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import brentq
 from scipy.special import ndtr
 
-Array = npt.NDArray[np.float64]
+from tawami.base.arrays import Array
 
 #: Orders p, sizes eta and rates r of deviations. The range is about twice the deviation of pure noise.
 ORDERS = np.linspace(-1.0, 6.0, 71)
