@@ -60,3 +60,12 @@ class Added:
 def share_places(a: sp.csr_matrix, b: sp.csr_matrix) -> bool:
     """Whether two matrices share the arrays of the places of their entries."""
     return a.indices is b.indices and a.indptr is b.indptr
+
+
+def same_places(a: sp.csr_matrix | None, b: sp.csr_matrix) -> bool:
+    """Whether two matrices have entries in the same places."""
+    if a is None or a.nnz != b.nnz:
+        return False
+    if share_places(a, b):
+        return True
+    return np.array_equal(a.indptr, b.indptr) and np.array_equal(a.indices, b.indices)

@@ -10,7 +10,7 @@ from petsc4py import PETSc
 
 from tawami.base import ranks
 from tawami.base.petsc import Handles, add_rows, aij
-from tawami.base.places import share_places
+from tawami.base.places import same_places
 from tawami.field.reduction import Reduction
 
 
@@ -57,12 +57,3 @@ class Sum:
             part.destroy()
         self._tangent, self._matrix = tangent, matrix
         return known["total"]
-
-
-def same_places(a: sp.csr_matrix | None, b: sp.csr_matrix) -> bool:
-    """Whether two matrices have entries in the same places."""
-    if a is None or a.nnz != b.nnz:
-        return False
-    if share_places(a, b):
-        return True
-    return np.array_equal(a.indptr, b.indptr) and np.array_equal(a.indices, b.indices)

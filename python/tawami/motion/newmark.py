@@ -24,7 +24,6 @@ from tawami.scene import reactions
 from tawami.scene.action import Term
 from tawami.scene.configuration import Configuration
 from tawami.scene.constraints import constraints
-from tawami.scene.contact import ActiveSet
 from tawami.scene.held_border import HeldBorder
 from tawami.scene.impulses import Impulses
 from tawami.scene.obstacle_contact import ObstacleContact
@@ -32,6 +31,7 @@ from tawami.scene.obstacle_motion import Times
 from tawami.scene.share import Moment
 from tawami.scene.step import Accepted, Problem
 from tawami.scene.step_values import Fields
+from tawami.scene.wall_states import ActiveSet
 from tawami.solve.inertia import Inertia
 
 

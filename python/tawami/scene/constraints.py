@@ -14,12 +14,12 @@ from tawami.field.reduction import Reduction
 from tawami.scene import step_values
 from tawami.scene.action import Term
 from tawami.scene.agreement import others_hold
-from tawami.scene.contact import ActiveSet
 from tawami.scene.domain import Domain
 from tawami.scene.held_border import HeldBorder
 from tawami.scene.moving_points import MovingPoints
 from tawami.scene.support import Support
 from tawami.scene.supports import Supports
+from tawami.scene.wall_states import ActiveSet
 from tawami.scene.walls import on_functions
 
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from tawami.base.arrays import Array
 from tawami.field.reduction import Reduction
-from tawami.scene.contact import ActiveSet
 from tawami.scene.held_border import HeldBorder
 from tawami.scene.obstacle_contact import ObstacleContact
 from tawami.scene.share import Moment
+from tawami.scene.wall_states import ActiveSet
 from tawami.solve.inertia import Inertia
 from tawami.solve.newton import Converged
 from tawami.solve.path import Path

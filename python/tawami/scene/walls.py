@@ -47,7 +47,7 @@ def name_of(edge: str) -> str:
 
 
 @dataclass
-class Contact:
+class WallState:
     """State of the functions along a wall.
 
     Attributes:
@@ -87,7 +87,7 @@ class Wall:
     owner: Owner[Any] | None = None
     obstacle: Obstacle | None = field(init=False, default=None)
     functions: npt.NDArray[np.int64] = field(init=False)
-    state: Contact = field(init=False)
+    state: WallState = field(init=False)
     returns: npt.NDArray[np.int64] = field(init=False)
     told: bool = field(init=False, default=False)
 
@@ -100,7 +100,7 @@ class Wall:
         """States of contact in which nothing has slipped."""
         # without friction nothing sticks; the sign does not matter then
         slip = np.full(len(touching), 1 if self.friction == 0 else 0, dtype=np.int8)
-        self.state = Contact(touching, slip)
+        self.state = WallState(touching, slip)
 
     def __str__(self) -> str:
         return f"wall(edge='{self.edge}') friction {self.friction:g}"
@@ -146,7 +146,7 @@ class Wall:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`stored`."""
-        self.state = Contact(state["touching"], state["slip"])
+        self.state = WallState(state["touching"], state["slip"])
         self.friction = state["friction"]
 
     def begin(self) -> None:

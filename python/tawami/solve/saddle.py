@@ -20,8 +20,8 @@ from petsc4py import PETSc
 from tawami.base import ranks
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.petsc import Handles, aij, diagonal_of, rows_of
+from tawami.base.places import same_places
 from tawami.field.reduction import Reduction
-from tawami.field.sum import same_places
 
 #: D relative to B diag(K)^-1 B^T.
 PROXIMAL = 1e-10
