@@ -99,8 +99,8 @@ class Contact:
         Args:
             x: Positions [m], points x dim.
             pose: Pose of the obstacle.
-            held: Multipliers: at first pressure zero and friction of the last step, or both from an
-                earlier evaluation, `ContactForces.multipliers`.
+            held: Multipliers: at first those of the last step, later those of an earlier evaluation,
+                `ContactForces.multipliers`.
             sticking: Take all touching patches as sticking; or the last evaluation: take those as
                 sticking whose friction would turn round. It prevents cycles between states in Newton's
                 method; without friction it has no effect.
