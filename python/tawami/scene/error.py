@@ -20,8 +20,8 @@ from tawami.picture.figure import lay_out, shown_axes
 from tawami.picture.particles import Squares, draw_border, draw_frame, scale_of, size_of
 from tawami.scene import estimable
 from tawami.scene.configuration import Configuration
+from tawami.scene.dual_solutions import DualSolutions
 from tawami.scene.goal import Goal
-from tawami.scene.ladder import Ladder
 from tawami.scene.level import Level, Points, with_volume
 from tawami.scene.outline import Outline
 from tawami.scene.presentation import corners_of
@@ -130,22 +130,22 @@ def estimate(now: Configuration, goal: Any, coefficients: Array, load: float) ->
     form, plain = (own.residual(coefficients, stabilised=s) for s in (True, False))
     estimable.check_state(own, coefficients, form, plain)
     at = coefficients if model is now.model else own.with_volume(model.form, coefficients)
-    ladder = Ladder(now, replace(model, fits=False), body, goal, at)
-    z = ladder.z[: layout.size]
-    of_particles = -ladder.residual * ladder.z
+    dual = DualSolutions(now, replace(model, fits=False), body, goal, at)
+    z = dual.z[: layout.size]
+    of_particles = -dual.residual * dual.z
     of_particles[: layout.size] += plain * z
     parts = {
-        "grid": (ladder.fine, ladder.of_grid),
-        "particles": (ladder.coarse, of_particles),
+        "grid": (dual.fine, dual.of_grid),
+        "particles": (dual.coarse, of_particles),
         "stabilisation": (layout, (form - plain) * z),
         "Newton": (layout, -form * z),
     }
     points = now.border.points
     return ErrorEstimate(
         goal,
-        ladder.value,
+        dual.value,
         {name: float(values.sum()) for name, (_, values) in parts.items()},
-        ladder.order,
+        dual.order,
         {name: _in_cells(now.model.grid, *part) for name, part in parts.items()},
         now.model.grid,
         None if points is None else Outline(points, now.domain, coefficients),

@@ -22,7 +22,7 @@ POINTS = 3
 IRREGULAR, SLOWEST, FASTEST, SMOOTH = 0.5, 2.0, 64.0, 16.0
 
 
-class Ladder:
+class DualSolutions:
     """Dual solutions for a quantity on three grids.
 
     Those on cells of h/2, h and 2h give the errors e', e and e_2 of the computed value, without the
