@@ -119,6 +119,8 @@ def test_a_scene_that_has_changed():
 def test_what_is_not_modelled():
     with pytest.raises(tawami.NotModelledError, match="small strain"):
         loaded(form="u_epsv_finite").solve().error(TIP)
+    with pytest.raises(tawami.NotModelledError, match="basis = 'bilinear'"):
+        loaded(basis="bilinear").solve().error(TIP)
     scene = loaded()
     scene.initial("stress", (-1.0e4, -1.0e4, -1.0e4, 0.0))
     with pytest.raises(tawami.NotModelledError, match="without initial stress"):

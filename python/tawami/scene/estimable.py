@@ -31,6 +31,11 @@ def check(now: Configuration, coefficients: Array, load: float) -> None:
             f"error(...) with form {model.form.name}: expected a form of small strain: at finite strain "
             "each step has a body of its own"
         )
+    if model.basis != "quadratic_spline":  # loads on the border: its points are those of cells of h
+        raise NotModelledError(
+            f"error(...) with basis = '{model.basis}': expected 'quadratic_spline', for which loads on "
+            "the border are integrated on cells of h/2"
+        )
     if now.model.grid.comm.size > 1:
         raise NotModelledError("error(...) on several ranks: expected one rank")
     if not np.array_equal(now.total, coefficients):
