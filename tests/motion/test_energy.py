@@ -234,8 +234,8 @@ def test_the_work_of_moving_supports_is_that_of_their_mean_force(support):
 
 
 @pytest.mark.slow
-def test_the_work_of_moving_supports_has_an_error_of_second_order():
+def test_the_error_of_the_work_of_moving_supports_falls_with_the_step():
     """At finite strain each reset of the grid takes some energy; the rest depends on the step."""
     found = [shaken("u_finite", "edge", dt)[0].integration for dt in (0.01, 0.005, 0.0025)]
     first, second = -np.diff(found)
-    assert abs(second) < abs(first) / 3
+    assert abs(second) < abs(first) / 2

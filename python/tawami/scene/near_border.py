@@ -69,7 +69,9 @@ class BorderNear:
         weight = place.weight
         self.weights = np.maximum(weight, 1e-12 * weight.max())  # 0 on an axis of symmetry
         shear = domain.moduli_at(cells)[1]
-        self.penalty = PENALTY / self.h * self.groups.means(self.weights, shear)
+        penalty = PENALTY / self.h * self.groups.means(self.weights, shear)
+        # no particle is near a patch that its body has lost
+        self.penalty = np.maximum(penalty, np.finfo(float).tiny)
         self.distance = shape.evaluate(self.start).distance
         self.chosen = np.zeros(self.groups.count, dtype=bool)
 

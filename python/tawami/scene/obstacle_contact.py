@@ -163,8 +163,7 @@ class ObstacleContact:
     def improve(self) -> bool:
         """See `Term`."""
         now, penalty = self.now, self._contact.penalty
-        depth = np.divide(now.pressure, penalty, out=np.zeros_like(now.pressure), where=penalty > 0)
-        allowed = SETTLED * np.abs(depth).max(initial=0.0)
+        allowed = SETTLED * np.max(np.abs(now.pressure) / penalty, initial=0.0)
         settled = now.violation <= max(allowed, ROUND_OFF * self._border.h)
         if settled and not now.exceeded and not self._pulls:
             return False
