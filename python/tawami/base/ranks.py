@@ -13,6 +13,7 @@ from mpi4py import MPI
 from scipy.linalg.blas import dnrm2
 
 Value = TypeVar("Value")
+Number = TypeVar("Number", int, float)
 
 
 def sum_of(comm: Any, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -27,6 +28,33 @@ def any_of(comm: Any, mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     if comm.size > 1:
         comm.Allreduce(MPI.IN_PLACE, mask, op=MPI.LOR)
     return mask
+
+
+def anywhere(comm: Any, found: Any) -> bool:
+    """Whether something is so on any rank."""
+    return bool(any_of(comm, np.array([bool(found)]))[0])
+
+
+def total(comm: Any, value: Number) -> Number:
+    """Sum of the numbers of all ranks."""
+    summed: Number = sum_of(comm, np.array([value]))[0].item()
+    return summed
+
+
+def scattered(
+    comm: Any, size: int, place: npt.NDArray[Any], own: npt.NDArray[Any]
+) -> npt.NDArray[Any]:
+    """An array on every rank, of which each rank has some rows; the others are zero.
+
+    Args:
+        comm: Communicator.
+        size: Number of its rows.
+        place: Those of this rank, which no other one has.
+        own: Their values.
+    """
+    found = np.zeros((size, *own.shape[1:]), own.dtype)
+    found[place] = own
+    return sum_of(comm, found)
 
 
 def same(comm: Any, value: Value) -> Value:

@@ -118,13 +118,13 @@ class Filling:
         """
         grid = self.grid
         material = np.zeros_like(full) if material is None else material
-        area = ranks.sum_of(grid.comm, np.array([len(full) + cut.weight.sum()]))[0]
+        area = ranks.total(grid.comm, len(full) + cut.weight.sum())
         with ranks.raise_together(grid.comm):
             key = cut.cell * max(len(names or ()), 1) + cut.material
             in_full = self.in_full_cells(full, material)
             in_cut, key = self._thinned(cut, key, ROUND_OFF * min(1.0, float(area)), allowed)
         parts = joined([in_full, in_cut])
-        if not ranks.any_of(grid.comm, np.array([len(parts.x) > 0]))[0]:
+        if not ranks.anywhere(grid.comm, len(parts.x) > 0):
             raise InputError("the body has no particles: expected a shape with an area")
         x, volume = grid.in_metres(parts.x), grid.space.measure(grid.h) * parts.weight
         number = None if names is None else parts.material.astype(np.uint32)

@@ -130,7 +130,7 @@ def level_set(
     index = grid.own_cells((0, 0), grid.cells)
     with ranks.raise_together(grid.comm):
         signs = sign.in_cells(index, samples)
-    if not ranks.any_of(grid.comm, np.array([(signs < 0).any()]))[0]:
+    if not ranks.anywhere(grid.comm, (signs < 0).any()):
         raise InputError(
             f"level_set: f is not negative at any of the {(nx + 1) * (ny + 1)} samples, "
             f"{grid.h / samples:g} m apart, so the body has no particles: expected f < 0 inside the "
@@ -138,7 +138,7 @@ def level_set(
         )
     _check_ends(grid, index, signs, [*ended, "left"] if grid.on_axis else ended)
     inside, squares = _along_border(grid, sign, index, signs, samples)
-    area = ranks.sum_of(grid.comm, np.array([np.count_nonzero(inside)]))[0] / samples**2
+    area = ranks.total(grid.comm, np.count_nonzero(inside)) / samples**2
     with ranks.raise_together(grid.comm):
         triangles, whole, pieces = triangulated(sign, squares, area, tolerance)
         ending = outline(grid, pieces, name, bool(sign(np.zeros((1, 2)))[0] < 0))

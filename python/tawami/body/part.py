@@ -45,7 +45,7 @@ class Part:
             first = total + ranks.offsets(grid.comm, cell, count)
             before = np.cumsum(count) - count
             number.append(np.repeat(first - before, count) + np.arange(count.sum()))
-            total += int(ranks.sum_of(grid.comm, np.array([count.sum()]))[0])
+            total += ranks.total(grid.comm, count.sum())
         return cls(grid, np.concatenate(number), total)
 
     @classmethod
@@ -70,7 +70,7 @@ class Part:
         """The part of a body that keeps only some of its particles; a collective call."""
         number = self.number[mask]
         one = np.ones(len(number), dtype=np.int64)
-        total = int(ranks.sum_of(self.grid.comm, np.array([len(number)]))[0])
+        total = ranks.total(self.grid.comm, len(number))
         return Part(self.grid, ranks.offsets(self.grid.comm, number, one), total)
 
     def followed_by(self, other: Part) -> Part:

@@ -86,7 +86,7 @@ class Attachment:
             moves = compiled.form.strain.finite
             full = None if moves else full_cells(grid, location, volume)
             self.sides = list(sides(window, self.active, full))
-        self.has_sides = bool(ranks.any_of(grid.comm, np.array([bool(self.sides)]))[0])
+        self.has_sides = ranks.anywhere(grid.comm, self.sides)
         weak = [
             name
             for name, place in self.layout.fields.items()

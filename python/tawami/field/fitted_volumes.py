@@ -95,7 +95,7 @@ def corrections(
     def dot(a: Array, b: Array) -> float:
         own = layout.own[: len(a)].reshape(-1, dim)[:, 0]
         mine = np.tile(own, dim)
-        return float(ranks.sum_of(grid.comm, np.array([a[mine] @ b[mine]]))[0])
+        return ranks.total(grid.comm, float(a[mine] @ b[mine]))
 
     at_border = border.sums(layout.functions, basis, area)
     b = np.concatenate([scale @ of_axis for of_axis in at_border.T])

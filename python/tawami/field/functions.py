@@ -100,9 +100,7 @@ class ActiveFunctions:
             return values
         count = math.prod(_rust.basis_len(basis, n) for n in self._grid.cells)
         own = np.flatnonzero(self.owner(basis) == comm.rank)
-        found = np.zeros((count, *values.shape[1:]), values.dtype)
-        found[self._window.in_grid(basis, own)] = values[own]
-        return ranks.sum_of(comm, found)
+        return ranks.scattered(comm, count, self._window.in_grid(basis, own), values[own])
 
     def support(self, basis: Basis, function: int) -> Indices:
         """Indices (i, j) in the grid of the active cells in a function's support, cells x axes."""
@@ -127,7 +125,7 @@ class ActiveFunctions:
             before = first.copy()
             first[cells] = least[part[cells]]
             window.of_cells.update(first)
-            changed = bool(ranks.any_of(comm, np.array([(first != before).any()]))[0])
+            changed = ranks.anywhere(comm, (first != before).any())
         roots = np.unique(ranks.allgathered(comm, np.unique(first[cells[window.own[cells]]])))
         numbered = np.full(len(part), -1, dtype=np.int64)
         numbered[cells] = np.searchsorted(roots, first[cells])

@@ -32,9 +32,7 @@ class Owned:
         """
         if self._number is None:
             return self._values
-        found = np.zeros(self._size)
-        found[self._number] = self._values
-        return ranks.sum_of(self._comm, found)
+        return ranks.scattered(self._comm, self._size, self._number, self._values)
 
     def at(self, number: Indices) -> Array:
         """Values of some coefficients, the same on every rank; a call for all ranks."""

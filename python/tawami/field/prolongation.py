@@ -16,6 +16,7 @@ import scipy.sparse as sp
 from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array, Indices
+from tawami.base.exchange import Exchange
 from tawami.base.petsc import aij
 from tawami.grid.basis import Basis, refinement
 
@@ -55,10 +56,10 @@ def prolongations(comm: Any, basis: Basis, components: int, level: Level) -> Ite
         components: Components of each function.
         level: The finest grid.
     """
-    size = _total(comm, len(level.unknowns))
+    size = ranks.total(comm, len(level.unknowns))
     while size > COARSEST and max(level.cells) > 1:
         step = _Step(comm, basis, components, level)
-        coarse = _total(comm, len(step.coarse.unknowns))
+        coarse = ranks.total(comm, len(step.coarse.unknowns))
         if coarse >= size:
             return
         yield step.matrix
@@ -68,10 +69,6 @@ def prolongations(comm: Any, basis: Basis, components: int, level: Level) -> Ite
 def coarser(cells: Sequence[int]) -> tuple[int, ...]:
     """Size of the next coarser grid."""
     return tuple((n + 1) // 2 for n in cells)
-
-
-def _total(comm: Any, count: int) -> int:
-    return int(ranks.sum_of(comm, np.array([count]))[0])
 
 
 class _Step:
@@ -92,9 +89,11 @@ class _Step:
         start = int(sum(comm.allgather(len(own))[: comm.rank]))
         number = np.full(len(reached), -1)
         number[mine] = np.arange(start, start + len(own))
-        self._ask(reached, own, start, number, owner)
+        Exchange.of(
+            comm, owner, lambda places: reached[places], lambda n: np.searchsorted(reached, n)
+        ).update(number)
         kept = used[column]
-        size = _total(comm, len(own))
+        size = ranks.total(comm, len(own))
         places = (rows[kept], number[column[kept]])
         part = sp.csr_matrix((values[kept], places), shape=(len(fine.unknowns), size))
         self.matrix = aij(comm, part, len(own))
@@ -147,18 +146,6 @@ class _Step:
         for matrix, index in zip(self._along, at, strict=True):
             total *= np.asarray(matrix.sum(axis=0)).ravel()[index]
         return total
-
-    def _ask(
-        self, reached: Indices, own: Indices, start: int, number: Indices, owner: Indices
-    ) -> None:
-        """Fill in the numbers of coarse unknowns that other ranks own."""
-        comm = self._comm
-        others = [np.flatnonzero(owner == rank) for rank in range(comm.size)]
-        others[comm.rank] = np.empty(0, dtype=np.int64)
-        wanted = comm.alltoall([reached[places] for places in others])
-        found = comm.alltoall([start + np.searchsorted(own, numbers) for numbers in wanted])
-        for places, numbers in zip(others, found, strict=True):
-            number[places] = numbers
 
     def _sent(self, numbers: Indices, values: Any = None) -> list[Any]:
         """Numbers, or values of them, that the ranks send to those that the numbers determine."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
@@ -43,7 +42,7 @@ class Sum:
         if not same or self._matrix is not matrix:
             rows = (reduction.of_grid if of_grid else reduction.of_window)(matrix)
             differs = not (same and same_places(self._rows, rows))
-            same = not ranks.any_of(self._comm, np.array([differs]))[0]
+            same = not ranks.anywhere(self._comm, differs)
             self._rows = rows
         if same:
             known["total"].zeroEntries()

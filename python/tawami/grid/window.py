@@ -111,10 +111,10 @@ class Window:
         """
         if self._comm.size == 1:
             return values
-        found = np.zeros((math.prod(self._whole), *values.shape[1:]), values.dtype)
         own = np.flatnonzero(self.own)
-        found[self.cells_in_grid(own)] = values[own]
-        return ranks.sum_of(self._comm, found)  # type: ignore[return-value]
+        size, place = math.prod(self._whole), self.cells_in_grid(own)
+        found = ranks.scattered(self._comm, size, place, values[own])
+        return found  # type: ignore[return-value]
 
     @functools.cached_property
     def own(self) -> Mask:

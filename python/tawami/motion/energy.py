@@ -140,7 +140,7 @@ class Balance:
 
     def sum(self, value: float) -> float:
         """A sum over the ranks."""
-        return float(ranks.sum_of(self._now.model.grid.comm, np.array([value]))[0])
+        return ranks.total(self._now.model.grid.comm, value)
 
     @property
     def kinetic(self) -> float:

@@ -141,13 +141,12 @@ class PathStep:
             size = following.sign * self.size
             return controls.PointControl(domain.layout, held.indices, held.weights, size)
         particles, comm, space = domain.particles, domain.model.grid.comm, domain.model.space
-        total = ranks.sum_of(comm, np.array([particles.volume.sum()]))[0]
+        total = ranks.total(comm, float(particles.volume.sum()))
         last = following.direction.at(particles.number)
 
         def product(a: Array, b: Array) -> float:
             """Mean over the volume of a . b, particles x dim; the same bits on all ranks."""
-            own = np.array([particles.volume @ np.sum(a * b, axis=1)])
-            return float(ranks.sum_of(comm, own)[0] / total)
+            return ranks.total(comm, float(particles.volume @ np.sum(a * b, axis=1))) / total
 
         def at_particles(u: Array) -> Array:
             return domain.at_particles(space.vectors(u))

@@ -66,7 +66,7 @@ class OfParticles:
         order = np.argsort(number, kind="stable")
         self.number, self.values = number[order], values[order]
         self._last: tuple[Indices, Array] | None = None
-        self._any = bool(ranks.any_of(comm, np.array([bool(np.any(values))]))[0])
+        self._any = ranks.anywhere(comm, np.any(values))
 
     def __bool__(self) -> bool:
         """Whether any value is not 0."""
@@ -76,7 +76,7 @@ class OfParticles:
         """The values of the particles with these numbers."""
         wanted = number.astype(np.int64)
         known = self._last is not None and np.array_equal(wanted, self._last[0])
-        if ranks.any_of(self._comm, np.array([not known]))[0]:
+        if ranks.anywhere(self._comm, not known):
             self._last = wanted, self._found(wanted)
         assert self._last is not None
         return self._last[1]

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy.typing as npt
 
+from tawami.base import ranks
 from tawami.particles import placement
 
 
@@ -26,7 +27,7 @@ class Gathered(Mapping[str, npt.NDArray[Any]]):
     @property
     def num_particles(self) -> int:
         """Number of particles of all ranks; a collective call."""
-        return int(self._comm.allreduce(len(self.own["number"])))
+        return ranks.total(self._comm, len(self.own["number"]))
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         if self._comm.size == 1:

@@ -168,7 +168,7 @@ def migrated(
         if comm.size == 1:
             return particles, grid.window.place(location)
         rank = grid.ranks_of(location.cell.astype(np.int64))
-        if not ranks.any_of(comm, np.array([(rank != comm.rank).any()]))[0]:
+        if not ranks.anywhere(comm, (rank != comm.rank).any()):
             return particles, grid.window.place(location)
         particles = particles.of_rows(ranks.exchanged(comm, particles.rows(), rank))
         particles = particles.select(np.argsort(particles.number).astype(np.uint32))
@@ -206,8 +206,7 @@ def leaving(
                 f"{x[p, 1]:g}) m, and {gone.sum() - 1} others with it: expected a grid that holds the "
                 "motion, or Scene(..., leaving='remove'). Nothing was changed"
             )
-    staying = ranks.sum_of(grid.comm, np.array([np.sum(~gone)]))
-    if not staying[0]:
+    if not ranks.anywhere(grid.comm, not gone.all()):
         raise InputError("the last particle would leave the grid, and no body would remain")
     return gone
 

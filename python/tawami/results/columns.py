@@ -7,10 +7,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from mpi4py import MPI
 
 from tawami import _rust
-from tawami.base import checks
+from tawami.base import checks, ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError, NotModelledError
 from tawami.base.text import meant
@@ -122,7 +121,7 @@ def _momentum(name: str, subject: Subject) -> Columns:
 def _farthest(scene: Scene) -> float:
     """The largest x of a particle [m]."""
     most = float(np.asarray(scene.particles.x)[:, 0].max(initial=-np.inf))
-    return float(scene.grid.comm.allreduce(most, op=MPI.MAX))
+    return ranks.largest(scene.grid.comm, most)
 
 
 def _present(scene: Scene) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from tawami.base import archive
 from tawami.base.errors import ConvergenceError, SingularError
 from tawami.base.files import result_folder
-from tawami.base.ranks import any_of, raise_together
+from tawami.base.ranks import any_of, anywhere, raise_together
 from tawami.base.signals import Interruption
 from tawami.motion.observer import Snapshot, Subject
 from tawami.motion.pace import Pace, Step, pack, unpack
@@ -231,7 +231,7 @@ class Phase:
 
     def _asked_to_stop(self) -> bool:
         """Whether a signal has arrived on any rank."""
-        return bool(any_of(self._comm, np.array([self._interruption.signal is not None]))[0])
+        return anywhere(self._comm, self._interruption.signal is not None)
 
     def _stop(self) -> None:
         """End the run on all ranks, as the signal would have."""

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from tawami.base import checks
 from tawami.motion.observer import Snapshot
-from tawami.results.frame import Frame, grid_frame, particle_frame
+from tawami.results.frame import grid_frame, particle_frame
 from tawami.results.grid_quantities import on_grid, usual_on_grid
 from tawami.results.vtu import write_vtu
 from tawami.scene.quantities import of_particles
@@ -32,7 +31,7 @@ def write_particles(path: str | Path, solution: Solution) -> None:
     names = ["displacement", "stress", "mean stress", "volume"]
     names += ["eps_v"] if scene.form.kinematics.has_eps_v else []
     frame = particle_frame(of_particles(names, scene), scene, solution.own)
-    _write(path, frame, scene.grid.comm)
+    write_vtu(path, frame, scene.grid.comm)
 
 
 def write_grid(path: str | Path, solution: Solution) -> None:
@@ -50,8 +49,4 @@ def write_grid(path: str | Path, solution: Solution) -> None:
     scene = solution.scene
     snapshot = Snapshot(scene, solution, 0.0, 0, last=True)
     frame = grid_frame(on_grid(usual_on_grid(scene), scene), snapshot)
-    _write(path, frame, scene.grid.comm)
-
-
-def _write(path: str | Path, frame: Frame, comm: Any) -> None:
-    write_vtu(path, frame, comm)
+    write_vtu(path, frame, scene.grid.comm)

@@ -102,7 +102,7 @@ class Construction:
 
 
 def _check_any(now: Configuration, what: str, mask: Mask) -> None:
-    if not ranks.any_of(now.model.grid.comm, np.array([mask.any()]))[0]:
+    if not ranks.anywhere(now.model.grid.comm, mask.any()):
         raise InputError(
             f"{what}: the particles have left the body already (scene.left): expected particles that "
             "are in it"
@@ -114,7 +114,7 @@ def _remove(now: Configuration, mask: Mask) -> Removed:
     model, before = now.model, now.domain
     comm, particles = model.grid.comm, before.particles
     _check_any(now, "remove(...)", mask)
-    if not ranks.any_of(comm, np.array([not mask.all()]))[0]:
+    if not ranks.anywhere(comm, not mask.all()):
         raise InputError("remove(...) of all particles: expected some that remain")
     moving = "velocity" in dict(particles.arrays)
     velocity = particles.carried("velocity")[mask] if moving else np.zeros((0, model.space.dim))

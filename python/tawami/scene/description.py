@@ -44,13 +44,13 @@ def lines(now: Configuration, motion: str = "") -> dict[str, str]:
 def _grid(now: Configuration) -> str:
     domain, grid = now.domain, now.model.grid
     filled = int(np.count_nonzero(domain.active.ravel() & grid.window.own))
-    filled = int(ranks.sum_of(grid.comm, np.array([filled]))[0])
+    filled = ranks.total(grid.comm, filled)
     return f"{now.model.grid.line}, {filled} with particles; basis {now.model.basis}"
 
 
 def _particles(now: Configuration) -> str:
     particles = now.domain.particles
-    number = int(ranks.sum_of(now.model.grid.comm, np.array([len(particles)]))[0])
+    number = ranks.total(now.model.grid.comm, len(particles))
     each = particles.bytes_per_particle
     arrays = ", ".join(f"{name} {width}" for name, width in particles.arrays)
     gone = f" ({len(now.left)} have left)" if now.left else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from tawami.base.arrays import Array
 from tawami.body import rings
 from tawami.body.within import within
+from tawami.field.prolongation import coarser
 from tawami.grid.grid import Grid
 from tawami.scene.configuration import Configuration
 from tawami.scene.goal import Goal
@@ -54,10 +56,7 @@ class DualSolutions:
         coefficients: Array,
     ) -> None:
         grid = model.grid
-        double = Grid(
-            grid.comm, origin=grid.origin, h=grid.h / 2, cells=[2 * n for n in grid.cells],
-            geometry=grid.geometry,
-        )  # fmt: skip
+        double = _with_cells(grid, grid.h / 2, [2 * n for n in grid.cells])
         half = Level(now, replace(model, grid=double), _exact(double, model, particles))
         body = _exact(grid, model, particles)
         whole = Level(now, model, body)
@@ -72,11 +71,7 @@ class DualSolutions:
         self.z = whole.dual(weights_here, coefficients)
         self.residual = up.T @ residual
         self.of_grid = -residual * (fine - up @ self.z)
-        # cells of 2h
-        cells = [(n + 1) // 2 for n in grid.cells]  # they may reach beyond the grid
-        large = Grid(
-            grid.comm, origin=grid.origin, h=2 * grid.h, cells=cells, geometry=grid.geometry
-        )
+        large = _with_cells(grid, 2 * grid.h, coarser(grid.cells))  # may reach beyond the grid
         twice, down = Level(now, replace(model, grid=large), body), prolongation(self.coarse)
         state = twice.nearest(self.coarse, down, coefficients)
         z = twice.dual(down.T @ weights_here, state)
@@ -89,6 +84,11 @@ class DualSolutions:
         used = min(max(ratio, SLOWEST), FASTEST) if ratio > IRREGULAR else SMOOTH
         self.order = float(np.log2(ratio)) if ratio > 0 else np.nan
         self.of_grid *= used / (used - 1)
+
+
+def _with_cells(grid: Grid, h: float, cells: Sequence[int]) -> Grid:
+    """The grid with other cells, from the same corner on."""
+    return Grid(grid.comm, origin=grid.origin, h=h, cells=cells, geometry=grid.geometry)
 
 
 def _exact(grid: Grid, model: Model, particles: Points) -> Points:

@@ -36,7 +36,7 @@ def check(now: Configuration, coefficients: Array, load: float) -> None:
             f"error(...) with basis = '{model.basis}': expected 'quadratic_spline', for which loads on "
             "the border are integrated on cells of h/2"
         )
-    if now.model.grid.comm.size > 1:
+    if model.grid.comm.size > 1:
         raise NotModelledError("error(...) on several ranks: expected one rank")
     if not np.array_equal(now.total, coefficients):
         raise InputError(

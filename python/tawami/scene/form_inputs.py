@@ -63,7 +63,7 @@ class FormInputs:
             InputError: It has a term that is infinite.
         """
         bulk = domain.responses.constants["K"]
-        infinite = ranks.any_of(domain.model.grid.comm, np.array([np.isinf(bulk).any()]))[0]
+        infinite = ranks.anywhere(domain.model.grid.comm, np.isinf(bulk).any())
         if infinite and not np.isfinite(domain.newton.internal(np.zeros(domain.layout.size))).all():
             mine = domain.particles.number[np.isinf(bulk)]
             which = f"particle {mine[0]}" if len(mine) else "a particle of another rank"

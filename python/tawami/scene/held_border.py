@@ -54,9 +54,11 @@ class HeldBorder:
         chosen: Mask | None = None,
     ) -> None:
         assert isinstance(support.place, MovingPoints)
-        self._support, self._domain = support, domain
+        #: The support.
+        self.support = support
+        self._place, self._domain = support.place, domain
         self._weak = weak = np.flatnonzero(support.weak if chosen is None else chosen)
-        place, fields, h = support.place, domain.layout.of_grid, domain.model.grid.h
+        place, fields, h = self._place, domain.layout.of_grid, domain.model.grid.h
         field = fields[str(support.component)] if support.is_field else next(iter(fields.values()))
         cells = place.cells(domain)
         numbers, functions, _ = cells.tabulated(field.basis)
@@ -74,7 +76,7 @@ class HeldBorder:
         )
         #: Prescribed values at its points, and their means over the patches.
         self.values = values[weak]
-        self._target = self._groups.means(self._weights, self.values)
+        self.prescribed_means = self._groups.means(self._weights, self.values)
         self.prescribed = float(np.abs(self.values).max(initial=0.0))
         areas = self._groups.sums(self._weights)
         #: Derivative of the residual by all coefficients.
@@ -86,8 +88,7 @@ class HeldBorder:
 
     def _check_bent(self) -> None:
         """Warn, once, of a border whose points have moved far from the means of their patches."""
-        support, place = self._support, self._support.place
-        assert isinstance(place, MovingPoints)
+        support, place = self.support, self._place
         if support.told or not isinstance(support.component, int) or not support.is_uniform:
             return
         moved = (place.x - place.made.x)[self._weak, support.component]
@@ -109,24 +110,17 @@ class HeldBorder:
     @property
     def x(self) -> Array:
         """Positions of its points [m], points x dim."""
-        assert isinstance(self._support.place, MovingPoints)
-        return np.asarray(self._support.place.x[self._weak])
+        return np.asarray(self._place.x[self._weak])
 
     @property
     def length(self) -> Array:
         """Length of the border at each of its points [m]."""
-        assert isinstance(self._support.place, MovingPoints)
-        return np.asarray(self._support.place.length[self._weak])
-
-    @property
-    def support(self) -> Support:
-        """The support."""
-        return self._support
+        return np.asarray(self._place.length[self._weak])
 
     def forces(self, coefficients: Array) -> Array:
         """See `Term`."""
         self._last = self._before + coefficients
-        self._error = self.means @ self._last - self._target
+        self._error = self.means @ self._last - self.prescribed_means
         self.on_body = np.asarray(-(self.gradient.T @ self._tractions))
         return self.on_body
 
@@ -149,7 +143,7 @@ class HeldBorder:
     def measure(self) -> float:
         """Largest error, relative to the displacement of the functions that reach the border."""
         error = float(np.abs(self._error).max(initial=0.0))
-        least = 0.0 if self._support.is_field else ROUND_OFF * self._domain.model.grid.h
+        least = 0.0 if self.support.is_field else ROUND_OFF * self._domain.model.grid.h
         if error <= max(ALIKE * np.abs(self._last[self._field]).max(initial=0.0), least):
             return 0.0
         near = np.abs(self._last[self._places]).max(initial=0.0)
@@ -181,7 +175,7 @@ class HeldBorder:
     @property
     def unsettled(self) -> str:
         """See `Term`."""
-        error, support = np.abs(self._error).max(), self._support
+        error, support = np.abs(self._error).max(), self.support
         return (
             f"{support}: its part of the border stays {error:.3g} {support.unit} away from the "
             f"prescribed values of '{support.axis}': other supports hold it, or the body cannot deform "
@@ -190,13 +184,12 @@ class HeldBorder:
 
     def accept(self) -> None:
         """Keep the tractions for later steps."""
-        self._support.held[self._weak] = self._tractions[self._groups.number]
+        self.support.held[self._weak] = self._tractions[self._groups.number]
 
     @property
     def resultants(self) -> dict[str, Array]:
         """Force on the body at each part of the border that the support covers [N per metre depth]."""
-        assert isinstance(self._support.place, MovingPoints)
-        made, resultant = self._support.place.made, self._domain.model.space.resultant
+        made, resultant = self._place.made, self._domain.model.space.resultant
         tractions = -(self._weights * self._tractions[self._groups.number])[:, None]
         on_points = tractions * self._directions
         tags = made.tag[self._weak]
@@ -206,14 +199,9 @@ class HeldBorder:
         }
 
     @property
-    def prescribed_means(self) -> Array:
-        """Mean of the prescribed values over each patch."""
-        return self._target
-
-    @property
     def rows(self) -> list[PointHeld]:
         """The means of the patches as multi-point constraints, to find rigid motions."""
-        if self._support.is_field:
+        if self.support.is_field:
             return []
         first = np.unique(self._groups.number, return_index=True)[1]
         parts = np.split(np.arange(self.means.nnz), self.means.indptr[1:-1])
@@ -222,7 +210,7 @@ class HeldBorder:
                 self.means.indices[mine].astype(np.int64),
                 self.means.data[mine],
                 0.0,
-                f"{self._support}",
+                f"{self.support}",
                 (float(x[0]), float(x[1])),
             )
             for mine, x in zip(parts, self.x[first], strict=True)

@@ -67,7 +67,7 @@ def in_order(domain: Domain, what: str, where: Where) -> tuple[Indices, bool]:
 
 
 def _check_any(comm: Any, what: str, found: bool) -> None:
-    if not ranks.any_of(comm, np.array([found]))[0]:
+    if not ranks.anywhere(comm, found):
         raise InputError(f"{what}: no particle was chosen: expected at least one")
 
 

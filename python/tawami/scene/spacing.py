@@ -47,6 +47,10 @@ def spacings(f: Array, size: Array) -> Array:
 def warned(domain: Domain) -> bool:
     """Warn of particles that are too far apart; whether it did. A call for all ranks."""
     model, particles = domain.model, domain.particles
+    # where a material flows, particles pass each other, and F does not give their distances
+    is_solid = np.array([not one.history_names for one in model.materials])
+    if not is_solid.any():
+        return False
     h, dim = model.grid.h, model.space.dim
     gradient = particles.displacement_gradient
     most = ranks.largest(model.grid.comm, float(np.abs(gradient).max(initial=0.0)))
@@ -58,9 +62,7 @@ def warned(domain: Domain) -> bool:
     f = gradient[:, :dim, :dim] + np.eye(dim)
     sizes, volume = np.sqrt(areas) / h, particles.volume
     found = spacings(f, sizes)
-    # where a material flows, particles pass each other, and F does not give their distances
-    solid = np.array([not one.history_names for one in model.materials])[particles.material]
-    far = solid & (found > GROWN * sizes) & (found > LIMIT)
+    far = is_solid[particles.material] & (found > GROWN * sizes) & (found > LIMIT)
     sums = np.array([volume[far].sum(), volume.sum()])
     apart, whole = ranks.sum_of(model.grid.comm, sums)
     farthest, growth = (

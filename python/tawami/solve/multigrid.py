@@ -288,8 +288,7 @@ class MultigridSolver(LinearSolver):
         coupling: Any = -1.0  # of the volume, by its scaling
         if not part.volume:
             coupling = part.share * coupling_of(matrix, place, of_u)
-        total = np.array([np.sum(coupling)])
-        sign = float(np.sign(ranks.sum_of(matrix.comm.tompi4py(), total)[0]))
+        sign = float(np.sign(ranks.total(matrix.comm.tompi4py(), float(np.sum(coupling)))))
         size = np.maximum(diagonal_of(part.mass), np.finfo(float).tiny)
         scale(part.mass, np.sqrt(0.5 * np.abs(coupling) / size))
         part.mass.scale(sign)

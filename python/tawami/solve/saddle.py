@@ -67,7 +67,7 @@ class Saddle:
         self.count = gradients.shape[0]
         rows = reduction.of_constraints(gradients)
         same = self._tangent is tangent and same_places(self._rows, rows)
-        same = not ranks.any_of(self._comm, np.array([not same]))[0]
+        same = not ranks.anywhere(self._comm, not same)
         self._rows, self._tangent = rows, tangent
         stiffness = np.abs(diagonal_of(tangent))
         largest = ranks.largest(self._comm, float(stiffness.max(initial=0.0)))
