@@ -32,19 +32,17 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Set that solver; where multigrid stalls, the factorisation takes over."""
-    name = config.getoption("--linear-solver")
-    if name is not None:
-        tawami.Scene.__init__.__kwdefaults__["linear_solver"] = name
+    """Where multigrid stalls, the factorisation takes over."""
+    if config.getoption("--linear-solver") is not None:
         config.addinivalue_line("filterwarnings", "default::tawami.SolverWarning")
 
 
-@pytest.fixture(autouse=True)
-def _own_solver(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The solver by default, in tests of that solver."""
-    if request.node.get_closest_marker("direct"):
-        defaults = tawami.Scene.__init__.__kwdefaults__
-        monkeypatch.setitem(defaults, "linear_solver", "auto")
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Set that solver before the fixtures are made, and the one by default in tests of it."""
+    named = item.config.getoption("--linear-solver") or "auto"
+    own = item.get_closest_marker("direct") is not None
+    tawami.Scene.__init__.__kwdefaults__["linear_solver"] = "auto" if own else named
 
 
 @pytest.fixture(params=scenes.FORMS)

@@ -34,6 +34,7 @@ def test_the_closed_form_obeys_the_virial_theorem():
         )
 
 
+@pytest.mark.direct  # round-off
 @pytest.mark.parametrize(
     ("kind", "nu"),
     [

@@ -35,6 +35,7 @@ def record(motion, end, dt, *more):
     return np.array(rows)
 
 
+@pytest.mark.direct  # a gain of round-off
 def test_a_bouncing_block_never_gains_energy():
     scene = scene_of((0.23, 0.32), (0.73, 0.82))
     scene.gravity((0.0, -G))

@@ -70,6 +70,7 @@ def scene_with(material, form="u_epsv", **options):
     return scene
 
 
+@pytest.mark.direct  # agreement beyond the tolerance of an iteration that is not the last
 @pytest.mark.parametrize("form", ["u", "u_bbar", "u_epsv", "u_p"])
 def test_linear_elasticity_in_numpy_agrees_with_rust(form):
     scenes = [

@@ -13,7 +13,7 @@ from programs import on_ranks
 
 from tawami.results import plot
 
-pytestmark = pytest.mark.mpi
+pytestmark = [pytest.mark.mpi, pytest.mark.direct]  # the ranks have the solver by default
 
 
 @pytest.fixture(scope="module")

@@ -84,6 +84,7 @@ def test_a_forked_process_raises_an_error():
     assert "get_context('spawn')" in said
 
 
+@pytest.mark.direct  # the process has the solver by default
 def test_a_spawned_process_computes():
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         assert pool.map_async(outcome, [0]).get(120) == [deflection()]

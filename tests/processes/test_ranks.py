@@ -14,7 +14,7 @@ import on_ranks
 import pytest
 from programs import on_ranks as start
 
-pytestmark = pytest.mark.mpi
+pytestmark = [pytest.mark.mpi, pytest.mark.direct]  # the ranks have the solver by default
 #: Three ranks share no number of cells evenly, and one of them has none of two cells.
 NUMBERS = (3, *(pytest.param(number, marks=pytest.mark.slow) for number in (2, 4)))
 

@@ -120,6 +120,7 @@ def test_a_full_disk_raises_an_error_and_leaves_complete_files(output, room, tmp
 
 
 @pytest.mark.mpi
+@pytest.mark.direct  # the ranks have the solver by default
 def test_several_ranks_write_the_same_files_once(tmp_path):
     one, two = (tmp_path / "1", tmp_path / "2")
     write_everything(one)

@@ -46,6 +46,7 @@ def finished(folder):
     return run(folder, end=0.3, checkpoint_steps=5)[0].scene.particles.rows()
 
 
+@pytest.mark.direct  # the processes have the solver by default
 @pytest.mark.parametrize(
     ("sent", "code"), [(signal.SIGKILL, -9), (signal.SIGTERM, 143), (signal.SIGINT, -2)]
 )
@@ -84,6 +85,7 @@ def test_a_signal_while_the_last_checkpoint_is_written_is_not_lost(tmp_path, mon
 
 
 @pytest.mark.mpi
+@pytest.mark.direct  # the ranks have the solver by default
 def test_a_run_resumes_on_another_number_of_ranks(tmp_path, driver):
     """Begun on one rank, resumed on two and on three, where SIGTERM stops it, and finished on one."""
     whole = finished(tmp_path / "whole")

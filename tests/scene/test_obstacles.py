@@ -91,6 +91,7 @@ def test_friction_of_cattaneo_and_mindlin():
     assert pressed.solution.iterations <= 10
 
 
+@pytest.mark.direct  # the iterations that just fail
 @pytest.mark.filterwarnings("ignore::tawami.base.errors.SmallStrainWarning")
 def test_a_drag_that_does_not_converge_at_once_does_in_the_steps_of_the_message():
     setting = ("u_epsv", "disc", 1.0, 0.3, 0.25, 0.03, 0.03)

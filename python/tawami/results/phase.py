@@ -111,7 +111,10 @@ class Phase:
         """Resume the phase from its newest checkpoint, or begin it."""
         self._pace, self._steps, self._largest = pace, steps, pace.size
         self.subject.scene.configuration.domain.newton.record()
-        like = {"scene": self.subject.state()} if self._checkpoints.resumes else {}
+        # a factorisation may be there or not, and is checked where it is used
+        like = (
+            {"scene": self.subject.state() | {"newton": None}} if self._checkpoints.resumes else {}
+        )
         state = self._checkpoints.newest(like | self._progress_state())
         if state is not None:
             with self._checkpoints.using():

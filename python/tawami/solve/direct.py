@@ -257,18 +257,6 @@ class DirectSolver(LinearSolver):
         x.setArray(vector)
         return float(x.norm())
 
-    def _is_symmetric(self, matrix: Any, probe: Array) -> bool:
-        """Whether a matrix is symmetric, by its products with a random vector."""
-        x, y = (self._handles[name] for name in ("x", "b"))
-        x.setArray(probe)
-        matrix.mult(x, y)
-        forward = y.copy()
-        matrix.multTranspose(x, y)
-        size = forward.norm()
-        y.axpy(-1.0, forward)
-        forward.destroy()
-        return bool(y.norm() <= 1e-12 * size)
-
 
 class _Pays:
     """Test of convergence that also stops FGMRES when a factorisation costs less than the rest.

@@ -135,6 +135,18 @@ class LinearSolver:
             vector.setArray(factors)
             matrix.diagonalScale(vector, vector)
 
+    def _is_symmetric(self, matrix: Any, probe: Array) -> bool:
+        """Whether a matrix is symmetric, by its products with a random vector."""
+        x, y = (self._handles[name] for name in ("x", "b"))
+        x.setArray(probe)
+        matrix.mult(x, y)
+        forward = y.copy()
+        matrix.multTranspose(x, y)
+        size = forward.norm()
+        y.axpy(-1.0, forward)
+        forward.destroy()
+        return bool(y.norm() <= 1e-12 * size)
+
     def _krylov(self, right: Array, tolerance: float, limit: int) -> bool:
         """Solve the scaled system by `ksp`, into the vector x; False if it does not converge."""
         ksp, x, b = (self._handles[name] for name in ("ksp", "x", "b"))

@@ -77,7 +77,7 @@ class MultigridSolver(LinearSolver):
 
     def __init__(self, comm: Any, stopwatch: Stopwatch, cells: tuple[int, ...]) -> None:
         super().__init__(comm, stopwatch)
-        self._cells, self.symmetric = cells, False  # GMRES makes no use of it
+        self._cells = cells
         self._tested, self._matrix = False, None
         self.first = self._digits = 0.0
         self.made = False
@@ -138,6 +138,8 @@ class MultigridSolver(LinearSolver):
             else:
                 self._refresh(matrix)
             self._handles["ksp"].setOperators(matrix, self._handles["parts"])
+            if self.made:
+                self.symmetric = self._is_symmetric(matrix, self._probe(matrix))
         try:
             with self._stopwatch("solve"):
                 if not self._tested:

@@ -18,6 +18,10 @@ from tawami.solve.operators import Operators
 from tawami.solve.saddle import Saddle
 from tawami.solve.scaling import Scaling
 
+#: Tolerance of a system with constraints, relative to one without: their errors are most of its
+#: right-hand side.
+CONSTRAINED = 1e-2
+
 
 class Tangents:
     """Makes the linear systems of one scene. Their matrices, and what solvers keep for them, serve later
@@ -65,6 +69,7 @@ class Tangents:
             matrix = saddle.of(tangent, gradients, reduction)
             of_unknowns = scale
             scale = lambda: saddle.factors(of_unknowns())  # noqa: E731
+            tolerance *= CONSTRAINED
         parts = functools.partial(self._operators.parts, equations)
         right = -self.right(equations, residual, errors)
         return System(matrix, scale, right, tolerance, parts)
