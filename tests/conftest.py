@@ -32,7 +32,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Where multigrid stalls, the factorisation takes over."""
+    """Let the factorisation take over where multigrid stalls."""
     if config.getoption("--linear-solver") is not None:
         config.addinivalue_line("filterwarnings", "default::tawami.SolverWarning")
 
