@@ -52,6 +52,17 @@ def test_a_bouncing_block_never_gains_energy():
     assert abs(motion.energies.integration) < 1e-6 * most
 
 
+@pytest.mark.parametrize("dt", [1e-3, 1e-5])
+def test_an_impact_converges_in_short_steps(dt):
+    """The inertia in a step, 2 rho h / dt^2, may be far stiffer than the body."""
+    scene = scene_of((0.23, 0.3), (0.53, 0.6), cells=(8, 8))
+    wall = scene.obstacle(tawami.half_plane((0.0, 0.3), FLOOR))
+    motion = tawami.Dynamics(scene, velocity=(0.0, -1.0))
+    solution = motion.step(dt)
+    assert solution.iterations <= 6
+    assert solution.contact(wall).penetration < 1e-5 * dt
+
+
 @pytest.mark.slow
 def test_contact_never_gives_energy_to_a_block_at_finite_strain():
     scene = scene_of((0.23, 0.32), (0.73, 0.82), "u_epsv_finite", E=1e6)

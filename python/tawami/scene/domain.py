@@ -37,8 +37,6 @@ ASSEMBLIES: dict[str, type[PointAssembly | ReferenceAssembly]] = {
 }
 #: Share of a cell that a form which needs whole cells takes for a whole one.
 WHOLE = 0.5
-#: K/mu that an incompressible material counts with.
-INCOMPRESSIBLE = 1e4
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,28 +136,32 @@ class Domain:
         mask: npt.NDArray[np.bool_] = self.model.without_history[self.particles.material]
         return mask
 
-    def moduli_at(self, cells: BorderInCells) -> tuple[Array, Array]:
-        """Mean K and mu of the particles in the cells of points [Pa]; a call for all ranks.
+    def resistance_at(self, cells: BorderInCells, slope: float) -> Array:
+        """Mean of mu + rho h^2 slope of the particles in the cells of points [Pa]; a call for all ranks.
 
-        An incompressible material counts with a K that is not infinite.
+        It is the stiffness of a cell with its inertia, if accelerations are slope times displacements.
+
+        Args:
+            cells: The points in the cells of the grid.
+            slope: [1/s2]; 0 in statics.
         """
         found = np.zeros((2, len(cells)))
-        found[:, cells.own] = [of[cells.here[cells.own]] for of in self._moduli_of_cells]
-        K, mu = ranks.sum_of(self.model.grid.comm, found)
-        return K, mu
+        found[:, cells.own] = [of[cells.here[cells.own]] for of in self._means_of_cells]
+        mu, rho = ranks.sum_of(self.model.grid.comm, found)
+        return np.asarray(mu + rho * self.model.grid.h**2 * slope)
 
     @functools.cached_property
-    def _moduli_of_cells(self) -> tuple[Array, Array]:
-        """Mean K and mu of the particles in each cell of this rank [Pa], 0 without any."""
-        bulk, shear = self.constants["K"], self.constants["mu"]
-        bulk = np.where(np.isfinite(bulk), bulk, INCOMPRESSIBLE * shear)
-        columns = np.column_stack([np.ones(len(self.particles)), bulk, shear])
+    def _means_of_cells(self) -> tuple[Array, Array]:
+        """Mean mu [Pa] and density [kg/m3] of the particles in each cell of this rank, 0 without any."""
+        density, of = self.model.density, self.particles.material
+        rho = np.zeros(len(of)) if density is None else density[of]
+        columns = np.column_stack([np.ones(len(of)), self.constants["mu"], rho])
         sums = _rust.cell_sums(self.location, self.particles.volume, columns)
         volume, *weighted = sums.T
-        K, mu = (
+        mu, rho = (
             np.divide(one, volume, out=np.zeros_like(volume), where=volume > 0) for one in weighted
         )
-        return K, mu
+        return mu, rho
 
     @property
     def areas(self) -> Array:

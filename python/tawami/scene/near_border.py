@@ -13,7 +13,8 @@ from tawami.border.shapes import Shape
 from tawami.scene.domain import Domain
 from tawami.scene.moving_points import MovingPoints
 
-#: Penalty of a patch per cell, in shear moduli.
+#: Penalty of a patch per cell, in stiffnesses of a cell. Without inertia, shorter steps would need more
+#: passes.
 PENALTY = 200.0
 #: Lengths of patches that stay, unless they were made so [cells].
 SHORTEST, LONGEST = 0.7, 2.2
@@ -28,6 +29,8 @@ class BorderNear:
         shape: Shape of the obstacle.
         pose: Pose of the obstacle at the start.
         before: Displacement coefficients since the start where particles do not move, else 0.
+        slope: Derivative of the accelerations by the displacements, over the factor of contact forces
+            [1/s2]; 0 in statics.
         groups: Patches of the last step, which stay while they have about the size of a cell: other
             patches would have other distances.
 
@@ -56,6 +59,7 @@ class BorderNear:
         shape: Shape,
         pose: Pose,
         before: Array,
+        slope: float,
         groups: Patches | None = None,
     ) -> None:
         self.h, self._dim = domain.model.grid.h, domain.model.space.dim
@@ -68,8 +72,8 @@ class BorderNear:
         self.groups = self._grouped(place, groups)
         weight = place.weight
         self.weights = np.maximum(weight, 1e-12 * weight.max())  # 0 on an axis of symmetry
-        shear = domain.moduli_at(cells)[1]
-        penalty = PENALTY / self.h * self.groups.means(self.weights, shear)
+        resistance = domain.resistance_at(cells, slope)
+        penalty = PENALTY / self.h * self.groups.means(self.weights, resistance)
         # no particle is near a patch that its body has lost
         self.penalty = np.maximum(penalty, np.finfo(float).tiny)
         self.distance = shape.evaluate(self.start).distance

@@ -1,8 +1,9 @@
 """Contact of the border with one obstacle in one step (`tawami.solve.terms`).
 
-Pressure and friction act on means over patches (`tawami.border.contact`) with a penalty of 200 mu/h, in
-passes with better multipliers until penetration and slip of sticking patches are below 1e-3 of those of
-the penalty alone: below 5e-6 h times the largest pressure over mu.
+Pressure and friction act on means over patches (`tawami.border.contact`) with a penalty of 200 times
+the stiffness of a cell, mu/h + 2 rho h/dt^2, in passes with better multipliers until penetration and
+slip of sticking patches are below 1e-3 of those of the penalty alone: in statics below 5e-6 h times the
+largest pressure over mu.
 """
 
 from __future__ import annotations
@@ -56,8 +57,9 @@ class ObstacleContact:
         self.obstacle, self.motion = obstacle, motion
         self._dim = domain.model.space.dim
         self._border = BorderNear(
-            domain, obstacle.place, obstacle.shape, motion.start, before, obstacle.groups
-        )
+            domain, obstacle.place, obstacle.shape, motion.start, before,
+            motion.slope / motion.factor, obstacle.groups,
+        )  # fmt: skip
         groups, weights = self._border.groups, self._border.weights
         self._pressure = groups.means(weights, obstacle.pressure)
         self._traction = groups.means(weights, obstacle.traction)

@@ -100,6 +100,11 @@ class ObstacleMotion:
         return 1.0 if self.times is None else self.times.factor
 
     @property
+    def slope(self) -> float:
+        """Derivative of accelerations by displacements [1/s2]; 0 in statics."""
+        return 0.0 if self.times is None else self.times.slope
+
+    @property
     def pose(self) -> Pose:
         """Present pose."""
         return self.start.moved(self.unknown)
@@ -135,14 +140,12 @@ class ObstacleMotion:
     @property
     def round_off(self) -> Array:
         """Forces on the free motions below which their inertia has no digits."""
-        slope = 0.0 if self.times is None else self.times.slope
-        return np.asarray(DIGITS * slope * self.mass * np.abs(self.unknown))[self.free]
+        return np.asarray(DIGITS * self.slope * self.mass * np.abs(self.unknown))[self.free]
 
     @property
     def stiffness(self) -> Array:
         """Derivative of the residual by the free motions without contact."""
-        slope = 0.0 if self.times is None else self.times.slope
-        return np.diag(slope * self.mass[self.free])
+        return np.diag(self.slope * self.mass[self.free])
 
     def rates_at_end(self, at_start: Array, at_end: Array) -> tuple[Array, Array]:
         """Velocity and acceleration at the end of the step; statics keeps those at its start.
