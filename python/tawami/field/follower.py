@@ -28,8 +28,8 @@ class FollowerPressure:
         rate: Pressure per load factor of a path [Pa].
     """
 
-    #: It prescribes no displacement, has one tangent everywhere, and is no contact.
-    prescribed, smooth, implicit, unsettled = 0.0, True, False, ""
+    #: It prescribes no displacement.
+    prescribed = 0.0
 
     def __init__(
         self,
@@ -48,10 +48,6 @@ class FollowerPressure:
     def load(self, share: float) -> None:
         """Add a share of the loads of a path to the pressure at the start of the step."""
         self._pressure = self._start + share * self._rate
-
-    def improve(self) -> bool:
-        """See `Term`: there are no multipliers."""
-        return False
 
     def accept(self) -> None:
         """See `Term`: there is nothing to keep."""

@@ -167,8 +167,10 @@ class Configuration:
             obstacles: Contact with obstacles.
             ends: Load factors 0 and 1 of a path.
         """
-        found: list[Term] = [*self.loads.following(self.domain, now, ends), *supports, *obstacles]
-        return Terms(found, self.domain.layout, supports, obstacles) if found else None
+        found: list[Term] = [*self.loads.following(self.domain, now, ends), *supports]
+        if not found and not obstacles:
+            return None
+        return Terms(found, self.domain.layout, supports, obstacles)
 
     def external(self, now: Moment | None = None) -> Array:
         """External forces on all coefficients [N per metre depth], under all loads by default."""

@@ -43,7 +43,7 @@ class HeldBorder:
         chosen: Mask of the points that it holds; by default all that it holds by tractions.
     """
 
-    smooth, implicit, first_work = True, False, 0.0
+    first_work = 0.0
 
     def __init__(
         self,
@@ -168,13 +168,9 @@ class HeldBorder:
         """Work of the errors on the last change; the energy is largest in the tractions."""
         return -float(self._change @ self.residual)
 
-    def improve(self) -> bool:
-        """See `Term`: there is nothing to improve."""
-        return False
-
     @property
     def unsettled(self) -> str:
-        """See `Term`."""
+        """See `Tie`."""
         error, support = np.abs(self._error).max(), self.support
         return (
             f"{support}: its part of the border stays {error:.3g} {support.unit} away from the "

@@ -6,10 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.linalg import lsmr
 
 from tawami.base.arrays import Array, Mask
 from tawami.field.layout import Layout
 from tawami.scene.held_border import HeldBorder
+
+#: Relative tolerance of least squares.
+DIGITS = 1e-12
 
 
 class Impulses:
@@ -38,7 +42,10 @@ class Impulses:
         self._loose = (mass > 0) & ~fixed
         inverse = np.divide(1.0, mass, out=np.zeros(n), where=self._loose)
         self._weighted = (sp.diags(inverse) @ self._means.T).tocsr()
-        self._inverse = _inverse(self._means @ self._weighted)
+        matrix = (self._means @ self._weighted).toarray()
+        # patches that others hold too have no forces
+        least = len(matrix) * np.finfo(float).eps
+        self._inverse = np.linalg.pinv(matrix, rcond=least, hermitian=True)
 
     def imposed(self, rates: Sequence[Array], values: Array) -> Array:
         """Velocities after the impulses.
@@ -65,11 +72,5 @@ class Impulses:
         if not self._chosen:
             return 0.0
         whole, loose = self._layout.whole, self._means @ sp.diags(self._loose.astype(float))
-        multipliers = _inverse(loose @ loose.T) @ (loose @ whole(forces))
+        multipliers = lsmr(loose.T, whole(forces), atol=DIGITS, btol=DIGITS)[0]
         return float(multipliers @ (self._means @ whole(u)))
-
-
-def _inverse(matrix: sp.spmatrix) -> Array:
-    """Pseudo-inverse of a symmetric matrix: patches that others hold too have no forces."""
-    dense = matrix.toarray()
-    return np.asarray(np.linalg.pinv(dense, rcond=len(dense) * np.finfo(float).eps, hermitian=True))

@@ -49,7 +49,7 @@ class ObstacleContact:
             else 0.
     """
 
-    smooth, implicit, first_work = False, True, 0.0
+    first_work = 0.0
 
     def __init__(
         self, domain: Domain, obstacle: Obstacle, motion: ObstacleMotion, before: Array
@@ -163,7 +163,7 @@ class ObstacleContact:
         return self._border.on_coefficients(-self.motion.factor * self.now.derivatives)
 
     def improve(self) -> bool:
-        """See `Term`."""
+        """See `ContactTerm`."""
         now, penalty = self.now, self._contact.penalty
         allowed = SETTLED * np.max(np.abs(now.pressure) / penalty, initial=0.0)
         settled = now.violation <= max(allowed, ROUND_OFF * self._border.h)
@@ -177,7 +177,7 @@ class ObstacleContact:
 
     @property
     def unsettled(self) -> str:
-        """See `Term`."""
+        """See `ContactTerm`."""
         return (
             f"{self.obstacle}: contact and friction do not settle in this step: the penetration or the "
             f"slip of a patch is still off by {self.now.violation:.3g} m: expected shorter steps"

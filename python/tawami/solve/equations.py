@@ -72,8 +72,8 @@ class Equations:
 
     @property
     def is_smooth(self) -> bool:
-        """Whether no term has states, as contact has."""
-        return self.terms is None or self.terms.smooth
+        """Whether there is no contact, which has states."""
+        return self.terms is None or not self.terms.contacts
 
     def is_searched(self, finite: bool) -> bool:
         """Whether a line search serves: with contact, or in a static step of small strain.

@@ -32,55 +32,55 @@ class Term(Protocol):
     def prescribed(self) -> float:
         """The largest displacement that it prescribes in this step [m]; 0 for a load."""
 
-    @property
-    def smooth(self) -> bool:
-        """Whether the forces are those of a potential with one tangent everywhere."""
-
-    @property
-    def implicit(self) -> bool:
-        """Whether the forces are those of contact, with weights of their own in dynamics."""
-
     def forces(self, coefficients: Array) -> Array:
         """Forces on the body, on all coefficients [N per metre depth], at increments of all fields."""
 
     def stiffness(self) -> sp.csr_matrix | None:
         """Derivative of the last forces, with the opposite sign; None if there is none."""
 
+    def accept(self) -> None:
+        """Keep what later steps need, once a step is stored."""
+
+
+class ContactTerm(Term, Bordering, Protocol):
+    """Contact: its tangent changes with the states of patches, and its multipliers in passes.
+
+    It has a few unknowns of its own, or none, and in dynamics weights of its own.
+    """
+
     def improve(self) -> bool:
         """Improve the multipliers at a solution; whether another solve is needed."""
 
     @property
     def unsettled(self) -> str:
-        """Message if multipliers or constraints do not settle: what is wrong, and what to do."""
-
-    def accept(self) -> None:
-        """Keep what later steps need, once a step is stored."""
+        """Message if the multipliers do not settle: what is wrong, and what to do."""
 
 
 class Terms:
     """All such forces in one step.
 
     Args:
-        terms: The actions.
+        loads: The actions without contact.
         layout: Places of the coefficients.
         tied: Those with constraints, whose unknowns are multipliers.
-        bordering: Those with a few unknowns of their own, or none.
+        contacts: Contact with each obstacle.
 
     Attributes:
-        stuck: Message if the multipliers do not settle.
+        stuck: Message if the multipliers of contact do not settle.
         stiffness: That of the last tangent, on all coefficients of the whole grid.
     """
 
     def __init__(
         self,
-        terms: Sequence[Term],
+        loads: Sequence[Term],
         layout: Layout,
         tied: Sequence[Tie] = (),
-        bordering: Sequence[Bordering] = (),
+        contacts: Sequence[ContactTerm] = (),
     ) -> None:
-        self._terms, self._layout, self._added = terms, layout, Added()
-        self.tied, self._bordering = tied, bordering
-        self._following = [term for term in terms if isinstance(term, FollowerPressure)]
+        self._loads, self._layout, self._added = loads, layout, Added()
+        self.tied, self.contacts = tied, contacts
+        self._terms: list[Term] = [*loads, *contacts]
+        self._following = [term for term in loads if isinstance(term, FollowerPressure)]
         #: Stiffness of each term when they were last added, and their sum.
         self._stiffnesses: list[sp.csr_matrix] = []
         self.stiffness: sp.csr_matrix | None = None
@@ -105,11 +105,6 @@ class Terms:
         """The largest displacement that one of them prescribes [m]."""
         return max((term.prescribed for term in self._terms), default=0.0)
 
-    @property
-    def smooth(self) -> bool:
-        """Whether all of them are."""
-        return all(term.smooth for term in self._terms)
-
     def begin(self) -> None:
         """Start a step."""
         self._passes, self.stuck = 0, ""
@@ -117,7 +112,7 @@ class Terms:
 
     def restart(self) -> None:
         """Go back to the first guess of the unknowns of their own, and of the states of contact."""
-        for term in [*self.tied, *self._bordering]:
+        for term in [*self.tied, *self.contacts]:
             term.restart()
 
     def shorten(self, share: float) -> None:
@@ -142,15 +137,14 @@ class Terms:
             coefficients: Increments of all fields, in the window.
         """
         in_grid = self._layout.whole(coefficients)
+
+        def of(terms: Sequence[Term]) -> Array:
+            parts = (self._layout.part(term.forces(in_grid)) for term in terms)
+            return sum(parts, np.zeros_like(coefficients))
+
         #: Of all that are no contact.
-        self.loads = np.zeros_like(coefficients)
-        total = np.zeros_like(coefficients)
-        for term in self._terms:
-            forces = self._layout.part(term.forces(in_grid))
-            total += forces
-            if not term.implicit:
-                self.loads += forces
-        return total
+        self.loads = of(self._loads)
+        return self.loads + of(self.contacts)
 
     def update_stiffness(self) -> sp.csr_matrix | None:
         """Their stiffness at the last forces; the same object if no part has changed."""
@@ -168,7 +162,7 @@ class Terms:
     @functools.cached_property
     def bordering(self) -> list[Bordering]:
         """The terms with a few unknowns of their own."""
-        return [term for term in self._bordering if term.num_unknowns]
+        return [term for term in self.contacts if term.num_unknowns]
 
     def add(self, multipliers: Array) -> None:
         """Go to the next iterate of the multipliers of all constraints."""
@@ -204,9 +198,9 @@ class Terms:
         return np.concatenate([self._layout.part(change[:size]), change[size:]])
 
     def improve(self) -> bool:
-        """Improve all multipliers; whether another solve is needed."""
+        """Improve the multipliers of contact; whether another solve is needed."""
         self._passes += 1
-        pending = [term for term in self._terms if term.improve()]
+        pending = [term for term in self.contacts if term.improve()]
         if pending and self._passes >= PASSES:
             self.stuck = pending[0].unsettled
         return bool(pending)
