@@ -220,6 +220,25 @@ def test_supports_that_overlap_and_differ_raise():
         overlapping("left", part, (0.0, 1e-3)).solve()
 
 
+@pytest.mark.parametrize("value", [0.0, 1e-3])
+def test_a_third_direction_on_a_slanted_side_agrees_or_is_rejected(value):
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0, 0), h=0.25, cells=(6, 6))
+    block = tawami.polygon(grid, [(0.2, 0.2), (1.2, 0.4), (1.0, 1.3)], per_axis=2)
+    scene = tawami.Scene(grid, block, tawami.linear_elastic(E=1e6, nu=0.3), form="u_epsv")
+    for component in ("x", "y"):
+        scene.fix("0", component, 1e-3)
+    side = np.array([1.0, 0.2])
+    normal = np.array([0.2, -1.0]) / np.linalg.norm(side)
+    scene.fix("0", "normal", value + normal @ (1e-3, 1e-3))
+    if value:
+        with pytest.raises(
+            tawami.SupportError, match="x = 0.001 m, .* differ by 0.001 m where they"
+        ):
+            scene.solve()
+        return
+    assert scene.solve().displacement((0.9, 0.8)) == pytest.approx([1e-3, 1e-3], rel=1e-9)
+
+
 def test_supports_side_by_side_may_differ():
     def above(x, y):
         return (x == 0.13) & (y > 0.81)

@@ -9,14 +9,15 @@ import numpy as np
 
 from tawami.base.arrays import Array, Mask
 from tawami.base.errors import SupportError
+from tawami.base.text import listed
 from tawami.scene import step_values
 from tawami.scene.action import Term
 from tawami.scene.held_border import HeldBorder
 from tawami.scene.moving_points import MovingPoints
 from tawami.scene.support import Support
 
-#: Difference of values that is round-off, relative to the largest.
-ROUND_OFF = 1e-9
+#: Difference of values that is round-off, relative to the largest, and of directions that are alike.
+ROUND_OFF, ALIKE = 1e-9, 1e-6
 #: Share of the length of a point within which its place is surely the same part of the border: Gauss
 #: points lie at 0.396 of their length from the end of a piece at least.
 NEAR = 0.39
@@ -27,7 +28,7 @@ APART = 1.08
 def others_hold(
     support: Support, others: Sequence[HeldBorder], amount: Callable[[Term], float]
 ) -> Mask:
-    """Mask of the points of a support that others hold already in the same direction.
+    """Mask of the points of a support that others hold already in its direction, alone or together.
 
     Args:
         support: The support.
@@ -37,23 +38,35 @@ def others_hold(
     Raises:
         SupportError: Others prescribe another value there.
     """
-    assert isinstance(support.place, MovingPoints)
-    x, found = support.place.x, np.zeros(len(support.place), dtype=bool)
-    for other in others:
-        if other.support.component != support.component:
-            continue
-        both = support.weak & _covered(x, other)
-        found |= both
-        if not both.any():
-            continue
-        one, two = (step_values.at_points(s, amount, x)[both] for s in (support, other.support))
-        change = float(np.abs(one - two).max(initial=0.0))
-        if change > ROUND_OFF * max(np.abs(one).max(initial=0.0), np.abs(two).max(initial=0.0)):
-            raise SupportError(
-                f"{other.support} and {support} prescribe values of '{support.axis}' that differ by "
-                f"{change:.3g} {support.unit} where they meet: expected supports that agree; change or "
-                "release one"
-            )
+    place = support.place
+    assert isinstance(place, MovingPoints)
+    x, normals = place.x, place.normal
+    masks = {
+        other.support: support.weak & _covered(x, other)
+        for other in others
+        if other.support.of_field == support.of_field
+    }
+    near = [other for other, mask in masks.items() if mask.any()]
+    if not near:
+        return np.zeros(len(x), dtype=bool)
+    covered = np.stack([masks[other] for other in near], axis=1)
+    direction = support.directions(normals)
+    known = np.stack([other.directions(normals) for other in near], axis=1) * covered[..., None]
+    # the direction as a sum of those of the others
+    shares = np.einsum("ja,jak->jk", direction, np.linalg.pinv(known, rcond=ALIKE))
+    rest = np.abs(np.einsum("jk,jka->ja", shares, known) - direction).max(axis=1)
+    found: Mask = covered.any(axis=1) & (rest <= ALIKE)
+    values = np.stack([step_values.at_points(other, amount, x) for other in near], axis=1)
+    theirs = (shares * values).sum(axis=1)[found]
+    mine = step_values.at_points(support, amount, x)[found]
+    change = float(np.abs(theirs - mine).max(initial=0.0))
+    if change > ROUND_OFF * max(np.abs(values).max(), np.abs(mine).max(initial=0.0)):
+        names = listed([other.line for other in near])
+        raise SupportError(
+            f"{names} and {support.line} prescribe values of '{support.axis}' that differ by "
+            f"{change:.3g} {support.unit} where they meet: expected supports that agree; change or "
+            "release one"
+        )
     return found
 
 

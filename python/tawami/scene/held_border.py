@@ -66,8 +66,7 @@ class HeldBorder:
         #: Functions at the points, and their coefficients, points x functions x components.
         self._functions = functions[weak]
         self._places = field.start + of_components(numbers[weak], field.components)
-        directions = np.ones((len(place), 1)) if support.is_field else support.directions
-        self._directions, self._weights = directions[weak], place.weight[weak]
+        self._directions, self._weights = support.directions(place.normal)[weak], place.weight[weak]
         self._groups = patches(place.now[weak], h)
         along = (self._functions[:, :, None] * self._directions[:, None]).reshape(len(weak), -1)
         #: Mean of the held component over each patch, of all coefficients: patches x coefficients.

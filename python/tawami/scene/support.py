@@ -99,12 +99,20 @@ class Support(Action):
         return self.component, 1.0
 
     @property
-    def directions(self) -> Array:
-        """Unit vectors of its component of the displacement at its points, points x dim."""
-        if not isinstance(self.place, MovingPoints) or self.is_field:
-            return np.zeros((0, 0))
-        names = directions(self.place.space, [self.axis], self.place.normal)
-        return np.asarray(names[0])
+    def of_field(self) -> str:
+        """Name of the field that it prescribes; empty for the displacement."""
+        return str(self.component) if self.is_field else ""
+
+    def directions(self, normals: Array) -> Array:
+        """Unit vectors of its component of the displacement, points x dim; 1 for a field.
+
+        Args:
+            normals: Outward normals of a border, points x dim.
+        """
+        if self.is_field:
+            return np.ones((len(normals), 1))
+        assert isinstance(self.place, MovingPoints)
+        return np.asarray(directions(self.place.space, [self.axis], normals)[0])
 
     @property
     def edges(self) -> list[Edge]:

@@ -292,7 +292,7 @@ class Supports(Owner[Support]):
         points x dim.
         """
         return [
-            (s.place, -s.held[:, None] * s.directions)
+            (s.place, -s.held[:, None] * s.directions(s.place.normal))
             for s in self.all
             if isinstance(s.place, MovingPoints) and not s.is_field
         ]
