@@ -115,11 +115,17 @@ def test_the_secant_method_ends_where_the_work_is_half_as_large():
     assert advanced(lambda t: -1 + 3 * t, rose=False) == [1.0]
 
 
-def test_the_search_ends_after_eight_evaluations_and_takes_no_tiny_step():
-    """A work that never falls: the step is shortened to 1/20 at most."""
+def test_the_search_ends_after_twelve_evaluations_and_takes_no_tiny_step():
+    """A work that never falls: the step is shortened to 1/200 at most."""
     tried = advanced(lambda _: 2.0)
-    assert tried[-1] >= 0.05
-    assert len(tried) <= 9
+    assert tried[-1] >= 0.005
+    assert len(tried) <= 13
+
+
+def test_the_search_finds_a_patch_that_closes_early():
+    """g(t) = -1 until a patch closes at t = 0.02, and a slope of 200 from there."""
+    tried = advanced(lambda t: -1 + 200 * max(t - 0.02, 0.0))
+    assert tried[-1] == pytest.approx(0.025, abs=0.0025)
 
 
 def test_a_step_that_inverts_a_particle_is_halved():

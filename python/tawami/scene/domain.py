@@ -136,19 +136,16 @@ class Domain:
         mask: npt.NDArray[np.bool_] = self.model.without_history[self.particles.material]
         return mask
 
-    def resistance_at(self, cells: BorderInCells, slope: float) -> Array:
-        """Mean of mu + rho h^2 slope of the particles in the cells of points [Pa]; a call for all ranks.
-
-        It is the stiffness of a cell with its inertia, if accelerations are slope times displacements.
+    def means_at(self, cells: BorderInCells) -> tuple[Array, Array]:
+        """Mean mu [Pa] and density [kg/m3] of particles in the cells of points; a call for all ranks.
 
         Args:
             cells: The points in the cells of the grid.
-            slope: [1/s2]; 0 in statics.
         """
         found = np.zeros((2, len(cells)))
         found[:, cells.own] = [of[cells.here[cells.own]] for of in self._means_of_cells]
         mu, rho = ranks.sum_of(self.model.grid.comm, found)
-        return np.asarray(mu + rho * self.model.grid.h**2 * slope)
+        return mu, rho
 
     @functools.cached_property
     def _means_of_cells(self) -> tuple[Array, Array]:

@@ -13,9 +13,9 @@ from tawami.border.shapes import Shape
 from tawami.scene.domain import Domain
 from tawami.scene.moving_points import MovingPoints
 
-#: Penalty of a patch per cell, in stiffnesses of a cell. Without inertia, shorter steps would need more
-#: passes.
-PENALTY = 200.0
+#: Penalty of a patch per cell, in shear moduli, and in inertias of a cell. Without inertia, short steps
+#: need many passes. With more of it, the round-off of positions is a force in small impacts.
+PENALTY, INERTIA = 200.0, 20.0
 #: Lengths of patches that stay, unless they were made so [cells].
 SHORTEST, LONGEST = 0.7, 2.2
 
@@ -72,8 +72,9 @@ class BorderNear:
         self.groups = self._grouped(place, groups)
         weight = place.weight
         self.weights = np.maximum(weight, 1e-12 * weight.max())  # 0 on an axis of symmetry
-        resistance = domain.resistance_at(cells, slope)
-        penalty = PENALTY / self.h * self.groups.means(self.weights, resistance)
+        mu, rho = domain.means_at(cells)
+        resistance = PENALTY * mu / self.h + INERTIA * rho * self.h * slope
+        penalty = self.groups.means(self.weights, resistance)
         # no particle is near a patch that its body has lost
         self.penalty = np.maximum(penalty, np.finfo(float).tiny)
         self.distance = shape.evaluate(self.start).distance

@@ -1,9 +1,9 @@
 """Contact of the border with one obstacle in one step (`tawami.solve.terms`).
 
-Pressure and friction act on means over patches (`tawami.border.contact`) with a penalty of 200 times
-the stiffness of a cell, mu/h + 2 rho h/dt^2, in passes with better multipliers until penetration and
-slip of sticking patches are below 1e-3 of those of the penalty alone: in statics below 5e-6 h times the
-largest pressure over mu.
+Pressure and friction act on means over patches (`tawami.border.contact`) with a penalty of 200 mu/h, and
+of 40 rho h/dt^2 more in dynamics, in passes with better multipliers until penetration and slip of
+sticking patches are below 1e-3 of those of the penalty alone: below 5e-6 h times the largest pressure
+over mu.
 """
 
 from __future__ import annotations

@@ -36,8 +36,9 @@ OVERSHOT, KINKED, REDUCED = 0.8, 0.5, 0.5
 #: Iterations of full steps with contact in motions. Steps of a collapse need 7 on average, and with a
 #: search from the first on 8, with twice as many evaluations. Large static steps need it at once.
 PATIENCE = 10
-#: Largest number of evaluations, and the shortest step as a share of the full one.
-MOST, SHORTEST = 8, 0.05
+#: Largest number of evaluations, and shares of the full step: the shortest that is tried where particles
+#: turn inside out, and that of the secant method. Patches that close are 200 times as stiff as a cell.
+MOST, SHORTEST, LEAST = 12, 0.05, 0.005
 
 
 class LineSearch:
@@ -122,7 +123,7 @@ class LineSearch:
         other, at_other = 0.0, self._start
         t, at_t = 1.0, end
         for _ in range(MOST):
-            newer = max((other * at_t - t * at_other) / (at_t - at_other), SHORTEST)
+            newer = max((other * at_t - t * at_other) / (at_t - at_other), LEAST)
             forces, measured = evaluate(newer)
             at_newer = self._at_last_forces(forces.residual)
             if not np.isfinite(at_newer) or newer == t:
