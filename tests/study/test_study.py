@@ -14,6 +14,7 @@ from programs import python
 
 import tawami
 from tawami.study import Series, Table, process, verdict
+from tawami.study.peers import read_peers
 
 MB = 2**20
 
@@ -249,8 +250,12 @@ def test_a_study_without_runs_or_without_a_quantity_raises_an_error(tmp_path):
 
 
 def test_shipped_results_belong_to_shipped_studies():
-    """The shipped tables hold every setting of the studies."""
-    from cases.costs.trade.__main__ import SHIPPED, STUDIES
+    """The shipped tables hold every setting of the studies, and other codes have the same quantities."""
+    from cases.costs.trade.__main__ import PEERS, SHIPPED, STUDIES
+
+    for path in PEERS.glob("*.csv"):
+        quantities = STUDIES[path.stem].reference.keys()
+        assert all(peer.errors.keys() == quantities for peer in read_peers(path)), path
 
     for name, study in STUDIES.items():
         table = Table.read(SHIPPED / f"{name}.csv")

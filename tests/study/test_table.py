@@ -7,7 +7,7 @@ import pytest
 
 import tawami
 from tawami.study import Row, Table, figure, verdict
-from tawami.study.peers import read_peers
+from tawami.study.peers import comparison, read_peers
 from tawami.study.row import error_of
 
 
@@ -84,6 +84,23 @@ def test_results_of_other_codes_are_read(tmp_path):
     path.write_text("code,x\nother,1\n")
     with pytest.raises(tawami.InputError, match="has no column version, command"):
         read_peers(path)
+
+
+def test_runs_on_the_front_of_another_code_are_compared_with_the_fastest_run_as_accurate(tmp_path):
+    path = tmp_path / "toy.csv"
+    runs = ("h = 1,3,0.1", "slower and worse,4,0.2", "h = 1/2,30,0.02", "h = 1/8,300,0.001",
+            "not timed,,0.0001")  # fmt: skip
+    path.write_text(PEERS + "".join(f"other,1.2,run,8 cores,,{run}\n" for run in runs))
+    table = table_of((1, 0.1), (2, 0.01), (0.5, 0.05), n=(1, 2, 4), form=("a", "a", "b"))
+    assert comparison(table, read_peers(path), {"n": ..., "form": "a"}).splitlines() == [
+        "Runs of other codes, and the fastest run at least as accurate with form a:",
+        "",
+        "| other code | error of x | time | MPM | error | time | other time / own |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+        "| other 1.2: h = 1 | 0.1 | 3 s | n 1 | 0.1 | 1 s | 3 |",
+        "| other 1.2: h = 1/2 | 0.02 | 30 s | n 2 | 0.01 | 2 s | 15 |",
+        "| other 1.2: h = 1/8 | 0.001 | 300 s | none |  |  |  |",
+    ]
 
 
 def test_a_table_is_read_from_its_file(tmp_path):

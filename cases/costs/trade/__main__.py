@@ -22,6 +22,7 @@ from cases.costs.trade import (
 )
 from tawami.base.files import atomic_file
 from tawami.study import Table, verdict
+from tawami.study.peers import comparison, read_peers
 
 CASES = (
     cantilever, cook, ring, consolidation, penetration, collapse, self_weight, spinning_disc,
@@ -39,8 +40,19 @@ PROGRAM.option("--words", action="store_true", help="print the shipped results, 
 
 
 def in_words(table: Table) -> str:
-    """Table and sentences about changes that reduce the error or only cost time."""
-    return f"# {table.name}\n\n{verdict(table)}\n"
+    """Changes that reduce the error or only cost time, and the default compared with other codes."""
+    text = f"# {table.name}\n\n{verdict(table)}\n"
+    peers = peers_of(table.name)
+    if peers is None:
+        return text
+    default = STUDIES[table.name].marks["default"]
+    return f"{text}\n{comparison(table, read_peers(peers), default)}\n"
+
+
+def peers_of(name: str) -> Path | None:
+    """Results of other codes for a study; None without such results."""
+    path = PEERS / f"{name}.csv"
+    return path if path.exists() else None
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -56,8 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         else:
             study = STUDIES[name]
             study.path = Path(options.results) / name
-            peers = PEERS / f"{name}.csv"
-            study.peers = peers if peers.exists() else None
+            study.peers = peers_of(name)
             table = study.run(sample=options.sample)
             with atomic_file(study.path / f"{name}.md") as part:
                 part.write_text(in_words(table))

@@ -10,7 +10,7 @@ import numpy as np
 
 from tawami.picture import style
 from tawami.picture.figure import new_figure, save
-from tawami.study.peers import Peer
+from tawami.study.peers import Peer, peer_front
 from tawami.study.row import Row, text_of
 from tawami.study.table import Table
 
@@ -127,19 +127,13 @@ def _mark(
     """Draw lines through the runs of marked settings."""
     shades = (style.VERMILION, style.BLUE, style.GREEN)
     for (name, setting), shade in zip(marks.items(), shades, strict=False):
-        rows = [
-            row
-            for row in table.of(table.series[0])
-            if row.knobs.keys() == setting.keys()
-            and all(setting[knob] in (..., value) for knob, value in row.knobs.items())
-        ]
-        rows.sort(key=lambda row: row.costs[cost])
+        rows = sorted(table.matching(setting), key=lambda row: row.costs[cost])
         axes.plot([r.costs[cost] for r in rows], [r.errors[quantity] for r in rows], "s-", color=shade,
                   markersize=9, fillstyle="none", markeredgewidth=1.8, label=name)  # fmt: skip
 
 
 def _add_peers(axes: Axes, quantity: str, peers: Sequence[Peer]) -> None:
-    """Draw runs of other codes; an error without a time is a horizontal line."""
+    """Draw runs of other codes and their fronts; an error without a time is a horizontal line."""
     shown = [peer for peer in peers if quantity in peer.errors]
     for number, label in enumerate(dict.fromkeys(peer.label for peer in shown)):
         mine = [peer for peer in shown if peer.label == label]
@@ -150,3 +144,6 @@ def _add_peers(axes: Axes, quantity: str, peers: Sequence[Peer]) -> None:
         axes.plot([p.wall_s for p in timed], [p.errors[quantity] for p in timed],
                   MARKERS[-1 - number % len(MARKERS)], color=style.GRAY, markersize=8,
                   label=label if timed else None)  # fmt: skip
+        best = peer_front(timed, quantity)
+        axes.step([p.wall_s for p in best], [p.errors[quantity] for p in best], ":", where="post",
+                  color=style.GRAY, linewidth=1.5)  # fmt: skip

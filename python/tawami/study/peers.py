@@ -1,4 +1,4 @@
-"""Results of other codes for the picture of a study, from a CSV file with their origin.
+"""Results of other codes for a study, from a CSV file with their origin.
 
 A file has one line for each run and the columns
 
@@ -11,12 +11,16 @@ where the numbers are published. An empty `wall_s` is an error without a time.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from tawami.base import csv_file
 from tawami.base.errors import InputError
 from tawami.base.files import readable_file, reason
+from tawami.study.row import Row, pareto, text_of
+from tawami.study.table import Table
 
 #: Columns before the quantities; those that may be empty.
 ORIGIN = ("code", "version", "command", "machine", "source", "setting", "wall_s")
@@ -79,3 +83,57 @@ def _peer(path: Path, number: int, line: dict[str, str]) -> Peer:
     except ValueError as error:
         raise InputError(f"peers '{path}', line {number}: {error}: expected numbers") from None
     return Peer({name: line[name] for name in ORIGIN[:-1]}, wall, errors)
+
+
+def peer_front(peers: Sequence[Peer], quantity: str) -> list[Peer]:
+    """Timed runs of each code that no other run of the same code beats in both time and error."""
+    timed = [peer for peer in peers if quantity in peer.errors and math.isfinite(peer.wall_s)]
+    return [
+        peer
+        for label in dict.fromkeys(peer.label for peer in timed)
+        for peer in pareto(
+            [peer for peer in timed if peer.label == label],
+            lambda peer: peer.wall_s,
+            lambda peer: peer.errors[quantity],
+        )
+    ]
+
+
+def comparison(table: Table, peers: Sequence[Peer], setting: Mapping[str, Any]) -> str:
+    """Compare a setting with other codes at the same accuracy, in a table for each quantity.
+
+    A row has a run on the front of another code, and the fastest run of the setting that is at least as
+    accurate.
+
+    Args:
+        table: The runs of the study.
+        peers: Runs of other codes.
+        setting: Setting of the study's own series; knobs with the value `...` are chosen for each row.
+    """
+    free = [knob for knob, value in setting.items() if value is ...]
+    fixed = {knob: value for knob, value in setting.items() if knob not in free}
+    own = table.matching(setting)
+    parts = [
+        f"Runs of other codes, and the fastest run at least as accurate with {text_of(fixed)}:"
+    ]
+    for quantity in table.quantities:
+        head = ["other code", f"error of {quantity}", "time", table.series[0], "error", "time",
+                "other time / own"]  # fmt: skip
+        lines = [f"| {' | '.join(head)} |", f"|{' --- |' * len(head)}"]
+        for peer in peer_front(peers, quantity):
+            lines.append(f"| {' | '.join(_cells(peer, own, free, quantity))} |")
+        parts.append("\n".join(lines))
+    return "\n\n".join(parts)
+
+
+def _cells(peer: Peer, own: Sequence[Row], free: Sequence[str], quantity: str) -> list[str]:
+    """Cells of a row: a run of another code, and the fastest run that is at least as accurate."""
+    error, wall = peer.errors[quantity], peer.wall_s
+    cells = [f"{peer.label}: {peer.origin['setting']}", f"{error:.2g}", f"{wall:.3g} s"]
+    accurate = [row for row in own if row.errors[quantity] <= error]
+    if not accurate:
+        return [*cells, "none", "", "", ""]
+    best = min(accurate, key=lambda row: row.costs["wall_s"])
+    time = best.costs["wall_s"]
+    chosen = text_of({knob: best.knobs[knob] for knob in free})
+    return [*cells, chosen, f"{best.errors[quantity]:.2g}", f"{time:.3g} s", f"{wall / time:.3g}"]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,19 @@ from tawami.base.errors import InputError
 COSTS = ("wall_s", "cpu_s", "peak_MB", "newton_iterations", "steps", "unknowns")
 #: Changes below this factor are noise; errors below this are round-off.
 NOISE, ROUND_OFF = 1.1, 1e-12
+
+Run = TypeVar("Run")
+
+
+def pareto(
+    runs: Iterable[Run], cost: Callable[[Run], float], error: Callable[[Run], float]
+) -> list[Run]:
+    """Runs that no other run beats in both cost and error, cheapest first."""
+    front: list[Run] = []
+    for run in sorted(runs, key=lambda r: (cost(r), error(r))):
+        if not front or error(run) < error(front[-1]):
+            front.append(run)
+    return front
 
 
 def error_of(value: Any, reference: Any) -> float:

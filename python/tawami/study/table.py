@@ -15,7 +15,7 @@ import numpy as np
 from tawami.base import checks, csv_file
 from tawami.base.errors import InputError
 from tawami.base.files import readable_file, reason
-from tawami.study.row import COSTS, Change, Row, mean_ratio
+from tawami.study.row import COSTS, Change, Row, mean_ratio, pareto
 
 
 @dataclass(frozen=True)
@@ -49,16 +49,21 @@ class Table:
         """Successful runs of a series; of all series by default."""
         return [r for r in self.rows if r.failure is None and series in (None, r.series)]
 
+    def matching(self, setting: Mapping[str, Any]) -> list[Row]:
+        """Successful runs of the study's own series with a setting; `...` as a value stands for any."""
+        return [
+            row
+            for row in self.of(self.series[0])
+            if row.knobs.keys() == setting.keys()
+            and all(setting[knob] in (..., value) for knob, value in row.knobs.items())
+        ]
+
     # -- error over cost -----------------------------------------------------------
 
     def front(self, quantity: str, *, cost: str = "wall_s", series: str | None = None) -> list[Row]:
         """Pareto front: runs that no other run of the series beats in both, cheapest first."""
         self.check(quantity, cost)
-        front: list[Row] = []
-        for row in sorted(self.of(series), key=lambda r: (r.costs[cost], r.errors[quantity])):
-            if not front or row.errors[quantity] < front[-1].errors[quantity]:
-                front.append(row)
-        return front
+        return pareto(self.of(series), lambda r: r.costs[cost], lambda r: r.errors[quantity])
 
     def knees(self, quantity: str, *, cost: str = "wall_s", series: str | None = None) -> list[Row]:
         """Corners of the lower convex hull of the front, in logarithms of cost and error: each is the
