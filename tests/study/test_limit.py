@@ -15,11 +15,19 @@ HALVED = [1 / 4, 1 / 8, 1 / 16, 1 / 32]
 def test_a_power_is_extrapolated(order, sizes):
     found = limit_of(sizes, [2 + s**order for s in sizes])
     error = sizes[-1] ** order  # of the finest value
-    assert abs(found.value - 2) <= min(found.uncertainty, error / 4) + 1e-9
+    assert abs(found.value - 2) <= min(found.uncertainty, error / 2) + 1e-9
     if len(sizes) > 3:  # a second order confirms the first
-        assert found.value == pytest.approx(2, abs=1e-3 * error)
-        assert found.uncertainty < 0.15 * error
-        assert found.order == pytest.approx(order, abs=0.02)
+        assert found.value == pytest.approx(2, abs=3e-3 * error)
+        # a second term of low order hides behind a high order
+        assert found.uncertainty < (0.4 if order <= 2 else 3) * error
+        assert found.order == pytest.approx(order, abs=0.05)
+
+
+def test_a_second_source_of_error_is_in_the_bar():
+    """h^2.4 minus a smaller term in h: one power fits to 1 %, and its limit would be far off."""
+    values = [1 - 0.2 * s**2.4 + 0.003 * s for s in (1 / 4, 1 / 8, 1 / 12, 1 / 16)]
+    found = limit_of([1 / 4, 1 / 8, 1 / 12, 1 / 16], values)
+    assert abs(found.value - 1) <= found.uncertainty < 3e-4
 
 
 def test_a_number_that_grows_is_an_inverse_size():
