@@ -33,9 +33,15 @@ def test_the_command(tmp_path, monkeypatch, capsys):
     ):
         assert main(["trade", *line]) == 2
         assert message in capsys.readouterr().err
-    with pytest.raises(SystemExit):
-        main(["trade", "case.py", "--budget", "soon"])
-    assert "'soon': expected a time, as 60s, 10m or 1h" in capsys.readouterr().err
+    for option, value, message in (
+        ("--budget", "soon", "'soon': expected a positive time, as 60s, 10m or 1h"),
+        ("--budget", "-5s", "'-5s': expected a positive time"),
+        ("--apply", "200%", "'200%': expected an error below 100%"),
+        ("--jobs", "x", "'x': expected a whole number"),
+    ):
+        with pytest.raises(SystemExit):
+            main(["trade", "case.py", option, value])
+        assert message in capsys.readouterr().err
     script.write_text("x = 1\n")
     assert main(["trade", "case.py"]) == 2
     assert "has no function build" in capsys.readouterr().err

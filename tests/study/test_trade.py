@@ -248,7 +248,7 @@ def test_jobs_change_no_result(tmp_path, runs):
         (only_names, "no knob of only_names refines"),
         (text, "quantity 'tip' = 'long': expected real numbers"),
         (profile, "quantity 'tip' of 'profile' is a list: expected a number"),
-        (always_fails, "3 runs failed, the first with: InputError: no h = "),
+        (always_fails, "finds no limit: 3 runs failed, the first with h 0.25: InputError: no h = "),
     ],
 )
 def test_wrong_input(tmp_path, function, message):

@@ -9,6 +9,7 @@ python -m cases.costs.trade.coverage [NAME ...]
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -185,8 +186,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         folder = Path(options.results) / f"coverage_{name}"
         try:
             trade = tawami.trade(function, budget=options.budget, folder=folder, quiet=True)
-        except tawami.InputError as error:
+        except tawami.InputError as error:  # every run failed
             print(f"# {name}\n{error}\n")
+            rows.append(Row(name, math.nan, math.inf, exact, 0))
             continue
         print(f"# {name}\n{trade}\n")
         rows.append(judged(name, trade, exact))

@@ -18,7 +18,7 @@ from tawami.base import checks
 from tawami.base.errors import FormError, InputError, TawamiError
 from tawami.command import new, trade
 from tawami.command.folders import run_folder
-from tawami.command.misuse import command_line, unrecognised
+from tawami.command.misuse import command_line, joined, unrecognised
 from tawami.command.resume import resume
 from tawami.command.script import INTERRUPTED, Script, start
 from tawami.results.progress import LOG_LEVEL
@@ -74,6 +74,7 @@ def _parsed(given: list[str]) -> argparse.Namespace:
     parser = _parser()
     if own and own[0].endswith(".py"):
         parser.error(f"'{own[0]}' is not a command: to run a script: {command_line('run', own[0])}")
+    own = joined(own)
     asked, unknown = parser.parse_known_args(own)
     if asked.name == "tawami run" and asked.script is asked.module is None:
         asked.parser.error("expected a SCRIPT, or -m with the name of a module")

@@ -10,6 +10,17 @@ from collections import Counter
 from tawami.base.text import meant
 
 
+def joined(words: list[str]) -> list[str]:
+    """Arguments in which `--budget -5s` is `--budget=-5s`: a negative value is no option."""
+    found = list[str]()
+    for word in words:
+        if re.match(r"-\.?\d", word) and found and re.fullmatch(r"--[a-z-]+", found[-1]):
+            found[-1] += f"={word}"
+        else:
+            found.append(word)
+    return found
+
+
 def unrecognised(asked: argparse.Namespace, unknown: list[str], own: list[str]) -> str:
     """Message about arguments that a command does not have.
 

@@ -28,9 +28,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="error of the recommended setting, as 0.5%% (default: 1%%)",
     )  # fmt: skip
     parser.add_argument(
-        "--jobs", metavar="N", type=int,
+        "--jobs", metavar="N", type=jobs,
         help="runs at a time, with one thread each (default: the number of processors)",
     )  # fmt: skip
+    parser.add_argument(
+        "--folder", metavar="F", help="folder of the results (default: results/trade/NAME)"
+    )
     parser.add_argument(
         "--apply", metavar="E", type=part,
         help="write a copy of the script with the fastest setting within this error, as 0.5%%",
@@ -41,7 +44,7 @@ def seconds(text: str) -> float:
     """A time of the command line [s]: a number with s, m or h."""
     found = re.fullmatch(r"(\d+\.?\d*|\.\d+)([smh]?)", text)
     if found is None or float(found[1]) == 0:
-        raise argparse.ArgumentTypeError(f"'{text}': expected a time, as 60s, 10m or 1h")
+        raise argparse.ArgumentTypeError(f"'{text}': expected a positive time, as 60s, 10m or 1h")
     return float(found[1]) * UNITS[found[2]]
 
 
@@ -50,8 +53,15 @@ def part(text: str) -> float:
     found = re.fullmatch(r"(\d+\.?\d*|\.\d+)(%?)", text)
     value = 0.0 if found is None else float(found[1]) / (100 if found[2] else 1)
     if not 0 < value < 1:
-        raise argparse.ArgumentTypeError(f"'{text}': expected an error, as 0.5%")
+        raise argparse.ArgumentTypeError(f"'{text}': expected an error below 100%, as 0.5%")
     return value
+
+
+def jobs(text: str) -> int:
+    """Runs at a time of the command line."""
+    if not re.fullmatch(r"[1-9]\d*", text):
+        raise argparse.ArgumentTypeError(f"'{text}': expected a whole number, at least 1")
+    return int(text)
 
 
 def run(asked: argparse.Namespace) -> int:
@@ -62,9 +72,11 @@ def run(asked: argparse.Namespace) -> int:
     path: Path = checks.path("script", asked.script)
     Script(path, None).check()
     tolerance = asked.apply or asked.tolerance
-    result = trade(path, asked.quantity, asked.budget, tolerance=tolerance, jobs=asked.jobs)
+    folder = checks.path("folder", asked.folder or default_folder(path.stem))
+    result = trade(
+        path, asked.quantity, asked.budget, tolerance=tolerance, folder=folder, jobs=asked.jobs
+    )
     print(result)
-    folder = default_folder(path.stem)
     print(f"{folder / path.stem}.csv and .png are written")
     if asked.apply is not None:
         copy = write_applied(path, result.recommended().knobs, tolerance)

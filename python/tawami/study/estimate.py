@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 from tawami.study.knobs import Knob
 from tawami.study.limit import Limit, limit_of, sizes_of
-from tawami.study.row import shortened, value_text
+from tawami.study.row import shortened, text_of, value_text
 
 T = TypeVar("T")
 #: Value of a quantity for the values of all knobs, in their order.
@@ -117,16 +117,22 @@ def estimate(
     orders = {} if main.order is None else {knobs[first].name: main.order}
     value, uncertainty, remarks, moves = main.value, main.uncertainty, list[str](), list[float]()
     for k, knob in enumerate(knobs):
-        if k == first or knob.repeats:
+        if k == first or not knob.refines:
             continue
         limits = _limits(points, knobs, first, k)
         at_default = line(points, knobs, k, centre)
-        rest = _limit(points, knobs, k, centre) if knob.refines and at_default else main
+        rest = _limit(points, knobs, k, centre) if at_default else main
         found = _other(name, knob, limits, main, at_default, rest)
         moves.append(abs(found.value))
         value, uncertainty = value + found.value, uncertainty + found.uncertainty
         orders |= found.orders
         remarks += found.remarks
+    for k, knob in enumerate(knobs):
+        if not (knob.refines or knob.repeats):
+            coarse = {o.name: o.default for o in knobs if o.refines and o is not knobs[first]}
+            allowed = uncertainty + sum(moves)
+            limits = _limits(points, knobs, first, k)
+            remarks += _alternatives(name, knob, limits, main, allowed, coarse)
     uncertainty += sum(sorted(moves)[:-1])  # two knobs together: at most the smaller effect of both
     return Estimate(value, uncertainty, orders, tuple(remarks))
 
@@ -171,18 +177,11 @@ def _other(
 ) -> Estimate:
     """Effect of another knob on the limit: shift, uncertainty, order, remarks."""
     values = {value: limit.value for value, limit in limits.items()}
-    if len(values) < 2 and knob.refines:  # only its effect at the defaults is known
+    if len(values) < 2:  # only its effect at the defaults is known
         if not rest.exists:
             return Estimate(0.0, math.inf, remarks=(_no_limit(name, knob, at_default),))
         here = at_default.get(knob.default, rest.value)
         return Estimate(0.0, abs(rest.value - here) + rest.uncertainty)
-    if not knob.refines:
-        others = [
-            _another(name, knob, value, limit, main)
-            for value, limit in limits.items()
-            if abs(limit.value - main.value) > 2 * (limit.uncertainty + main.uncertainty)
-        ]
-        return Estimate(0.0, 0.0, remarks=tuple(others))
     finest = list(limits.values())[-3:]
     spread = max(limit.value for limit in finest) - min(limit.value for limit in finest)
     known = max(limit.uncertainty for limit in finest)
@@ -201,7 +200,8 @@ def _no_limit(name: str, knob: Knob, found: Mapping[Any, float]) -> str:
     sizes = list(found.items())
     steps = ", ".join(f"{v:.5g} at {value_text(k)}" for k, v in sizes)
     return (
-        f"'{name}' does not converge with '{knob.name}' ({steps}): the problem has no limit, or "
+        f"'{name}' does not converge with '{knob.name}' ({steps}): the values of '{knob.name}' are too "
+        f"coarse, the problem has no limit, or "
         f"'{knob.name}' changes the problem instead of its accuracy."
     )
 
@@ -214,12 +214,32 @@ def _fails(name: str, knob: Knob, finer: tuple[Any, str]) -> str:
     )
 
 
-def _another(name: str, knob: Knob, value: Any, limit: Limit, main: Limit) -> str:
-    return (
+def _alternatives(
+    name: str,
+    knob: Knob,
+    limits: Mapping[Any, Limit],
+    main: Limit,
+    allowed: float,
+    coarse: Mapping[str, Any],
+) -> list[str]:
+    """Sentences about values of a knob that lead to another limit than its default.
+
+    Args:
+        name: Of the quantity.
+        knob: Its values are not sizes.
+        limits: Limit along the first knob for each of them.
+        main: That of the default.
+        allowed: Error of the default by all knobs.
+        coarse: Knobs that are not refined in these limits.
+    """
+    others = f", or {text_of(coarse)} is too coarse to tell" if coarse else ""
+    return [
         f"'{name}' converges to {limit.value:.5g} with {knob.name} {value_text(value)}, and to "
         f"{main.value:.5g} with {knob.name} {value_text(knob.default)}: "
-        f"'{knob.name}' changes the problem."
-    )
+        f"'{knob.name}' changes the problem{others}."
+        for value, limit in limits.items()
+        if abs(limit.value - main.value) > 2 * (limit.uncertainty + allowed)
+    ]
 
 
 def _too_few(name: str, knob: Knob) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -132,6 +133,9 @@ class Trade:
         if self.converges:
             parts.append(self._costs())
             parts += [f"{text} gains nothing here." for text in self._useless()]
+        else:
+            limits = [q for q, estimate in self.estimates.items() if estimate.exists]
+            parts += [f"'{q}' alone has a limit: see --quantity {shlex.quote(q)}." for q in limits]
         failed = [run for run in self.runs if run.failure is not None]
         if failed:
             first = f"{text_of(failed[0].knobs)}: {shortened(str(failed[0].failure))}"

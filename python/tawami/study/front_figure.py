@@ -22,7 +22,7 @@ DEEPEST = 0.1
 def picture(trade: Trade, path: str | Path) -> None:
     """Draw the errors of all runs over wall time, the front, the default and the recommended setting.
 
-    Without a limit the values are drawn instead of errors.
+    Without a limit the values are drawn instead of errors, over those of the default.
 
     Args:
         trade: The runs.
@@ -72,13 +72,17 @@ def _errors(axes: Axes, trade: Trade) -> None:
             if name in mark:
                 axes.plot(*place([run]), marker, markersize=12, fillstyle="none", color=colour,
                           markeredgewidth=2, label=f"{name}: {text_of(run.knobs)}")  # fmt: skip
-    axes.axhline(trade.tolerance, color=style.BLACK, linewidth=0.8, linestyle=":")
+    axes.axhline(trade.tolerance, color=style.BLACK, linewidth=0.8, linestyle=":",
+                 label=f"tolerance {100 * trade.tolerance:.2g} %")  # fmt: skip
     axes.set_yscale("log")
     axes.set_ylabel("relative error [-]")
 
 
 def _values(axes: Axes, trade: Trade) -> None:
+    runs = trade.succeeded
+    unit = trade.default or runs[-1]
     for quantity in trade.estimates:
-        runs = trade.succeeded
-        axes.plot([r.wall_s for r in runs], [r.values[quantity] for r in runs], "o", label=quantity)
-    axes.set_ylabel("value")
+        scale = unit.values[quantity] or 1.0
+        values = [run.values[quantity] / scale for run in runs]
+        axes.plot([run.wall_s for run in runs], values, "o", label=quantity)
+    axes.set_ylabel(f"value over that of {text_of(unit.knobs)}")

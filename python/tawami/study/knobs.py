@@ -102,7 +102,8 @@ def _annotated(build: Run) -> dict[str, Any]:
         raise InputError(f"annotations cannot be read: {error}") from error
     found = {name: getattr(hint, "__metadata__", ()) for name, hint in hints.items()}
     lists = {
-        name: [m for m in metadata if is_list(m) or _is_set(m)] for name, metadata in found.items()
+        name: [m for m in metadata if is_list(m) or _is_set(m) or isinstance(m, int | float)]
+        for name, metadata in found.items()
     }
     return {name: metadata[0] for name, metadata in lists.items() if metadata}
 
@@ -113,13 +114,19 @@ def _is_set(values: Any) -> bool:
 
 def _knob(name: str, values: Any, default: Any) -> Knob:
     repeats = _is_set(values)
+    if isinstance(values, int | float):
+        raise InputError(
+            f"knob '{name}' = {checks.shown(values)}: expected its values from coarse to fine, {EXAMPLE}"
+        )
     if repeats:
         values = sorted({*values, default}, key=lambda v: (v != default, repr(v)))
     listed = list(dict.fromkeys(knob_values(name, values)))
     if default not in listed:
         listed = _with_default(name, listed, default)
     if len(listed) < 2:
-        raise InputError(f"knob '{name}' = {checks.shown(values)}: expected at least two values")
+        raise InputError(
+            f"knob '{name}' = {checks.shown(values)}: expected at least two values, {EXAMPLE}"
+        )
     return Knob(name, tuple(listed), default, repeats)
 
 

@@ -239,11 +239,12 @@ class Ladder:
         self.runs[setting] = run
 
     def _too_few(self) -> str:
-        failures = list(self.failures.values())
-        if failures:
+        if self.failures:
+            setting, message = next(iter(self.failures.items()))
             return (
-                f"trade '{self.name}': no limit is found, as {len(failures)} runs failed, the first "
-                f"with: {shortened(failures[0])}"
+                f"trade '{self.name}' finds no limit: {len(self.failures)} runs failed, the first with "
+                f"{text_of(self.named(setting))}: {shortened(message)}; expected two runs that succeed: "
+                "call the function with this setting to see the whole message"
             )
         longest = max(run["spent_s"] for run in self.runs.values())
         return (

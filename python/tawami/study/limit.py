@@ -6,8 +6,8 @@ The model of a value q_i at size s_i is a power law with a second term and a dev
 
 where D is the range of the values. The second term represents another source of error, as the time step
 next to the grid. It may have the smaller order, and a fit of one power does not show it. The deviation
-represents cut cells and particles that cross cells. The orders p and m, the size eta of the deviation and
-its rate r are unknown. All of them are considered, with their probability given the values (Bayes'
+represents cut cells and particles that cross cells. The orders p and m, the size eta of the deviation
+and its rate r are unknown. All of them are considered, with their probability given the values (Bayes'
 rule; q*, C and B are integrated exactly). The interval of the uncertainty contains q* with a probability
 of 90 %. A regular sequence leaves one order and a small deviation, as in Richardson's extrapolation
 (1911). An irregular one leaves many orders, and the uncertainty is large. Several values of one size, as
@@ -17,9 +17,10 @@ A sequence has no limit if orders below `SLOWEST` are probable: 0 is a logarithm
 orders the values grow. It has no limit either if the deviation probably grows with refinement, r < 0.
 
 The priors: a limit exists with a probability of 70 %, and then ln p is normal (90 % of the orders are
-between 0.6 and 4); eta is uniform in its logarithm, r is one of `RATES` and rarely negative, and m is one
-of `SECOND`. B is normal with the standard deviation `SHARE` D, and the change by C over the sizes with 2 D.
-`SHARE` was chosen with the lines of `cases.costs.trade.coverage` and of `held_out.SEEN` in view.
+between 0.6 and 4). eta is uniform in its logarithm, r is one of `RATES` and rarely negative, and m is
+one of `SECOND`. B is normal with the standard deviation `SHARE` D, and the change by C over the sizes
+with 2 D. `SHARE` was chosen with the lines of `cases.costs.trade.coverage` and of `held_out.SEEN` in
+view.
 """
 
 from __future__ import annotations

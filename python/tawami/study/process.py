@@ -206,7 +206,7 @@ def _plain(values: Any) -> dict[str, Any]:
             array = checks.real_values(value)
         except (TypeError, ValueError):
             raise InputError(
-                f"quantity '{name}' = {checks.shown(value)}: expected real numbers"
+                f"quantity '{name}' = {checks.shown(value)}: expected real numbers; leave out others"
             ) from None
         if not np.isfinite(array).all():
             raise InputError(f"quantity '{name}' is not finite: expected numbers")
