@@ -33,6 +33,10 @@ def singular(h: Annotated[float, H] = 1 / 8, n: Annotated[int, (2, 4, 8)] = 4):
     return {"tip": 1 + h**-0.5 + 1 / n**2}
 
 
+def singular_and_regular(h: Annotated[float, H] = 1 / 8):
+    return {"tip": 1 + h**2, "stress": h**-0.5}
+
+
 def loaded(h: Annotated[float, H] = 1 / 8, load: Annotated[float, (1.0, 2.0, 4.0)] = 1.0):
     return {"tip": load * (1 + h**2)}
 
@@ -70,6 +74,10 @@ def profile(h: Annotated[float, H] = 1 / 8):
 
 
 def no_knobs(h: float = 1 / 8):
+    return {"tip": h}
+
+
+def one_value(h: Annotated[float, 0.1] = 0.1):
     return {"tip": h}
 
 
@@ -204,6 +212,26 @@ def test_a_knob_that_changes_the_problem_is_reported(tmp_path, function, message
     assert message in traded(function, tmp_path).sentence()
 
 
+def test_an_alternative_may_need_a_finer_grid():
+    """Values with 'u' may converge with h, which is not refined there: alpha has the largest effect."""
+    knobs = [
+        Knob("alpha", (2.5, 0.5, 0.1), 0.1), Knob("h", H, 1 / 8),
+        Knob("form", ("u_epsv", "u"), "u_epsv"),
+    ]  # fmt: skip
+    points = {(a, h, "u_epsv"): 1 + a * h**2 for a in knobs[0].values for h in H}
+    points |= {(a, 1 / 8, "u"): 1 - 5 / 8**2 for a in knobs[0].values}
+    (remark,) = estimate("tip", knobs, points).remarks
+    assert remark.endswith("'form' changes the problem, or h 0.125 is too coarse to tell.")
+
+
+def test_quantities_with_a_limit_are_named(tmp_path, runs):
+    trade = tawami.trade(singular_and_regular, folder=tmp_path, quiet=True, jobs=1)
+    assert trade.sentence().endswith("'tip' alone has a limit: see --quantity tip.")
+    only = tawami.trade(singular_and_regular, "tip", folder=tmp_path, quiet=True, jobs=1)
+    assert only.recommended().bound <= 0.01  # the advice
+    assert len(runs) == 4
+
+
 @pytest.mark.usefixtures("runs")
 def test_runs_that_fail_are_shown(tmp_path):
     trade = traded(fails_when_coarse, tmp_path)
@@ -246,6 +274,7 @@ def test_jobs_change_no_result(tmp_path, runs):
         ),
         (no_default, "argument 'h' of no_default has no default"),
         (only_names, "no knob of only_names refines"),
+        (one_value, "knob 'h' = 0.1: expected its values from coarse to fine, as h: Annotated"),
         (text, "quantity 'tip' = 'long': expected real numbers"),
         (profile, "quantity 'tip' of 'profile' is a list: expected a number"),
         (always_fails, "finds no limit: 3 runs failed, the first with h 0.25: InputError: no h = "),

@@ -197,8 +197,9 @@ LINES = SEEN | NEW
 
 @dataclass(frozen=True)
 class Row:
-    """A line: error of the finest value, of the limit, its uncertainty [%]; settings and their bars."""
+    """A line: error of the finest value and of the limit, bar of the limit [%]; settings and bars."""
 
+    lines: str
     line: str
     finest: float
     limit: float
@@ -208,7 +209,7 @@ class Row:
     narrow: int
 
 
-COLUMNS = ("line", "finest", "limit", "uncertainty", "settings", "covered", "narrow")
+COLUMNS = ("lines", "line", "finest", "limit", "uncertainty", "settings", "covered", "narrow")
 
 
 def judged(name: str) -> Row:
@@ -221,7 +222,10 @@ def judged(name: str) -> Row:
     narrow = sum(e + limit.uncertainty <= 3 * true + least for true, e in bars)
     errors = (100 * (value / exact - 1) for value in (values[-1], limit.value))
     uncertainty = 100 * limit.uncertainty / abs(exact)
-    return Row(name, *errors, uncertainty, len(values), covered if limit.exists else 0, narrow)
+    kind = "seen" if name in SEEN else "new"
+    return Row(
+        kind, name, *errors, uncertainty, len(values), covered if limit.exists else 0, narrow
+    )
 
 
 PROGRAM = Program("cases.costs.trade.held_out", __doc__, files=False)
