@@ -39,6 +39,8 @@ PATIENCE = 10
 #: Largest number of evaluations, and shares of the full step: the shortest that is tried where particles
 #: turn inside out, and that of the secant method. Patches that close are 200 times as stiff as a cell.
 MOST, SHORTEST, LEAST = 12, 0.05, 0.005
+#: Distance of the next step of the secant method from both ends of its interval, relative to its length.
+MARGIN = 0.1
 
 
 class LineSearch:
@@ -123,7 +125,9 @@ class LineSearch:
         other, at_other = 0.0, self._start
         t, at_t = 1.0, end
         for _ in range(MOST):
-            newer = max((other * at_t - t * at_other) / (at_t - at_other), LEAST)
+            secant = (other * at_t - t * at_other) / (at_t - at_other)
+            near, far, margin = min(t, other), max(t, other), MARGIN * abs(t - other)
+            newer = max(min(max(secant, near + margin), far - margin), LEAST)
             forces, measured = evaluate(newer)
             at_newer = self._at_last_forces(forces.residual)
             if not np.isfinite(at_newer) or newer == t:
