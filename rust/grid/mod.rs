@@ -5,6 +5,7 @@ mod basis;
 mod extraction;
 mod functions;
 mod location;
+mod near;
 mod rule;
 
 pub use active::Active;
@@ -13,6 +14,7 @@ pub use extraction::{extraction, Extraction};
 pub(crate) use functions::sum;
 pub use functions::{products, products_of, CellFunctions, Functions};
 pub use location::Location;
+pub use near::Search;
 pub use rule::{Rule, MAX_POINTS};
 
 use crate::error::{Error, Result};

@@ -9,7 +9,7 @@ use super::array::{Read1, Read2};
 use super::require;
 use super::threads::detached;
 use crate::error::Error;
-use crate::grid::{products, Active, Basis, Functions, Grid, Location, Rule, MAX_CELLS};
+use crate::grid::{products, Active, Basis, Functions, Grid, Location, Rule, Search, MAX_CELLS};
 use crate::space::{count, index_of, Index, Point, DIM, FUNCTIONS_1D};
 
 /// Most points of a Gauss rule; the time to make one grows with their square.
@@ -49,10 +49,55 @@ impl PyGrid {
         require(inside, "a cell outside the grid")?;
         Ok(PyLocation(Arc::new(Location::new(self.0, cell.to_vec(), xi))))
     }
+
+    /// Points [m] in known cells, which they may lie outside of.
+    fn place_at(&self, cell: Read1<i64>, x: Read2<f64>) -> PyResult<PyLocation> {
+        let (cell, mut x) = (cell.as_slice()?, points(&x)?);
+        require(cell.len() == x.len(), "cells and positions differ in number")?;
+        let inside = cell.iter().all(|&c| usize::try_from(c).is_ok_and(|c| c < self.0.num_cells()));
+        require(inside, "a cell outside the grid")?;
+        let cell: Vec<u32> = cell.iter().map(|&c| c as u32).collect();
+        for (x, &c) in x.iter_mut().zip(&cell) {
+            let index = self.0.cell_index(c as usize);
+            for axis in 0..DIM {
+                let scaled = (x[axis] - self.0.origin[axis]) / self.0.h;
+                x[axis] = scaled - self.0.first[axis] as f64 - index[axis] as f64;
+            }
+        }
+        Ok(PyLocation(Arc::new(Location::new(self.0, cell, x))))
+    }
+
+    /// Cells in the whole grid of points on a border, -1 for those in cells that are not treated here, and
+    /// whether no cell near each holds particles; see `grid/near.rs`.
+    #[allow(clippy::too_many_arguments)]
+    fn near<'py>(
+        &self,
+        py: Python<'py>,
+        whole: Index,
+        active: Read1<bool>,
+        own: Read1<bool>,
+        x: Read2<f64>,
+        normal: Read2<f64>,
+        inward: f64,
+        reach: usize,
+    ) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<bool>>)> {
+        let (active, own, x, normal) =
+            (active.as_slice()?, own.as_slice()?, points(&x)?, points(&normal)?);
+        require(x.len() == normal.len(), "positions and normals differ in number")?;
+        let cells = self.0.num_cells();
+        require(active.len() == cells && own.len() == cells, "masks of other cells")?;
+        require((0..DIM).all(|k| whole[k] > 0 && whole[k] <= MAX_CELLS), "an empty grid")?;
+        require(reach <= MAX_CELLS, "a search beyond the grid")?;
+        let search = Search { whole, active, own, inward, reach };
+        let found = self.0.near(&search, &x, &normal);
+        let (cell, lost): (Vec<_>, Vec<_>) =
+            found.into_iter().map(|(cell, lost)| (cell.map_or(-1, i64::from), lost)).unzip();
+        Ok((cell.to_pyarray(py), lost.to_pyarray(py)))
+    }
 }
 
 /// Rows of positions as points.
-fn points(x: &Read2<f64>) -> PyResult<Vec<Point>> {
+pub(super) fn points(x: &Read2<f64>) -> PyResult<Vec<Point>> {
     let x = x.as_array();
     if x.ncols() != DIM {
         let expected = format!("(points, {DIM})");

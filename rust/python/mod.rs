@@ -77,6 +77,7 @@ fn _rust(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(particles::logarithmic_strain, m)?)?;
     m.add_function(wrap_pyfunction!(transfer::interpolate, m)?)?;
     m.add_function(wrap_pyfunction!(transfer::gradients, m)?)?;
+    m.add_function(wrap_pyfunction!(transfer::carried, m)?)?;
     m.add_function(wrap_pyfunction!(grid::basis_1d, m)?)?;
     m.add_function(wrap_pyfunction!(grid::basis_len, m)?)?;
     m.add_function(wrap_pyfunction!(grid::gauss, m)?)?;

@@ -7,12 +7,13 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use super::array::{Read1, Read2, Write2};
-use super::grid::PyLocation;
+use super::grid::{points, PyLocation};
 use super::require;
 use super::threads::detached;
 use crate::grid::{Basis, Functions, Grid, Location, Rule, MAX_POINTS};
 use crate::particles::kinematics::gradient;
-use crate::space::{Index, DIM};
+use crate::space::{Index, Point, DIM};
+use crate::transfer::border::carry;
 use crate::transfer::cells::{cell_sums as sums_of_cells, mean_of_cell};
 use crate::transfer::densities::{pack, Densities};
 use crate::transfer::to_grid::nodal_sums as sums_of_functions;
@@ -73,6 +74,29 @@ pub(super) fn gradients<'py>(
         });
     });
     gradients.to_pyarray(py).reshape([location.len(), width])
+}
+
+/// Positions [m] and outward normals times areas of points on a border after a displacement, points x 2
+/// each; lost points stay. See `transfer/border.rs`.
+#[pyfunction]
+#[allow(clippy::too_many_arguments, clippy::type_complexity)]
+pub(super) fn carried<'py>(
+    py: Python<'py>,
+    location: &PyLocation,
+    basis: &str,
+    coefficients: Read1<f64>,
+    x: Read2<f64>,
+    area: Read2<f64>,
+    lost: Read1<bool>,
+) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+    let location = &*location.0;
+    let u = field::<DIM>(location.grid, basis.parse()?, &coefficients)?;
+    let (mut x, mut area, lost) = (points(&x)?, points(&area)?, lost.as_slice()?);
+    let n = location.len();
+    require(x.len() == n && area.len() == n && lost.len() == n, "points of another border")?;
+    carry(&u, location, lost, &mut x, &mut area);
+    let array = |points: Vec<Point>| points.as_flattened().to_pyarray(py).reshape([n, DIM]);
+    Ok((array(x)?, array(area)?))
 }
 
 /// Points per axis of a tensor rule with these points; 0 for means over cells, which have no points.

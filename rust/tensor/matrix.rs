@@ -41,6 +41,11 @@ pub(crate) fn inverse(f: &Matrix, det: f64) -> Matrix {
     [[f[1][1] / det, -f[0][1] / det], [-f[1][0] / det, f[0][0] / det]]
 }
 
+/// `det(f) f^-T`.
+pub(crate) fn cofactor(f: &Matrix) -> Matrix {
+    [[f[1][1], -f[1][0]], [-f[0][1], f[0][0]]]
+}
+
 /// Components row by row.
 pub(crate) fn flat(a: &Matrix) -> [f64; GRADIENT] {
     std::array::from_fn(|k| a[k / DIM][k % DIM])

@@ -96,8 +96,6 @@ class BorderInCells(PointsInCells):
         grid: The grid.
         location: Cells and positions in them.
         lost: Whether each point has no particles near it; its cell has no meaning then.
-        own: Whether the cell of each point belongs to this rank.
-        here: Number of this cell in the window of this rank, if it does; -1 otherwise.
 
     Raises:
         SupportError: No cell near a point holds particles.
@@ -113,26 +111,27 @@ class BorderInCells(PointsInCells):
         *,
         torn: bool = False,
     ) -> None:
-        scaled = (x - np.array(grid.origin)) / grid.h
-        most = np.array(grid.cells) - 1
-        index = np.clip(np.floor(scaled - INWARD * normal), 0, most).astype(np.int64)
-        here = grid.window.found(index)
-        mine = here >= 0
-        away = mine & ~active.ravel()[here]
-        self.lost: Mask = np.zeros(len(x), dtype=bool)
-        if away.any():
-            index[away], self.lost[away] = _nearest(grid, active.ravel(), scaled[away])
+        window = grid.window
+        cell, self.lost = window.rust.near(
+            grid.cells, active.ravel(), window.own, x, normal, INWARD, REACH
+        )
         if grid.comm.size > 1:
-            found = np.where(mine[:, None], np.column_stack([index, self.lost]), 0)
-            *axes, lost = ranks.sum_of(grid.comm, found).T
-            index, self.lost = np.stack(axes, axis=-1), lost > 0
+            found = np.where(cell[:, None] >= 0, np.column_stack([cell, self.lost]), 0)
+            cell, lost = np.ascontiguousarray(ranks.sum_of(grid.comm, found).T)
+            self.lost = lost > 0
         if self.lost.any() and not torn:
             raise _far_from_particles(grid, x, self.lost, where)
-        self.here: Indices = grid.window.found(index)
-        self.own: Mask = self.here >= 0
-        xi = np.ascontiguousarray(scaled - index)
-        cell = grid.cell_numbers(index).astype(np.uint32)
-        super().__init__(grid, grid.rust.place(cell, xi))
+        super().__init__(grid, grid.rust.place_at(cell, x))
+
+    @functools.cached_property
+    def here(self) -> Indices:
+        """Number of the cell of each point in the window of this rank, if it belongs to it; else -1."""
+        return self.grid.window.found(self.location.cell.astype(np.int64))
+
+    @functools.cached_property
+    def own(self) -> Mask:
+        """Whether the cell of each point belongs to this rank."""
+        return np.asarray(self.here >= 0)
 
     def sums(self, functions: ActiveFunctions, basis: Basis, values: Array) -> Array:
         """Sums over all points of the functions of a basis times values; a collective call.
@@ -161,42 +160,3 @@ def _far_from_particles(grid: Grid, x: Array, lost: Mask, where: str) -> Support
         f"{where}: {lost.sum()} of {len(x)} points of the border are more than {REACH} cells from any "
         f"particle, the first at {position(x[lost][0])} m: expected the border of the body's particles"
     )
-
-
-def _nearest(grid: Grid, active: Mask, scaled: Array) -> tuple[Indices, Mask]:
-    """The nearest active cell of each point, by its position along the axes, and whether there is none.
-
-    Args:
-        grid: The grid.
-        active: Whether each cell of the window holds particles, x fastest.
-        scaled: Positions [cells], in cells of this rank.
-    """
-    index, square = _nearest_within(grid, active, scaled, 1)
-    far = square >= 1  # cells further away may be nearer
-    if far.any():
-        index[far], square[far] = _nearest_within(grid, active, scaled[far], REACH)
-    return index, np.isinf(square)
-
-
-def _nearest_within(grid: Grid, active: Mask, scaled: Array, reach: int) -> tuple[Indices, Array]:
-    """The nearest active cell at most `reach` cells away along each axis, and the distance squared;
-    infinite for none.
-    """
-    window, dim, steps = grid.window, grid.space.dim, np.arange(-reach, reach + 1)
-    base = np.clip(np.floor(scaled), 0, np.array(grid.cells) - 1).astype(np.int64)
-    square, number, stride = np.zeros(1), np.zeros(1, dtype=np.int64), 1
-    for axis in range(dim):
-        near, count = base[:, axis, None] + steps, window.cells[axis]
-        before = near - scaled[:, axis, None]
-        away = np.maximum(np.maximum(before, 0.0), -1 - before)
-        near -= window.first[axis]
-        away[(near < 0) | (near >= count)] = np.inf
-        along = (-1, *(len(steps) if k == axis else 1 for k in range(dim)))
-        square = square + (away**2).reshape(along)
-        number = number + stride * np.clip(near, 0, count - 1).reshape(along)
-        stride *= count
-    square = np.where(active[number], square, np.inf).reshape(len(base), -1)
-    best = square.argmin(axis=1)
-    least = square[np.arange(len(base)), best]
-    change = np.column_stack(np.unravel_index(best, (len(steps),) * dim)) - reach
-    return np.where(np.isinf(least)[:, None], base, base + change), least

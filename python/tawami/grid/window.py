@@ -85,7 +85,12 @@ class Window:
         return np.asarray(self.indices(number) @ _strides(self._whole))
 
     def found(self, index: Indices) -> Indices:
-        """Numbers in the window of cells of this rank, given indices (i, j); -1 for other cells."""
+        """Numbers in the window of cells of this rank, given indices (i, j) or numbers in the grid.
+
+        It is -1 for other cells.
+        """
+        if index.ndim == 1:
+            index = _indices(index, self._whole)
         end = np.add(self.first, self.cells)
         number = np.full(len(index), -1)
         inside = np.flatnonzero(((index >= self.first) & (index < end)).all(axis=1))
@@ -96,7 +101,7 @@ class Window:
 
     def owns(self, location: _rust.Location) -> Mask:
         """Whether the cell of each point belongs to this rank, given those of the whole grid."""
-        return np.asarray(self.found(_indices(location.cell.astype(np.int64), self._whole)) >= 0)
+        return np.asarray(self.found(location.cell.astype(np.int64)) >= 0)
 
     def place(self, location: _rust.Location) -> _rust.Location:
         """The same points in cells of the window, given those in cells of the whole grid."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -11,9 +12,10 @@ import numpy as np
 from tawami import _rust
 from tawami.base import stored
 from tawami.base.arrays import Array, Indices, Mask
+from tawami.base.known import Known
 from tawami.base.space import Space
 from tawami.border.curves import left, spread
-from tawami.border.points import BorderPoints, transformed
+from tawami.border.points import BorderPoints
 from tawami.field.border import BorderInCells
 from tawami.grid.grid import ON_LINE, Edge, Grid
 from tawami.scene.domain import Domain
@@ -64,8 +66,8 @@ class MovingPoints:
         self.reference = self.weight
         self.middle = self.now.along - points.along if middle is None else middle
         self._located: tuple[Domain, BorderInCells] | None = None
-        #: Masks of points on edges, at these positions.
-        self._on_edges: tuple[Array, dict[tuple[Edge, float], Mask]] = self.x, {}
+        #: Masks of points on edges.
+        self._on_edges = Known()
 
     def __len__(self) -> int:
         return len(self.x)
@@ -128,13 +130,11 @@ class MovingPoints:
             edge: Name of the edge.
             tolerance: Distance that is ignored [cells].
         """
-        if self._on_edges[0] is not self.x:
-            self._on_edges = self.x, {}
-        known = self._on_edges[1]
-        if (edge, tolerance) not in known:
-            inwards = self._grid.inwards(edge, self.x)
-            known[edge, tolerance] = np.asarray(inwards <= tolerance * self._grid.h)
-        return known[edge, tolerance]
+
+        def mask() -> Mask:
+            return np.asarray(self._grid.inwards(edge, self.x) <= tolerance * self._grid.h)
+
+        return self._on_edges.of([self.x], (edge, tolerance), mask)
 
     def gap(self, edge: Edge) -> float:
         """Distance from an edge of the grid [m] that the nearest place on the border has at least.
@@ -281,14 +281,15 @@ def halve(ends: MovingPoints, longest: float) -> Indices:
     Returns:
         The piece that each one is now, or is a half of.
     """
-    start, end = np.split(ends.x, 2)
-    count = 1 + (np.linalg.norm(end - start, axis=1) > longest)
+    n = len(ends) // 2
+    start, end = ends.x[:n], ends.x[n:]
+    count = 1 + (((end - start) ** 2).sum(axis=1) > longest**2)
     of, place = spread(count)
-    if len(of) > len(count):
+    if len(of) > n:
         half, middle = count[of] == 2, ((start + end) / 2)[of]
         first = np.where((half & (place == 1))[:, None], middle, start[of])
         last = np.where((half & (place == 0))[:, None], middle, end[of])
-        ends.keep(np.concatenate([of, of + len(start)]))
+        ends.keep(np.concatenate([of, of + n]))
         ends.x = np.concatenate([first, last])
     return of
 
@@ -308,17 +309,11 @@ def moved(
     """
     if not all_points:
         return []
-    grid, basis, space = domain.model.grid, domain.layout.basis, domain.model.space
-    x, area = (
-        np.concatenate(arrays) for arrays in zip(*((p.x, p.area) for p in all_points), strict=True)
-    )
-    normal = area / np.linalg.norm(area, axis=1)[:, None]
+    grid, layout = domain.model.grid, domain.layout
+    x, area = (np.concatenate([getattr(p, name) for p in all_points]) for name in ("x", "area"))
+    normal = area / np.sqrt((area**2).sum(axis=1))[:, None]
     cells = BorderInCells(grid, domain.active, x, normal, torn=True)
-    location, near = cells.location, ~cells.lost[:, None]
-    flat = domain.layout.whole(np.ascontiguousarray(u).ravel())
-    gradient = space.in_space(space.gradients(_rust.gradients(location, basis, flat)))
-    f = gradient + np.eye(space.dim)
-    x = x + np.where(near, _rust.interpolate(location, basis, space.dim, flat), 0.0)
-    area = np.where(near, transformed(area, f), area)
-    ends = np.cumsum([len(p) for p in all_points])[:-1]
-    return list(zip(np.split(x, ends), np.split(area, ends), strict=True))
+    flat = layout.whole(np.ascontiguousarray(u).ravel())
+    x, area = _rust.carried(cells.location, layout.basis, flat, x, area, cells.lost)
+    ends = np.cumsum([0, *map(len, all_points)])
+    return [(x[a:b], area[a:b]) for a, b in itertools.pairwise(ends)]

@@ -10,6 +10,7 @@ import numpy as np
 from tawami.base import checks, stored
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import InputError
+from tawami.base.known import Known
 from tawami.border.tied import NORMAL, TANGENT, directions
 from tawami.grid.edges import Profile
 from tawami.grid.grid import Edge, Grid
@@ -41,7 +42,7 @@ class Support(Action):
         told: Whether a warning was issued that it does not hold what it should.
     """
 
-    __slots__ = ("_whole", "component", "given", "held", "place", "told", "unit")
+    __slots__ = ("_known", "_whole", "component", "given", "held", "place", "told", "unit")
 
     def __init__(
         self,
@@ -57,6 +58,7 @@ class Support(Action):
         self.place, self.given = place, given
         self.component, self.unit, self.told = component, unit, False
         self._whole: Mapping[Edge, Mask] = {} if whole is None else whole
+        self._known = Known()
         count = len(place) if isinstance(place, MovingPoints) else 0
         self.held = np.zeros(count)
         super().__init__(owner, value, factor)
@@ -76,11 +78,15 @@ class Support(Action):
         """Edges of the grid that its part of the border covered as far as the body touched them, each
         with the mask of its points there. On these it prescribes coefficients of the grid.
         """
-        if not isinstance(self.place, MovingPoints):
+        place = self.place
+        if not isinstance(place, MovingPoints):
             return {}
-        number = self.place.number
-        left = {edge: mask[number] for edge, mask in self._whole.items()}
-        return {edge: mask for edge, mask in left.items() if mask.any()}
+
+        def whole() -> dict[Edge, Mask]:
+            left = {edge: mask[place.number] for edge, mask in self._whole.items()}
+            return {edge: mask for edge, mask in left.items() if mask.any()}
+
+        return self._known.of([place.x, place.number], "whole", whole)
 
     @property
     def is_field(self) -> bool:
@@ -122,26 +128,40 @@ class Support(Action):
         if not isinstance(self.place, MovingPoints):
             return []
         place = self.place
-        return [edge for edge, mask in self.whole.items() if place.edge(edge)[mask].all()]
+
+        def edges() -> list[Edge]:
+            return [edge for edge, mask in self.whole.items() if place.edge(edge)[mask].all()]
+
+        return self._known.of([place.x, place.number], "edges", edges)
 
     @property
     def names(self) -> dict[str, set[Edge]]:
         """Parts of the border that it covers, each with the edges of the grid that it is held on."""
-        if not isinstance(self.place, MovingPoints):
+        place = self.place
+        if not isinstance(place, MovingPoints):
             return {}
-        made, held = self.place.made, self.edges
-        tags = {made.names[tag]: made.tag == tag for tag in np.unique(made.tag)}
-        return {name: {e for e in held if (self.whole[e] & of).any()} for name, of in tags.items()}
+
+        def names() -> dict[str, set[Edge]]:
+            made, on = place.made, [(edge, self.whole[edge]) for edge in self.edges]
+            tags = {made.names[tag]: made.tag == tag for tag in np.unique(made.tag)}
+            return {name: {e for e, mask in on if (mask & of).any()} for name, of in tags.items()}
+
+        return self._known.of([place.x, place.number], "names", names)
 
     @property
     def weak(self) -> Mask:
         """Mask of its points on the border that it holds by tractions on patches."""
-        if not isinstance(self.place, MovingPoints):
+        place = self.place
+        if not isinstance(place, MovingPoints):
             return np.zeros(0, dtype=bool)
-        mask = np.ones(len(self.place), dtype=bool)
-        for edge in self.edges:
-            mask &= ~self.whole[edge]
-        return mask
+
+        def weak() -> Mask:
+            mask = np.ones(len(place), dtype=bool)
+            for edge in self.edges:
+                mask &= ~self.whole[edge]
+            return mask
+
+        return self._known.of([place.x, place.number], "weak", weak)
 
     def keep(self, kept: Indices) -> None:
         """Keep some of its points of the border; those of removed particles are lost, others divided."""
