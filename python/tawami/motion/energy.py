@@ -2,8 +2,9 @@
 
     kinetic + elastic + dissipated + friction + left = start + external - transfer - impact - integration
 
-All terms are measured except the last, the remainder: the error of the time integration, and the energy
-in the stabilisation of the form (1/2 alpha h^2 sum V K^2/mu |grad eps_v|^2).
+All terms are measured except the last, the remainder: the error of the time integration, the energy in
+the stabilisation of the form (1/2 alpha h^2 sum V K^2/mu |grad eps_v|^2), and where particles move
+1/2 sum (f0 - m a) u of each step: mapped accelerations do not balance the forces f0 on the new grid.
 """
 
 from __future__ import annotations
