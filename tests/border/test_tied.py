@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 from border.contacts import line, rough
 from numpy.testing import assert_allclose
 
 from tawami.base.arrays import of_components
 from tawami.base.errors import InputError
+from tawami.base.rows import Rows
 from tawami.base.space import PLANE
 from tawami.border.patches import patches
 from tawami.border.tied import directions, means
@@ -31,12 +31,12 @@ def test_means_are_those_of_the_displacement_along_each_direction(components):
     u = rough(POINTS)
     for row, d in zip(rows, directions(PLANE, components, POINTS.normal), strict=True):
         expected = groups.means(POINTS.length, (d * u).sum(axis=1))
-        assert_allclose(row @ u.ravel(), expected, rtol=1e-12)
+        assert_allclose(row.times(u.ravel()), expected, rtol=1e-12)
 
 
 def test_both_pairs_of_components_hold_the_same():
     one, other = (
-        sp.vstack(held(*pair)[0]).toarray() for pair in (("x", "y"), ("normal", "tangent"))
+        Rows.stacked(held(*pair)[0]).csr.toarray() for pair in (("x", "y"), ("normal", "tangent"))
     )
     assert np.linalg.matrix_rank(np.vstack([one, other])) == len(one)
 

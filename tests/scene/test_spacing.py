@@ -57,12 +57,35 @@ def test_a_border_that_the_particles_do_not_follow_warns():
     scene.fix("bottom", "y")
     scene.fix("top", "y")
     pull = scene.fix("right", "x", 0.0)
-    with pytest.warns(tawami.SupportWarning, match="fix..right..: the border bends") as caught:
+    with pytest.warns(tawami.SupportWarning) as caught:
         pull_in_steps(scene, pull)
-    assert len(caught) == 1
+    told = sorted(str(one.message)[:26] for one in caught)
+    assert told == ["a piece of the border is 3", "fix('right'): the border b"]
 
 
-def pull_in_steps(scene, pull):
-    for value in np.arange(0.05, 0.41, 0.05):
+@pytest.mark.parametrize("off", [0.0, 0.2])
+def test_an_error_of_a_stretched_border_names_the_stretch_after_a_warning(off):
+    """To 1.6 times the length, with sides on lines of the grid, and as the message advises."""
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(-1 - off, -1 - off), h=0.5, cells=(9, 7))
+    body = tawami.box(grid, (0, 0), (1, 1), per_axis=3 if off else 2)
+    law = tawami.neo_hookean(E=1.0, nu=0.3)
+    volumes = "fitted" if off else "own"
+    scene = tawami.Scene(grid, body, law, form="u_finite", ghost_penalty="on", volumes=volumes)
+    scene.fix("left", "x")
+    scene.fix(["bottom", "top"], "y")
+    pull = scene.fix("right", "x", 0.0)
+    if off:
+        pull_in_steps(scene, pull, 0.6)
+        return
+    told = "a piece of the border is .* times as long.*volumes='fitted'.*0.4 h from them"
+    with (
+        pytest.warns(tawami.SupportWarning, match=told),
+        pytest.raises(tawami.SupportError, match=told),
+    ):
+        pull_in_steps(scene, pull, 1.0)
+
+
+def pull_in_steps(scene, pull, end=0.4):
+    for value in np.arange(0.05, end + 0.01, 0.05):
         pull.change(value)
         scene.solve()

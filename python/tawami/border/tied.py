@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.sparse as sp
 
 from tawami.base.arrays import Array, Indices
 from tawami.base.checks import choice
+from tawami.base.rows import Rows
 from tawami.base.space import Space
 from tawami.border.curves import left
 from tawami.border.patches import Patches
@@ -39,9 +39,7 @@ def directions(space: Space, components: Sequence[str], normals: Array) -> Array
     return np.stack(vectors)
 
 
-def means(
-    patches: Patches, weights: Array, functions: Array, places: Indices, size: int
-) -> sp.csr_matrix:
+def means(patches: Patches, weights: Array, functions: Array, places: Indices, size: int) -> Rows:
     """Means over patches of a sum of unknowns at their points, patches x unknowns.
 
     Args:
@@ -53,5 +51,5 @@ def means(
     """
     point, function = functions.nonzero()
     values = patches.shares(weights)[point] * functions[point, function]
-    entries = (values, (patches.number[point], places[point, function]))
-    return sp.csr_matrix(entries, shape=(patches.count, size))
+    place = patches.number[point], places[point, function]
+    return Rows.of(*place, values, (patches.count, size))

@@ -16,6 +16,7 @@ import scipy.sparse as sp
 from tawami.base import ranks
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.places import Places, share_places
+from tawami.base.rows import Rows
 from tawami.field.constraints import Held, PointHeld
 from tawami.field.elimination import eliminated, prescribed_by
 from tawami.field.layout import Layout
@@ -207,6 +208,15 @@ class Reduction(Unknowns):
         shape = (self.layout.size, self.layout.size)
         swap = sp.csr_matrix((np.ones(len(followers)), (followers, leaders)), shape=shape)
         return sp.csr_matrix(selection + swap @ selection)
+
+    def of_constraints(self, gradients: Rows) -> Rows:
+        """See `Unknowns.of_constraints`."""
+        if self._comm.size > 1 or self._places is None:
+            return super().of_constraints(gradients)
+        column = self._column_of[gradients.column]
+        known = column >= 0
+        shape = (gradients.shape[0], self.size)
+        return Rows.of(gradients.row[known], column[known], gradients.values[known], shape)
 
     @classmethod
     def of_all(cls, layout: Layout) -> Reduction:

@@ -13,6 +13,7 @@ from tawami.base import ranks
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.exchange import Exchange
 from tawami.base.petsc import aij, rows_of
+from tawami.base.rows import Rows
 from tawami.field.layout import Layout
 
 
@@ -120,19 +121,20 @@ class Unknowns:
         shape = (self.num_own, self.size)
         return sp.coo_matrix((product.data[mine], places), shape=shape).tocsr()
 
-    def of_constraints(self, gradients: sp.csr_matrix) -> sp.csr_matrix:
+    def of_constraints(self, gradients: Rows) -> Rows:
         """B S, constraints x unknowns of all ranks; a collective call.
 
         Args:
             gradients: B, on coefficients of the grid, the same on every rank.
         """
-        if self._comm.size == 1:
-            return sp.csr_matrix(gradients @ self.selection)
-        some = np.unique(gradients.indices)
-        s, numbers = self._rows_at(some)
-        found = (gradients[:, some] @ s).tocoo()
         shape = (gradients.shape[0], self.size)
-        return sp.csr_matrix((found.data, (found.row, numbers[found.col])), shape=shape)
+        if self._comm.size == 1:
+            found, numbers = (gradients.csr @ self.selection).tocoo(), self.number
+        else:
+            some = np.unique(gradients.column)
+            s, numbers = self._rows_at(some)
+            found = (gradients.csr[:, some] @ s).tocoo()
+        return Rows.of(found.row, numbers[found.col], found.data, shape)
 
     def _rows_at(self, in_grid: Indices) -> tuple[sp.csr_matrix, Indices]:
         """Rows of S of some coefficients of the whole grid, and the numbers of its columns."""

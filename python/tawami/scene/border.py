@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -10,14 +10,17 @@ import numpy as np
 import numpy.typing as npt
 
 from tawami import _rust
-from tawami.base import checks, ranks, stored
+from tawami.base import checks, stored
 from tawami.base.arrays import Array, Indices, Mask
-from tawami.base.errors import CheckpointError, InputError
+from tawami.base.errors import CheckpointError, InputError, SupportWarning
 from tawami.base.text import meant, quoted
+from tawami.base.warn import warn
 from tawami.border.curves import left
 from tawami.border.pieces import Border
 from tawami.border.points import BorderPoints
-from tawami.grid.grid import EDGES, ON_LINE, Edge, Grid
+from tawami.grid.grid import EDGES, ON_LINE, Edge
+from tawami.scene import spacing
+from tawami.scene.border_fits import check_fits
 from tawami.scene.domain import Domain
 from tawami.scene.excavation import Excavation
 from tawami.scene.model import Model
@@ -26,9 +29,6 @@ from tawami.scene.moving_points import SAMPLES, MovingPoints, halve, moved
 #: Gauss points on a piece of the border between two lines of the grid: where particles stay, three are
 #: exact; points that move to other places in their cells need five (noise of a pressure .5 and .14 %).
 STAYING, MOVING = 3, 5
-#: Sum of n dA of a closed border relative to its length, and differences of areas and centroids, that
-#: are ignored.
-CLOSED, FITS = 1e-6, 0.02
 #: Part of a border, as a driver script names it: a name or names, a function f(x, y) on arrays that
 #: returns a mask, or a mask of the points `scene.border.x`.
 Part = (
@@ -75,7 +75,7 @@ class SceneBorder:
         #: shares of the length between which they are.
         self._pieces_at_lines: Border | None = None
         self._left, self._shares = np.zeros(0, dtype=np.int64), np.zeros((0, 2))
-        self._has_moved = False
+        self._has_moved = self._told = False
         self.parts: list[MovingPoints] = []
         self.users: list[User] = []
         border = model.border
@@ -249,8 +249,19 @@ class SceneBorder:
         self._shares = first[:, None] + (last - first)[:, None] * np.stack([low, high], axis=1)
 
     def moved(self, domain: Domain, u: Array) -> list[tuple[Array, Array]]:
-        """Positions and areas of all points after a step, for :meth:`move`."""
-        return moved(self.all, domain, u)
+        """Positions and areas of all points after a step, for :meth:`move`.
+
+        Warns:
+            SupportWarning: Once, where the border of loads and supports has left the particles.
+        """
+        found = moved(self.all, domain, u)
+        ends = found[len(found) - len(self.parts) :]
+        growth = 0.0 if self._told else _growth(self.parts, ends)
+        told = spacing.outgrown(domain, growth)
+        self._told |= bool(told)
+        if told and self._grid.comm.rank == 0:
+            warn(told, SupportWarning)
+        return found
 
     def move(self, moved: list[tuple[Array, Array]]) -> None:
         """Move all points."""
@@ -288,39 +299,6 @@ class SceneBorder:
         self._has_moved, self._left, self._shares = bool(state["moved"]), left, shares
 
 
-def check_fits(grid: Grid, points: BorderPoints, x: Array, area: Array) -> None:
-    """Check that a closed border encloses the particles: area and centroid by the divergence theorem.
-
-    A call for all ranks.
-
-    Args:
-        grid: The grid.
-        points: Points of the border.
-        x: Positions of the particles of this rank [m], particles x dim.
-        area: Their areas in the plane [m2].
-
-    Raises:
-        InputError: It does not.
-    """
-    flux = points.length[:, None] * points.normal
-    axis = 1 if grid.space.hoop else 0  # the axis of rotation closes the border
-    if np.abs(flux.sum(axis=0)[axis:]).max() > CLOSED * points.length.sum():
-        return
-    # positions relative to the middle: round-off far from the origin cancels
-    middle = points.x.mean(axis=0)
-    middle[:axis] = 0.0
-    enclosed = ((points.x - middle) * flux).sum() / grid.space.dim
-    centroid = ((points.x - middle) ** 2 * flux).sum(axis=0) / 2 / enclosed
-    total, *moments = ranks.sum_of(grid.comm, np.array([area.sum(), *(area @ (x - middle))]))
-    away = float(np.linalg.norm(centroid - np.array(moments) / total))
-    if abs(enclosed - total) > FITS * total or away > FITS * max(grid.h, np.sqrt(total)):
-        raise InputError(
-            f"the border of the body encloses {enclosed:.6g} m2 and its particles have {total:.6g} m2, "
-            f"with centroids {away:.2g} m apart: expected a border that fits the particles; "
-            "Body(x, volume, border=tawami.polyline(corners)) gives another one, border=None none"
-        )
-
-
 def label(where: Part) -> str:
     """A part of a border in words.
 
@@ -338,6 +316,12 @@ def label(where: Part) -> str:
             "f(x, y) that returns a mask, or a mask of the points scene.border.x"
         )
     return ", ".join(repr(name) for name in names)
+
+
+def _growth(parts: Sequence[MovingPoints], moved: Sequence[tuple[Array, Array]]) -> float:
+    """The largest growth of a piece of the border in some parts, which have moved."""
+    grown = (part.growth(area) for part, (_, area) in zip(parts, moved, strict=True))
+    return max(grown, default=0.0)
 
 
 def _ends(border: Border) -> BorderPoints:

@@ -12,7 +12,6 @@ iteration. They need no stress at the border, so that they serve for all laws, f
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 
 from tawami.base.arrays import Array, Mask, of_components
 from tawami.base.errors import SupportWarning
@@ -79,7 +78,7 @@ class HeldBorder:
         self.prescribed = float(np.abs(self.values).max(initial=0.0))
         areas = self._groups.sums(self._weights)
         #: Derivative of the residual by all coefficients.
-        self.gradient = sp.diags(areas) @ self.means
+        self.gradient = self.means.rows_scaled(areas)
         self._areas, self._before = areas, before
         self._check_bent()
         self._change = np.zeros(len(areas))
@@ -119,8 +118,8 @@ class HeldBorder:
     def forces(self, coefficients: Array) -> Array:
         """See `Term`."""
         self._last = self._before + coefficients
-        self._error = self.means @ self._last - self.prescribed_means
-        self.on_body = np.asarray(-(self.gradient.T @ self._tractions))
+        self._error = self.means.times(self._last) - self.prescribed_means
+        self.on_body = -self.gradient.transposed_times(self._tractions)
         return self.on_body
 
     def stiffness(self) -> None:
@@ -199,11 +198,12 @@ class HeldBorder:
         if self.support.is_field:
             return []
         first = np.unique(self._groups.number, return_index=True)[1]
-        parts = np.split(np.arange(self.means.nnz), self.means.indptr[1:-1])
+        ends = np.searchsorted(self.means.row, np.arange(1, self.num_unknowns))
+        parts = np.split(np.arange(len(self.means.row)), ends)
         return [
             PointHeld(
-                self.means.indices[mine].astype(np.int64),
-                self.means.data[mine],
+                self.means.column[mine],
+                self.means.values[mine],
                 0.0,
                 f"{self.support}",
                 (float(x[0]), float(x[1])),

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.sparse as sp
 from scipy.sparse.linalg import lsmr
 
 from tawami.base.arrays import Array, Mask
+from tawami.base.rows import Rows
 from tawami.field.layout import Layout
 from tawami.scene.held_border import HeldBorder
 
@@ -38,14 +38,15 @@ class Impulses:
             return
         mass, fixed = layout.whole(mass), layout.whole(fixed.astype(float)) > 0
         n = len(mass)
-        self._means = sp.vstack([held[k].means[:, :n] for k in self._chosen]).tocsr()
+        means = Rows.stacked([held[k].means for k in self._chosen])
+        self._means = means.columns(slice(0, n))
         self._loose = (mass > 0) & ~fixed
         inverse = np.divide(1.0, mass, out=np.zeros(n), where=self._loose)
-        self._weighted = (sp.diags(inverse) @ self._means.T).tocsr()
-        matrix = (self._means @ self._weighted).toarray()
+        self._weighted = self._means.scaled(inverse)
+        sizes, vectors = np.linalg.eigh((self._means.csr @ self._weighted.csr.T).toarray())
         # patches that others hold too have no forces
-        least = len(matrix) * np.finfo(float).eps
-        self._inverse = np.linalg.pinv(matrix, rcond=least, hermitian=True)
+        large = sizes > len(sizes) * np.finfo(float).eps * sizes.max(initial=0.0)
+        self._inverse = (vectors[:, large] / sizes[large]) @ vectors[:, large].T
 
     def imposed(self, rates: Sequence[Array], values: Array) -> Array:
         """Velocities after the impulses.
@@ -57,8 +58,8 @@ class Impulses:
         if not self._chosen:
             return values
         prescribed = np.concatenate([rates[k] for k in self._chosen]) if rates else 0.0
-        impulse = self._inverse @ (prescribed - self._means @ self._layout.whole(values))
-        return np.asarray(values + self._layout.part(self._weighted @ impulse))
+        impulse = self._inverse @ (prescribed - self._means.times(self._layout.whole(values)))
+        return np.asarray(values + self._layout.part(self._weighted.transposed_times(impulse)))
 
     def work(self, forces: Array, u: Array) -> float:
         """Work of the supports, given the forces out of balance without them.
@@ -71,6 +72,6 @@ class Impulses:
         """
         if not self._chosen:
             return 0.0
-        whole, loose = self._layout.whole, self._means @ sp.diags(self._loose.astype(float))
-        multipliers = lsmr(loose.T, whole(forces), atol=DIGITS, btol=DIGITS)[0]
-        return float(multipliers @ (self._means @ whole(u)))
+        whole, loose = self._layout.whole, self._means.scaled(self._loose.astype(float))
+        multipliers = lsmr(loose.transposed.csr, whole(forces), atol=DIGITS, btol=DIGITS)[0]
+        return float(multipliers @ self._means.times(whole(u)))

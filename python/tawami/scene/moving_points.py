@@ -12,12 +12,14 @@ import numpy as np
 from tawami import _rust
 from tawami.base import stored
 from tawami.base.arrays import Array, Indices, Mask
+from tawami.base.errors import SupportError
 from tawami.base.known import Known
 from tawami.base.space import Space
 from tawami.border.curves import left, spread
 from tawami.border.points import BorderPoints
 from tawami.field.border import BorderInCells
 from tawami.grid.grid import ON_LINE, Edge, Grid
+from tawami.scene import spacing
 from tawami.scene.domain import Domain
 from tawami.scene.excavation import Excavation
 
@@ -120,7 +122,17 @@ class MovingPoints:
         """
         if self._located is None or self._located[0] is not domain:
             of = domain.model.grid, domain.active, self.x, self.normal, self.what
-            self._located = domain, BorderInCells(*of, torn=torn)
+            try:
+                self._located = domain, BorderInCells(*of, torn=torn)
+            except SupportError as error:
+                told = spacing.outgrown(domain, self.growth(self.area))
+                share, distance, growth = spacing.farthest(domain)
+                if share:
+                    told = (
+                        f"the particles are stretched up to {distance:.2g} h apart, {growth:.2g} times "
+                        f"as far as at the start. {spacing.advice(domain)}"
+                    )
+                raise SupportError(f"{error}. Cause: {told}" if told else str(error)) from None
         return self._located[1]
 
     def edge(self, edge: Edge, tolerance: float = ON_LINE) -> Mask:
@@ -207,6 +219,15 @@ class MovingPoints:
         """Whether a point is on a longer stretch of the border than `LONGEST`."""
         longest = LONGEST * self._grid.h * (1 + 1e-9)
         return bool(np.einsum("ja,ja->j", self.area, self.area).max(initial=0.0) > longest**2)
+
+    def growth(self, area: Array) -> float:
+        """The largest ratio of the length of the border at a point to that when it was made.
+
+        Args:
+            area: As the attribute, at a time.
+        """
+        squares = np.einsum("ja,ja->j", area, area) / self.made.length**2
+        return float(np.sqrt(squares.max(initial=0.0)))
 
     def divide(self) -> Indices:
         """Divide points on longer stretches of the border than `LONGEST` into equal parts.

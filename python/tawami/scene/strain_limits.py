@@ -35,7 +35,7 @@ class StrainLimits:
                 self._small = False
                 strain_limit.warn_of(domain, *large)
         if not self._apart:
-            self._apart = spacing.warned(domain)
+            self._apart = spacing.warned(domain, domain.model.space.vectors(coefficients[:n]))
         if not self._softens:
             self._softens = softening.warned(domain, coefficients)
         warn_of_differences(domain, self._without_tangent)

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import scipy.sparse as sp
 from scipy.linalg import block_diag
 
 from tawami.base.arrays import Array
+from tawami.base.rows import Rows
 
 
 class GivesWayError(Exception):
@@ -78,7 +78,7 @@ class Tie(OwnUnknowns, Protocol):
     """
 
     @property
-    def gradient(self) -> sp.csr_matrix:
+    def gradient(self) -> Rows:
         """Derivative of the residual by all coefficients, constraints x coefficients."""
 
     @property

@@ -20,7 +20,7 @@ from petsc4py import PETSc
 from tawami.base import ranks
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.petsc import Handles, aij, diagonal_of, rows_of
-from tawami.base.places import same_places
+from tawami.base.rows import Rows
 from tawami.field.reduction import Reduction
 
 #: D relative to B diag(K)^-1 B^T.
@@ -41,7 +41,8 @@ class Saddle:
     def __init__(self, comm: Any) -> None:
         self._comm, self._petsc = comm, Handles(self, comm)
         self._tangent: Any = None
-        self._rows = self._own = sp.csr_matrix((0, 0))
+        none = np.zeros(0, dtype=np.int64)
+        self._rows = self._own = Rows(none, none, np.zeros(0), (0, 0))
         #: Values of the matrix, whether each is one of K, and places of those of B^T, B and -D.
         self._values = np.zeros(0)
         self._of_tangent: Mask = np.zeros(0, dtype=bool)
@@ -53,7 +54,7 @@ class Saddle:
         """Number of multipliers that this rank owns."""
         return self.count if self._comm.rank == self._comm.size - 1 else 0
 
-    def of(self, tangent: Any, gradients: sp.csr_matrix, reduction: Reduction) -> Any:
+    def of(self, tangent: Any, gradients: Rows, reduction: Reduction) -> Any:
         """The matrix of a tangent and constraints; a collective call.
 
         It is the same object as long as the tangent is and B has the same pattern.
@@ -66,21 +67,22 @@ class Saddle:
         """
         self.count = gradients.shape[0]
         rows = reduction.of_constraints(gradients)
-        same = self._tangent is tangent and same_places(self._rows, rows)
+        same = self._tangent is tangent and self._rows.same_places(rows)
         same = not ranks.anywhere(self._comm, not same)
         self._rows, self._tangent = rows, tangent
         stiffness = np.abs(diagonal_of(tangent))
         largest = ranks.largest(self._comm, float(stiffness.max(initial=0.0)))
         stiffness[stiffness == 0] = largest or 1.0
-        self._own = rows[:, reduction.own]
-        sizes = self._squares(1 / stiffness)
-        added = [self._own.T.tocsr()]
+        self._own = rows.columns(reduction.own)
+        every = np.arange(self.count)
+        sizes = -PROXIMAL * self._squares(1 / stiffness)
+        added = [self._own.transposed]
         if self.num_own:
-            added += [rows, sp.diags(-PROXIMAL * sizes, format="csr")]
+            added += [rows, Rows(every, every, sizes, (self.count, self.count))]
         if not same:
-            self._make([rows_of(tangent), *added])
+            self._make([rows_of(tangent), *(part.csr for part in added)])
         self._values[self._of_tangent] = tangent.getValuesCSR()[2]
-        self._values[self._others] = np.concatenate([part.data for part in added])
+        self._values[self._others] = np.concatenate([part.values for part in added])
         matrix = self._petsc["matrix"]
         if self._comm.size > 1:
             matrix.setValuesCSR(*self._pattern, self._values)
@@ -125,5 +127,7 @@ class Saddle:
         """Diagonal of B W B^T, W the diagonal matrix of weights of this rank's unknowns; 1 where it is
         0, as others hold all that the constraint acts on. A collective call.
         """
-        sizes = ranks.sum_of(self._comm, self._own.multiply(self._own) @ weights)
+        own = self._own
+        squares = np.bincount(own.row, own.values**2 * weights[own.column], own.shape[0])
+        sizes = ranks.sum_of(self._comm, squares)
         return np.asarray(np.where(sizes > 0, sizes, 1.0))

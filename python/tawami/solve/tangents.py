@@ -7,10 +7,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
 from tawami.base import ranks
 from tawami.base.arrays import Array
+from tawami.base.rows import Rows
 from tawami.field.sum import Sum
 from tawami.solve.equations import Equations
 from tawami.solve.linear_solver import System
@@ -64,7 +64,7 @@ class Tangents:
         errors, matrix = np.zeros(0), tangent
         saddle.count = 0
         if terms is not None and terms.tied:
-            gradients = sp.vstack([tie.gradient for tie in terms.tied], format="csr")
+            gradients = Rows.stacked([tie.gradient for tie in terms.tied])
             errors = np.concatenate([tie.residual for tie in terms.tied])
             matrix = saddle.of(tangent, gradients, reduction)
             of_unknowns = scale
