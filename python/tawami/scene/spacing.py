@@ -137,7 +137,7 @@ def outgrown(domain: Domain, growth: float) -> str:
 
 
 def advice(domain: Domain) -> str:
-    """What to do about particles that are too far apart."""
+    """Advice against particles that are too far apart."""
     fitted = "" if domain.model.fits else ", Scene(..., volumes='fitted')"
     return (
         f"Expected more particles per cell (per_axis=...){fitted}, or sides that begin between lines of "
