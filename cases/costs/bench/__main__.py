@@ -98,6 +98,8 @@ def survey(
     for assembly in ("dolfinx", "points"):
         empty_cells(max(max(cells) // 4, 8), assembly)
     borders.print_ratios([max(n // 4, 2) for n in cells])
+    for particles in (800, 51200):
+        borders.print_ratio_of_borders(particles)
     for h, end in ((0.01, 0.3), (0.005, 0.06)):
         borders.print_ratio_of_walls(h, end)
 

@@ -18,6 +18,7 @@ import numpy as np
 from mpi4py import MPI
 
 import tawami
+from cases.costs.bench import timed
 from cases.showcase.collapse.pile import HEIGHT, LENGTH, NU, PHI, RHO, E, G
 
 #: Steps before the first that is measured, pairs of steps, and the size of a step [s].
@@ -112,6 +113,20 @@ def pile(h: float, *, border: bool) -> Any:
     vertical = -RHO * G * (HEIGHT - scene.particles.x[:, 1])
     scene.particles.stress[:, :3] = np.outer(vertical, (0.5, 1.0, 0.75))
     return tawami.Dynamics(scene)
+
+
+def print_ratio_of_borders(particles: int, pairs: int = PAIRS) -> None:
+    """Print the cost of a border that moves with the collapsing pile on held edges.
+
+    Args:
+        particles: Number of particles.
+        pairs: Pairs of steps.
+    """
+    dt = timed.Steps.dt(particles)
+    finer = round((particles / 800) ** 0.5)
+    motions = [timed.pile(finer, border=border) for border in (True, False)]
+    found = compared(*motions, pairs, dt)
+    print(f"  collapse of {particles} particles, a border / loose particles: {found}")
 
 
 def print_ratio_of_walls(h: float, end: float, dt: float = 1e-3) -> None:

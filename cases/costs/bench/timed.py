@@ -42,16 +42,18 @@ def beam(n: int, **options: Any) -> Any:
     return scene
 
 
-def pile(finer: int = 1, **options: Any) -> Any:
+def pile(finer: int = 1, *, border: bool = True, **options: Any) -> Any:
     """The pile of `cases.showcase.collapse` in motion.
 
     Args:
         finer: Ratio of 1 cm to the cell size: 800 finer^2 particles.
+        border: Whether the body has a border.
         options: Options of the scene.
     """
     cells = (80 * finer, 14 * finer)
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.01 / finer, cells=cells)
     body = tawami.box(grid, (0.0, 0.0), (0.2, 0.1), per_axis=2)
+    body = body if border else tawami.Body(body.x, body.volume)
     rods = tawami.drucker_prager(tawami.linear_elastic(E=0.84e6, nu=0.3), phi=21.9)
     scene = tawami.Scene(grid, body, rods, form="u_epsv_finite", density=RHO, alpha=0.01, **options)
     scene.gravity((0.0, -G))

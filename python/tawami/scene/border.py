@@ -218,7 +218,8 @@ class SceneBorder:
         """Divide points and pieces where the border has been stretched."""
         if self._ends is not None:
             of = halve(self._ends, self._grid.h)
-            self._left, self._shares = self._left[of], self._shares[of]
+            if len(of) > len(self._left):
+                self._left, self._shares = self._left[of], self._shares[of]
         all_points = [points for points in self.all if points is not self._ends]
         if any(points.is_stretched for points in all_points):
             kept = {points: points.divide() for points in all_points}

@@ -305,8 +305,9 @@ def halve(ends: MovingPoints, longest: float) -> Indices:
     n = len(ends) // 2
     start, end = ends.x[:n], ends.x[n:]
     count = 1 + (((end - start) ** 2).sum(axis=1) > longest**2)
-    of, place = spread(count)
-    if len(of) > n:
+    of = np.arange(n)
+    if (count > 1).any():
+        of, place = spread(count)
         half, middle = count[of] == 2, ((start + end) / 2)[of]
         first = np.where((half & (place == 1))[:, None], middle, start[of])
         last = np.where((half & (place == 0))[:, None], middle, end[of])

@@ -42,7 +42,17 @@ class Support(Action):
         told: Whether a warning was issued that it does not hold what it should.
     """
 
-    __slots__ = ("_known", "_whole", "component", "given", "held", "place", "told", "unit")
+    __slots__ = (
+        "_at_place",
+        "_of_points",
+        "_whole",
+        "component",
+        "given",
+        "held",
+        "place",
+        "told",
+        "unit",
+    )
 
     def __init__(
         self,
@@ -58,7 +68,8 @@ class Support(Action):
         self.place, self.given = place, given
         self.component, self.unit, self.told = component, unit, False
         self._whole: Mapping[Edge, Mask] = {} if whole is None else whole
-        self._known = Known()
+        #: What follows from its points where they are, and from their numbers alone.
+        self._at_place, self._of_points = Known(), Known()
         count = len(place) if isinstance(place, MovingPoints) else 0
         self.held = np.zeros(count)
         super().__init__(owner, value, factor)
@@ -86,7 +97,7 @@ class Support(Action):
             left = {edge: mask[place.number] for edge, mask in self._whole.items()}
             return {edge: mask for edge, mask in left.items() if mask.any()}
 
-        return self._known.of([place.x, place.number], "whole", whole)
+        return self._of_points.of([place.number], "whole", whole)
 
     @property
     def is_field(self) -> bool:
@@ -132,36 +143,36 @@ class Support(Action):
         def edges() -> list[Edge]:
             return [edge for edge, mask in self.whole.items() if place.edge(edge)[mask].all()]
 
-        return self._known.of([place.x, place.number], "edges", edges)
+        return self._at_place.of([place.x, place.number], "edges", edges)
 
     @property
     def names(self) -> dict[str, set[Edge]]:
         """Parts of the border that it covers, each with the edges of the grid that it is held on."""
-        place = self.place
+        place, held = self.place, self.edges
         if not isinstance(place, MovingPoints):
             return {}
 
         def names() -> dict[str, set[Edge]]:
-            made, on = place.made, [(edge, self.whole[edge]) for edge in self.edges]
+            made, on = place.made, [(edge, self.whole[edge]) for edge in held]
             tags = {made.names[tag]: made.tag == tag for tag in np.unique(made.tag)}
             return {name: {e for e, mask in on if (mask & of).any()} for name, of in tags.items()}
 
-        return self._known.of([place.x, place.number], "names", names)
+        return self._of_points.of([place.number], ("names", *held), names)
 
     @property
     def weak(self) -> Mask:
         """Mask of its points on the border that it holds by tractions on patches."""
-        place = self.place
+        place, held = self.place, self.edges
         if not isinstance(place, MovingPoints):
             return np.zeros(0, dtype=bool)
 
         def weak() -> Mask:
             mask = np.ones(len(place), dtype=bool)
-            for edge in self.edges:
+            for edge in held:
                 mask &= ~self.whole[edge]
             return mask
 
-        return self._known.of([place.x, place.number], "weak", weak)
+        return self._of_points.of([place.number], ("weak", *held), weak)
 
     def keep(self, kept: Indices) -> None:
         """Keep some of its points of the border; those of removed particles are lost, others divided."""
