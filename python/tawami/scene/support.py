@@ -68,7 +68,7 @@ class Support(Action):
         self.place, self.given = place, given
         self.component, self.unit, self.told = component, unit, False
         self._whole: Mapping[Edge, Mask] = {} if whole is None else whole
-        #: What follows from its points where they are, and from their numbers alone.
+        #: Values that depend on the positions of its points, and on their numbers alone.
         self._at_place, self._of_points = Known(), Known()
         count = len(place) if isinstance(place, MovingPoints) else 0
         self.held = np.zeros(count)
