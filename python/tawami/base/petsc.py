@@ -95,6 +95,15 @@ def rows_of(matrix: Any) -> sp.csr_matrix:
     return csr_matrix((np.array(values), columns, start), shape=shape)
 
 
+def values_of(matrix: Any) -> Any:
+    """Entries of a PETSc matrix on this rank, row by row.
+
+    They are the array of the matrix itself if it was made of arrays of NumPy, else a copy.
+    """
+    arrays = matrix.getAttr("__csr__")
+    return (arrays or matrix.getValuesCSR())[2]
+
+
 def diagonal_of(matrix: Any) -> Any:
     """Diagonal of a PETSc matrix, the entries of this rank; a collective call."""
     vector = matrix.getDiagonal()

@@ -19,7 +19,7 @@ from petsc4py import PETSc
 
 from tawami.base import ranks
 from tawami.base.arrays import Array, Indices, Mask
-from tawami.base.petsc import Handles, aij, diagonal_of, rows_of
+from tawami.base.petsc import Handles, aij, diagonal_of, rows_of, values_of
 from tawami.base.rows import Rows
 from tawami.field.reduction import Reduction
 
@@ -43,9 +43,9 @@ class Saddle:
         self._tangent: Any = None
         none = np.zeros(0, dtype=np.int64)
         self._rows = self._own = Rows(none, none, np.zeros(0), (0, 0))
-        #: Values of the matrix, whether each is one of K, and places of those of B^T, B and -D.
+        #: Values of the matrix, the runs of those of K in it, and places of those of B^T, B and -D.
         self._values = np.zeros(0)
-        self._of_tangent: Mask = np.zeros(0, dtype=bool)
+        self._of_tangent = list[tuple[slice, slice]]()
         self._others: Indices = np.zeros(0, dtype=np.int64)
         self.count = 0
 
@@ -81,7 +81,9 @@ class Saddle:
             added += [rows, Rows(every, every, sizes, (self.count, self.count))]
         if not same:
             self._make([rows_of(tangent), *(part.csr for part in added)])
-        self._values[self._of_tangent] = tangent.getValuesCSR()[2]
+        given = values_of(tangent)
+        for place, mine in self._of_tangent:
+            self._values[place] = given[mine]
         self._values[self._others] = np.concatenate([part.values for part in added])
         matrix = self._petsc["matrix"]
         if self._comm.size > 1:
@@ -100,7 +102,7 @@ class Saddle:
         if len(blocks) > 2:
             whole = sp.vstack([whole, sp.hstack(blocks[2:], format="csr")], format="csr")
         whole.sort_indices()
-        self._values, self._of_tangent = np.zeros(whole.nnz), whole.data < parts[0].nnz
+        self._values, self._of_tangent = np.zeros(whole.nnz), _runs(whole.data < parts[0].nnz)
         places = np.empty(whole.nnz, dtype=np.int64)
         places[whole.data] = np.arange(whole.nnz)
         self._others = places[parts[0].nnz :]
@@ -131,3 +133,16 @@ class Saddle:
         squares = np.bincount(own.row, own.values**2 * weights[own.column], own.shape[0])
         sizes = ranks.sum_of(self._comm, squares)
         return np.asarray(np.where(sizes > 0, sizes, 1.0))
+
+
+def _runs(chosen: Mask) -> list[tuple[slice, slice]]:
+    """Runs of chosen entries of an array, and the places of these among all that are chosen."""
+    ends = np.flatnonzero(np.diff(chosen, prepend=False, append=False)).reshape(-1, 2)
+    after = np.cumsum(ends[:, 1] - ends[:, 0])
+    before = after - (ends[:, 1] - ends[:, 0])
+    return [
+        (slice(*place), slice(*mine))
+        for place, mine in zip(
+            ends.tolist(), np.stack([before, after], axis=1).tolist(), strict=True
+        )
+    ]
