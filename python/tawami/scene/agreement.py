@@ -41,16 +41,16 @@ def others_hold(
     place = support.place
     assert isinstance(place, MovingPoints)
     x, normals = place.x, place.normal
-    masks = {
-        other.support: support.weak & _covered(x, other)
-        for other in others
-        if other.support.of_field == support.of_field
-    }
+    direction, none = support.directions(normals), np.zeros(len(x), dtype=bool)
+    alike = [other for other in others if other.support.of_field == support.of_field]
+    along = [(direction * other.support.directions(normals)).sum(axis=1) for other in alike]
+    if not np.any(along):  # no sum of theirs has this direction
+        return none
+    masks = {other.support: support.weak & _covered(x, other) for other in alike}
     near = [other for other, mask in masks.items() if mask.any()]
     if not near:
-        return np.zeros(len(x), dtype=bool)
+        return none
     covered = np.stack([masks[other] for other in near], axis=1)
-    direction = support.directions(normals)
     known = np.stack([other.directions(normals) for other in near], axis=1) * covered[..., None]
     # the direction as a sum of those of the others
     shares = np.einsum("ja,jak->jk", direction, np.linalg.pinv(known, rcond=ALIKE))
