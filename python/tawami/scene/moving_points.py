@@ -18,7 +18,7 @@ from tawami.base.space import Space
 from tawami.border.curves import left, spread
 from tawami.border.points import BorderPoints
 from tawami.field.border import BorderInCells
-from tawami.grid.grid import ON_LINE, Edge, Grid
+from tawami.grid.grid import EDGES, ON_LINE, Edge, Grid
 from tawami.scene import spacing
 from tawami.scene.domain import Domain
 from tawami.scene.excavation import Excavation
@@ -223,10 +223,14 @@ class MovingPoints:
     def growth(self, area: Array) -> float:
         """The largest ratio of the length of the border at a point to that when it was made.
 
+        Points on edges of the grid do not count from `spacing.LONGER` on: coefficients are held there.
+
         Args:
             area: As the attribute, at a time.
         """
         squares = np.einsum("ja,ja->j", area, area) / self.made.length**2
+        if squares.max(initial=0.0) > spacing.LONGER**2:
+            squares[np.any([self.edge(edge) for edge in EDGES], axis=0)] = 0.0
         return float(np.sqrt(squares.max(initial=0.0)))
 
     def divide(self) -> Indices:

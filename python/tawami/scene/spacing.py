@@ -125,7 +125,7 @@ def outgrown(domain: Domain, growth: float) -> str:
         return ""
     dim = model.space.dim
     f = domain.particles.displacement_gradient[:, :dim, :dim] + np.eye(dim)
-    largest = float(np.linalg.norm(f, axis=(1, 2)).max(initial=1.0))
+    largest = float(np.linalg.norm(f, 2, axis=(1, 2)).max(initial=1.0))
     body = ranks.largest(model.grid.comm, largest)
     if not growth > LONGER * body:
         return ""
