@@ -9,6 +9,7 @@ mod hencky;
 mod linear_elastic;
 mod location;
 mod mohr_coulomb;
+mod near;
 mod neo_hookean;
 mod plasticity;
 mod space;
