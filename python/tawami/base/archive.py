@@ -3,7 +3,7 @@
 A file is an archive of NumPy (.npz). Each array of the state is stored under its path, as
 'scene.particles.stress'; all else is JSON: the state without its arrays, and the identity of the run.
 The checksums of the archive detect damage. Each rank writes and reads its own rows of the arrays of the
-particles, in the order of their numbers: the file does not depend on the number of ranks.
+particles, in the order of their numbers. Only the cells of each rank depend on the number of ranks.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from tawami.base.ranks import raise_together
 from tawami.base.shared_file import Rows, crc_of
 
 #: Version of the content of a state.
-FORMAT = 5
+FORMAT = 6
 #: Entry of the archive with the JSON.
 ABOUT = "about.json"
 #: Folder of the checkpoints in the folder of a run.

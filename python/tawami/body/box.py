@@ -13,6 +13,7 @@ from tawami.base.errors import InputError
 from tawami.base.space import lattice
 from tawami.body import clipping
 from tawami.body.body import Body
+from tawami.body.dealing import dealt_cells
 from tawami.body.filling import PER_AXIS, Filling
 from tawami.body.part import Part
 from tawami.body.points import in_boxes
@@ -59,7 +60,7 @@ def box(
     ends = _ends(grid, np.array([lower, upper]))
     first, last = np.floor(ends[0]).astype(int), np.ceil(ends[1]).astype(int)
     filling.check_memory(math.prod(last - first))
-    index = grid.own_cells(first, last)
+    index = dealt_cells(grid, first, last)
     low, high = np.maximum(index, ends[0]), np.minimum(index + 1, ends[1])
     full = (high - low == 1).all(axis=1)
     cell = grid.cell_numbers(index)
@@ -71,7 +72,7 @@ def _of_full_cells(filling: Filling, cells: Array) -> Body:
     """A box of full cells, given the first and the last line along each axis, dim x 2."""
     grid, per_axis = filling.grid, filling.per_axis
     filling.check_memory(math.prod(cells[:, 1] - cells[:, 0]))
-    index = grid.own_cells(*cells.T)
+    index = dealt_cells(grid, *cells.T)
     shape = per_axis * (cells[:, 1] - cells[:, 0])  # particles of the whole box along each axis
     corner = per_axis * (index - cells[:, 0])
     place = corner[:, None] + lattice([np.arange(per_axis)] * grid.space.dim)

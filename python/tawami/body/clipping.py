@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tawami.base.arrays import Array, Indices
+from tawami.body.dealing import dealt_cells
 from tawami.body.points import ROUND_OFF
 from tawami.grid.grid import ON_LINE, Grid
 
@@ -52,7 +53,7 @@ def clipped(grid: Grid, shape: Any) -> tuple[Indices, Array, Indices]:
 
     bounds = np.array(shape.bounds)
     lower, upper = np.floor(bounds[:2]).astype(int), np.ceil(bounds[2:]).astype(int)
-    index = grid.own_cells(lower, upper)
+    index = dealt_cells(grid, lower, upper)
     cell, boxes = grid.cell_numbers(index), squares(index)
     shapely.prepare(shape)
     full = shapely.covers(shape, boxes)

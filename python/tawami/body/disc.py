@@ -12,6 +12,7 @@ from tawami.base.checks import LEAST, number, point
 from tawami.base.errors import InputError
 from tawami.body import clipping
 from tawami.body.body import Body
+from tawami.body.dealing import dealt
 from tawami.body.filling import PER_AXIS, Filling
 from tawami.body.points import ROUND_OFF, Points, halves, in_triangles, joined
 from tawami.border.pieces import Border
@@ -79,13 +80,13 @@ def disc(
     # The chords of the outer circle must not cross the inner one.
     chords = max(CHORDS, int(np.ceil(2 * np.pi / np.sqrt(1 - hole / r))))
     border, caps = _circle(grid, middle, r, chords)
-    caps = caps[grid.owns(caps.cell)]
+    caps = caps[dealt(grid, caps.cell)]
     arcs = _border(grid, middle, {"outer": r, "inner": hole})
     if hole == 0.0:
         full, triangles, cell = clipping.clipped(grid, shapely.Polygon(border))
         return filling.body(full, joined([in_triangles(triangles, cell), caps]), border=arcs)
     inner_border, removed = _circle(grid, middle, hole, chords)
-    removed = removed[grid.owns(removed.cell)]
+    removed = removed[dealt(grid, removed.cell)]
     clipped = clipping.clipped(grid, shapely.Polygon(border, [inner_border]))
     full, triangles, cell = _refined(grid, *clipped, removed.cell)
     removed = Points(removed.x, -removed.weight, removed.cell, removed.material)

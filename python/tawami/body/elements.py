@@ -10,6 +10,7 @@ import numpy as np
 from tawami.base.arrays import Array, Indices
 from tawami.base.errors import InputError
 from tawami.body import clipping
+from tawami.body.dealing import dealt
 from tawami.body.points import Points, areas, in_triangles
 from tawami.grid.grid import Grid
 
@@ -169,7 +170,7 @@ def by_cells(grid: Grid, elements: Elements, num_materials: int) -> tuple[Indice
     large = area > 0
     triangles, of, area = triangles[large], of[large], area[large]
     cell = grid.cell_numbers(grid.cell_at(triangles.mean(axis=1)))
-    mine = grid.owns(cell)
+    mine = dealt(grid, cell)
     triangles, of, area, cell = triangles[mine], of[mine], area[mine], cell[mine]
     key, place = np.unique(cell * num_materials + elements.material[of], return_inverse=True)
     covered = np.bincount(place.ravel(), area, len(key)) > 1 - COVERED
@@ -193,7 +194,7 @@ def _cut(grid: Grid, corners: Array) -> tuple[Array, Indices]:
     of = np.repeat(many, count)
     step = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
     cell = low[of] + np.column_stack([step % size[of, 0], step // size[of, 0]])  # x fastest
-    mine = grid.owns(grid.cell_numbers(cell))
+    mine = dealt(grid, grid.cell_numbers(cell))
     of, cell = of[mine], cell[mine]
     parts = shapely.intersection(shapely.polygons(corners)[of], clipping.squares(cell))
     some = shapely.area(parts) > 0

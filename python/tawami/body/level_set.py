@@ -15,6 +15,7 @@ from tawami.base.errors import InputError
 from tawami.base.space import lattice
 from tawami.body.body import Body
 from tawami.body.border_squares import CORNERS, Signs, Squares, merged, triangulated
+from tawami.body.dealing import dealt_cells
 from tawami.body.filling import PER_AXIS, Filling
 from tawami.body.outline import outline
 from tawami.body.points import ROUND_OFF, areas, in_boxes, in_triangles, joined
@@ -127,7 +128,7 @@ def level_set(
     what = f"level_set: samples = {shown(samples)} in {grid.cells[0]} x {grid.cells[1]} cells"
     of_rank = BYTES_PER_SAMPLE / grid.comm.size
     room(what, (nx + 1) * (ny + 1), of_rank, "expected fewer samples")
-    index = grid.own_cells((0, 0), grid.cells)
+    index = dealt_cells(grid, (0, 0), grid.cells)
     with ranks.raise_together(grid.comm):
         signs = sign.in_cells(index, samples)
     if not ranks.anywhere(grid.comm, (signs < 0).any()):

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from tawami.base import ranks
 from tawami.base.arrays import Array, Indices, Mask
+from tawami.body.dealing import dealt
 from tawami.grid.grid import Grid
 
 
@@ -51,7 +52,7 @@ class Part:
     @classmethod
     def of_whole(cls, grid: Grid, x: Array) -> tuple[Part, Mask]:
         """The part of a body that every rank has, and the mask of its particles; a collective call."""
-        mask = grid.owns(grid.cell_numbers(grid.cell_at(grid.in_cells(x))))
+        mask = dealt(grid, grid.cell_numbers(grid.cell_at(grid.in_cells(x))))
         return cls(grid, np.flatnonzero(mask), len(x)), mask
 
     def at(self, rows: npt.NDArray[Any], number: npt.NDArray[Any]) -> npt.NDArray[Any]:

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from tawami.base.arrays import Array
+from tawami.base.arrays import Array, Indices
 from tawami.base.dependencies import report_missing
 from tawami.base.space import PLANE
 
 __all__ = [
-    "OLD", "IntegralType", "at_points", "at_vertices", "basix", "cpp", "dolfinx", "domain",
-    "element_of", "ffcx", "function_space", "interval", "jit", "lagrange",
+    "OLD", "IntegralType", "at_points", "at_vertices", "basix", "cpp", "create_mesh", "dolfinx",
+    "domain", "element_of", "ffcx", "function_space", "interval", "jit", "lagrange",
     "mixed", "on_interval", "per_cell", "reference_nodes", "version",
 ]  # fmt: skip
 
@@ -137,6 +137,26 @@ def element_of(fields: Sequence[tuple[int, int]]) -> Any:
 def domain() -> Any:
     """A UFL mesh of squares, to write forms on without a grid."""
     return ufl.Mesh(lagrange(1, PLANE.dim))
+
+
+def create_mesh(comm: Any, vertices: Indices, x: Array) -> Any:
+    """A dolfinx mesh of squares without ghosts, whose cells stay on their ranks; a collective call.
+
+    Args:
+        comm: Communicator.
+        vertices: Numbers of the vertices of each cell of this rank, cells x 4, in the order of dolfinx.
+        x: Positions [m] of this rank's share of the vertices: the first rank has the first ones.
+    """
+
+    def stay(*_: Any) -> Any:
+        ends = np.arange(len(vertices) + 1, dtype=np.int32)
+        return cpp.graph.AdjacencyList_int32(np.full(len(vertices), comm.rank, np.int32), ends)
+
+    if OLD:
+        none = dolfinx.mesh.GhostMode.none
+        return dolfinx.mesh.create_mesh(comm, vertices, x, domain(), none, stay)
+    # by name: their order differs between 0.9 and 0.11
+    return dolfinx.mesh.create_mesh(comm, cells=vertices, x=x, e=domain(), partitioner=stay)
 
 
 @functools.cache

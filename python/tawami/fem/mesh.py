@@ -12,68 +12,59 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from mpi4py import MPI
 
-from tawami.base.arrays import Array
-from tawami.fem.dolfinx import OLD, IntegralType, cpp, dolfinx, function_space, version
+from tawami.base.arrays import Array, Indices
+from tawami.base.space import lattice
+from tawami.fem.dolfinx import OLD, IntegralType, cpp, create_mesh, function_space, version
 from tawami.fem.kernels import Kernel, quiet, settings
 
 Integers = npt.NDArray[np.int32]
 
 
+#: Facets of a cell, by the edge of the grid on that side.
+FACETS = ("bottom", "left", "right", "top")
+
+
 class Rectangle:
-    """The dolfinx mesh of a grid.
+    """The dolfinx mesh of a grid. Making one is a collective call.
+
+    Args:
+        comm: Communicator.
+        origin, h, cells: Lower left corner [m], side of a cell [m] and numbers of cells of the grid.
+        box: First cell of this rank along each axis, and the cell after its last one.
 
     Attributes:
         ij: Cell (i, j) of each of this rank's dolfinx cells, cells x 2.
-        swapped: Whether reference axis 0 is y, as in meshes of create_rectangle.
     """
 
-    def __init__(self, comm: Any, origin: Sequence[float], h: float, cells: Sequence[int]) -> None:
-        corners = [np.array(origin), np.array(origin) + h * np.array(cells)]
-        none = dolfinx.mesh.GhostMode.none
-        kind = dolfinx.mesh.CellType.quadrilateral
-        self.mesh = dolfinx.mesh.create_rectangle(comm, corners, cells, kind, ghost_mode=none)
+    def __init__(
+        self,
+        comm: Any,
+        origin: Sequence[float],
+        h: float,
+        cells: Sequence[int],
+        box: tuple[Indices, Indices],
+    ) -> None:
+        index = lattice([np.arange(*ends) for ends in zip(*box, strict=True)])
+        corners = lattice([np.arange(2)] * len(cells))  # in the order of dolfinx
+        shape = [n + 1 for n in cells]
+        share = np.array_split(np.arange(int(np.prod(shape))), comm.size)[comm.rank]
+        x = origin + h * np.stack(np.unravel_index(share, shape, order="F"), axis=-1)
+        vertices = (index[:, None] + corners) @ np.cumprod((1, *shape[:-1]))
+        self.mesh = create_mesh(comm, vertices, x)
         self.cpp = self.mesh._mesh if OLD else self.mesh._cpp_object
-        x = np.asarray(self.mesh.geometry.x)[:, :2]
-        # the vertices of each cell in reference order (0, 0), (1, 0), (0, 1), (1, 1): axis 0 first
-        vertices = x[_table(_vertices(self.mesh.geometry), 4)]
-        axis0 = (vertices[:, 1] - vertices[:, 0]) / h
-        # a rank may be without cells
-        self.swapped = comm.allreduce(bool((np.abs(axis0[:, 1]) > 0.5).any()), op=MPI.LOR)
-        expected = np.array([0.0, 1.0]) if self.swapped else np.array([1.0, 0.0])
-        if not np.allclose(axis0, expected, atol=1e-6):
+        x = np.asarray(self.mesh.geometry.x)[:, : len(cells)]
+        at = (x[_table(_vertices(self.mesh.geometry), len(corners))] - origin) / h
+        self.ij = np.floor(at.mean(axis=1)).astype(np.int64)
+        if not np.allclose(at, self.ij[:, None] + corners, atol=1e-6):
             raise RuntimeError("internal: dolfinx gave cells of different orientation")
-        middle = (vertices.mean(axis=1) - corners[0]) / h
-        self.ij = np.floor(middle).astype(np.int64)
 
-    def to_grid_axes(self, points: Array) -> Array:
-        """Reference positions (dolfinx axes) as positions in the cell along x and y."""
-        return points[:, ::-1] if self.swapped else points
-
-    def facet_of_edge(self, edge: str) -> int:
-        """Local number of a cell's facet on its 'left', 'right', 'bottom' or 'top' side."""
-        # reference facets: axis 1 = 0, axis 0 = 0, axis 0 = 1, axis 1 = 1
-        names = ("left", "bottom", "top", "right") if self.swapped else (
-            "bottom", "left", "right", "top")  # fmt: skip
-        return names.index(edge)
-
-    def _facets(self, cells: Integers, local: int) -> Integers:
-        topology = self.mesh.topology
-        topology.create_connectivity(2, 1)
-        topology.create_connectivity(1, 2)
-        facets: Integers = _table(topology.connectivity(2, 1), 4)[cells, local]
-        return facets
-
-    def entities(self, cells: Integers, local: int | None) -> Any:
-        """Integration domain: cells, or facets `local` of cells (both in assembly order)."""
-        if OLD:
-            ids = cells if local is None else self._facets(cells, local)
-            values = np.zeros(len(ids), dtype=np.int32)
-            return cpp.mesh.MeshTags_int32(self.cpp, 2 if local is None else 1, ids, values)
-        if local is None:
+    def domain(self, cells: Integers) -> Any:
+        """Integration domain of some cells, in ascending order."""
+        if not OLD:
             return cells
-        return np.column_stack([cells, np.full(len(cells), local)]).astype(np.int32).ravel()
+        values = np.zeros(len(cells), dtype=np.int32)
+        return cpp.mesh.MeshTags_int32(self.cpp, self.ij.shape[1], cells, values)
 
 
 class FunctionSpace:

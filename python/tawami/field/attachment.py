@@ -40,10 +40,7 @@ class Attachment:
         stopwatch: Measures the time of each stage.
 
     Attributes:
-        space: Function space of all fields on the mesh.
         active: Whether each cell of the rank's window holds particles, on any rank, ny x nx.
-        cells: This rank's active cells, as dolfinx numbers them.
-        rows: Position of each of them in `location.active`.
         layout: Places of the coefficients.
         sides: Sides of partially filled cells of this rank, if the form has a ghost penalty.
         has_sides: Whether any rank has such a side.
@@ -72,15 +69,11 @@ class Attachment:
         self.values |= parameters
         self.version = 0
         self.start: Array | None = None
-        self.space = grid.function_space(compiled.element)
         window = grid.window
-        number = window.numbers(grid.rectangle.ij)
         active: Mask = np.zeros(len(window.rank_of_cell), dtype=bool)
         active[location.active] = True
-        self.cells = np.flatnonzero(active[number]).astype(np.int32)
-        self.rows = np.searchsorted(location.active, number[self.cells]).astype(np.uint32)
         self.active = window.of_cells.update(active).reshape(window.cells[::-1])
-        self.layout = Layout(grid, basis, compiled.form.fields, self.space, self.active.ravel())
+        self.layout = Layout(grid, basis, compiled.form.fields, self.active.ravel())
         self.sides: list[Side] = []
         if compiled.penalises:
             moves = compiled.form.strain.finite
@@ -97,8 +90,7 @@ class Attachment:
             sums = self.layout.functions.sums(location, once, once[:, None], "quadratic_spline")
             self.layout.tie(weak, sums[:, 0], UNRESOLVED)
         self.points: dict[Rule, list[tuple[int, ...]]] = {
-            rule: _point_indices(rule, swapped=grid.rectangle.swapped)
-            for rule in compiled.densities
+            rule: _point_indices(rule) for rule in compiled.densities
         }
 
     def constants(self, integral: Integral) -> Array:
@@ -120,12 +112,11 @@ class Attachment:
 
 
 @functools.lru_cache(maxsize=32)
-def _point_indices(rule: Rule, *, swapped: bool) -> list[tuple[int, ...]]:
+def _point_indices(rule: Rule) -> list[tuple[int, ...]]:
     """Indices along each axis, in the rule of one axis, of each point of a rule of dolfinx."""
     if rule == "mean":
         return []
     points = rule_points(rule)
-    points = points[:, ::-1] if swapped else points  # as Rectangle.to_grid_axes
     along = np.array([0.0, 1.0])
     if rule != "vertex":
         along, _ = _rust.gauss(round(len(points) ** (1 / points.shape[1])))

@@ -69,7 +69,7 @@ class Block(Unknowns):
         """
         attachment, place = self._attachment, self._place
         fields = [(place.basis, place.components, place.degree)]
-        assembler = assembler_of(attachment.grid, attachment.location, fields)
+        assembler = assembler_of(attachment.location, fields)
         if kernel == "elasticity":
             kernels = _rust.Kernels.elasticity(assembler, attachment.grid.geometry)
         else:

@@ -18,6 +18,7 @@ from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.fem import dolfinx
 from tawami.fem.kernels import Kernel
+from tawami.fem.mesh import FACETS
 from tawami.fem.rules import Rule
 from tawami.field.attachment import Attachment
 from tawami.field.reduction import Reduction
@@ -87,15 +88,14 @@ class GhostPenalty:
         means = self._means(data)
         columns = list(integral.slots[0].columns) if integral.slots else []
         constants, kernel = attached.constants(integral), _call(integral.kernel)
-        to_grid = grid.rectangle.to_grid_axes
-        vertices = grid.h * np.pad(to_grid(dolfinx.reference_nodes(1)), ((0, 0), (0, 1)))
+        vertices = grid.h * np.pad(dolfinx.reference_nodes(1), ((0, 0), (0, 1)))
         rows, cols, entries = [], [], []
         for here, there, names in attached.sides:
             shift = grid.h * np.array([*np.subtract(there, here), 0])
             x = np.concatenate([vertices, vertices + shift])
             if integral.reads_position:
                 x[:, : grid.space.dim] += grid.in_metres(np.array(here))
-            facets = np.array([grid.rectangle.facet_of_edge(n) for n in names], dtype=np.int32)
+            facets = np.array([FACETS.index(n) for n in names], dtype=np.int32)
             packed = means[grid.window.numbers(np.array([here, there]))][:, columns].ravel()
             (c0, t0), (c1, t1) = (layout.on_cell(np.array(cell)) for cell in (here, there))
             element = np.zeros((2 * len(t0), 2 * len(t0)))

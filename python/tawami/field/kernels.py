@@ -13,25 +13,21 @@ from tawami.base.arrays import Array
 from tawami.fem import dolfinx
 from tawami.field.attachment import Attachment
 from tawami.form.integral import Integral
-from tawami.grid.grid import Grid
 
 Pair = tuple[Integral, Integral]
 
 
 def assembler_of(
-    grid: Grid, location: _rust.Location, fields: Sequence[tuple[str, int, int]]
+    location: _rust.Location, fields: Sequence[tuple[str, int, int]]
 ) -> _rust.Assembler:
     """The loop over the cells with points.
 
     Args:
-        grid: The grid.
         location: Cells of the points and positions in them.
         fields: Basis, number of components, and degree of the element of each field.
     """
-    to_grid = grid.rectangle.to_grid_axes
     nodes, vertices = (
-        np.rint(degree * to_grid(dolfinx.reference_nodes(degree))).astype(int).tolist()
-        for degree in (2, 1)
+        np.rint(degree * dolfinx.reference_nodes(degree)).astype(int).tolist() for degree in (2, 1)
     )
     return _rust.Assembler(location, fields, nodes, vertices)
 
@@ -71,7 +67,7 @@ class KernelsAtPoints:
         """The loop over the cells with points."""
         layout = self._attachment.layout
         fields = [(f.basis, f.components, f.degree) for f in layout.fields.values()]
-        return assembler_of(layout.grid, self._location, fields)
+        return assembler_of(self._location, fields)
 
     def vector(self, data: Sequence[Array], coefficients: Array, *, absolute: bool) -> Array:
         """Residual on all coefficients, or the sums of absolute values of its contributions.

@@ -23,7 +23,6 @@ from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.exchange import Exchange
 from tawami.base.space import lattice
 from tawami.fem import dolfinx
-from tawami.fem.mesh import FunctionSpace
 from tawami.field.coefficients import Coefficients, places_of
 from tawami.field.functions import ActiveFunctions
 from tawami.form.fields import Field
@@ -40,7 +39,6 @@ class Layout(Coefficients):
         grid: The grid.
         basis: Basis of the displacement.
         fields: The fields of the form; the displacement comes first.
-        space: Their function space on the mesh.
         active: Whether each cell of the window holds particles, on any rank, x fastest.
 
     Attributes:
@@ -62,10 +60,9 @@ class Layout(Coefficients):
         grid: Grid,
         basis: Basis,
         fields: Mapping[str, Field],
-        space: FunctionSpace,
         active: Mask,
     ) -> None:
-        self.grid, self.basis, self._space = grid, basis, space
+        self.grid, self.basis = grid, basis
         self.window = grid.window
         self.fields = places_of(fields, basis, self.window.cells)
         self.of_grid = places_of(fields, basis, grid.cells)
@@ -146,36 +143,6 @@ class Layout(Coefficients):
             ]
         )
 
-    @functools.cached_property
-    def extraction(self) -> sp.csr_matrix:
-        """E: degrees of freedom of this rank's cells x coefficients."""
-        return self.extraction_on(np.arange(len(self._space.dofs)))
-
-    def extraction_on(self, cells: Any) -> sp.csr_matrix:
-        """The rows of E of the degrees of freedom of some dolfinx cells; the others are empty."""
-        number = self.window.numbers(self.grid.rectangle.ij[cells])
-        dofs = self._space.dofs[cells]
-        rows, columns, values, done = [], [], [], 0
-        for field in self.fields.values():
-            functions, at_nodes = self._at_nodes(field.basis, field.degree, number)
-            width = at_nodes.shape[1] * field.components
-            of_nodes = dofs[:, done : done + width].reshape(-1, field.components)
-            done += width
-            once = np.unique(of_nodes[:, 0], return_index=True)[1]  # (cell, node) of each row
-            functions = functions[once // at_nodes.shape[1]]
-            at_nodes = at_nodes.reshape(-1, at_nodes.shape[2])[once]
-            components = np.arange(field.components)
-            shape = (*functions.shape, len(components))
-            columns.append(field.start + len(components) * functions[..., None] + components)
-            rows.append(np.broadcast_to(of_nodes[once][:, None], shape))
-            values.append(np.broadcast_to(at_nodes[..., None], shape))
-        flat = [
-            np.concatenate([part.ravel() for part in parts]) for parts in (values, rows, columns)
-        ]
-        matrix = sp.csr_matrix((flat[0], (flat[1], flat[2])), shape=(self._space.size, self.size))
-        matrix.eliminate_zeros()
-        return matrix
-
     def on_cell(self, cell: Indices) -> tuple[Indices, Array]:
         """Coefficients on a cell (i, j) of the grid, and T: degrees of freedom of a kernel = T
         coefficients.
@@ -183,19 +150,18 @@ class Layout(Coefficients):
         number = np.array([self.window.numbers(cell)])
         coefficients, blocks = [], []
         for field in self.fields.values():
-            functions, at_nodes = self._at_nodes(field.basis, field.degree, number)
+            functions, at_nodes = self.at_nodes(field.basis, field.degree, number)
             components = np.arange(field.components)
             first = field.start + field.components * functions[0]
             coefficients.append((first[:, None] + components).ravel())
             blocks.append(np.kron(at_nodes[0], np.eye(field.components)))
         return np.concatenate(coefficients), sp.block_diag(blocks).toarray()
 
-    def _at_nodes(self, basis: Basis, degree: int, cells: Indices) -> tuple[Indices, Array]:
+    def at_nodes(self, basis: Basis, degree: int, cells: Indices) -> tuple[Indices, Array]:
         """Functions on cells (cells x functions), and their values at Lagrange nodes of a degree
         (cells x nodes x functions).
         """
-        nodes = self.grid.rectangle.to_grid_axes(dolfinx.reference_nodes(degree))
-        return _rust.extraction(basis, self.window.cells, cells, np.ascontiguousarray(nodes))
+        return _rust.extraction(basis, self.window.cells, cells, dolfinx.reference_nodes(degree))
 
     @property
     def greville(self) -> Array:

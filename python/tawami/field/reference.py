@@ -29,13 +29,18 @@ class ReferenceAssembly(Assembly):
 
     def __init__(self, attachment: Attachment) -> None:
         super().__init__(attachment)
-        self._space, self._cells = attachment.space, attachment.cells
+        grid, location = attachment.grid, attachment.location
+        self._space = grid.function_space(attachment.compiled.element)
+        number, active = grid.window.numbers(grid.rectangle.ij), location.active
+        #: Active cells, as dolfinx numbers them, and the position of each in `location.active`.
+        self._cells = np.flatnonzero(np.isin(number, active)).astype(np.int32)
+        self._rows = np.searchsorted(active, number[self._cells]).astype(np.uint32)
         self._packed: dict[int, Array] = {}
         self._petsc = Handles(self, attachment.grid.comm)
 
     def residual(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
         """See `Assembly.residual`."""
-        extraction = self.layout.extraction
+        extraction = self._extraction
         vector, nodal = np.zeros(self._space.size), extraction @ coefficients
         for integral in self._compiled.residual:
             with self._stopwatch("pack"):
@@ -47,7 +52,7 @@ class ReferenceAssembly(Assembly):
 
     def magnitude(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
         """See `Assembly.magnitude`; all contributions are those of cells."""
-        extraction, dofs = self.layout.extraction, self._space.dofs[self._cells]
+        extraction, dofs = self._extraction, self._space.dofs[self._cells]
         nodal, sums = extraction @ coefficients, np.zeros(self.layout.size)
         for integral in self._compiled.residual:
             of_cells = self._of_each_cell(integral, nodal, data)
@@ -64,7 +69,7 @@ class ReferenceAssembly(Assembly):
             else:
                 self._petsc.free("P", "reduced")
                 self.reduction = reduction
-                rows = (self.layout.extraction[: self._space.own] @ reduction.selection).tocoo()
+                rows = (self._extraction[: self._space.own] @ reduction.selection).tocoo()
                 places, shape = (
                     (rows.row, reduction.number[rows.col]),
                     (rows.shape[0], reduction.size),
@@ -75,9 +80,36 @@ class ReferenceAssembly(Assembly):
         return self._ghost.add_tangent(self._petsc["reduced"], data, reduction)
 
     @functools.cached_property
+    def _extraction(self) -> sp.csr_matrix:
+        """E: degrees of freedom of this rank's cells x coefficients."""
+        layout, dofs = self.layout, self._space.dofs
+        number = layout.window.numbers(layout.grid.rectangle.ij)
+        rows, columns, values, done = [], [], [], 0
+        for field in layout.fields.values():
+            functions, at_nodes = layout.at_nodes(field.basis, field.degree, number)
+            width = at_nodes.shape[1] * field.components
+            of_nodes = dofs[:, done : done + width].reshape(-1, field.components)
+            done += width
+            once = np.unique(of_nodes[:, 0], return_index=True)[1]  # (cell, node) of each row
+            functions = functions[once // at_nodes.shape[1]]
+            at_nodes = at_nodes.reshape(-1, at_nodes.shape[2])[once]
+            components = np.arange(field.components)
+            shape = (*functions.shape, len(components))
+            columns.append(field.start + len(components) * functions[..., None] + components)
+            rows.append(np.broadcast_to(of_nodes[once][:, None], shape))
+            values.append(np.broadcast_to(at_nodes[..., None], shape))
+        flat = [
+            np.concatenate([part.ravel() for part in parts]) for parts in (values, rows, columns)
+        ]
+        shape = (self._space.size, layout.size)
+        matrix = sp.csr_matrix((flat[0], (flat[1], flat[2])), shape=shape)
+        matrix.eliminate_zeros()
+        return matrix
+
+    @functools.cached_property
     def _forms(self) -> dict[int, Any]:
         """The integrals over cells as dolfinx forms on the active cells."""
-        entities = self.layout.grid.rectangle.entities(self._cells, None)
+        entities = self.layout.grid.rectangle.domain(self._cells)
         return {
             id(integral): self._space.form(integral.kernel, integral.rank, entities)
             for integral in (*self._compiled.residual, *self._compiled.tangent)
@@ -90,7 +122,7 @@ class ReferenceAssembly(Assembly):
                 self._petsc["full"] = self._space.create_matrix(self._cells)
             matrix = self._petsc["full"]
             matrix.zeroEntries()
-        nodal = self.layout.extraction @ coefficients
+        nodal = self._extraction @ coefficients
         for integral in self._compiled.tangent:
             with self._stopwatch("pack"):
                 packed = self._pack(integral, nodal, data)
@@ -118,7 +150,7 @@ class ReferenceAssembly(Assembly):
                 rule = slot.data
                 _rust.densities(
                     attached.location, attached.volume, data[rule], attached.points[rule],
-                    rule == "vertex", attached.rows, list(slot.columns), offset, packed,
+                    rule == "vertex", self._rows, list(slot.columns), offset, packed,
                 )  # fmt: skip
             offset += slot.width
         return packed
@@ -128,7 +160,7 @@ class ReferenceAssembly(Assembly):
         packed, rows = self._pack(integral, nodal, data), []
         for k in range(len(self._cells)):
             cell, vector = slice(k, k + 1), np.zeros(self._space.size)
-            entities = self.layout.grid.rectangle.entities(self._cells[cell], None)
+            entities = self.layout.grid.rectangle.domain(self._cells[cell])
             form = self._space.form(integral.kernel, integral.rank, entities)
             self._add_vector(vector, form, integral, packed[cell])
             rows.append(vector[self._space.dofs[self._cells[k]]])

@@ -1,4 +1,4 @@
-"""The background grid: cells of one size on a communicator, and its dolfinx mesh."""
+"""The background grid: cells of one size on a communicator."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ import numpy as np
 from mpi4py import MPI
 
 from tawami import _rust
-from tawami.base import program, ranks
-from tawami.base.arrays import Array, Indices, Mask
+from tawami.base import program
+from tawami.base.arrays import Array, Indices
 from tawami.base.checks import choice, number, one_of, pair, point, room, shown, whole_number
 from tawami.base.errors import InputError
 from tawami.base.process import Unique, check_process
-from tawami.base.space import SPACES, Counts, Position, lattice
+from tawami.base.space import SPACES, Counts, Position
 from tawami.base.text import meant, position
 from tawami.fem import mesh
+from tawami.grid.division import Division
 from tawami.grid.window import Window
 
 Edge = Literal["left", "right", "bottom", "top"]
@@ -35,11 +36,12 @@ BYTES_PER_CELL = 600.0
 
 
 class Grid(Unique):
-    """Uniform grid of squares; all scenes on it share its dolfinx mesh.
+    """Uniform grid of squares.
 
     Attributes:
         space: Dimension, names of components and units.
         geometry: As given.
+        division: Cells of each rank; a scene divides them by their particles.
 
     Args:
         comm: Communicator, such as MPI.COMM_WORLD; its ranks share the cells.
@@ -84,7 +86,8 @@ class Grid(Unique):
                 f"origin = {self.origin}: expected at most {FARTHEST:g} cells of {self.h:g} m from "
                 "(0, 0): farther away, positions have too few digits; move body and grid nearer"
             )
-        self._rectangle: mesh.Rectangle | None = None
+        none = np.zeros((0, self.space.dim), dtype=np.int64)
+        self.division = Division.weighed(MPI.COMM_SELF, comm.size, self.cells, none, none[:, 0])
         self._function_spaces: dict[str, mesh.FunctionSpace] = {}
 
     @property
@@ -134,67 +137,26 @@ class Grid(Unique):
             "geometry": self.geometry,
         }
 
-    @property
-    def rectangle(self) -> mesh.Rectangle:
-        """The dolfinx mesh, made when it is first needed."""
-        if self._rectangle is None:
-            self._rectangle = mesh.Rectangle(self.comm, self.origin, self.h, self.cells)
-        return self._rectangle
-
     @functools.cached_property
     def window(self) -> Window:
-        """The part of the grid that this rank knows; the first call is one for all ranks."""
-        own = self.rectangle.ij
-        return Window(self.comm, self.origin, self.h, self.cells, self.rust, own)
+        """The part of the grid that this rank knows."""
+        return Window(self.comm, self.origin, self.h, self.rust, self.division)
 
-    def ranks_of(self, cells: Indices) -> Indices:
-        """The ranks that own cells, given by their numbers, and the particles there; a collective call.
-
-        Each rank keeps the owners of an equal share of all cells, and answers for these.
-        """
-        comm = self.comm
-        if comm.size == 1:
-            return np.zeros(len(cells), dtype=np.int64)
-        some, at = np.unique(cells, return_inverse=True)
-        asked = ranks.parts_to(comm, some, some // self._share)
-        first = comm.rank * self._share
-        answers = comm.alltoall([self._owners[numbers - first] for numbers in asked])
-        return np.asarray(np.concatenate(answers)[at])
-
-    @property
-    def _share(self) -> int:
-        """Number of cells whose owners each rank keeps."""
-        return -(-self.num_cells // self.comm.size)
+    def divided(self, division: Division) -> Grid:
+        """The same grid with other cells for each rank; itself if they are the same."""
+        if np.array_equal(division.cuts, self.division.cuts):
+            return self
+        other = Grid(
+            self.comm, origin=self.origin, h=self.h, cells=self.cells, geometry=self.geometry
+        )
+        other.division = division
+        return other
 
     @functools.cached_property
-    def _owners(self) -> Indices:
-        """Owners of the share of this rank; the first call is one for all ranks."""
-        own = self.cell_numbers(self.rectangle.ij)
-        owners = np.zeros(self._share, dtype=np.int64)
-        for rank, cells in enumerate(ranks.parts_to(self.comm, own, own // self._share)):
-            owners[cells - self.comm.rank * self._share] = rank
-        return owners
-
-    def own_cells(self, lower: Sequence[int], upper: Sequence[int]) -> Indices:
-        """Indices (i, j) of this rank's cells in a box, in the order of their numbers, cells x dim.
-
-        A collective call on several ranks.
-
-        Args:
-            lower: Its first cell along each axis.
-            upper: The cell after its last one.
-        """
-        if self.comm.size == 1:
-            return lattice([np.arange(*ends) for ends in zip(lower, upper, strict=True)])
-        index = self.rectangle.ij
-        index = index[((index >= lower) & (index < upper)).all(axis=1)]
-        return np.asarray(index[np.argsort(self.cell_numbers(index))])
-
-    def owns(self, cell: Indices) -> Mask:
-        """Whether cells, given by their numbers, are this rank's; a collective call on several ranks."""
-        if self.comm.size == 1:
-            return np.ones(len(cell), dtype=bool)
-        return np.isin(cell, self.cell_numbers(self.rectangle.ij))
+    def rectangle(self) -> mesh.Rectangle:
+        """The dolfinx mesh; the first call is one for all ranks."""
+        box = self.division.lower[self.comm.rank], self.division.upper[self.comm.rank]
+        return mesh.Rectangle(self.comm, self.origin, self.h, self.cells, box)
 
     def function_space(self, element: Any) -> mesh.FunctionSpace:
         """The function space of an element."""

@@ -12,9 +12,10 @@ import numpy as np
 from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array, Indices, Mask
-from tawami.base.exchange import Exchange, Values
+from tawami.base.exchange import Exchange, Places, Values
 from tawami.base.space import lattice
 from tawami.grid.basis import Basis, greville_1d
+from tawami.grid.division import Division
 
 #: Cells around those of a rank: a function on a cell next to them has its whole support in the window.
 RING = 3
@@ -25,50 +26,51 @@ class Window:
 
     Cells and functions of the window have numbers of their own, x fastest, as those of the whole grid.
     At its ends functions have no meaning, unless the grid ends there too. On one rank it is the grid.
-    Making one is a collective call.
 
     Args:
         comm: Communicator.
         origin, h: Lower left corner [m] and side of a cell [m] of the grid.
-        whole: Numbers of cells of the grid along each axis.
         rust: The grid for `_rust`.
-        own: Indices (i, j) of this rank's cells, cells x axes.
+        division: Cells of each rank.
 
     Attributes:
         first: Its first cell along each axis.
         cells: Its number of cells along each axis.
         rust: The same for `_rust`.
         rank_of_cell: Rank that owns each of its cells.
+        of_cells: The exchange of values of its cells.
     """
 
     def __init__(
-        self,
-        comm: Any,
-        origin: Sequence[float],
-        h: float,
-        whole: Sequence[int],
-        rust: _rust.Grid,
-        own: Indices,
+        self, comm: Any, origin: Sequence[float], h: float, rust: _rust.Grid, division: Division
     ) -> None:
-        self._comm, self._origin, self._h, self._whole = comm, origin, h, tuple(whole)
-        most = np.array(whole)
-        low, high = (own.min(axis=0), own.max(axis=0) + 1) if len(own) else (0 * most, 0 * most + 1)
-        first, end = np.maximum(low - RING, 0), np.minimum(high + RING, most)
+        self._comm, self._origin, self._h, self._whole = comm, origin, h, division.cells
+        low, high = division.lower, division.upper
+        some = (low < high).all(axis=1)[:, None]
+        most = np.array(self._whole)
+        begin = np.where(some, np.maximum(low - RING, 0), 0)
+        end = np.where(some, np.minimum(high + RING, most), np.minimum(1 + RING, most))
+        first, last = begin[comm.rank], end[comm.rank]
         self.first: tuple[int, ...] = tuple(first.tolist())
-        self.cells: tuple[int, ...] = tuple((end - first).tolist())
+        self.cells: tuple[int, ...] = tuple((last - first).tolist())
         self.rust = rust.window(list(self.first), list(self.cells))
         self.rank_of_cell: Indices = np.full(math.prod(self.cells), comm.rank, dtype=np.int64)
-        if comm.size > 1:
-            boxes = comm.allgather((first, end))
-            inside = [((own >= f) & (own < e)).all(axis=1) for f, e in boxes]
-            for rank, cells in enumerate(comm.alltoall([own[mask] for mask in inside])):
-                self.rank_of_cell[self.numbers(cells)] = rank
-        self.of_cells = Exchange.of(
-            comm,
-            self.rank_of_cell,
-            self.cells_in_grid,
-            lambda numbers: self.numbers(_indices(numbers, self._whole)),
+        copies = self._common(low, high, first, last)
+        for rank, places in copies.items():
+            self.rank_of_cell[places] = rank
+        self.of_cells = Exchange(
+            comm, copies, self._common(begin, end, low[comm.rank], high[comm.rank])
         )
+
+    def _common(self, low: Indices, high: Indices, first: Indices, last: Indices) -> Places:
+        """Cells of this window in a box of each other rank and in a box of this one, by rank."""
+        low, high = np.maximum(low, first), np.minimum(high, last)
+        found: Places = {}
+        for rank in np.flatnonzero((low < high).all(axis=1)).tolist():
+            if rank != self._comm.rank:
+                along = [np.arange(*ends) for ends in zip(low[rank], high[rank], strict=True)]
+                found[rank] = self.numbers(lattice(along))
+        return found
 
     # -- cells -------------------------------------------------------------------
 
@@ -98,10 +100,6 @@ class Window:
         own = self.own[here]
         number[inside[own]] = here[own]
         return number
-
-    def owns(self, location: _rust.Location) -> Mask:
-        """Whether the cell of each point belongs to this rank, given those of the whole grid."""
-        return np.asarray(self.found(location.cell.astype(np.int64)) >= 0)
 
     def place(self, location: _rust.Location) -> _rust.Location:
         """The same points in cells of the window, given those in cells of the whole grid."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Collection, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,8 @@ from tawami.base.arrays import Array, Mask
 from tawami.base.errors import CheckpointError, InputError
 from tawami.base.shared_file import Rows, by_number
 from tawami.grid.grid import EDGES, Edge, Grid
+from tawami.particles import work
+from tawami.particles.work import Work
 
 #: Least distance of moving particles from the sides of their cell [cells]. A single particle on a side
 #: would leave functions beyond it without stiffness and mass.
@@ -22,6 +24,20 @@ MARGIN = 1e-5
 #: Distance beyond a wall at which a particle that moves is taken as on it [cells]: contact acts on means
 #: over patches of the border, so that a corner or a curved border may pass it a little.
 BEYOND = 0.5
+
+
+class Placed(NamedTuple):
+    """Particles where they are.
+
+    Attributes:
+        grid: The grid with the cells of each rank.
+        particles: The particles in those of this rank.
+        location: Their cells in its window.
+    """
+
+    grid: Grid
+    particles: _rust.Particles
+    location: _rust.Location
 
 
 def located(grid: Grid, x: Array, *, moving: bool, moved: bool = True) -> _rust.Location:
@@ -58,8 +74,8 @@ def outside(grid: Grid, x: Array, walls: Collection[Edge] = ()) -> Mask:
 
 def distributed(
     grid: Grid, body: _rust.Particles, moving: bool, *, whole: bool = True, moved: bool = False
-) -> tuple[_rust.Particles, _rust.Location]:
-    """The particles in this rank's cells, which are those of its window; a collective call.
+) -> Placed:
+    """The particles in this rank's cells, which the particles divide; a collective call.
 
     Args:
         grid: The grid.
@@ -70,22 +86,23 @@ def distributed(
     Raises:
         InputError: Particles are outside the grid, or a whole body is not the same on all ranks.
     """
-    if not whole:
-        return migrated(grid, body, moving=moving, moved=moved)
-    location = located(grid, body.x, moving=moving, moved=moved)
-    if grid.comm.size == 1:
-        return body, grid.window.place(location)
-    parts = (body.x, body.volume, body.material)
-    digest = hashlib.sha1(b"".join(part.tobytes() for part in parts)).digest()
-    if len(set(grid.comm.allgather(digest))) > 1:
-        raise InputError(
-            "the body is not the same on all ranks: expected the same positions, volumes and "
-            "materials on each. Give random numbers a seed, or make it on one rank and bcast it; to "
-            "move or choose particles of box(...) and other shapes, whose ranks have a part each, use "
-            "dataclasses.replace(body, x=...) or body[mask]"
-        )
-    mine = np.flatnonzero(grid.window.owns(location)).astype(np.uint32)
-    return body.select(mine), grid.window.place(location.select(mine))
+    comm = grid.comm
+    if whole and comm.size > 1:
+        parts = (body.x, body.volume, body.material)
+        digest = hashlib.sha1(b"".join(part.tobytes() for part in parts)).digest()
+        if len(set(comm.allgather(digest))) > 1:
+            raise InputError(
+                "the body is not the same on all ranks: expected the same positions, volumes and "
+                "materials on each. Give random numbers a seed, or make it on one rank and bcast it; to "
+                "move or choose particles of box(...) and other shapes, whose ranks have a part each, "
+                "use dataclasses.replace(body, x=...) or body[mask]"
+            )
+        body = body.select(np.arange(comm.rank, len(body), comm.size, dtype=np.uint32))
+    with ranks.raise_together(comm):
+        location = located(grid, body.x, moving=moving, moved=moved)
+    cells = grid.cell_indices(location.active.astype(np.int64))
+    grid = grid.divided(work.divided(grid, location, cells))
+    return migrated(grid, body, moving=moving, moved=moved)
 
 
 def columns(particles: _rust.Particles) -> list[tuple[str, int]]:
@@ -117,16 +134,27 @@ def stored(comm: Any, particles: _rust.Particles) -> dict[str, Rows]:
 
 
 def restored(
-    grid: Grid, particles: _rust.Particles, given: Mapping[str, Rows | Array], *, moving: bool
-) -> tuple[_rust.Particles, _rust.Location]:
-    """The particles of this rank, the reverse of :func:`stored`; arrays that are whole are those of all
-    ranks.
+    grid: Grid,
+    particles: _rust.Particles,
+    work: Work,
+    state: Mapping[str, Any],
+    *,
+    moving: bool,
+) -> Placed:
+    """The particles of a state, the reverse of :func:`stored`; a collective call.
 
-    The result is `particles` itself, with these values, if the particles of this rank are the same.
+    Args:
+        grid: The grid.
+        particles: Particles of the scene. The result has the same object, with the values of the state,
+            if the particles of this rank are the same.
+        work: Work of the ranks; changes to that of the state.
+        state: "particles" as :func:`stored` gives them, and "work".
+        moving: As of `located`.
 
     Raises:
         CheckpointError: The arrays are not those of the particles.
     """
+    given = state["particles"]
     wanted = dict(columns(particles))
     found = {name: array.shape[1] for name, array in given.items()}
     if wanted != found:
@@ -138,8 +166,14 @@ def restored(
     whole = not isinstance(given["x"], Rows)
     parts = (given[name] for name in wanted)
     rows = np.hstack([part.own if isinstance(part, Rows) else part for part in parts])
-    mine, location = distributed(grid, particles.of_rows(rows), moving, whole=whole, moved=True)
-    return (particles if particles.assign(mine) else mine), location
+    same, mine = work.restore(grid, state["work"]), particles.of_rows(rows)
+    if same is None:  # written by another number of ranks
+        placed = distributed(grid, mine, moving, whole=whole, moved=True)
+    else:
+        placed = migrated(same, mine, moving=moving)
+    if not particles.assign(placed.particles):
+        return placed
+    return Placed(placed.grid, particles, placed.location)
 
 
 def numbered(particles: _rust.Particles, number: npt.NDArray[Any]) -> _rust.Particles:
@@ -152,11 +186,8 @@ def numbered(particles: _rust.Particles, number: npt.NDArray[Any]) -> _rust.Part
 
 def migrated(
     grid: Grid, particles: _rust.Particles, *, moving: bool = True, moved: bool = True
-) -> tuple[_rust.Particles, _rust.Location]:
+) -> Placed:
     """Move particles to the rank of their cell, in the order of their numbers; a collective call.
-
-    Returns:
-        The particles of this rank, and their cells in its window.
 
     Raises:
         InputError: Particles are outside the grid.
@@ -166,12 +197,27 @@ def migrated(
         with ranks.raise_together(comm):
             location = located(grid, particles.x, moving=moving, moved=moved)
         if comm.size == 1:
-            return particles, grid.window.place(location)
-        rank = grid.ranks_of(location.cell.astype(np.int64))
+            return Placed(grid, particles, grid.window.place(location))
+        rank = grid.division.rank_of(grid.cell_indices(location.cell.astype(np.int64)))
         if not ranks.anywhere(comm, (rank != comm.rank).any()):
-            return particles, grid.window.place(location)
+            return Placed(grid, particles, grid.window.place(location))
         particles = particles.of_rows(ranks.exchanged(comm, particles.rows(), rank))
         particles = particles.select(np.argsort(particles.number).astype(np.uint32))
+
+
+def shared(grid: Grid, particles: _rust.Particles, work: Work) -> Placed:
+    """Move particles to the rank of their cell after a step, and cells to other ranks where that pays.
+
+    A collective call.
+
+    Args:
+        grid: The grid with the cells of each rank so far.
+        particles: Particles that have moved.
+        work: Work of the ranks.
+    """
+    placed = migrated(grid, particles)
+    other = work.redivided(grid, placed.location)
+    return placed if other is grid else migrated(other, placed.particles)
 
 
 def leaving(

@@ -22,28 +22,23 @@ from tawami.base.program import leave_together
 from tawami.base.timing import Stopwatch
 from tawami.particles import placement
 from tawami.particles.following import fingerprints
-from tawami.scene import (
-    coverage,
-    fitting,
-    left_edges,
-    mean_stress,
-    own_fields,
-    quantities,
-    strain_limit,
-    wall_gap,
-)
+from tawami.particles.placement import Placed
+from tawami.particles.work import Work
+from tawami.scene import coverage, fitting, mean_stress, own_fields, strain_limit, wall_gap
 from tawami.scene.activity import Activity
 from tawami.scene.border import SceneBorder
 from tawami.scene.border_sums import BorderSums
 from tawami.scene.domain import Domain
 from tawami.scene.form_inputs import FormInputs
 from tawami.scene.held_border import HeldBorder
+from tawami.scene.left_edges import taken_over
 from tawami.scene.loads import Loads
 from tawami.scene.model import Model
 from tawami.scene.obstacle_contact import ObstacleContact
 from tawami.scene.obstacle_motion import Times
 from tawami.scene.obstacles import Obstacles
 from tawami.scene.outcome import Moved, Outcome
+from tawami.scene.quantities import copies
 from tawami.scene.reactions import Reactions
 from tawami.scene.share import Moment
 from tawami.scene.solving import solved
@@ -81,16 +76,17 @@ class Configuration:
     """
 
     def __init__(self, model: Model, particles: _rust.Particles, numerics: Numerics) -> None:
-        self.model, self.numerics, self.stopwatch = model, numerics, Stopwatch()
+        self.numerics, self.stopwatch, self._work = numerics, Stopwatch(), Work()
         whole = model.part is None
-        mine, location = placement.distributed(model.grid, particles, model.moves, whole=whole)
+        placed = placement.distributed(model.grid, particles, model.moves, whole=whole)
+        self.model, mine = replace(model, grid=placed.grid), placed.particles
         if model.form.kinematics.has_eps_v:
             mine.add_eps_v()
         mine.add_strain(model.moves, model.grid.geometry)
         own_fields.carry(model.form, mine, model.space.dim)
         self.border = SceneBorder(model, mine)
         self.border_sums = BorderSums(model, self.border, lambda: self.total)
-        self._attach(mine, location)
+        self._attach(placed)
         self.activity = Activity()
         own = model.form.own_fields
         self.supports = Supports(model.grid, model.basis, own, self.border, self.activity)
@@ -104,8 +100,10 @@ class Configuration:
         self.begun, self._coverage_checked, self.projected = False, False, 0.0
         self._travel, self._limits = mean_stress.Travel(), StrainLimits(small=not model.moves)
 
-    def _attach(self, particles: _rust.Particles, location: _rust.Location) -> None:
-        of = self.model, particles, location, self.numerics, self.stopwatch
+    def _attach(self, placed: Placed) -> None:
+        if placed.grid is not self.model.grid:
+            self.model = replace(self.model, grid=placed.grid)
+        of = self.model, placed.particles, placed.location, self.numerics, self.stopwatch
         self.domain = Domain.attach(*of, getattr(self, "domain", None))
         self.border_sums.attach(self.domain)
         with self.stopwatch("set-up"):
@@ -261,19 +259,22 @@ class Configuration:
     def _store(self, accepted: Accepted, moved: Moved | None, time: float) -> Outcome:
         """Store a step that the laws have committed, and move the particles."""
         self.begun, grid, coefficients = True, self.model.grid, accepted.step.coefficients
+        layout = self.domain.layout
         if moved is None:
             coefficients = self.total = self.total + coefficients
             return self._outcome(accepted, coefficients)
-        self.supports.follow(self.domain.layout, accepted.u, accepted.problem.reduction.points)
+        self.supports.follow(layout, accepted.u, accepted.problem.reduction.points)
         projects = self._travel.must_project(self.domain, moved.particles)
         self.domain.particles.move_to(moved.particles)
-        with left_edges.taken_over(self.domain, self.supports.all, accepted.forces):
+        with taken_over(self.domain, self.supports.all, accepted.forces):
             self.border.move(moved.border)
         outcome, particles = self._outcome(accepted, coefficients), self.domain.particles
         self.border.divide()
         particles, gone = placement.removed(grid, particles, moved.gone)
         self.left += [(number, x, time) for number, x in gone]
-        self._attach(*placement.migrated(grid, particles))
+        self._attach(placement.shared(grid, particles, self._work))
+        self.total = np.zeros(self.domain.layout.size)
+        self.loads.follow(layout, self.domain.layout)
         with self.stopwatch("commit"):
             self.projected = mean_stress.project(self.domain) if projects else 0.0
             if projects:
@@ -283,7 +284,7 @@ class Configuration:
     def _outcome(self, accepted: Accepted, coefficients: Array) -> Outcome:
         self.obstacles.warn(self.domain, coefficients)
         wall_gap.warn_of_distant(self.supports.walls, self.domain, accepted)
-        arrays = quantities.copies(self.domain.particles)
+        arrays = copies(self.domain.particles)
         return Outcome(accepted, coefficients, Reactions.of(accepted, self.supports), arrays)
 
     # -- checkpoints ---------------------------------------------------------
@@ -306,6 +307,7 @@ class Configuration:
         """State that passes from one step to the next, of all ranks; a call for all ranks."""
         return {
             "particles": placement.stored(self.model.grid.comm, self.domain.particles),
+            "work": self._work.state(self.model.grid),
             "time": self.activity.time,
             "inputs": self.inputs.state(),
             "total": self.domain.layout.whole(self.total),
@@ -327,13 +329,13 @@ class Configuration:
         Raises:
             CheckpointError: Particles or fields with other arrays.
         """
-        given = self.model.grid, self.domain.particles, state["particles"]
-        particles, location = placement.restored(*given, moving=self.model.moves)
+        given = self.model.grid, self.domain.particles, self._work, state
+        placed = placement.restored(*given, moving=self.model.moves)
         sizes = {np.shape(state["total"]), np.shape(state["loads"]["unbalanced"])}
         if sizes - {(0,)} != {(self.domain.layout.size_of_grid,)}:
             raise CheckpointError("its fields have another number of coefficients than the scene")
         self.model.check_same_laws(state["laws"])
-        self.activity.time, self.total = state["time"], self.domain.layout.part(state["total"])
+        self.activity.time = state["time"]
         self.activity.statics += 1
         self.left = [(number, (x, y), time) for number, (x, y), time in state["left"]]
         self.removed = np.reshape(state["removed"], 2)
@@ -342,8 +344,9 @@ class Configuration:
         self.inputs.restore(state["inputs"])
         self.border.restore(state["border"])
         self.supports.restore(state["supports"])
-        self.loads.restore(state["loads"], self.domain.layout)
         self.obstacles.restore(state["obstacles"])
-        self._attach(particles, location)
+        self._attach(placed)
+        self.total = self.domain.layout.part(state["total"])
+        self.loads.restore(state["loads"], self.domain.layout)
         self.domain.newton.record()
         self.domain.newton.restore(state["newton"])

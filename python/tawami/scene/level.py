@@ -81,8 +81,8 @@ class Level:
     def __init__(self, now: Configuration, model: Model, body: Points) -> None:
         particles = _rust.Particles(*body)
         particles.add_history(model.materials)
-        model = replace(model, num_particles=len(body.x))
-        mine, location = placement.distributed(model.grid, particles, moving=False)
+        grid, mine, location = placement.distributed(model.grid, particles, moving=False)
+        model = replace(model, grid=grid, num_particles=len(body.x))
         if model.form.kinematics.has_eps_v:
             mine.add_eps_v()
         mine.add_strain(False, model.grid.geometry)

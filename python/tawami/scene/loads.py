@@ -216,6 +216,11 @@ class Loads(Owner[Load]):
         self.unbalanced = forces if self.unbalanced is None else self.unbalanced + forces
         self.changed()
 
+    def follow(self, before: Layout, after: Layout) -> None:
+        """Keep forces that fade where cells have changed their rank; a call for all ranks."""
+        if self.unbalanced is not None and after.window is not before.window:
+            self.unbalanced = after.part(before.whole(self.unbalanced))
+
     def _acting(self, now: Moment) -> Iterator[tuple[Load, Term, float]]:
         """The terms with their factors, but for those that are zero."""
         for load in self.all:

@@ -202,7 +202,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
     def particles_per_cell(self) -> npt.NDArray[np.int64]:
         """Number of particles in each cell, x fastest; a call for all ranks."""
         domain = self.configuration.domain
-        return self.grid.window.whole(domain.particles_per_cell)
+        return domain.layout.window.whole(domain.particles_per_cell)
 
     def initial(self, name: str, source: Source, *, beyond: initial.Beyond = "stop") -> None:
         """Give the particles an initial field, before anything is solved; loads and supports act on
