@@ -68,6 +68,7 @@ def build(
     psi: float = 0.0,
     per_axis: int = 2,
     size: tuple[float, float] = (LENGTH, HEIGHT),
+    cells: tuple[int, int] | None = None,
     transfer: str = "affine_flip",
     **options: Any,
 ) -> tawami.Dynamics:
@@ -80,12 +81,12 @@ def build(
         psi: Angle of dilation [degrees].
         per_axis: Particles per cell and axis.
         size: Length and height of the pile [m].
+        cells: Numbers of cells of the grid; room for a run-out of twice the height by default.
         transfer: Transfer between particles and grid.
         options: Options of `Scene`; alpha is 0.01 by default in the mixed form.
     """
     length, height = size
-    # room for a run-out of twice the height
-    cells = (round((2 * length + 4 * height) / h), round(1.4 * height / h))
+    cells = cells or (round((2 * length + 4 * height) / h), round(1.4 * height / h))
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=h, cells=cells)
     body = tawami.box(grid, (0.0, 0.0), size, per_axis=per_axis)
     rods = tawami.drucker_prager(tawami.linear_elastic(E=E, nu=nu), phi=PHI, psi=psi)

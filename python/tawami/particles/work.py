@@ -16,10 +16,10 @@ from tawami.grid.grid import Grid
 
 #: Weights of a particle and of a cell with particles, in those of a cell without: what they add to the
 #: time of a step (`python -m cases.costs.balance`). The weight of an empty cell limits the window.
-PARTICLE, CELL = 64, 256
+PARTICLE, CELL = 8, 64
 #: Time of a division [steps of evenly divided work]: once as much has been lost since the last one, a
 #: division pays.
-MOVE = 1.0
+MOVE = 0.5
 #: Difference of the largest to the mean work, relative to the mean, for which cells do not move.
 GAIN = 0.05
 
@@ -52,7 +52,7 @@ class Work:
     """
 
     def __init__(self) -> None:
-        self.lost, self.least = 0.0, np.inf
+        self.lost, self.least = 0.0, 1.0
 
     def redivided(self, grid: Grid, location: _rust.Location) -> Grid:
         """The grid with other cells for each rank, if they pay; itself otherwise. A collective call.
@@ -66,8 +66,7 @@ class Work:
             return grid
         weight = _weights(location)
         uneven = _most_over_mean(np.array(comm.allgather(int(weight.sum()))))
-        self.least = min(self.least, uneven)
-        self.lost += uneven - self.least
+        self.lost += max(uneven - self.least, 0.0)
         if self.lost < MOVE:
             return grid
         cells = grid.window.indices(location.active.astype(np.int64))
