@@ -71,7 +71,7 @@ class Work:
             return grid
         cells = grid.window.indices(location.active.astype(np.int64))
         division = divided(grid, location, cells)
-        of_ranks = np.bincount(division.rank_of(cells), weight, comm.size)
+        of_ranks = np.bincount(division.rank_of(cells), weight, comm.size).astype(np.int64)
         then = _most_over_mean(ranks.sum_of(comm, of_ranks))
         pays = uneven - then > GAIN
         self.lost, self.least = 0.0, then if pays else uneven
