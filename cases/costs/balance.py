@@ -40,7 +40,8 @@ WHOLE = numbers(int, lambda n: n > 0, "whole numbers separated by commas, such a
 PROGRAM.option("--ranks", type=WHOLE, default="2,4", help="numbers of ranks")
 PROGRAM.option("--steps", type=int, default=100, help="steps")
 PROGRAM.option("--size", type=float, default=0.01, help="cell size [m]")
-DT = 1e-3  # [s]
+#: Size of a step over the size of a cell [s/m].
+PACE = 0.1
 COLUMNS = ("ranks", "cells", "start", "worst", "end", "step_s", "moves", "move_steps")
 #: Particles per axis, cells of a block and of its grid along each axis, for the weights.
 BLOCKS = ((2, 24, 26), (3, 24, 26), (2, 12, 26), (3, 12, 26), (2, 12, 96))
@@ -64,7 +65,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Weight:
-    """What adds to the time of a step: microseconds, and the weight relative to a particle."""
+    """A part of the time of a step: microseconds, and its weight relative to that of a particle."""
 
     of: str
     us: float
@@ -91,7 +92,7 @@ def of_rank(steps: int, size: float, cells: str) -> None:
     counts, seconds, moves = [uneven()], list[float](), 0
     for _ in range(steps):
         before, began = now.model.grid, perf_counter()
-        motion.step(DT)
+        motion.step(PACE * size)
         seconds.append(perf_counter() - began)
         counts.append(uneven())
         moves += now.model.grid is not before
@@ -128,7 +129,7 @@ def weights() -> list[Weight]:
         times = list[float]()
         for _ in range(8):
             began = perf_counter()
-            motion.step(DT)
+            motion.step(PACE * h)
             times.append(perf_counter() - began)
         counts.append((motion.scene.num_particles, filled**2, cells**2 - filled**2, 1))
         seconds.append(np.median(times))
