@@ -32,8 +32,8 @@ from cases.common.program import Program, numbers
 from cases.common.table import as_csv, as_text
 from cases.showcase.collapse import pile
 from tawami.base.program import mpirun
-from tawami.grid.division import Division
-from tawami.particles import placement, work
+from tawami.grid.division import CELL, EMPTY, PARTICLE, Division
+from tawami.particles import placement
 
 PROGRAM = Program("cases.costs.balance", __doc__)
 WHOLE = numbers(int, lambda n: n > 0, "whole numbers separated by commas, such as 1,2,4")
@@ -82,7 +82,7 @@ def of_rank(steps: int, size: float, cells: str) -> None:
     """Run on all ranks; the first one prints a row as JSON."""
     comm = MPI.COMM_WORLD
     if cells == "even":
-        work.divided = lambda grid, *_: grid.division
+        tawami.Grid.divided_by = lambda grid, cell: grid  # type: ignore[method-assign]
     motion = pile.build("u_epsv_finite", h=size)
     now, scene = motion.scene.configuration, motion.scene
 
@@ -106,8 +106,9 @@ def moved(now: Any) -> float:
     """Seconds to divide the cells anew, and to move all particles to other ranks and back."""
     grid, particles = now.model.grid, now.domain.particles
     began, location = perf_counter(), now.domain.location
-    active = grid.window.indices(location.active.astype(np.int64))
-    Division.weighed(grid.comm, grid.comm.size, grid.cells, active, np.ones(len(active), np.int64))
+    Division.by_particles(
+        grid.comm, grid.cells, grid.window.cells_in_grid(location.cell.astype(np.int64))
+    )
     other = placement.migrated(tawami.Grid(grid.comm, **given(grid)), particles)
     placement.migrated(grid, other.particles)
     return perf_counter() - began
@@ -134,10 +135,10 @@ def weights() -> list[Weight]:
         counts.append((motion.scene.num_particles, filled**2, cells**2 - filled**2, 1))
         seconds.append(np.median(times))
     found = np.linalg.lstsq(np.array(counts, dtype=float), np.array(seconds), rcond=None)[0]
-    used = (work.PARTICLE, work.CELL, 1)
+    used = (PARTICLE, CELL, EMPTY)
     names = ("a particle", "a cell with particles", "a cell without")
     return [
-        Weight(name, 1e6 * s, s / found[0], w / work.PARTICLE)
+        Weight(name, 1e6 * s, s / found[0], w / PARTICLE)
         for name, s, w in zip(names, found, used, strict=False)
     ]
 

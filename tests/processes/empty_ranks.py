@@ -44,6 +44,7 @@ def moving(leaving: str = "stop", speed: float = SPEED) -> tawami.Dynamics:
         grid, body, laws, material_of=(body.x[:, 1] > 0.25).astype(int), form="u_epsv_finite",
         density=1000.0, leaving=leaving,
     )  # fmt: skip
+    assert np.array_equal(scene.particles.number, body.number)
     scene.gravity((0.0, -9.81))
     scene.wall("bottom", 0.1)
     scene.initial("stress", lambda x, y: (-50.0 * y, -100.0 * y, -50.0 * y, 0.0))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -33,8 +33,8 @@ class Body:
     particles and no border.
 
     On several ranks `box`, `polygon`, `disc`, `level_set` and `mesh` give each rank the particles in its
-    cells: the arrays of a body hold these, and so do masks and fields that are made of them. `Body(x,
-    volume)` is a whole body, the same on every rank.
+    cells, which they divide. The arrays of a body hold these, and so do masks and fields that
+    are made of them. `Body(x, volume)` is a whole body, the same on every rank.
 
     Attributes:
         x: Positions [m], particles x 2.
@@ -91,7 +91,20 @@ class Body:
             material_of=None if self.material_of is None else self.material_of[chosen],
             border=None,
             part=None if self.part is None else self.part.chosen(chosen),
-        )
+        ).in_own_cells()
+
+    def in_own_cells(self) -> Body:
+        """The body with the particles of each rank as a scene divides them; a call for all ranks.
+
+        Raises:
+            InputError: Particles are outside the grid.
+        """
+        if self.part is None:
+            return self
+        given = () if self.material_of is None else (self.material_of,)
+        part, (x, volume, *material) = self.part.in_own_cells(self.x, self.volume, *given)
+        of = material[0] if material else None
+        return replace(self, x=x, volume=volume, material_of=of, part=part)
 
     def named(self, name: str) -> Body:
         """The same body as one group, to which a scene gives a material by this name.
@@ -128,8 +141,13 @@ class Body:
                     "Body + Body: they were made for different grids: expected the same origin, h and "
                     "cells; make both with the grid of the scene"
                 )
-            with raise_together(MPI.COMM_SELF if self.part is None else self.part.grid.comm):
-                _check_apart(one, others, *self.lattice)
+            comm: Any = MPI.COMM_SELF
+            first, second = one, others
+            if self.part is not None and other.part is not None:
+                comm = self.part.grid.comm
+                first, second = self.part.by_cells(*one), other.part.by_cells(*others)
+            with raise_together(comm):
+                _check_apart(first, second, *self.lattice)
         names, number = _groups(self, other)
         x, volume = (np.concatenate(arrays) for arrays in zip(one, others, strict=True))
         for part in (self, other):
@@ -138,7 +156,7 @@ class Body:
         joined = None
         if self.part is not None and other.part is not None:
             joined = self.part.followed_by(other.part)
-        return Body(x, volume, number, names, lattice, border, joined)
+        return Body(x, volume, number, names, lattice, border, joined).in_own_cells()
 
     def _divided(self, other: Body) -> Body:
         """The part of a whole body that a rank holds of its sum with another one."""

@@ -84,7 +84,8 @@ def _of_full_cells(filling: Filling, cells: Array) -> Body:
     volume = np.prod([w[k] for w, k in zip(weights, at, strict=True)], axis=0)
     part = Part(grid, number, int(shape.prod())) if grid.comm.size > 1 else None
     border = _border(grid, cells.T)
-    return Body(grid.in_metres(x), volume, lattice=grid.lattice, border=border, part=part)
+    body = Body(grid.in_metres(x), volume, lattice=grid.lattice, border=border, part=part)
+    return body.in_own_cells()
 
 
 def _ends(grid: Grid, corners: Array) -> Array:

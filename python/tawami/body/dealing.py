@@ -1,7 +1,7 @@
 """Cells in which a rank makes the particles of a body: blocks of cells, dealt to the ranks in turn.
 
-Every shape is then made by all ranks, wherever it lies. A scene moves the particles to the ranks that
-own their cells.
+Every shape is then made by all ranks, wherever it lies. Its particles are counted and moved to the ranks
+among which they divide the cells.
 """
 
 from __future__ import annotations

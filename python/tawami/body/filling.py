@@ -130,7 +130,8 @@ class Filling:
         number = None if names is None else parts.material.astype(np.uint32)
         groups = (full, np.full(len(full), self.per_cell)), np.unique(key, return_counts=True)
         part = Part.of_cells(grid, *groups)
-        return Body(x, volume, number, names or (), grid.lattice, border, part)
+        body = Body(x, volume, number, names or (), grid.lattice, border, part)
+        return body.in_own_cells()
 
     def _thinned(
         self,

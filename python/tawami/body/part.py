@@ -55,6 +55,32 @@ class Part:
         mask = dealt(grid, grid.cell_numbers(grid.cell_at(grid.in_cells(x))))
         return cls(grid, np.flatnonzero(mask), len(x)), mask
 
+    def in_own_cells(
+        self, x: Array, *arrays: npt.NDArray[Any]
+    ) -> tuple[Part, tuple[npt.NDArray[Any], ...]]:
+        """The particles in the cells of this rank, where these are divided by the particles; their
+        positions and other arrays. A collective call.
+
+        Raises:
+            InputError: Particles are outside the grid.
+        """
+        grid, comm = self.grid, self.grid.comm
+        with ranks.raise_together(comm):
+            cell = grid.rust.locate(np.ascontiguousarray(x)).cell.astype(np.int64)
+        to = grid.divided_by(cell).division.rank_of(grid.cell_indices(cell))
+        number, *moved = (ranks.exchanged(comm, rows, to) for rows in (self.number, x, *arrays))
+        order = np.argsort(number)
+        return Part(grid, number[order], self.total), tuple(rows[order] for rows in moved)
+
+    def by_cells(self, x: Array, volume: Array) -> tuple[Array, Array]:
+        """Positions and volumes of the particles in cells that bodies share in the same way on all
+        ranks; a collective call.
+        """
+        grid = self.grid
+        cell = grid.cell_numbers(grid.cell_at(grid.in_cells(x)))
+        rows = ranks.exchanged(grid.comm, np.column_stack([x, volume]), cell % grid.comm.size)
+        return rows[:, :-1], rows[:, -1]
+
     def at(self, rows: npt.NDArray[Any], number: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Rows of other particles, given those of the particles of this part; a collective call.
 

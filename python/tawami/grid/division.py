@@ -10,8 +10,14 @@ from tawami.base import ranks
 from tawami.base.arrays import Indices
 from tawami.base.space import Counts
 
-#: Weight of a cell without particles; see `tawami.particles.balance`.
-EMPTY = 1
+#: Weights of a particle, of a cell with particles, and of every cell, by the time that they add to a
+#: step (`python -m cases.costs.balance`). That of every cell also limits the windows of the ranks.
+PARTICLE, CELL, EMPTY = 8, 64, 1
+
+
+def weights(count: Indices) -> Indices:
+    """Weights of cells, without `EMPTY`, given their numbers of particles."""
+    return np.asarray(PARTICLE * count + CELL)
 
 
 class Division:
@@ -58,6 +64,22 @@ class Division:
         return rank
 
     @classmethod
+    def by_particles(cls, comm: Any, cells: Counts, cell: Indices) -> Division:
+        """The division in which the ranks have nearly the same work; a collective call.
+
+        Args:
+            comm: Communicator.
+            cells: Number of cells of the grid along each axis.
+            cell: Number of the cell of each particle of this rank.
+        """
+        here = np.stack(np.unique(cell, return_counts=True), axis=1)
+        rows = ranks.exchanged(comm, here, here[:, 0] % comm.size)  # several ranks may share a cell
+        some, place = np.unique(rows[:, 0], return_inverse=True)
+        count = np.bincount(place, rows[:, 1], len(some)).astype(np.int64)
+        index = np.stack(np.unravel_index(some, cells, order="F"), axis=-1)
+        return cls.weighed(comm, comm.size, cells, index, weights(count))
+
+    @classmethod
     def weighed(
         cls, comm: Any, parts: int, cells: Counts, index: Indices, weight: Indices
     ) -> Division:
@@ -70,8 +92,7 @@ class Division:
             comm: Communicator.
             parts: Number of boxes.
             cells: Number of cells of the grid along each axis.
-            index: Indices (i, j) of cells that weigh more than others, cells x axes; several ranks may
-                have parts of the weight of a cell.
+            index: Indices (i, j) of some cells, cells x axes, each on one rank.
             weight: Their weights; every cell has `EMPTY` in addition.
         """
         cuts = np.zeros((parts - 1, 2), dtype=np.int64)

@@ -152,6 +152,16 @@ class Grid(Unique):
         other.division = division
         return other
 
+    def divided_by(self, cell: Indices) -> Grid:
+        """The same grid whose cells are divided by particles; a collective call.
+
+        Args:
+            cell: Number of the cell of each particle of this rank.
+        """
+        if self.comm.size == 1:
+            return self
+        return self.divided(Division.by_particles(self.comm, self.cells, cell))
+
     @functools.cached_property
     def rectangle(self) -> mesh.Rectangle:
         """The dolfinx mesh; the first call is one for all ranks."""

@@ -15,7 +15,6 @@ from tawami.base.arrays import Array, Mask
 from tawami.base.errors import CheckpointError, InputError
 from tawami.base.shared_file import Rows, by_number
 from tawami.grid.grid import EDGES, Edge, Grid
-from tawami.particles import work
 from tawami.particles.work import Work
 
 #: Least distance of moving particles from the sides of their cell [cells]. A single particle on a side
@@ -100,9 +99,9 @@ def distributed(
         body = body.select(np.arange(comm.rank, len(body), comm.size, dtype=np.uint32))
     with ranks.raise_together(comm):
         location = located(grid, body.x, moving=moving, moved=moved)
-    cells = grid.cell_indices(location.active.astype(np.int64))
-    grid = grid.divided(work.divided(grid, location, cells))
-    return migrated(grid, body, moving=moving, moved=moved)
+    return migrated(
+        grid.divided_by(location.cell.astype(np.int64)), body, moving=moving, moved=moved
+    )
 
 
 def columns(particles: _rust.Particles) -> list[tuple[str, int]]:

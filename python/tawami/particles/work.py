@@ -11,34 +11,14 @@ from tawami import _rust
 from tawami.base import ranks, stored
 from tawami.base.arrays import Indices
 from tawami.base.errors import CheckpointError
-from tawami.grid.division import Division
+from tawami.grid.division import Division, weights
 from tawami.grid.grid import Grid
 
-#: Weights of a particle and of a cell with particles, in those of a cell without: what they add to the
-#: time of a step (`python -m cases.costs.balance`). The weight of an empty cell limits the window.
-PARTICLE, CELL = 8, 64
 #: Time of a division [steps of evenly divided work]: once as much has been lost since the last one, a
 #: division pays.
 MOVE = 0.5
 #: Difference of the largest to the mean work, relative to the mean, for which cells do not move.
 GAIN = 0.05
-
-
-def divided(grid: Grid, location: _rust.Location, cells: Indices) -> Division:
-    """Cells of each rank for particles at their present places; a collective call.
-
-    Args:
-        grid: The grid.
-        location: Cells of the particles of this rank.
-        cells: Indices (i, j) in the grid of its active cells.
-    """
-    return Division.weighed(grid.comm, grid.comm.size, grid.cells, cells, _weights(location))
-
-
-def _weights(location: _rust.Location) -> Indices:
-    """Weights of the active cells."""
-    place = np.searchsorted(location.active, location.cell)
-    return PARTICLE * np.bincount(place, minlength=len(location.active)) + CELL
 
 
 class Work:
@@ -64,18 +44,19 @@ class Work:
         comm = grid.comm
         if comm.size == 1:
             return grid
-        weight = _weights(location)
+        place = np.searchsorted(location.active, location.cell)
+        weight = weights(np.bincount(place, minlength=len(location.active)))
         uneven = _most_over_mean(np.array(comm.allgather(int(weight.sum()))))
         self.lost += max(uneven - self.least, 0.0)
         if self.lost < MOVE:
             return grid
-        cells = grid.window.indices(location.active.astype(np.int64))
-        division = divided(grid, location, cells)
-        of_ranks = np.bincount(division.rank_of(cells), weight, comm.size).astype(np.int64)
+        other = grid.divided_by(grid.window.cells_in_grid(location.cell.astype(np.int64)))
+        rank = other.division.rank_of(grid.window.indices(location.active.astype(np.int64)))
+        of_ranks = np.bincount(rank, weight, comm.size).astype(np.int64)
         then = _most_over_mean(ranks.sum_of(comm, of_ranks))
         pays = uneven - then > GAIN
         self.lost, self.least = 0.0, then if pays else uneven
-        return grid.divided(division) if pays else grid
+        return other if pays else grid
 
     def state(self, grid: Grid) -> dict[str, Any]:
         """Cells of each rank and the work so far, for a checkpoint."""
