@@ -79,7 +79,7 @@ class Configuration:
         self.numerics, self.stopwatch, self._work = numerics, Stopwatch(), Work()
         whole = model.part is None
         placed = placement.distributed(model.grid, particles, model.moves, whole=whole)
-        self.model, mine = replace(model, grid=placed.grid), placed.particles
+        self.model, mine = model.on(placed.grid), placed.particles
         if model.form.kinematics.has_eps_v:
             mine.add_eps_v()
         mine.add_strain(model.moves, model.grid.geometry)
@@ -101,8 +101,7 @@ class Configuration:
         self._travel, self._limits = mean_stress.Travel(), StrainLimits(small=not model.moves)
 
     def _attach(self, placed: Placed) -> None:
-        if placed.grid is not self.model.grid:
-            self.model = replace(self.model, grid=placed.grid)
+        self.model = self.model.on(placed.grid)
         of = self.model, placed.particles, placed.location, self.numerics, self.stopwatch
         self.domain = Domain.attach(*of, getattr(self, "domain", None))
         self.border_sums.attach(self.domain)
@@ -258,19 +257,18 @@ class Configuration:
 
     def _store(self, accepted: Accepted, moved: Moved | None, time: float) -> Outcome:
         """Store a step that the laws have committed, and move the particles."""
-        self.begun, grid, coefficients = True, self.model.grid, accepted.step.coefficients
-        layout = self.domain.layout
+        self.begun, grid, layout = True, self.model.grid, self.domain.layout
         if moved is None:
-            coefficients = self.total = self.total + coefficients
-            return self._outcome(accepted, coefficients)
+            self.total = self.total + accepted.step.coefficients
+            return self._outcome(accepted, self.total)
         self.supports.follow(layout, accepted.u, accepted.problem.reduction.points)
         projects = self._travel.must_project(self.domain, moved.particles)
         self.domain.particles.move_to(moved.particles)
         with taken_over(self.domain, self.supports.all, accepted.forces):
             self.border.move(moved.border)
-        outcome, particles = self._outcome(accepted, coefficients), self.domain.particles
+        outcome = self._outcome(accepted, accepted.step.coefficients)
         self.border.divide()
-        particles, gone = placement.removed(grid, particles, moved.gone)
+        particles, gone = placement.removed(grid, self.domain.particles, moved.gone)
         self.left += [(number, x, time) for number, x in gone]
         self._attach(placement.shared(grid, particles, self._work))
         self.total = np.zeros(self.domain.layout.size)
@@ -329,8 +327,8 @@ class Configuration:
         Raises:
             CheckpointError: Particles or fields with other arrays.
         """
-        given = self.model.grid, self.domain.particles, self._work, state
-        placed = placement.restored(*given, moving=self.model.moves)
+        grid, moving = self.model.grid, self.model.moves
+        placed = placement.restored(grid, self.domain.particles, self._work, state, moving=moving)
         sizes = {np.shape(state["total"]), np.shape(state["loads"]["unbalanced"])}
         if sizes - {(0,)} != {(self.domain.layout.size_of_grid,)}:
             raise CheckpointError("its fields have another number of coefficients than the scene")

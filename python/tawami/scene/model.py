@@ -92,6 +92,10 @@ class Model:
         """Everything that follows from the dimension."""
         return self.grid.space
 
+    def on(self, grid: Grid) -> Model:
+        """The model on its grid with other cells for each rank; itself if they are the same."""
+        return self if grid is self.grid else replace(self, grid=grid)
+
     @property
     def along_body(self) -> int:
         """Length of the arrays of a driver script: the particles of its body on this rank."""
