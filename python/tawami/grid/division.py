@@ -12,7 +12,7 @@ from tawami.base.space import Counts
 
 #: Weights of a particle, of a cell with particles, and of every cell, by the time that they add to a
 #: step (`python -m cases.costs.balance`). That of every cell also limits the windows of the ranks.
-PARTICLE, CELL, EMPTY = 8, 64, 1
+PARTICLE, CELL, EMPTY = 16, 128, 1
 
 
 def weights(count: Indices) -> Indices:
