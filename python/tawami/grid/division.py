@@ -55,9 +55,10 @@ class Division:
         """Rank of cells, given their indices (i, j), cells x axes."""
         rows = {0: np.arange(len(index))}
         for place, first, count in _nodes(self.size):
-            here, (axis, line) = rows[first], self.cuts[place]
-            below = index[here, axis] < line
-            rows[first], rows[first + count // 2] = here[below], here[~below]
+            here, (axis, line) = rows.get(first, rows[0][:0]), self.cuts[place]
+            if len(here):
+                below = index[here, axis] < line
+                rows[first], rows[first + count // 2] = here[below], here[~below]
         rank = np.empty(len(index), dtype=np.int64)
         for one, here in rows.items():
             rank[here] = one
