@@ -1,8 +1,8 @@
-"""Places of the coefficients of all fields, and the extraction matrix E.
+"""Places of the coefficients of all fields, and the functions of cells at their nodes.
 
 The coefficients of all fields form one vector, in the order of the form: the displacement first. Those
-of a field go function by function and component by component. E gives the degrees of freedom of the
-mesh: nodal = E coefficients.
+of a field go function by function and component by component. The rows of the extraction matrix E, which
+gives the degrees of freedom of a mesh (nodal = E coefficients), are the values at the nodes of cells.
 
 A rank has the coefficients of its window (`tawami.grid.window`). Each coefficient belongs to one rank,
 and others have copies of it. `Layout.whole` and `Layout.part` convert to and from the coefficients of
@@ -31,7 +31,7 @@ from tawami.grid.grid import Grid
 
 
 class Layout(Coefficients):
-    """Places of the coefficients of a rank's window, and E.
+    """Places of the coefficients of a rank's window, and functions at the nodes of cells.
 
     Making one is a collective call.
 
