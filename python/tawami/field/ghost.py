@@ -89,27 +89,26 @@ class GhostPenalty:
         columns = list(integral.slots[0].columns) if integral.slots else []
         constants, kernel = attached.constants(integral), _call(integral.kernel)
         vertices = grid.h * np.pad(dolfinx.reference_nodes(1), ((0, 0), (0, 1)))
-        rows, cols, entries = [], [], []
-        for here, there, names in attached.sides:
-            shift = grid.h * np.array([*np.subtract(there, here), 0])
+        shape = (layout.size, layout.size)
+        if not attached.sides:
+            return sp.csr_matrix(shape)
+        here, there = (np.array([side[k] for side in attached.sides]) for k in (0, 1))
+        (c0, t0), (c1, t1) = layout.on_cells(here), layout.on_cells(there)
+        coefficients, t = np.concatenate([c0, c1], axis=1), np.stack([t0, t1], axis=1)
+        count, dofs = len(t0), t0.shape[1]
+        element = np.zeros((count, 2, dofs, 2, dofs))
+        packed = np.stack([means[grid.window.numbers(of)][:, columns] for of in (here, there)], 1)
+        for k, (_, _, names) in enumerate(attached.sides):
+            shift = grid.h * np.array([*(there[k] - here[k]), 0])
             x = np.concatenate([vertices, vertices + shift])
             if integral.reads_position:
-                x[:, : grid.space.dim] += grid.in_metres(np.array(here))
+                x[:, : grid.space.dim] += grid.in_metres(here[k])
             facets = np.array([FACETS.index(n) for n in names], dtype=np.int32)
-            packed = means[grid.window.numbers(np.array([here, there]))][:, columns].ravel()
-            (c0, t0), (c1, t1) = (layout.on_cell(np.array(cell)) for cell in (here, there))
-            element = np.zeros((2 * len(t0), 2 * len(t0)))
-            kernel(element, packed, constants, x.ravel(), facets)
-            coefficients = np.concatenate([c0, c1])
-            t = sp.block_diag([t0, t1]).toarray()
-            rows.append(np.repeat(coefficients, len(coefficients)))
-            cols.append(np.tile(coefficients, len(coefficients)))
-            entries.append((t.T @ element @ t).ravel())
-        shape = (layout.size, layout.size)
-        if not rows:
-            return sp.csr_matrix(shape)
-        index = (np.concatenate(rows), np.concatenate(cols))
-        return sp.csr_matrix((np.concatenate(entries), index), shape=shape)
+            kernel(element[k], packed[k].ravel(), constants, x.ravel(), facets)
+        blocks = t.transpose(0, 1, 3, 2)[:, :, None] @ element.transpose(0, 1, 3, 2, 4) @ t[:, None]
+        entries = blocks.transpose(0, 1, 3, 2, 4)  # sides x (cell, function) x (cell, function)
+        rows, cols = np.broadcast_arrays(coefficients[:, :, None], coefficients[:, None])
+        return sp.csr_matrix((entries.ravel(), (rows.ravel(), cols.ravel())), shape=shape)
 
     def _means(self, data: Array) -> Array:
         """Volume-weighted means over the particles of each cell of the window, cells x columns."""

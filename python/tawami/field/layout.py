@@ -143,19 +143,26 @@ class Layout(Coefficients):
             ]
         )
 
-    def on_cell(self, cell: Indices) -> tuple[Indices, Array]:
-        """Coefficients on a cell (i, j) of the grid, and T: degrees of freedom of a kernel = T
-        coefficients.
+    def on_cells(self, cells: Indices) -> tuple[Indices, Array]:
+        """Coefficients on cells (i, j) of the grid (cells x coefficients), and T of each: degrees of
+        freedom of a kernel = T coefficients.
         """
-        number = np.array([self.window.numbers(cell)])
+        number = self.window.numbers(cells)
         coefficients, blocks = [], []
         for field in self.fields.values():
             functions, at_nodes = self.at_nodes(field.basis, field.degree, number)
             components = np.arange(field.components)
-            first = field.start + field.components * functions[0]
-            coefficients.append((first[:, None] + components).ravel())
-            blocks.append(np.kron(at_nodes[0], np.eye(field.components)))
-        return np.concatenate(coefficients), sp.block_diag(blocks).toarray()
+            first = field.start + field.components * functions
+            coefficients.append((first[:, :, None] + components).reshape(len(cells), -1))
+            blocks.append(np.kron(at_nodes, np.eye(field.components)))
+        columns = np.concatenate(coefficients, axis=1)
+        t = np.zeros((len(cells), sum(block.shape[1] for block in blocks), columns.shape[1]))
+        row = column = 0
+        for block in blocks:
+            _, height, width = block.shape
+            t[:, row : row + height, column : column + width] = block
+            row, column = row + height, column + width
+        return columns, t
 
     def at_nodes(self, basis: Basis, degree: int, cells: Indices) -> tuple[Indices, Array]:
         """Functions on cells (cells x functions), and their values at Lagrange nodes of a degree

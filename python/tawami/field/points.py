@@ -36,7 +36,7 @@ class PointAssembly(Assembly):
 
     def __init__(self, attachment: Attachment) -> None:
         super().__init__(attachment)
-        on_cell, _ = self.layout.on_cell(np.array(self.layout.window.first))
+        (on_cell,), _ = self.layout.on_cells(np.array([self.layout.window.first]))
         count = len(on_cell)
         if count > _rust.MAX_COEFFICIENTS:
             raise FormError(

@@ -228,7 +228,9 @@ class Sums:
 
         def evaluate(values: Mapping[str, Any]) -> Any:
             columns = np.column_stack([part.evaluate(values) for part in parts.values()])
-            rows, place = np.unique(columns, axis=0, return_inverse=True)
+            rows, place = columns[:1], np.zeros(len(columns), dtype=np.int64)
+            if (columns != rows).any():  # several materials
+                rows, place = np.unique(columns, axis=0, return_inverse=True)
             with np.errstate(all="ignore"):
                 found = [
                     D.evaluate(None, dict(zip(parts, row[:, None], strict=True)), (), StackDict())

@@ -65,16 +65,17 @@ class DualSolutions:
         at = up @ coefficients
         weights = goal.weights(half.domain, now.border)
         self.value = float(weights @ at)
-        fine = half.dual(weights, at)
-        residual = half.residual(at, stabilised=False)
         weights_here = up.T @ weights
-        self.z = whole.dual(weights_here, coefficients)
+        self.z, again = whole.dual(weights_here, coefficients)
+        matrix = half.transposed(at)
+        residual = half.residual(at, stabilised=False)
+        fine = half.finer_dual(matrix, whole, again, up, weights, self.z, residual)
         self.residual = up.T @ residual
         self.of_grid = -residual * (fine - up @ self.z)
         large = _with_cells(grid, 2 * grid.h, coarser(grid.cells))  # may reach beyond the grid
         twice, down = Level(now, replace(model, grid=large), body), prolongation(self.coarse)
         state = twice.nearest(self.coarse, down, coefficients)
-        z = twice.dual(down.T @ weights_here, state)
+        z, _ = twice.dual(down.T @ weights_here, state)
         there = up @ (down @ state)
         before = float(weights @ (there - at)) - float(
             half.residual(there, stabilised=False) @ (up @ (down @ z))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple, cast
 
@@ -28,10 +28,13 @@ from tawami.scene.domain import Domain
 from tawami.scene.model import Model
 from tawami.solve.direct import DirectSolver
 from tawami.solve.linear_solver import System
+from tawami.solve import two_grid
 from tawami.solve.scaling import Scaling
 
 #: Weight of coefficients that the finer ones do not determine.
 REGULAR = 1e-10
+#: Tolerance of further solves with the transposed tangent.
+COARSE = 1e-2
 
 
 def with_volume(model: Model) -> Model:
@@ -125,12 +128,27 @@ class Level:
             internal = internal - penalty @ coefficients
         return internal - self.external
 
-    def dual(self, weights: Array, coefficients: Array) -> Array:
+    def transposed(self, coefficients: Array) -> sp.csc_matrix:
+        """The transposed tangent of the unknowns.
+
+        Args:
+            coefficients: Of all fields, where the tangent is taken.
+        """
+        self.domain.newton.internal(coefficients)
+        responses = self.domain.responses
+        tangent = self.domain.assembly.tangent(coefficients, responses.data, self.reduction)
+        start, columns, values = tangent.getValuesCSR()
+        return sp.csc_matrix((values, columns, start), shape=tangent.getSize())
+
+    def dual(self, weights: Array, coefficients: Array) -> tuple[Array, Callable[[Array], Array]]:
         """The influence z of each residual on a quantity: K^T z = weights, K the tangent.
 
         Args:
             weights: Derivative of the quantity by all coefficients.
             coefficients: Of all fields, where the tangent is taken.
+
+        Returns:
+            z of all coefficients, and a function that solves K^T z = r for the unknowns.
         """
         reduction, responses = self.reduction, self.domain.responses
         self.domain.newton.internal(coefficients)
@@ -140,7 +158,26 @@ class Level:
         solver = DirectSolver(self.domain.model.grid.comm, Stopwatch())
         right = reduction.restricted(weights)
         found = solver.solve(System(matrix, scale, right, 0.0, list))
-        matrix.destroy()
+        return reduction.expanded(found), lambda more: solver.again(more, COARSE)
+
+    def finer_dual(
+        self,
+        matrix: sp.csc_matrix,
+        coarse: Level,
+        again: Callable[[Array], Array],
+        up: sp.csr_matrix,
+        weights: Array,
+        z: Array,
+        residual: Array,
+    ) -> Array:
+        reduction = self.reduction
+        some = reduction.coefficients
+        found = two_grid.solve(
+            matrix, int(reduction.of_displacement.sum()), (up @ coarse.reduction.selection)[some], again,
+            reduction.restricted(weights), (up @ z)[some], reduction.restricted(residual),
+        )  # fmt: skip
+        if found is None:
+            found = splu(matrix).solve(reduction.restricted(weights))
         return reduction.expanded(found)
 
     def nearest(self, finer: Layout, prolongation: sp.csr_matrix, fine: Array) -> Array:

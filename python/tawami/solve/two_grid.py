@@ -1,0 +1,94 @@
+"""Two grids for a mixed system: smoothing on the fine one, solves on the coarse one.
+
+A sweep of the smoother replaces the block of the displacement by D, twice its diagonal, and solves the
+system of the volume that is left, B D^-1 B^T + C, by one step of steepest descent (Braess and Sarazin
+1997).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse as sp
+
+from tawami.base.arrays import Array
+
+#: Factor on the diagonal in D.
+DAMPING = 2.0
+#: Change of the quantity in a cycle, relative to that since the start, at which the iteration stops,
+#: and the largest number of cycles.
+SETTLED, CYCLES = 0.02, 8
+
+
+class Smoother:
+    """Sweeps for a matrix.
+
+    Args:
+        matrix: Unknowns of the displacement first.
+        num_displacement: Their number.
+    """
+
+    def __init__(self, matrix: sp.csc_matrix, num_displacement: int) -> None:
+        self._matrix, self._n = matrix, num_displacement
+        of_volume = matrix[:, num_displacement:]
+        self._d = DAMPING * matrix.diagonal()[:num_displacement]
+        squares = sp.csc_matrix((of_volume.data**2, of_volume.indices, of_volume.indptr))
+        squares.resize(of_volume.shape)
+        weights = np.zeros(matrix.shape[0])
+        weights[:num_displacement] = 1 / self._d
+        self._of_volume = of_volume
+        self._diagonal = squares.T @ weights - matrix.diagonal()[num_displacement:]
+
+    def __call__(self, residual: Array) -> Array:
+        """Approximate solution of the system with a right-hand side."""
+        n, d = self._n, self._d
+        u = residual[:n] / d
+        right = self._in_volume(u) - residual[n:]
+        step = right / self._diagonal
+        coupled = self._of_volume @ step
+        u_of_step = coupled[:n] / d
+        image = self._in_volume(u_of_step) - coupled[n:]
+        length = (right @ step) / (step @ image)
+        return np.concatenate([u - length * u_of_step, length * step])
+
+    def _in_volume(self, u: Array) -> Array:
+        return (self._matrix @ np.pad(u, (0, self._matrix.shape[0] - self._n)))[self._n :]
+
+
+def solve(
+    matrix: sp.csc_matrix,
+    num_displacement: int,
+    prolongation: sp.csr_matrix,
+    coarse: Callable[[Array], Array],
+    right: Array,
+    start: Array,
+    quantity: Array,
+) -> Array | None:
+    """Solve a system until a linear quantity of the solution changes little; None if it diverges.
+
+    Args:
+        matrix: Matrix of the fine grid, unknowns of the displacement first.
+        num_displacement: Their number.
+        prolongation: Fine unknowns x coarse unknowns.
+        coarse: Solves the system of the coarse grid approximately.
+        right: Right-hand side.
+        start: First approximation.
+        quantity: Weights of the quantity.
+    """
+    smooth, back = Smoother(matrix, num_displacement), prolongation.T.tocsr()
+    x, last = start, float(quantity @ start)
+    first, residual = last, right - matrix @ start
+    size = np.linalg.norm(residual)
+    for _ in range(CYCLES):
+        x = x + smooth(residual)
+        x = x + prolongation @ coarse(back @ (right - matrix @ x))
+        x = x + smooth(right - matrix @ x)
+        residual = right - matrix @ x
+        if not np.linalg.norm(residual) < 2 * size:
+            return None
+        value = float(quantity @ x)
+        if abs(value - last) <= SETTLED * abs(value - first):
+            break
+        last = value
+    return x
