@@ -43,8 +43,19 @@ def test_a_patch_has_no_error():
     ):
         found = solution.error(goal)
         assert abs(found.error) < 1e-9 * abs(found.value)
+        assert "order at round-off" in repr(found)
     exact = 2 * 1e3 * (1 - 0.3**2) / 3e6  # plane strain
     assert solution.error(tawami.Goal.mean_displacement("right", "x")).value == pytest.approx(exact)
+
+
+def test_loads_that_end_inside_a_cell_are_exact():
+    body = tawami.box(GRID, (0, 0), (1.8, 1), per_axis=3, gauss=True)  # 0.6 h after a line
+    scene = tawami.Scene(GRID, body, tawami.linear_elastic(E=3e6, nu=0.3))
+    scene.fix("left", "x")
+    scene.fix("bottom", "y")
+    scene.traction("top", (0.0, -1e3))
+    found = scene.solve().error(tawami.Goal.displacement((1.8, 1.0), "y"))
+    assert abs(found.error) < 1e-9 * abs(found.value)
 
 
 def test_the_parts_add_up_and_belong_to_cells():

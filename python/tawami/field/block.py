@@ -13,7 +13,7 @@ from tawami.field.attachment import Attachment
 from tawami.field.coefficients import Place
 from tawami.field.kernels import assembler_of
 from tawami.field.matrix import ReducedMatrix
-from tawami.field.prolongation import Level, prolongations
+from tawami.field.prolongation import GridUnknowns, prolongations
 from tawami.field.reduction import Reduction
 from tawami.field.unknowns import Unknowns
 
@@ -105,6 +105,6 @@ class Block(Unknowns):
         unknowns = in_field(self.coefficients)
         if place.start == 0:  # parts are those of the displacement
             unknowns = unknowns + layout.parts[1][self.coefficients] * (there.stop - there.start)
-        level = Level(cells, unknowns, in_field(self._held))
+        level = GridUnknowns(cells, unknowns, in_field(self._held))
         comm = self._attachment.grid.comm
         return list(prolongations(comm, place.basis, place.components, level))

@@ -27,7 +27,7 @@ HELD = 0.5
 
 
 @dataclass(frozen=True)
-class Level:
+class GridUnknowns:
     """Coefficients of a field on one grid, on this rank.
 
     Attributes:
@@ -42,7 +42,7 @@ class Level:
     held: Indices
 
 
-def prolongations(comm: Any, basis: Basis, components: int, level: Level) -> Iterator[Any]:
+def prolongations(comm: Any, basis: Basis, components: int, level: GridUnknowns) -> Iterator[Any]:
     """Matrices from the unknowns of a coarser grid to those of the next finer one, the finest first.
 
     A coarse cell is 2 x 2 fine ones; at the upper ends of a grid of odd size it may reach beyond. Every
@@ -74,7 +74,7 @@ def coarser(cells: Sequence[int]) -> tuple[int, ...]:
 class _Step:
     """From one grid to the next coarser one."""
 
-    def __init__(self, comm: Any, basis: Basis, components: int, fine: Level) -> None:
+    def __init__(self, comm: Any, basis: Basis, components: int, fine: GridUnknowns) -> None:
         self._comm, self._components = comm, components
         self._along = [refinement(basis, n) for n in fine.cells]
         cells = coarser(fine.cells)
@@ -97,7 +97,7 @@ class _Step:
         places = (rows[kept], number[column[kept]])
         part = sp.csr_matrix((values[kept], places), shape=(len(fine.unknowns), size))
         self.matrix = aij(comm, part, len(own))
-        self.coarse = Level(cells, own, self._held)
+        self.coarse = GridUnknowns(cells, own, self._held)
 
     def _rows(self, coefficients: Indices) -> tuple[Indices, Indices, Array]:
         """Coarse coefficients in which fine ones lie: places of the fine ones, numbers, and values."""

@@ -130,6 +130,20 @@ class Grid(Unique):
         """Origin [m], side of a cell [m] and numbers of cells."""
         return self.origin, self.h, self.cells
 
+    def with_cells(self, h: float, cells: Sequence[int]) -> Grid:
+        """The grid with other cells, from the same corner on.
+
+        Args:
+            h: Side of a cell [m].
+            cells: Numbers of cells.
+        """
+        return Grid(self.comm, origin=self.origin, h=h, cells=cells, geometry=self.geometry)
+
+    @property
+    def halved(self) -> Grid:
+        """The grid with cells of h/2."""
+        return self.with_cells(self.h / 2, [2 * n for n in self.cells])
+
     def identity(self) -> dict[str, Any]:
         """Facts that identify the grid, for checkpoints."""
         return {

@@ -68,6 +68,7 @@ class SceneBorder:
 
     def __init__(self, model: Model, particles: _rust.Particles) -> None:
         self._grid, self._given = model.grid, model.border
+        self._lines = model.grid if model.moves else model.grid.halved
         self._count = MOVING if model.moves else STAYING
         self.points: MovingPoints | None = None
         self._ends: MovingPoints | None = None
@@ -78,11 +79,10 @@ class SceneBorder:
         self._has_moved = self._told = False
         self.parts: list[MovingPoints] = []
         self.users: list[User] = []
-        border = model.border
-        if border is not None:
+        if (border := model.border) is not None:
             area = particles.volume / model.space.thickness(particles.x)
             check_fits(self._grid, border.points(self._grid, STAYING), particles.x, area)
-            self.points = MovingPoints(border.points(self._grid, self._count), self._grid)
+            self.points = MovingPoints(border.points(self._lines, self._count), self._grid)
             self._pieces_at_lines = border.at_lines(self._grid)
             self._left = np.arange(len(self._pieces_at_lines.start))
             self._shares = np.tile([0.0, 1.0], (len(self._left), 1))
@@ -138,7 +138,7 @@ class SceneBorder:
             pieces = self._pieces(what, where)
             if joined:
                 pieces = replace(pieces, tag=np.zeros_like(pieces.tag), names=("border",))
-            points = pieces.points(self._grid, self._count)
+            points = pieces.points(self._lines, self._count)
         if not len(points):
             raise InputError(
                 f"{what}: no point of the border is in this part: expected some of it; the border has "

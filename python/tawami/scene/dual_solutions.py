@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
 
 from tawami.base.arrays import Array
 from tawami.body import rings
@@ -14,14 +16,17 @@ from tawami.field.prolongation import coarser
 from tawami.grid.grid import Grid
 from tawami.scene.configuration import Configuration
 from tawami.scene.goal import Goal
-from tawami.scene.level import Level, Points, prolongation
+from tawami.scene.level import Level, Points, from_coarser
 from tawami.scene.model import Model
+from tawami.solve import two_grid
 
 #: Gauss points per axis of a full cell of h/2, which integrate the residual exactly.
 POINTS = 3
 #: Ratio of the differences between grids below which they tell nothing, its smallest and largest value
 #: that is used (orders 1 and 6), and the one that is used instead (order 4, that of smooth solutions).
 IRREGULAR, SLOWEST, FASTEST, SMOOTH = 0.5, 2.0, 64.0, 16.0
+#: Difference between grids that counts as round-off, relative to the absolute terms of the quantity.
+ROUND_OFF = 1e-9
 
 
 class DualSolutions:
@@ -44,7 +49,8 @@ class DualSolutions:
         residual: Exact residual without stabilisation on the coefficients of cells of h.
         z: The dual solution there.
         of_grid: Contributions of the coefficients of cells of h/2 to the error of the grid.
-        order: Order of this error in h; NaN if it is irregular.
+        at_round_off: Whether this error is as small as round-off.
+        order: Order of this error in h; NaN if it is irregular or at round-off.
     """
 
     def __init__(
@@ -56,24 +62,25 @@ class DualSolutions:
         coefficients: Array,
     ) -> None:
         grid = model.grid
-        double = _with_cells(grid, grid.h / 2, [2 * n for n in grid.cells])
+        double = grid.halved
         half = Level(now, replace(model, grid=double), _exact(double, model, particles))
         body = _exact(grid, model, particles)
         whole = Level(now, model, body)
         self.fine, self.coarse = half.layout, whole.layout
-        up = prolongation(self.fine)
+        up = from_coarser(self.fine)
         at = up @ coefficients
         weights = goal.weights(half.domain, now.border)
         self.value = float(weights @ at)
         weights_here = up.T @ weights
         self.z, again = whole.dual(weights_here, coefficients)
-        matrix = half.transposed(at)
         residual = half.residual(at, stabilised=False)
-        fine = half.finer_dual(matrix, whole, again, up, weights, self.z, residual)
+        fine = _on_half(
+            half, at, weights, residual, up @ self.z, up @ whole.reduction.selection, again
+        )
         self.residual = up.T @ residual
         self.of_grid = -residual * (fine - up @ self.z)
-        large = _with_cells(grid, 2 * grid.h, coarser(grid.cells))  # may reach beyond the grid
-        twice, down = Level(now, replace(model, grid=large), body), prolongation(self.coarse)
+        large = grid.with_cells(2 * grid.h, coarser(grid.cells))  # may reach beyond the grid
+        twice, down = Level(now, replace(model, grid=large), body), from_coarser(self.coarse)
         state = twice.nearest(self.coarse, down, coefficients)
         z, _ = twice.dual(down.T @ weights_here, state)
         there = up @ (down @ state)
@@ -83,13 +90,38 @@ class DualSolutions:
         first = float(self.of_grid.sum())
         ratio = (-float(self.residual @ self.z) - before) / first if first else np.inf
         used = min(max(ratio, SLOWEST), FASTEST) if ratio > IRREGULAR else SMOOTH
-        self.order = float(np.log2(ratio)) if ratio > 0 else np.nan
+        self.at_round_off = abs(first) <= ROUND_OFF * float(np.abs(weights) @ np.abs(at))
+        self.order = float(np.log2(ratio)) if ratio > 0 and not self.at_round_off else np.nan
         self.of_grid *= used / (used - 1)
 
 
-def _with_cells(grid: Grid, h: float, cells: Sequence[int]) -> Grid:
-    """The grid with other cells, from the same corner on."""
-    return Grid(grid.comm, origin=grid.origin, h=h, cells=cells, geometry=grid.geometry)
+def _on_half(
+    half: Level,
+    at: Array,
+    weights: Array,
+    residual: Array,
+    start: Array,
+    prolongation: sp.csr_matrix,
+    coarse: Callable[[Array], Array],
+) -> Array:
+    """The dual solution on cells of h/2, by cycles with that on cells of h.
+
+    Args:
+        half: Cells of h/2.
+        at: The solution there.
+        weights: Derivative of the quantity.
+        residual: Exact residual without stabilisation.
+        start: The dual solution on cells of h.
+        prolongation: Coefficients x unknowns of cells of h.
+        coarse: Solves with the transposed tangent on cells of h.
+    """
+    reduction, matrix = half.reduction, half.transposed(at)
+    own, right = reduction.coefficients, reduction.restricted(weights)
+    found = two_grid.solve(
+        matrix, int(reduction.of_displacement.sum()), prolongation[own], coarse, right, start[own],
+        reduction.restricted(residual),
+    )  # fmt: skip
+    return reduction.expanded(splu(matrix).solve(right) if found is None else found)
 
 
 def _exact(grid: Grid, model: Model, particles: Points) -> Points:

@@ -38,8 +38,8 @@ class ErrorEstimate:
         goal: The quantity.
         value: Its computed value, in its unit.
         parts: The error by source: 'grid', 'particles' (as quadrature), 'stabilisation', 'Newton'.
-        order: Observed order of convergence with h of the part 'grid'; NaN if it is irregular. Near or
-            below 0 the quantity has no limit.
+        order: Observed order of convergence with h of the part 'grid'; NaN if it is irregular or if this
+            part is as small as round-off. Near or below 0 the quantity has no limit.
         cells: Contributions of the cells to each part, ny x nx.
     """
 
@@ -48,6 +48,7 @@ class ErrorEstimate:
     parts: Mapping[str, float]
     order: float
     cells: Mapping[str, Array] = field(repr=False)
+    _at_round_off: bool = field(repr=False)
     _grid: Grid = field(repr=False)
     _outline: Outline | None = field(repr=False)
 
@@ -56,18 +57,25 @@ class ErrorEstimate:
         """The estimated error: the sum of its parts."""
         return float(sum(self.parts.values()))
 
+    @property
+    def _order(self) -> str:
+        """The order in words."""
+        if self._at_round_off:
+            return "at round-off"
+        return "irregular" if np.isnan(self.order) else f"{self.order:.1f}"
+
     def __repr__(self) -> str:
         parts = ", ".join(f"{name} {part:.2g}" for name, part in self.parts.items())
         return (
             f"ErrorEstimate({self.goal.name} = {self.value:.6g} {self.goal.unit}, error "
-            f"{self.error:.2g} {self.goal.unit}: {parts}; order {self.order:.1f})"
+            f"{self.error:.2g} {self.goal.unit}: {parts}; order {self._order})"
         )
 
     def _repr_html_(self) -> str:
         rows = {"value": f"{self.value:.6g} {self.goal.unit}"}
         rows["error"] = f"{self.error:.2g} {self.goal.unit}"
         rows |= {name: f"{part:.2g} {self.goal.unit}" for name, part in self.parts.items()}
-        return html.table(f"Error of {self.goal.name}", rows | {"order": f"{self.order:.1f}"})
+        return html.table(f"Error of {self.goal.name}", rows | {"order": self._order})
 
     @style.used()
     def plot(self, part: str | None = None, axes: Axes | None = None) -> Axes:
@@ -147,6 +155,7 @@ def estimate(now: Configuration, goal: Any, coefficients: Array, load: float) ->
         {name: float(values.sum()) for name, (_, values) in parts.items()},
         dual.order,
         {name: _in_cells(now.model.grid, *part) for name, part in parts.items()},
+        dual.at_round_off,
         now.model.grid,
         None if points is None else Outline(points, now.domain, coefficients),
     )

@@ -28,7 +28,6 @@ from tawami.scene.domain import Domain
 from tawami.scene.model import Model
 from tawami.solve.direct import DirectSolver
 from tawami.solve.linear_solver import System
-from tawami.solve import two_grid
 from tawami.solve.scaling import Scaling
 
 #: Weight of coefficients that the finer ones do not determine.
@@ -160,26 +159,6 @@ class Level:
         found = solver.solve(System(matrix, scale, right, 0.0, list))
         return reduction.expanded(found), lambda more: solver.again(more, COARSE)
 
-    def finer_dual(
-        self,
-        matrix: sp.csc_matrix,
-        coarse: Level,
-        again: Callable[[Array], Array],
-        up: sp.csr_matrix,
-        weights: Array,
-        z: Array,
-        residual: Array,
-    ) -> Array:
-        reduction = self.reduction
-        some = reduction.coefficients
-        found = two_grid.solve(
-            matrix, int(reduction.of_displacement.sum()), (up @ coarse.reduction.selection)[some], again,
-            reduction.restricted(weights), (up @ z)[some], reduction.restricted(residual),
-        )  # fmt: skip
-        if found is None:
-            found = splu(matrix).solve(reduction.restricted(weights))
-        return reduction.expanded(found)
-
     def nearest(self, finer: Layout, prolongation: sp.csr_matrix, fine: Array) -> Array:
         """The coefficients that obey the supports and are next to those of a finer grid."""
         rows = np.flatnonzero(finer.active)
@@ -207,7 +186,7 @@ class Level:
         )
 
 
-def prolongation(layout: Layout) -> sp.csr_matrix:
+def from_coarser(layout: Layout) -> sp.csr_matrix:
     """Coefficients of a layout from those of cells twice as large (two-scale relation)."""
     blocks = []
     for place in layout.fields.values():

@@ -53,7 +53,9 @@ class Smoother:
         return np.concatenate([u - length * u_of_step, length * step])
 
     def _in_volume(self, u: Array) -> Array:
-        return (self._matrix @ np.pad(u, (0, self._matrix.shape[0] - self._n)))[self._n :]
+        return np.asarray(
+            (self._matrix @ np.pad(u, (0, self._matrix.shape[0] - self._n)))[self._n :]
+        )
 
 
 def solve(
