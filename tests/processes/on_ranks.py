@@ -403,7 +403,7 @@ def wide() -> dict[str, np.ndarray]:
     scene.pressure("2", 1e3)
     solution = scene.solve()
     box = tawami.box(grid, (0, 0), (5, 0.5), per_axis=2)
-    scene = tawami.Scene(grid, box, law, form="u_finite", density=1e3, tolerance=1e-11)
+    scene = tawami.Scene(grid, box, law, form="u_finite", density=1e3, tolerance=1e-9)
     scene.wall("bottom", 0.2)
     scene.wall("left")
     scene.gravity((0, -9.81))
