@@ -16,7 +16,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
 from tawami import _rust
 from tawami.base.arrays import Array, Indices, Mask
