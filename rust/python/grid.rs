@@ -69,7 +69,7 @@ impl PyGrid {
 
     /// Cells in the whole grid of points on a border, -1 for those in cells that are not treated here, and
     /// whether no cell near each holds particles; see `grid/near.rs`.
-    #[allow(clippy::too_many_arguments)]
+    #[allow(clippy::too_many_arguments, clippy::type_complexity)]
     fn near<'py>(
         &self,
         py: Python<'py>,
