@@ -366,11 +366,12 @@ impl Stage<'_> {
     }
 
     /// Accept the increments: stress (tau at finite strain), history, displacement and (where stored)
-    /// eps_v of the particles. Returns the energy that the laws dissipate in the step [J per metre depth].
+    /// eps_v of the particles. Returns the energy that the laws dissipate in the step [J per metre depth],
+    /// with these volumes, those of the particles by default.
     ///
     /// # Errors
     /// [`Error::Inverted`]; then nothing has changed.
-    pub fn commit(&self, particles: &mut Particles) -> Result<f64> {
+    pub fn commit(&self, particles: &mut Particles, volume: Option<&[f64]>) -> Result<f64> {
         let old = self.old(particles);
         let of = |p: usize| {
             let mut answer = self.respond(&old, p)?;
@@ -387,7 +388,7 @@ impl Stage<'_> {
         if let Some(p) = new.iter().position(Option::is_none) {
             return Err(Error::Inverted { index: particles.number()[p] as usize });
         }
-        let each = new.iter().flatten().zip(particles.volume());
+        let each = new.iter().flatten().zip(volume.unwrap_or(particles.volume()));
         let dissipated = each.fold(0.0, |sum, (new, volume)| sum + volume * new.dissipated);
         self.store(particles, &new);
         Ok(dissipated)

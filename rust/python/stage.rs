@@ -114,6 +114,14 @@ impl PyStage {
         Ok(Given { stress, tangent, plastic_volume, variables, history, slopes })
     }
 
+    /// A copy of volumes, which may be a view of the particles.
+    fn volume(&self, given: Option<Read1<f64>>) -> PyResult<Option<Vec<f64>>> {
+        let Some(given) = given else { return Ok(None) };
+        let volume = given.as_slice()?.to_vec();
+        require(volume.len() == self.location.len(), "volumes of other particles")?;
+        Ok(Some(volume))
+    }
+
     fn stage<'a>(
         &'a self,
         u: &'a Read1<f64>,
@@ -225,26 +233,32 @@ impl PyStage {
     }
 
     /// Accept the increments: stress, displacement and eps_v of the particles. Returns the energy that the
-    /// laws dissipate [J per metre depth].
-    #[pyo3(signature = (u, volumetric, given=None))]
+    /// laws dissipate [J per metre depth], with these volumes, those of the particles by default.
+    #[pyo3(signature = (u, volumetric, given=None, volume=None))]
     fn commit(
         &self,
         py: Python,
         u: Read1<f64>,
         volumetric: Option<Read1<f64>>,
         given: Option<GivenArrays>,
+        volume: Option<Read1<f64>>,
     ) -> PyResult<f64> {
+        let volume = self.volume(volume)?;
         let mut particles = self.particles.try_borrow_mut(py)?;
         let particles = &mut particles.0;
         let stage = self.stage(&u, volumetric.as_ref(), given.as_ref())?;
         self.check_given(&stage)?;
-        Ok(detached(py, || stage.commit(particles))?)
+        Ok(detached(py, || stage.commit(particles, volume.as_deref()))?)
     }
 
-    /// Energy that the laws store in the particles [J per metre depth].
-    fn elastic_energy(&self, py: Python) -> PyResult<f64> {
+    /// Energy that the laws store in the particles [J per metre depth], with these volumes, those of the
+    /// particles by default.
+    #[pyo3(signature = (volume=None))]
+    fn elastic_energy(&self, py: Python, volume: Option<Read1<f64>>) -> PyResult<f64> {
+        let given = self.volume(volume)?;
         let particles = &self.particles.try_borrow(py)?.0;
-        let (volume, material) = (particles.volume(), particles.material());
+        let volume = given.as_deref().unwrap_or(particles.volume());
+        let material = particles.material();
         let of = |(p, stress): (usize, &[f64])| {
             let law = &self.materials[material[p] as usize];
             let stress: Sym = std::array::from_fn(|i| stress[i]);

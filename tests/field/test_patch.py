@@ -84,12 +84,18 @@ def test_evenly_spaced_particles_under_integrate_the_end_splines(name, per_axis,
     does not fall on finer grids; its L2 norm falls like h (documentation, Limits). The numbers are the
     code's own.
     """
-    errors = tension_error(FORMS[name], per_axis=per_axis, gauss=False, cells=(8, 6))
+    options = FORMS[name] | {"volumes": "own"}
+    errors = tension_error(options, per_axis=per_axis, gauss=False, cells=(8, 6))
     assert errors[0] == pytest.approx(largest, rel=0.03)
     assert errors[1] == pytest.approx(l2, rel=0.03)
-    finer = tension_error(FORMS[name], per_axis=per_axis, gauss=False, cells=(16, 12))
+    finer = tension_error(options, per_axis=per_axis, gauss=False, cells=(16, 12))
     assert finer[0] == pytest.approx(largest, rel=0.05)
     assert finer[1] == pytest.approx(errors[1] / 2, rel=0.05)
+
+
+@pytest.mark.parametrize("per_axis", [3, 4])
+def test_nine_particles_in_a_full_cell_pass(per_axis):
+    assert tension_error({"form": "u_epsv"}, per_axis=per_axis, gauss=False)[0] < 1e-12
 
 
 @pytest.mark.parametrize("per_axis", [1, 2])

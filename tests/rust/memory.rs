@@ -67,7 +67,7 @@ fn accepting_a_step_holds_no_tangents() {
         };
         let before = IN_USE.load(SeqCst);
         MOST.store(before, SeqCst);
-        stage.commit(&mut particles).unwrap();
+        stage.commit(&mut particles, None).unwrap();
         let each = (MOST.load(SeqCst) - before) as f64 / count as f64;
         assert!((100.0..200.0).contains(&each), "{each} bytes a particle");
     }

@@ -106,7 +106,7 @@ fn one_particle(kinematics: Kinematics, p: f64) -> Particles {
         Output { requests: &scaled, columns: 2, data: &mut other },
     ];
     stage.evaluate(&particles, outputs).unwrap();
-    stage.commit(&mut particles).unwrap();
+    stage.commit(&mut particles, None).unwrap();
     if kinematics != Kinematics::Deviatoric {
         for (k, i) in [(0, 0), (1, 1), (2, 3)] {
             assert_eq!(data[k], particles.stress()[i]);

@@ -14,7 +14,7 @@ div (w e_r) = w,r + w/r.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import scipy.sparse as sp
@@ -35,14 +35,14 @@ TOLERANCE, ITERATIONS = 1e-3, 80
 #: Largest correction of a volume.
 LARGEST = 0.5
 
-Volumes = Literal["fitted", "own"]
+Volumes = Literal["full_cells", "own", "fitted"]
 
 
-def chosen(volumes: Volumes, border: Border | None) -> bool:
-    """Whether volumes are fitted.
+def checked(volumes: Volumes, border: Border | None) -> Volumes:
+    """The choice of the volumes, checked.
 
-    They are not by default: conjugate gradients amplify round-off, so that runs with another order of
-    sums, as on other numbers of ranks, differ by about 1e-3 of the correction.
+    They are not fitted to the border by default: conjugate gradients amplify round-off, so that runs
+    with another order of sums, as on other numbers of ranks, differ by about 1e-3 of the correction.
 
     Args:
         volumes: As the user gave it.
@@ -51,14 +51,13 @@ def chosen(volumes: Volumes, border: Border | None) -> bool:
     Raises:
         InputError: Another value, or a body without a border.
     """
-    if checks.choice("volumes", volumes, ("own", "fitted")) == "own":
-        return False
-    if border is None:
+    checks.choice("volumes", volumes, get_args(Volumes))
+    if volumes == "fitted" and border is None:
         raise InputError(
-            "volumes='fitted': the body has no border: expected volumes='own', or "
+            "volumes='fitted': the body has no border: expected volumes='full_cells', or "
             "Body(x, volume, border=tawami.polyline(corners))"
         )
-    return True
+    return volumes
 
 
 def corrections(

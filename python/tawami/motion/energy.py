@@ -153,7 +153,7 @@ class Balance:
     @property
     def elastic(self) -> float:
         """Energy that the laws store [J per metre depth]."""
-        return self.sum(self._now.domain.stage.elastic_energy())
+        return self.sum(self._now.domain.elastic_energy)
 
     def begin(self) -> None:
         """Start a step: add the energy of velocities that the script wrote into the particles, of

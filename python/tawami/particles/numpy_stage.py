@@ -192,9 +192,10 @@ class NumpyStage:
         """Tangent of the laws in NumPy [Pa] at increments of the fields, n x 4 x 4; others are 0."""
         return self._given(u, volumetric).tangent.copy()
 
-    def commit(self, u: Array, volumetric: Array | None) -> float:
+    def commit(self, u: Array, volumetric: Array | None, *, volume: Array | None = None) -> float:
         """See `_rust.Stage.commit`."""
-        dissipated = self._stage.commit(u, volumetric, self._given(u, volumetric).flat)
+        given = self._given(u, volumetric).flat
+        dissipated = self._stage.commit(u, volumetric, given, volume)
         self._latest = None
         return dissipated
 

@@ -18,7 +18,7 @@ from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import InputError
 from tawami.particles import assignment, placement
 from tawami.particles.assignment import Law
-from tawami.scene import locking, selection
+from tawami.scene import fitting, locking, selection
 from tawami.scene.configuration import Configuration
 from tawami.scene.domain import Domain
 from tawami.scene.excavation import Excavation
@@ -128,19 +128,20 @@ def _remove(now: Configuration, mask: Mask) -> Removed:
     excavation = Excavation(comm, kept.x, particles.x[mask])
     now.supports.check_reach(before, after, excavation)
     now.loads.check_reach(excavation)
+    elastic, volume_removed = before.elastic_energy, np.asarray(particles.volume)[mask].sum()
+    _replace(now, after, excavation)
     sums = ranks.sum_of(
         comm,
         np.array(
             [
-                np.asarray(particles.volume)[mask].sum(),
+                volume_removed,
                 mass.sum(),
                 kinetic,
-                before.stage.elastic_energy() - after.stage.elastic_energy(),
+                elastic - after.elastic_energy,
                 *model.space.resultant(momentum),
             ]
         ),
     )
-    _replace(now, after, excavation)
     time = now.activity.time if moving else np.nan
     now.left += [(number, x, time) for number, x in gone]
     now.removed = now.removed + sums[2:4]
@@ -158,6 +159,7 @@ def _replace(now: Configuration, after: Domain, excavation: Excavation | None = 
     if excavation is not None:
         now.border.excavate(excavation)
     now.border_sums.attach(after)
+    fitting.fit(after, now.border)
     after.assembly.attachment.start = before.assembly.attachment.start
     now.inputs.repeat(after, now.moment(), gravity)
     internal = after.newton.internal(zero)

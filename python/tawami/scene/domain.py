@@ -126,6 +126,16 @@ class Domain:
         return self.assembly.attachment.active
 
     @property
+    def volume(self) -> Array:
+        """Volumes of this rank's particles in the integrals of the form."""
+        return self.assembly.attachment.volume
+
+    @property
+    def elastic_energy(self) -> float:
+        """Energy that the laws store on this rank [J per metre depth]."""
+        return self.stage.elastic_energy(self.volume)
+
+    @property
     def constants(self) -> dict[str, Array]:
         """K and mu [Pa] of each particle."""
         return self.responses.constants

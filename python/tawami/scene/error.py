@@ -138,7 +138,7 @@ def estimate(now: Configuration, goal: Any, coefficients: Array, load: float) ->
     form, plain = (own.residual(coefficients, stabilised=s) for s in (True, False))
     estimable.check_state(own, coefficients, form, plain)
     at = coefficients if model is now.model else own.with_volume(model.form, coefficients)
-    dual = DualSolutions(now, replace(model, fits=False), body, goal, at)
+    dual = DualSolutions(now, replace(model, volumes="own"), body, goal, at)
     z = dual.z[: layout.size]
     of_particles = -dual.residual * dual.z
     of_particles[: layout.size] += plain * z

@@ -1,4 +1,4 @@
-"""Volumes of the particles that fit the border of the body, for the integrals of a form."""
+"""Volumes in the integrals of a form: those of the particles, or corrected ones."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tawami.scene.domain import Domain
 
 
 def fit(domain: Domain, border: SceneBorder) -> None:
-    """Let the form integrate with fitted volumes if the scene asks for them.
+    """Let the form integrate with the volumes that the scene asks for.
 
     Where a part of the border has no particles near it, as after a body broke, volumes are not fitted.
     A call for all ranks.
@@ -21,20 +21,22 @@ def fit(domain: Domain, border: SceneBorder) -> None:
         border: The border of the body.
     """
     particles, points, model = domain.particles, border.points, domain.model
-    if points is None or not model.fits:
+    volume = np.array(particles.volume)
+    if model.volumes != "own" and not model.moves:
+        w = full_cells.factors(model.grid, domain.location, volume, particles.material)
+        if (w != 1).any():
+            volume *= w
+            domain.assembly.integrate_with(volume)
+    if points is None or model.volumes != "fitted":
         return
     try:
         cells = points.cells(domain)
     except SupportError:
         return
-    now = volume = np.array(particles.volume)
+    now = volume
     if model.moves:
         gradient = np.asarray(particles.displacement_gradient)
         now = volume * np.linalg.det(np.eye(gradient.shape[-1]) + gradient)
-    else:
-        now = volume = volume * full_cells.factors(
-            model.grid, domain.location, volume, particles.material
-        )
     area = points.area * model.space.thickness(points.x)[:, None]
     c = fitted_volumes.corrections(cells, area, domain.location, now, domain.layout)
     domain.assembly.integrate_with(volume * (1 + c))

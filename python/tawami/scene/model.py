@@ -65,7 +65,7 @@ class Model:
         num_particles: Particles of the body, on all ranks.
         part: The part of the body that the driver script has on this rank, whose order arrays of the
             script have; None if it has the whole body.
-        fits: Whether the form integrates with volumes that fit the border of the body.
+        volumes: Volumes that the form integrates with, as in `Scene`.
         border: The border of the body; None if it has none.
     """
 
@@ -84,7 +84,7 @@ class Model:
     leaving: Leaving
     num_particles: int
     part: Part | None
-    fits: bool
+    volumes: fitted_volumes.Volumes
     border: Border | None
 
     @property
@@ -182,7 +182,7 @@ class Model:
                 "laws": [*self.texts, *laws],
                 "density": None if self.density is None else self.density.tolist(),
                 "leaving": self.leaving,
-                "volumes": "fitted" if self.fits else "own",
+                "volumes": self.volumes,
                 "number of particles": self.num_particles,
             }
         )
@@ -243,7 +243,7 @@ def build(
         used, in_time, in_space, Settings(options, fixed),
         laws, densities, _names(body, len(materials)), leaving,
         len(particles) if body.part is None else body.part.total, body.part,
-        fitted_volumes.chosen(volumes, body.border),
+        fitted_volumes.checked(volumes, body.border),
         body.border,
     )  # fmt: skip
     return model, particles

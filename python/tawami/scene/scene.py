@@ -64,8 +64,10 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
             dictionary as for the materials); gravity needs it.
         leaving: Treatment of particles that leave the grid: 'stop' with an error before they do, or
             'remove' them; `left` lists them.
-        volumes: Volumes in the integrals of the form: 'own' of the particles, or 'fitted', so that the
-            divergence theorem holds for the functions of the grid; masses stay.
+        volumes: Volumes in the integrals of the form. 'full_cells': those of the particles, corrected at
+            small strain so that polynomials are integrated exactly over full cells with 9 particles or
+            more; 'own': those of the particles; 'fitted': also corrected so that the divergence theorem
+            holds for the functions of the grid. Masses stay.
         parameters: Parameters and options of the form: alpha, stabilisation, ... A parameter is a
             number, a function of time [s], or one number for each particle: a function f(x, y), an
             array, `tawami.table(...)` or `tawami.earlier(...)`.
@@ -107,7 +109,7 @@ class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):
         linear_solver: SolverName = "auto",
         density: float | Sequence[float] | Mapping[str, float] | None = None,
         leaving: Literal["stop", "remove"] = "stop",
-        volumes: Literal["own", "fitted"] = "own",
+        volumes: Literal["full_cells", "own", "fitted"] = "full_cells",
         **parameters: Any,
     ) -> None:
         check_process()

@@ -138,7 +138,7 @@ def outgrown(domain: Domain, growth: float) -> str:
 
 def advice(domain: Domain) -> str:
     """Advice against particles that are too far apart."""
-    fitted = "" if domain.model.fits else ", Scene(..., volumes='fitted')"
+    fitted = "" if domain.model.volumes == "fitted" else ", Scene(..., volumes='fitted')"
     return (
         f"Expected more particles per cell (per_axis=...){fitted}, or sides that begin between lines of "
         "the grid, as 0.4 h from them"
