@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 import tawami
-from cases.costs.fronts.measure import Row, compared
+from cases.costs.trade.fronts.measure import Row, compared
 from cases.showcase.collapse import pile
 from cases.verification.vibrating_beam import beam as timoshenko
 from cases.verification.vibrating_beam import mpm

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 import tawami
-from cases.costs.fronts.measure import Row, compared
+from cases.costs.trade.fronts.measure import Row, compared
 from cases.verification.cantilever import mpm
 from cases.verification.cantilever.beam import D, L
 

@@ -1,6 +1,6 @@
 """Gains in error at equal time of ways to integrate, stabilise, step and iterate.
 
-python -m cases.costs.fronts [NAME ...]
+python -m cases.costs.trade.fronts [NAME ...]
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from cases.common.program import Program
 from cases.common.table import as_text
-from cases.costs.fronts import alpha, measure, time_step, tolerance, volumes
+from cases.costs.trade.fronts import alpha, measure, time_step, tolerance, volumes
 
 SUBJECTS = {
     "volumes": (volumes.rows, measure.COLUMNS),
@@ -17,7 +17,7 @@ SUBJECTS = {
     "dt": (time_step.rows, measure.COLUMNS),
     "tolerance": (tolerance.rows, tolerance.COLUMNS),
 }
-PROGRAM = Program("cases.costs.fronts", __doc__, files=False)
+PROGRAM = Program("cases.costs.trade.fronts", __doc__, files=False)
 PROGRAM.option("subjects", nargs="*", help=f"among {', '.join(SUBJECTS)}; all by default")
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 import tawami
-from cases.costs.fronts.measure import Row, compared
+from cases.costs.trade.fronts.measure import Row, compared
 from cases.showcase.collapse import pile
 from cases.verification import ring
 from cases.verification.cantilever import mpm
