@@ -88,7 +88,7 @@ def test_full_cells_are_as_good_as_gauss_points_at_small_strain():
 def test_bodies_without_a_border_are_rejected():
     grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.5, cells=(2, 2))
     loose = tawami.Body(np.array([[0.4, 0.4]]), np.array([0.1]))
-    with pytest.raises(tawami.InputError, match="has no border: expected volumes='own', or"):
+    with pytest.raises(tawami.InputError, match="has no border: expected volumes='full_cells', or"):
         tawami.Scene(grid, loose, LAW, form="u_finite", volumes="fitted")
     tawami.Scene(grid, loose, LAW, form="u_finite", volumes="own")
     with pytest.raises(tawami.InputError, match="volumes = 'exact': expected"):
