@@ -55,7 +55,7 @@ class Ring:
         strain: 'small' or 'large'.
         n: Cells per metre.
         particles: 'even' or 'Gauss'.
-        volumes: Volumes in the integrals, 'own' or 'fitted'.
+        volumes: Volumes in the integrals, as in `Scene`.
         shift: Shift of the centre along x [cells].
         radius: Error of u(A), at large strain of a [%].
         rms: Error of the mean stress, rms by volume [% of it, at large strain of p].
@@ -117,7 +117,7 @@ def small(
     exact = 2 / 3 * (1 + NU) * P * A**2 / (B**2 - A**2)
     found = errors(mean, exact, volume, exact)
     return Ring(
-        "small", n, "Gauss" if gauss else "even", options.get("volumes", "own"), shift[0],
+        "small", n, "Gauss" if gauss else "even", options.get("volumes", "full_cells"), shift[0],
         100 * (ratio - 1), *found, radius, mean,
     )  # fmt: skip
 
@@ -185,7 +185,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Load the rings, print the table, draw the figure."""
     n = PROGRAM.start(arguments).cells
     rings = [small(n, volumes="own")]
-    rings += [small(n, shift, volumes="fitted") for shift in SHIFTS]
+    rings += [small(n, shift) for shift in SHIFTS]
     rings += [small(n, shift, gauss=True) for shift in SHIFTS]
     drawn = [rings[0], rings[1]]
     rings += [large(m) for m in (n // 4, n // 2, n)]

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 import tawami
+from cases.costs.trade.fronts import volumes
 from cases.costs.trade.fronts.measure import Row, compared
 from cases.verification.cantilever import mpm
 from cases.verification.cantilever.beam import D, L
@@ -53,15 +54,14 @@ def by_gradient(solution: tawami.Solution) -> Array:
 
 
 def rows() -> list[Row]:
-    """All comparisons."""
-    ways = (ALPHA, 0.1, 0.03, 0.003, SMALL, "inside", "gradient")
-    return [
-        row
-        for nu in NUS
-        for row in compared(
-            f"cantilever, nu = {nu:g}",
-            {str(alpha): {"nu": nu, "alpha": alpha} for alpha in ways},
-            (8, 16, 32),
-            error,
-        )
-    ]
+    """All comparisons: the mean stress of the cantilever and of the ring, the deflection of Cook's
+    membrane.
+    """
+    constants = (ALPHA, 0.1, 0.03, 0.003, SMALL)
+    found = []
+    for nu in NUS:
+        ways = {str(a): {"nu": nu, "alpha": a} for a in (*constants, "inside", "gradient")}
+        found += compared(f"cantilever, nu = {nu:g}", ways, (8, 16, 32), error)
+    ways = {str(a): {"alpha": a} for a in constants}
+    found += compared("Cook", ways, (8, 16, 32), volumes.cook)
+    return found + compared("ring", ways, (4, 8, 16), volumes.small_ring)
