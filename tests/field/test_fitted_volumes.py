@@ -12,6 +12,7 @@ from cases.verification.cantilever.beam import V_THEORY, L
 from tawami.field import full_cells
 
 LAW = tawami.neo_hookean(E=1e3, nu=0.3)
+LINEAR = tawami.linear_elastic(E=1e3, nu=0.3)
 
 
 def moved(geometry="plane_strain", x0=0.0, **options):
@@ -83,6 +84,19 @@ def test_full_cells_are_as_good_as_gauss_points_at_small_strain():
     }
     assert off["full cells"] == pytest.approx(off["Gauss"], rel=0.01)
     assert off["own"] > 2 * off["Gauss"]
+
+
+@pytest.mark.parametrize("volumes", ["full_cells", "fitted"])
+def test_energies_have_the_volumes_of_the_integrals(volumes):
+    grid = tawami.Grid(MPI.COMM_WORLD, origin=(0.0, 0.0), h=0.5, cells=(4, 2))
+    body = tawami.box(grid, (0.0, 0.0), (2.0, 1.0))
+    scene = tawami.Scene(grid, body, LINEAR, form="u", density=1.0, volumes=volumes)
+    scene.fix("left", "x")
+    scene.fix("left", "y")
+    motion = tawami.Dynamics(scene, velocity=lambda x, y: (0 * x, 1e-3 * x**2))
+    motion.run(0.1, 0.02)
+    assert motion.elastic_energy > 0.01 * motion.kinetic_energy
+    assert abs(motion.energies.integration) < 1e-12 * motion.kinetic_energy
 
 
 def test_bodies_without_a_border_are_rejected():
