@@ -21,12 +21,12 @@ MIXED = {"form": ("u_epsv",), "n": CELLS}
 PLACES = tuple(SHIFTS)
 GRIDS = [
     {"form": ("u", "u_bbar"), "n": CELLS, "particles": ("3 x 3",), "place": PLACES},
-    MIXED | {"particles": ("3 x 3", "3 x 3 Gauss"), "volumes": ("own", "fitted"),
+    MIXED | {"particles": ("3 x 3", "3 x 3 Gauss"), "volumes": ("full_cells", "own", "fitted"),
              "alpha": (0.01,), "place": PLACES},
-    MIXED | {"particles": ("3 x 3",), "volumes": ("own",), "alpha": (0.003, 0.03, 0.1),
+    MIXED | {"particles": ("3 x 3",), "volumes": ("full_cells",), "alpha": (0.003, 0.03, 0.1),
              "place": PLACES},
-    MIXED | {"particles": ("3 x 3",), "volumes": ("own",), "alpha": (0.01,), "place": ("shifted",),
-             "ghost_penalty": ("off", "on")},
+    MIXED | {"particles": ("3 x 3",), "volumes": ("full_cells",), "alpha": (0.01,),
+             "place": ("shifted",), "ghost_penalty": ("off", "on")},
 ]  # fmt: skip
 
 STUDY = tawami.Study(
@@ -39,7 +39,7 @@ STUDY = tawami.Study(
             "form": "u_epsv",
             "n": ...,
             "particles": "3 x 3",
-            "volumes": "own",
+            "volumes": "full_cells",
             "alpha": alpha,
             "place": "shifted",
         }
