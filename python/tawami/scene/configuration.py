@@ -228,10 +228,8 @@ class Configuration:
             update = kind.accept(accepted)
             with signals.deferred():
                 with self.stopwatch("commit"), ranks.raise_together(self.model.grid.comm):
-                    layout, coefficients = self.domain.layout, accepted.step.coefficients
-                    dissipated = self.domain.stage.commit(
-                        *layout.split(coefficients), volume=self.domain.volume
-                    )
+                    coefficients = accepted.step.coefficients
+                    dissipated = self.domain.commit(coefficients)
                     own_fields.accept(self.domain, coefficients)
                 committed = True
                 if accepted.problem.terms is not None:

@@ -135,6 +135,14 @@ class Domain:
         """Energy that the laws store on this rank [J per metre depth]."""
         return self.stage.elastic_energy(self.volume)
 
+    def commit(self, coefficients: Array) -> float:
+        """Let the laws accept increments of all fields.
+
+        Returns:
+            The energy that they dissipate on this rank [J per metre depth].
+        """
+        return self.stage.commit(*self.layout.split(coefficients), volume=self.volume)
+
     @property
     def constants(self) -> dict[str, Array]:
         """K and mu [Pa] of each particle."""
