@@ -43,6 +43,10 @@ from tawami.border.polyline import polyline
 from tawami.border.shapes import half_plane, rigid_disc, rigid_polygon
 from tawami.check.form_check import check_form
 from tawami.check.report import FormReport
+from tawami.domain.earlier import earlier
+from tawami.domain.table import table
+from tawami.estimate.error import ErrorEstimate
+from tawami.estimate.goal import Goal
 from tawami.form.form import Form
 from tawami.grid.grid import Grid
 from tawami.motion.dynamics import Dynamics
@@ -59,17 +63,13 @@ from tawami.particles.laws import (
     von_mises,
 )
 from tawami.particles.numpy_law import NumpyLaw
+from tawami.quantities.quantities import Quantity
 from tawami.results.outputs import BorderOutput, GridOutput, ParticleOutput
 from tawami.results.plot import plot
 from tawami.results.results import Results
 from tawami.results.table import TableOutput
-from tawami.scene.earlier import earlier
-from tawami.scene.error import ErrorEstimate
-from tawami.scene.goal import Goal
-from tawami.scene.quantities import Quantity
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
-from tawami.scene.table import table
 from tawami.study import Series, Study, recommend
 from tawami.study.front import Trade
 from tawami.study.trade import trade

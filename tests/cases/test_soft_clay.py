@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cases.verification import soft_clay as case
-from tawami.scene import own_fields
+from tawami.domain import own_fields
 
 
 @pytest.fixture(scope="module")

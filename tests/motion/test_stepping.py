@@ -8,10 +8,10 @@ from mpi4py import MPI
 from scenes import grid_of
 
 import tawami
+from tawami.conditions.activity import Activity
 from tawami.motion.observer import NullObserver
 from tawami.motion.pace import Pace, Step, pack, unpack
 from tawami.motion.stepping import march
-from tawami.scene.activity import Activity
 
 ELASTIC = tawami.linear_elastic(E=100.0, nu=0.3)
 

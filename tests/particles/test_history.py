@@ -10,7 +10,7 @@ from scenes import grid_of
 import tawami
 from tawami import _rust
 from tawami.base.timing import Stopwatch
-from tawami.scene.domain import Domain
+from tawami.domain.domain import Domain
 
 K, MU = 5e3, 1e3
 STIFFENING = stiffening(K, MU)

@@ -11,7 +11,7 @@ from numpy_laws import drucker_prager, hooke, stiffening, von_mises
 from scenes import grid_of, linear_field
 
 import tawami
-from tawami.scene import presentation, quantities
+from tawami.quantities import presentation, quantities
 
 K, MU = 5e3, 1e3
 ELASTIC = hooke(K, MU)

@@ -10,8 +10,8 @@ from ufl import dot, inner
 
 import tawami
 from tawami.form import scalar, vector
+from tawami.quantities import presentation, quantities
 from tawami.results import write_particles
-from tawami.scene import presentation, quantities
 
 E, NU = 1e4, 0.3
 K, MU = E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU))

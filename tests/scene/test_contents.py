@@ -13,10 +13,10 @@ from scenes import FINITE, FORMS, grid_of
 from standing_block import STATIC, moving, plastic, scene_of
 
 import tawami
+from tawami.domain.domain import Domain
+from tawami.domain.model import KEYWORDS
 from tawami.fem import kernels
 from tawami.form import compilation, vector
-from tawami.scene.domain import Domain
-from tawami.scene.model import KEYWORDS
 from tawami.solve.inertia import Inertia
 
 MIXED = [name for name, options in (FORMS | FINITE).items() if "epsv" in options["form"]]

@@ -11,7 +11,7 @@ from ufl import dot, inner
 import tawami
 from tawami.form import scalar, vector
 from tawami.form.compilation import _compiled
-from tawami.scene import presentation, quantities
+from tawami.quantities import presentation, quantities
 
 LAW = {"K": 2.0, "mu": 1.0}
 FIELDS = {"u": vector("w"), "c": scalar("r", unit="mol/m3")}

@@ -10,7 +10,7 @@ from mpi4py import MPI
 import tawami
 from tawami.base import html
 from tawami.picture import style
-from tawami.scene import presentation
+from tawami.quantities import presentation
 
 Q = tawami.Quantity
 

@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 import tawami
-from tawami.scene import constraints
+from tawami.conditions import constraints
 
 ELASTIC = tawami.linear_elastic(E=1e5, nu=0.3)
 PLASTIC = tawami.von_mises(ELASTIC, yield_stress=2e3)

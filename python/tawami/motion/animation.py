@@ -12,9 +12,9 @@ from tawami.base.optional import optional
 from tawami.motion.observer import Motion
 from tawami.picture import film
 from tawami.picture.particles import scale_of
-from tawami.scene.presentation import checked_limits, corners_of, positions, shapes
-from tawami.scene.quantities import Given, body_arrays, of_scene
-from tawami.scene.scalars import pick
+from tawami.quantities.presentation import checked_limits, corners_of, positions, shapes
+from tawami.quantities.quantities import Given, body_arrays, of_scene
+from tawami.quantities.scalars import pick
 
 if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation

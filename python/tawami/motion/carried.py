@@ -14,7 +14,7 @@ from tawami.base import ranks
 from tawami.base.archive import check_like
 from tawami.base.arrays import Array
 from tawami.motion.transfer import Transfer, gradient_of, to_grid
-from tawami.scene.configuration import Configuration
+from tawami.step.configuration import Configuration
 
 #: Arrays of the particles, with the rank of their values: vectors and tensors.
 ARRAYS = {"velocity": 1, "acceleration": 1, "velocity_gradient": 2, "acceleration_gradient": 2}

@@ -13,6 +13,8 @@ from tawami.base.errors import InputError
 from tawami.base.identity import text
 from tawami.base.process import Unique
 from tawami.base.sealed import Sealed
+from tawami.domain import sources
+from tawami.domain.sources import Source
 from tawami.motion.animation import animate
 from tawami.motion.carried import Carried
 from tawami.motion.energy import Balance, Energies
@@ -23,11 +25,10 @@ from tawami.motion.requirements import check_displacements, check_scene, checked
 from tawami.motion.rotation import Rotation
 from tawami.motion.stepping import march
 from tawami.motion.transfer import TRANSFERS, TransferName
-from tawami.scene import description, sources
-from tawami.scene.quantities import Given
+from tawami.quantities.quantities import Given
+from tawami.scene import description
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
-from tawami.scene.sources import Source
 
 if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation

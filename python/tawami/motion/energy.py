@@ -21,8 +21,8 @@ from tawami.base.errors import EnergyWarning
 from tawami.base.warn import warn
 from tawami.field.layout import Layout
 from tawami.motion.carried import Carried
-from tawami.scene.configuration import Configuration
-from tawami.scene.step import Accepted
+from tawami.step.configuration import Configuration
+from tawami.step.step import Accepted
 
 #: Spurious energy is reported from this share of the most energy that the body had.
 GROWN = 0.05

@@ -15,8 +15,8 @@ from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 from tawami.base import checks
 from tawami.base.arrays import Array
 from tawami.base.errors import ConvergenceError, InputError
+from tawami.conditions.constraints import constraints
 from tawami.particles import placement
-from tawami.scene.constraints import constraints
 from tawami.scene.scene import Scene
 from tawami.solve.saddle import PROXIMAL
 

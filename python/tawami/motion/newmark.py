@@ -15,24 +15,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from tawami.base.arrays import Array
+from tawami.conditions.action import Term
+from tawami.conditions.constraints import constraints
+from tawami.conditions.held_border import HeldBorder
+from tawami.conditions.impulses import Impulses
+from tawami.conditions.obstacle_contact import ObstacleContact
+from tawami.conditions.obstacle_motion import Times
+from tawami.conditions.share import Moment
+from tawami.conditions.step_values import Fields
+from tawami.conditions.wall_states import ActiveSet
 from tawami.field.impulse import imposed
 from tawami.field.reduction import Reduction
 from tawami.motion.carried import Carried, divided
 from tawami.motion.energy import Balance, Energies
 from tawami.motion.rotation import Rotation
-from tawami.scene import reactions
-from tawami.scene.action import Term
-from tawami.scene.configuration import Configuration
-from tawami.scene.constraints import constraints
-from tawami.scene.held_border import HeldBorder
-from tawami.scene.impulses import Impulses
-from tawami.scene.obstacle_contact import ObstacleContact
-from tawami.scene.obstacle_motion import Times
-from tawami.scene.share import Moment
-from tawami.scene.step import Accepted, Problem
-from tawami.scene.step_values import Fields
-from tawami.scene.wall_states import ActiveSet
 from tawami.solve.inertia import Inertia
+from tawami.step import reactions
+from tawami.step.configuration import Configuration
+from tawami.step.step import Accepted, Problem
 
 
 @dataclass

@@ -11,20 +11,20 @@ import numpy as np
 from tawami.base import checks, ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import ConvergenceError, InputError
+from tawami.conditions.share import Moment
+from tawami.domain.points import check_in_body
 from tawami.field.constraints import held_point
 from tawami.grid.edges import Component
 from tawami.motion.observer import Recorder, observed
 from tawami.motion.pace import Pace, Steps
 from tawami.motion.stepping import Stop, end_early, march
 from tawami.particles.following import OfParticles
-from tawami.scene.configuration import Configuration
-from tawami.scene.points import check_in_body
 from tawami.scene.scene import Scene
-from tawami.scene.share import Moment
 from tawami.scene.solution import Solution
-from tawami.scene.statics import StaticStep
-from tawami.scene.step import Accepted, Problem
 from tawami.solve import path as controls
+from tawami.step.configuration import Configuration
+from tawami.step.statics import StaticStep
+from tawami.step.step import Accepted, Problem
 
 #: 'arc length', or a point (x, y) [m] and its component.
 Control = Literal["arc length"] | tuple[tuple[float, float], Component]
@@ -95,7 +95,7 @@ class Following:
 
 @dataclass(frozen=True)
 class PathStep:
-    """A static step of a given length (`tawami.scene.step.StepKind`).
+    """A static step of a given length (`tawami.step.step.StepKind`).
 
     Attributes:
         following: The path.

@@ -6,11 +6,11 @@ import numpy as np
 
 from tawami.base import checks
 from tawami.base.errors import InputError
+from tawami.conditions.obstacle import Obstacle
+from tawami.conditions.support import Support
 from tawami.motion.transfer import Transfer
-from tawami.scene.configuration import Configuration
-from tawami.scene.obstacle import Obstacle
 from tawami.scene.scene import Scene
-from tawami.scene.support import Support
+from tawami.step.configuration import Configuration
 
 
 def check_displacements(now: Configuration) -> None:

@@ -14,7 +14,7 @@ from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import RotationWarning
 from tawami.base.warn import warn
-from tawami.scene.configuration import Configuration
+from tawami.step.configuration import Configuration
 
 #: K/mu from which the volume is stiff, and the largest rotation in a step [rad].
 STIFF, LARGEST = 10.0, 0.08

@@ -9,9 +9,9 @@ from tawami.base import checks
 from tawami.base.errors import ConvergenceError, IncompleteWarning, InputError, SingularError
 from tawami.base.program import leave_together
 from tawami.base.warn import warn
+from tawami.conditions.activity import Activity
 from tawami.motion.observer import Observer, Recorder, observed
 from tawami.motion.pace import Pace, Step, Steps
-from tawami.scene.activity import Activity
 from tawami.scene.scene import Scene
 from tawami.scene.solution import Solution
 

@@ -20,7 +20,7 @@ from typing import Literal
 import numpy as np
 
 from tawami.base.arrays import Array
-from tawami.scene.domain import Domain
+from tawami.domain.domain import Domain
 
 TransferName = Literal["affine_flip", "flip", "apic", "tpic", "pic"]
 

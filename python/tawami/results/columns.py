@@ -13,13 +13,13 @@ from tawami.base import checks, ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError, NotModelledError
 from tawami.base.text import meant
+from tawami.domain.points import check_in_body
 from tawami.grid import edges
 from tawami.motion.energy import Energies
 from tawami.motion.observer import Motion, Snapshot, Subject
-from tawami.scene.points import check_in_body
-from tawami.scene.quantities import body_arrays
-from tawami.scene.reactions import check_supported
+from tawami.quantities.quantities import body_arrays
 from tawami.scene.scene import Scene
+from tawami.step.reactions import check_supported
 
 #: Particles that a linear fit of displacements around a point uses at finite strain.
 NEIGHBOURS = 12

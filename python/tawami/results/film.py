@@ -10,8 +10,8 @@ from tawami.base.arrays import Array
 from tawami.base.space import PLANE
 from tawami.picture import film
 from tawami.picture.particles import Corners, scale_of
+from tawami.quantities import scalars as numbers
 from tawami.results.frame import Frame
-from tawami.scene import scalars as numbers
 
 #: Times, and functions that read the frames.
 Times = Sequence[tuple[float, Callable[[], Frame]]]

@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from tawami.base.shared_file import Rows, by_number
 from tawami.motion.observer import Snapshot, Subject
+from tawami.quantities.outline import Outline
+from tawami.quantities.quantities import Arrays, Quantity, local_arrays, own_values
 from tawami.results.grid_quantities import GridQuantity
 from tawami.results.projection import vertices
-from tawami.scene.outline import Outline
-from tawami.scene.quantities import Arrays, Quantity, local_arrays, own_values
 
 Array = npt.NDArray[Any]
 

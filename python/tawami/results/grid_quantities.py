@@ -15,8 +15,7 @@ from tawami.grid import edges
 from tawami.grid.basis import extraction, greville_1d, values_1d
 from tawami.motion.observer import Snapshot, Subject
 from tawami.motion.transfer import to_grid
-from tawami.results.projection import Projection, nodal, vertices
-from tawami.scene.quantities import (
+from tawami.quantities.quantities import (
     HISTORY,
     PARTICLES,
     Given,
@@ -27,6 +26,7 @@ from tawami.scene.quantities import (
     own_values,
     unknown,
 )
+from tawami.results.projection import Projection, nodal, vertices
 from tawami.scene.scene import Scene
 
 

@@ -4,7 +4,7 @@
     tawami.GridOutput("displacement", "mean stress", every=0.05)
     tawami.TableOutput("energies", "reaction left")
 
-Names and units of quantities: `tawami.scene.quantities`, `tawami.results.grid_quantities`,
+Names and units of quantities: `tawami.quantities.quantities`, `tawami.results.grid_quantities`,
 `tawami.results.columns`.
 """
 
@@ -19,7 +19,7 @@ from tawami.base import archive, checks
 from tawami.base.errors import CheckpointError, InputError
 from tawami.base.ranks import raise_together
 from tawami.motion.observer import Snapshot, Subject
-from tawami.scene.quantities import Given, Quantity
+from tawami.quantities.quantities import Given, Quantity
 
 #: Kinds of phases of a run.
 PHASES = ("ramp", "settle", "motion")

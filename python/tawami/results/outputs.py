@@ -13,13 +13,13 @@ from pathlib import Path
 from tawami.base.errors import NotModelledError
 from tawami.base.ranks import raise_together, same
 from tawami.motion.observer import Snapshot, Subject
+from tawami.quantities.quantities import Given, of_particles, usual_of_particles
 from tawami.results.frame import Frame, border_frame, grid_frame, particle_frame
 from tawami.results.grid_quantities import on_grid, usual_on_grid
 from tawami.results.output import Output
 from tawami.results.projection import Projection, check_projection
 from tawami.results.series import Series
 from tawami.results.vtu import write_vtu
-from tawami.scene.quantities import Given, of_particles, usual_of_particles
 
 
 class _SeriesOutput(Output):

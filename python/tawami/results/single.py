@@ -6,10 +6,10 @@ from pathlib import Path
 
 from tawami.base import checks
 from tawami.motion.observer import Snapshot
+from tawami.quantities.quantities import of_particles
 from tawami.results.frame import grid_frame, particle_frame
 from tawami.results.grid_quantities import on_grid, usual_on_grid
 from tawami.results.vtu import write_vtu
-from tawami.scene.quantities import of_particles
 from tawami.scene.solution import Solution
 
 SOLVED = "a tawami.Solution, as scene.solve() returns it"

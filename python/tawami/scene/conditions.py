@@ -11,18 +11,18 @@ from tawami.base import checks
 from tawami.base.errors import InputError
 from tawami.base.text import quoted
 from tawami.border.shapes import Shape
+from tawami.conditions.factor import InTime
+from tawami.conditions.load import Load, Pressure, Traction
+from tawami.conditions.obstacle import Obstacle
+from tawami.conditions.support import Support
+from tawami.conditions.walls import Wall
+from tawami.domain.border import Part, label
+from tawami.domain.points import check_in_body
+from tawami.domain.selection import Where
 from tawami.grid.edges import Profile
 from tawami.grid.grid import Edge
-from tawami.scene import wall_gap
-from tawami.scene.border import Part, label
-from tawami.scene.configuration import Configuration
-from tawami.scene.factor import InTime
-from tawami.scene.load import Load, Pressure, Traction
-from tawami.scene.obstacle import Obstacle
-from tawami.scene.points import check_in_body
-from tawami.scene.selection import Where
-from tawami.scene.support import Support
-from tawami.scene.walls import Wall
+from tawami.step import wall_gap
+from tawami.step.configuration import Configuration
 
 
 class Conditions:

@@ -16,14 +16,14 @@ from tawami import _rust
 from tawami.base import checks, ranks
 from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import InputError
+from tawami.domain import fitting, locking, selection
+from tawami.domain.domain import Domain
+from tawami.domain.excavation import Excavation
+from tawami.domain.model import Model, with_laws
+from tawami.domain.selection import Where
 from tawami.particles import assignment, placement
 from tawami.particles.assignment import Law
-from tawami.scene import fitting, locking, selection
-from tawami.scene.configuration import Configuration
-from tawami.scene.domain import Domain
-from tawami.scene.excavation import Excavation
-from tawami.scene.model import Model, with_laws
-from tawami.scene.selection import Where
+from tawami.step.configuration import Configuration
 
 #: Share of the internal forces below which what is out of balance is round-off.
 ROUND_OFF = 1e-9

@@ -8,9 +8,9 @@ import numpy as np
 
 from tawami.base import ranks
 from tawami.base.text import labelled, size
+from tawami.conditions.constraints import num_free
 from tawami.form.kinematics import STRAIN_MEASURES
-from tawami.scene.configuration import Configuration
-from tawami.scene.constraints import num_free
+from tawami.step.configuration import Configuration
 
 
 def header(now: Configuration, motion: str = "") -> str:

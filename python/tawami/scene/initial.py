@@ -17,13 +17,13 @@ from tawami.base import checks, ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.space import PLANE
+from tawami.domain import own_fields, sources
+from tawami.domain.domain import Domain
+from tawami.domain.earlier import Earlier
+from tawami.domain.parameters import misplaced
+from tawami.domain.sources import Source
 from tawami.form import quantities
-from tawami.scene import own_fields, sources
-from tawami.scene.configuration import Configuration
-from tawami.scene.domain import Domain
-from tawami.scene.earlier import Earlier
-from tawami.scene.parameters import misplaced
-from tawami.scene.sources import Source
+from tawami.step.configuration import Configuration
 
 Beyond = Literal["stop", "return"]
 #: Stress beyond the yield surface by no more than this share is round-off; at finite strain another

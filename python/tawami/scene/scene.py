@@ -19,6 +19,11 @@ from tawami.base.process import Unique, check_process
 from tawami.base.sealed import Sealed, Settings
 from tawami.base.timing import Stopwatch
 from tawami.body.body import Body
+from tawami.conditions.obstacle import Obstacle
+from tawami.conditions.support import Support
+from tawami.domain.border import SceneBorder
+from tawami.domain.model import build
+from tawami.domain.sources import Source
 from tawami.field.reduction import Reduction
 from tawami.form.form import Form
 from tawami.form.symbols import Assembly
@@ -27,18 +32,13 @@ from tawami.grid.grid import Grid
 from tawami.particles import assignment
 from tawami.scene import description, initial
 from tawami.scene.absent import Elsewhere
-from tawami.scene.border import SceneBorder
 from tawami.scene.conditions import Conditions
-from tawami.scene.configuration import Configuration
 from tawami.scene.construction import Construction
-from tawami.scene.model import build
-from tawami.scene.obstacle import Obstacle
 from tawami.scene.solution import Solution
-from tawami.scene.sources import Source
-from tawami.scene.statics import StaticStep
-from tawami.scene.step import StepKind
-from tawami.scene.support import Support
 from tawami.solve.numerics import Factorise, Numerics, SolverName
+from tawami.step.configuration import Configuration
+from tawami.step.statics import StaticStep
+from tawami.step.step import StepKind
 
 
 class Scene(Conditions, Construction, Elsewhere, Sealed, Unique):

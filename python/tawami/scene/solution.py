@@ -15,23 +15,23 @@ from tawami.base.errors import InputError, NotModelledError
 from tawami.base.process import Unique
 from tawami.base.sealed import Sealed
 from tawami.base.text import meant, quoted
+from tawami.conditions.contact_result import ContactResult
+from tawami.conditions.obstacle import Obstacle
+from tawami.conditions.walls import Wall
+from tawami.domain.points import ROUND_OFF, outside
+from tawami.estimate.error import ErrorEstimate, estimate
+from tawami.estimate.goal import Goal
 from tawami.field.constraints import LEAST_SHARE
 from tawami.form.kinematics import KINEMATICS
 from tawami.grid import edges
 from tawami.particles.gathered import Gathered
-from tawami.scene import presentation, quantities
+from tawami.quantities import presentation, quantities
+from tawami.quantities.of_all_particles import OfAllParticles
+from tawami.quantities.outline import Outline
+from tawami.quantities.quantities import Arrays, Given, Quantity
 from tawami.scene.absent import Elsewhere
-from tawami.scene.configuration import Configuration
-from tawami.scene.contact_result import ContactResult
-from tawami.scene.error import ErrorEstimate, estimate
-from tawami.scene.goal import Goal
-from tawami.scene.obstacle import Obstacle
-from tawami.scene.of_all_particles import OfAllParticles
-from tawami.scene.outcome import Outcome
-from tawami.scene.outline import Outline
-from tawami.scene.points import ROUND_OFF, outside
-from tawami.scene.quantities import Arrays, Given, Quantity
-from tawami.scene.walls import Wall
+from tawami.step.configuration import Configuration
+from tawami.step.outcome import Outcome
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -218,7 +218,7 @@ class Solution(OfAllParticles, Elsewhere, Sealed, Unique):
         return np.asarray(value if reached > 1 - ROUND_OFF else value / reached)
 
     def error(self, goal: Goal) -> ErrorEstimate:
-        """The estimated error of a quantity, by source; see `tawami.scene.error.estimate`."""
+        """The estimated error of a quantity, by source; see `tawami.estimate.error.estimate`."""
         return estimate(self.scene.configuration, goal, self.coefficients, self.load)
 
     # -- in a notebook -------------------------------------------------------

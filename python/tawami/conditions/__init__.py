@@ -1,0 +1,1 @@
+"""Actions on a body: supports, loads, walls and rigid obstacles."""

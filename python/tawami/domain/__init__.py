@@ -1,0 +1,1 @@
+"""The body on its grid between two resets: particles in their cells, border, sources of fields."""

@@ -1,0 +1,1 @@
+"""The error of a solution by dual-weighted residuals."""

@@ -1,0 +1,136 @@
+"""Dual solutions on cells of h/2, h and 2h, and the error of the grid that they show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
+
+from tawami.base.arrays import Array
+from tawami.body import rings
+from tawami.body.within import within
+from tawami.domain.model import Model
+from tawami.estimate.goal import Goal
+from tawami.estimate.level import Level, Points, from_coarser
+from tawami.field.prolongation import coarser
+from tawami.grid.grid import Grid
+from tawami.solve import two_grid
+from tawami.step.configuration import Configuration
+
+#: Gauss points per axis of a full cell of h/2, which integrate the residual exactly.
+POINTS = 3
+#: Ratio of the differences between grids below which they tell nothing, its smallest and largest value
+#: that is used (orders 1 and 6), and the one that is used instead (order 4, that of smooth solutions).
+IRREGULAR, SLOWEST, FASTEST, SMOOTH = 0.5, 2.0, 64.0, 16.0
+#: Difference between grids that counts as round-off, relative to the absolute terms of the quantity.
+ROUND_OFF = 1e-9
+
+
+class DualSolutions:
+    """Dual solutions for a quantity on three grids.
+
+    Those on cells of h/2, h and 2h give the errors e', e and e_2 of the computed value, without the
+    parts that these grids do not resolve. With ratio = (e - e_2)/(e' - e) the error of the grid is
+    (e' - e) ratio/(ratio - 1) (Richardson).
+
+    Args:
+        now: The scene.
+        model: Its model with a field for the volume.
+        particles: Its particles.
+        goal: The quantity.
+        coefficients: The solution on cells of h.
+
+    Attributes:
+        fine, coarse: Places of the coefficients on cells of h/2 and h.
+        value: The quantity.
+        residual: Exact residual without stabilisation on the coefficients of cells of h.
+        z: The dual solution there.
+        of_grid: Contributions of the coefficients of cells of h/2 to the error of the grid.
+        at_round_off: Whether this error is as small as round-off.
+        order: Order of this error in h; NaN if it is irregular or at round-off.
+    """
+
+    def __init__(
+        self,
+        now: Configuration,
+        model: Model,
+        particles: Points,
+        goal: Goal,
+        coefficients: Array,
+    ) -> None:
+        grid = model.grid
+        double = grid.halved
+        half = Level(now, replace(model, grid=double), _exact(double, model, particles))
+        body = _exact(grid, model, particles)
+        whole = Level(now, model, body)
+        self.fine, self.coarse = half.layout, whole.layout
+        up = from_coarser(self.fine)
+        at = up @ coefficients
+        weights = goal.weights(half.domain, now.border)
+        self.value = float(weights @ at)
+        weights_here = up.T @ weights
+        self.z, again = whole.dual(weights_here, coefficients)
+        residual = half.residual(at, stabilised=False)
+        fine = _on_half(
+            half, at, weights, residual, up @ self.z, up @ whole.reduction.selection, again
+        )
+        self.residual = up.T @ residual
+        self.of_grid = -residual * (fine - up @ self.z)
+        large = grid.with_cells(2 * grid.h, coarser(grid.cells))  # may reach beyond the grid
+        twice, down = Level(now, replace(model, grid=large), body), from_coarser(self.coarse)
+        state = twice.nearest(self.coarse, down, coefficients)
+        z, _ = twice.dual(down.T @ weights_here, state)
+        there = up @ (down @ state)
+        before = float(weights @ (there - at)) - float(
+            half.residual(there, stabilised=False) @ (up @ (down @ z))
+        )
+        first = float(self.of_grid.sum())
+        ratio = (-float(self.residual @ self.z) - before) / first if first else np.inf
+        used = min(max(ratio, SLOWEST), FASTEST) if ratio > IRREGULAR else SMOOTH
+        self.at_round_off = abs(first) <= ROUND_OFF * float(np.abs(weights) @ np.abs(at))
+        self.order = float(np.log2(ratio)) if ratio > 0 and not self.at_round_off else np.nan
+        self.of_grid *= used / (used - 1)
+
+
+def _on_half(
+    half: Level,
+    at: Array,
+    weights: Array,
+    residual: Array,
+    start: Array,
+    prolongation: sp.csr_matrix,
+    coarse: Callable[[Array], Array],
+) -> Array:
+    """The dual solution on cells of h/2, by cycles with that on cells of h.
+
+    Args:
+        half: Cells of h/2.
+        at: The solution there.
+        weights: Derivative of the quantity.
+        residual: Exact residual without stabilisation.
+        start: The dual solution on cells of h.
+        prolongation: Coefficients x unknowns of cells of h.
+        coarse: Solves with the transposed tangent on cells of h.
+    """
+    reduction, matrix = half.reduction, half.transposed(at)
+    own, right = reduction.coefficients, reduction.restricted(weights)
+    found = two_grid.solve(
+        matrix, int(reduction.of_displacement.sum()), prolongation[own], coarse, right, start[own],
+        reduction.restricted(residual),
+    )  # fmt: skip
+    return reduction.expanded(splu(matrix).solve(right) if found is None else found)
+
+
+def _exact(grid: Grid, model: Model, particles: Points) -> Points:
+    """Points that integrate exactly over the body within its border."""
+    assert model.border is not None
+    body = within(grid, model.border, POINTS)
+    of = np.zeros(len(body.x), dtype=np.uint32)
+    if particles.material.any():
+        from scipy.spatial import cKDTree
+
+        of = particles.material[cKDTree(particles.x).query(body.x)[1]]
+    return Points(body.x, rings.volumes(grid, body.x, body.volume), of)

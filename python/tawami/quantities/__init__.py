@@ -1,0 +1,1 @@
+"""Quantities of the particles by name: arrays, pictures and tables."""
