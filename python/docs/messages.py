@@ -21,7 +21,7 @@ SUBJECTS: dict[str, tuple[str, ...]] = {
     "Particles and laws": ("particles", "rust"),
     "Supports and fields": ("field",),
     "Solving": ("solve",),
-    "Scene": ("scene",),
+    "Scene": ("domain", "conditions", "quantities", "step", "estimate", "scene"),
     "Steps and motion": ("motion",),
     "Results": ("picture", "results"),
     "Studies": ("study",),

@@ -94,7 +94,7 @@ def test_friction_of_cattaneo_and_mindlin():
 @pytest.mark.direct  # the iterations that just fail
 @pytest.mark.filterwarnings("ignore::tawami.base.errors.SmallStrainWarning")
 def test_a_drag_that_does_not_converge_at_once_does_in_the_steps_of_the_message():
-    setting = ("u_epsv", "round", 1.0, 0.3, 0.25, 0.03, 0.01)
+    setting = ("u_epsv", "round", 1.0, 0.3, 0.25, 0.05, 0.05)
     with pytest.raises(tawami.ConvergenceError, match=r"ramp\(scene, 0.5\) moves obstacles"):
         dragged(*setting, 1.0)
     dragged(*setting, 0.5)

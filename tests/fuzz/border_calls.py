@@ -63,6 +63,13 @@ CALLS: dict[str, Callable[[Sample], tuple[Any, ...]]] = {
     "Grid": lambda s: (_rust.Grid, (0.0, 0.0), 1.0, (2, 3)),
     "Grid.locate": lambda s: (s.grid.locate, s.x),
     "Grid.place": lambda s: (s.grid.place, s.location.cell, s.location.xi),
+    "Grid.place_at": lambda s: (s.grid.place_at, s.location.cell.astype(np.int64), s.x),
+    "Grid.near": lambda s: (
+        s.grid.near, (4, 3), np.ones(12, dtype=bool), np.ones(12, dtype=bool), s.x, s.x, 0.1, 2
+    ),
+    "carried": lambda s: (
+        _rust.carried, s.location, BASIS, s.u, s.x, np.ones((N, 2)), np.zeros(N, dtype=bool)
+    ),
     "Grid.window": lambda s: (s.grid.window, (0, 0), (1, 2)),
     "functions_at": lambda s: (_rust.functions_at, s.location, "bilinear"),
     "Location.away_from_sides": lambda s: (s.location.away_from_sides, 1e-5),

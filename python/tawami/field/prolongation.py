@@ -123,7 +123,7 @@ class _Step:
         comm = self._comm
         _, numbers, values = self._rows(held)
         on_held, column = np.unique(numbers, return_inverse=True)
-        sums = np.bincount(column, values, len(on_held))
+        sums = np.bincount(column, values, len(on_held)).astype(float)
         asked = self._sent(reached)
         told, shares = self._sent(on_held), self._sent(on_held, sums)
         every = np.unique(np.concatenate([*asked, *told]))

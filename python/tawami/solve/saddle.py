@@ -130,7 +130,7 @@ class Saddle:
         0, as others hold all that the constraint acts on. A collective call.
         """
         own = self._own
-        squares = np.bincount(own.row, own.values**2 * weights[own.column], own.shape[0])
+        squares = Rows(own.row, own.column, own.values**2, own.shape).times(weights)
         sizes = ranks.sum_of(self._comm, squares)
         return np.asarray(np.where(sizes > 0, sizes, 1.0))
 
