@@ -118,7 +118,7 @@ class SceneBorder:
         Args:
             what: The call, for messages.
             where: The part.
-            joined: Chains of points do not end where only the name changes.
+            joined: Chains of points do not end where only the name changes, as an obstacle needs it.
 
         Raises:
             InputError: The body has no border, no part of this name, or nothing where the function or
@@ -144,7 +144,9 @@ class SceneBorder:
                 f"{what}: no point of the border is in this part: expected some of it; the border has "
                 f"{quoted(self.names)}"
             )
-        return MovingPoints(points, self._grid, what, middle)
+        found = MovingPoints(points, self._grid, what, middle)
+        found.touched = joined
+        return found
 
     def _pieces(self, what: str, where: Part) -> Border:
         """The pieces of a part."""
@@ -321,7 +323,8 @@ def label(where: Part) -> str:
 
 def _growth(parts: Sequence[MovingPoints], moved: Sequence[tuple[Array, Array]]) -> float:
     """The largest growth of a piece of the border in some parts, which have moved."""
-    grown = (part.growth(area) for part, (_, area) in zip(parts, moved, strict=True))
+    pairs = zip(parts, moved, strict=True)
+    grown = (part.growth(area) for part, (_, area) in pairs if not part.touched)
     return max(grown, default=0.0)
 
 

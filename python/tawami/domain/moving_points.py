@@ -52,6 +52,7 @@ class MovingPoints:
         made: The points as they were when they were made, with parts of those that were divided.
         middle: Distance along the border from each point to the middle of the stretch that it
             integrates over, when it was made [m].
+        touched: Whether they are those of an obstacle, around which the border may fold.
     """
 
     def __init__(
@@ -62,7 +63,7 @@ class MovingPoints:
         middle: Array | None = None,
     ) -> None:
         self.first, self.made, self._grid, self.what = points, points, grid, what
-        self.number = np.arange(len(points))
+        self.number, self.touched = np.arange(len(points)), False
         self.x = np.array(points.x)
         self.area = points.length[:, None] * points.normal
         self.reference = self.weight
