@@ -118,7 +118,7 @@ pub fn pattern(cells: &Cells, location: &Location, selection: &Selection) -> Opt
             let support = (c >= 0).then(|| support(c as usize));
             if support.is_none() || of_support != support {
                 row.clear();
-                for (field, support) in fields.iter().flat_map(|f| support.map(|s| (f, s))) {
+                for (field, support) in fields.iter().filter_map(|f| support.map(|s| (f, s))) {
                     field.sharing(&active, support, selection, &mut row);
                 }
                 sort(&mut row);

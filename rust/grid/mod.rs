@@ -82,7 +82,7 @@ impl Grid {
     /// are as at those of the grid: they have a meaning in its inner cells, and where the grid ends too.
     #[must_use]
     pub fn window(self, first: Index, cells: Index) -> Self {
-        Self { first, cells, ..self }
+        Self { cells, first, ..self }
     }
 
     /// Number of cells.
