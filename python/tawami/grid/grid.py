@@ -160,9 +160,7 @@ class Grid(Unique):
         """The same grid with other cells for each rank; itself if they are the same."""
         if np.array_equal(division.cuts, self.division.cuts):
             return self
-        other = Grid(
-            self.comm, origin=self.origin, h=self.h, cells=self.cells, geometry=self.geometry
-        )
+        other = self.with_cells(self.h, self.cells)
         other.division = division
         return other
 
