@@ -1,4 +1,4 @@
-"""Types of NumPy arrays."""
+"""Types of NumPy arrays, and places in them."""
 
 from __future__ import annotations
 
@@ -18,3 +18,12 @@ def of_components(numbers: Indices, dim: int) -> Indices:
     another.
     """
     return dim * numbers[..., None] + np.arange(dim)
+
+
+def sums_at(place: Indices, values: Array, size: int) -> Array:
+    """Sums of the values at each of `size` places.
+
+    They are real numbers without any values too, where `bincount` gives whole ones, which are no part of
+    a sum over ranks.
+    """
+    return np.bincount(place, values, size).astype(np.float64, copy=False)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
-from tawami.base.arrays import Array, Indices
+from tawami.base.arrays import Array, Indices, sums_at
 
 
 class Places:
@@ -29,7 +29,7 @@ class Places:
     def matrix(self, values: Array) -> sp.csr_matrix:
         """The matrix of these values; all of them share the arrays of their places."""
         zero = self._zero
-        data = np.bincount(self._slots, values, zero.nnz)
+        data = sums_at(self._slots, values, zero.nnz)
         made = sp.csr_matrix((data, zero.indices, zero.indptr), shape=zero.shape)
         made.indices, made.indptr = zero.indices, zero.indptr  # it made others
         return made

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from tawami.base.arrays import Array, Indices
+from tawami.base.arrays import Array, Indices, sums_at
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,7 @@ class Rows:
         """A matrix of entries in any order; those in the same place are added."""
         width = max(shape[1], 1)
         keys, slots = np.unique(row.astype(np.int64) * width + column, return_inverse=True)
-        sums = np.bincount(slots, values, len(keys)).astype(float)
-        return cls(keys // width, keys % width, sums, shape)
+        return cls(keys // width, keys % width, sums_at(slots, values, len(keys)), shape)
 
     @classmethod
     def stacked(cls, parts: Sequence[Rows]) -> Rows:
@@ -49,15 +48,11 @@ class Rows:
 
     def times(self, x: Array) -> Array:
         """A x."""
-        return np.asarray(
-            np.bincount(self.row, self.values * x[self.column], self.shape[0]), dtype=float
-        )
+        return sums_at(self.row, self.values * x[self.column], self.shape[0])
 
     def transposed_times(self, y: Array) -> Array:
         """A^T y."""
-        return np.asarray(
-            np.bincount(self.column, self.values * y[self.row], self.shape[1]), dtype=float
-        )
+        return sums_at(self.column, self.values * y[self.row], self.shape[1])
 
     def scaled(self, factors: Array) -> Rows:
         """The matrix with each column multiplied by a factor."""

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tawami.base.arrays import Array, Indices
+from tawami.base.arrays import Array, Indices, sums_at
 from tawami.border.points import BorderPoints
 
 
@@ -47,7 +47,7 @@ class Patches:
             values: Values at the points, points x ...
         """
         columns = values.reshape(len(values), int(np.prod(values.shape[1:]))).T
-        sums = [np.bincount(self.number, column, self.count).astype(float) for column in columns]
+        sums = [sums_at(self.number, column, self.count) for column in columns]
         return np.asarray(np.transpose(sums)).reshape(self.count, *values.shape[1:])
 
     def means(self, weights: Array, values: Array) -> Array:

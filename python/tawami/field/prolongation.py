@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from tawami import _rust
 from tawami.base import ranks
-from tawami.base.arrays import Array, Indices
+from tawami.base.arrays import Array, Indices, sums_at
 from tawami.base.exchange import Exchange
 from tawami.base.petsc import aij
 from tawami.grid.basis import Basis, refinement
@@ -123,7 +123,7 @@ class _Step:
         comm = self._comm
         _, numbers, values = self._rows(held)
         on_held, column = np.unique(numbers, return_inverse=True)
-        sums = np.bincount(column, values, len(on_held)).astype(float)
+        sums = sums_at(column, values, len(on_held))
         asked = self._sent(reached)
         told, shares = self._sent(on_held), self._sent(on_held, sums)
         every = np.unique(np.concatenate([*asked, *told]))
