@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from scipy.sparse.linalg import splu
 
 from tawami import _rust
 from tawami.base.arrays import Array
+from tawami.base.petsc import rows_of
 from tawami.base.timing import Stopwatch
 from tawami.conditions.constraints import constraints
 from tawami.domain import fitting
@@ -133,11 +134,13 @@ class Level:
         Args:
             coefficients: Of all fields, where the tangent is taken.
         """
+        return rows_of(self._tangent(coefficients)).T
+
+    def _tangent(self, coefficients: Array) -> Any:
+        """The tangent of the unknowns, a matrix of PETSc that the next one overwrites."""
         self.domain.newton.internal(coefficients)
-        responses = self.domain.responses
-        tangent = self.domain.assembly.tangent(coefficients, responses.data, self.reduction)
-        start, columns, values = tangent.getValuesCSR()
-        return sp.csc_matrix((values, columns, start), shape=tangent.getSize())
+        data = self.domain.responses.data
+        return self.domain.assembly.tangent(coefficients, data, self.reduction)
 
     def dual(self, weights: Array, coefficients: Array) -> tuple[Array, Callable[[Array], Array]]:
         """The influence z of each residual on a quantity: K^T z = weights, K the tangent.
@@ -150,9 +153,7 @@ class Level:
             z of all coefficients, and a function that solves K^T z = r for the unknowns.
         """
         reduction, responses = self.reduction, self.domain.responses
-        self.domain.newton.internal(coefficients)
-        tangent = self.domain.assembly.tangent(coefficients, responses.data, reduction)
-        matrix = tangent.copy().transpose()
+        matrix = self._tangent(coefficients).copy().transpose()
         scale = functools.partial(Scaling(self.layout, responses).factors, matrix, reduction)
         solver = DirectSolver(self.domain.model.grid.comm, Stopwatch())
         right = reduction.restricted(weights)
