@@ -14,6 +14,12 @@ from typing import Any
 CACHE = Path(__file__).parents[1] / ".pytest_cache" / "xdg"
 os.environ["XDG_CACHE_HOME"] = str(CACHE)
 
+# Each process of pytest-xdist ("gw0", "gw1", ...) has a processor, which its programs share. Where ranks
+# have several, one that waits for a message gives its time to another test, for a time slice each time.
+PROCESSORS = sorted(os.sched_getaffinity(0))
+if (worker := os.environ.get("PYTEST_XDIST_WORKER")) is not None:
+    os.sched_setaffinity(0, {PROCESSORS[int(worker.removeprefix("gw")) % len(PROCESSORS)]})
+
 import profiles  # noqa: E402
 import pytest  # noqa: E402
 import scenes  # noqa: E402

@@ -21,9 +21,6 @@ PYTHONPATH = os.pathsep.join(
 
 #: Ranks that wait for others let them compute: there may be more ranks than processors.
 YIELD = {"OMPI_MCA_mpi_yield_when_idle": "1"}
-#: Processors of this process, and which process of pytest-xdist this is ("gw0", "gw1", ...).
-PROCESSORS = sorted(os.sched_getaffinity(0))
-WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
 
 
 def python(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
@@ -39,13 +36,8 @@ def python(*arguments: object, **options: Any) -> subprocess.CompletedProcess[st
 
 
 def on_ranks(number: int, *arguments: object, **variables: str) -> subprocess.CompletedProcess[str]:
-    """Run Python with these arguments on several ranks. A hang fails the test.
-
-    The ranks share one processor. On several, a rank that waits for messages gives its time to whatever
-    else runs there, as another test, and each message takes a time slice: 20 times as long in all.
-    """
+    """Run Python with these arguments on several ranks. A hang fails the test."""
     command, environment = mpirun(number, [sys.executable, *map(str, arguments)])
-    command = ["taskset", "--cpu-list", str(PROCESSORS[WORKER % len(PROCESSORS)]), *command]
     environment |= {"PYTHONPATH": PYTHONPATH, "OMP_NUM_THREADS": "1"} | YIELD | variables
     return subprocess.run(
         command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False, timeout=200
