@@ -32,7 +32,7 @@ def run_fem(n: int, element: str) -> dict[str, float]:
     }  # fmt: skip
 
 
-PARTICLES = ("2 x 2", "3 x 3 Gauss")
+PARTICLES = ("2 x 2", "3 x 3")
 GRIDS = [
     {"form": ("u", "u_bbar"), "n": CELLS, "particles": PARTICLES},
     {

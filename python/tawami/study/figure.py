@@ -75,7 +75,7 @@ def picture(
             _add_peers(axes, quantity, peers)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4)
-    figure.suptitle(title or table.name)
+    figure.suptitle(title or table.name.replace("_", " "))
     save(figure, path, dpi=150)
 
 
@@ -110,7 +110,7 @@ def _panel(
         ((x,), (y,)) = place([row])
         axes.annotate(str(number), (x, y), textcoords="offset points", xytext=(-9, -13),
                       fontsize=10, fontweight="bold")  # fmt: skip
-        axes.plot([x], [y], "o", markersize=11, fillstyle="none", color=style.VERMILION,
+        axes.plot([x], [y], "o", markersize=11, fillstyle="none", color=style.BLACK,
                   markeredgewidth=2.2 if row is best else 1.0,
                   label="corners of the front" if number == 1 else None)  # fmt: skip
         lines.append(f"{number}{' (knee)' if row is best else ''}: {text_of(row.knobs)}")
@@ -125,11 +125,12 @@ def _mark(
     axes: Axes, table: Table, quantity: str, cost: str, marks: Mapping[str, Mapping[str, Any]]
 ) -> None:
     """Draw lines through the runs of marked settings."""
-    shades = (style.VERMILION, style.BLUE, style.GREEN)
+    shades = (style.PURPLE, style.SKY, style.GRAY)  # those of values of a knob begin with others
     for (name, setting), shade in zip(marks.items(), shades, strict=False):
         rows = sorted(table.matching(setting), key=lambda row: row.costs[cost])
         axes.plot([r.costs[cost] for r in rows], [r.errors[quantity] for r in rows], "s-", color=shade,
-                  markersize=9, fillstyle="none", markeredgewidth=1.8, label=name)  # fmt: skip
+                  markersize=9, fillstyle="none", markeredgewidth=2.2, linewidth=2.2,
+                  label=name)  # fmt: skip
 
 
 def _add_peers(axes: Axes, quantity: str, peers: Sequence[Peer]) -> None:
@@ -146,4 +147,5 @@ def _add_peers(axes: Axes, quantity: str, peers: Sequence[Peer]) -> None:
                   label=label if timed else None)  # fmt: skip
         best = peer_front(timed, quantity)
         axes.step([p.wall_s for p in best], [p.errors[quantity] for p in best], ":", where="post",
-                  color=style.GRAY, linewidth=1.5)  # fmt: skip
+                  color=style.GRAY, linewidth=1.5,
+                  label=f"front, {label}" if best else None)  # fmt: skip
