@@ -243,4 +243,7 @@ def _alternatives(
 
 
 def _too_few(name: str, knob: Knob) -> str:
-    return f"'{name}': fewer than two runs with other values of '{knob.name}': no error estimate."
+    return (
+        f"'{name}' has no error estimate: fewer than two runs with values of '{knob.name}' succeeded; "
+        "use a larger budget, or values that do not fail."
+    )

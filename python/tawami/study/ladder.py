@@ -243,7 +243,7 @@ class Ladder:
             setting, message = next(iter(self.failures.items()))
             return (
                 f"trade '{self.name}' finds no limit: {len(self.failures)} runs failed, the first with "
-                f"{text_of(self.named(setting))}: {shortened(message)}; expected two runs that succeed: "
+                f"{text_of(self.named(setting))}: {shortened(message)}. Expected two runs that succeed: "
                 "call the function with this setting to see the whole message"
             )
         longest = max(run["spent_s"] for run in self.runs.values())
