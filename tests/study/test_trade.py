@@ -140,6 +140,11 @@ def test_an_error_that_stays_is_extrapolated_too():
     assert found.orders == pytest.approx({"h": 2, "dt": 1}, abs=0.01)
 
 
+def test_one_size_has_no_estimate():
+    (remark,) = estimate("tip", [Knob("h", H, 1 / 8)], {(1 / 8,): 1.0}).remarks
+    assert remark.startswith("'tip' has no error estimate: fewer than two runs with values of 'h'")
+
+
 # -- trades ------------------------------------------------------------------------
 
 
