@@ -31,8 +31,8 @@ class Effect:
 
     @property
     def kind(self) -> str:
-        """Whether the change reduces errors, only costs time, or has no effect."""
-        if self.change.error * NOISE < 1:
+        """Whether the change reduces errors, some of them, only costs time, or has no effect."""
+        if min(self.errors.values()) * NOISE < 1:
             return MIXED if max(self.errors.values()) > NOISE else REDUCES
         return COSTS if self.change.cost > NOISE else NEUTRAL
 
