@@ -173,6 +173,9 @@ PROGRAM = Program("cases.costs.trade.coverage", __doc__, files=False)
 PROGRAM.option("scenes", nargs="*", help=f"among {', '.join(SCENES)}; all by default")
 PROGRAM.option("--results", default="results/trade", help="folder of the results")
 PROGRAM.option("--budget", type=float, default=60.0, help="time of each scene [s]")
+PROGRAM.option(
+    "--tolerance", type=float, default=0.01, help="relative error of the recommended setting"
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -185,7 +188,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         function, exact = SCENES[name]
         folder = Path(options.results) / f"coverage_{name}"
         try:
-            trade = tawami.trade(function, budget=options.budget, folder=folder, quiet=True)
+            trade = tawami.trade(
+                function,
+                budget=options.budget,
+                tolerance=options.tolerance,
+                folder=folder,
+                quiet=True,
+            )
         except tawami.InputError as error:  # every run failed
             print(f"# {name}\n{error}\n")
             rows.append(Row(name, math.nan, math.inf, exact, 0))
