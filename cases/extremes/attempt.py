@@ -29,6 +29,7 @@ WARNINGS = (
     tawami.LockingWarning,
     tawami.ParameterWarning,
     tawami.QuadratureWarning,
+    tawami.SupportWarning,
 )
 
 COLUMNS = ("subject", "setting", "outcome", "error", "bound", "says")

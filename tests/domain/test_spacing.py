@@ -9,6 +9,7 @@ import pytest
 from mpi4py import MPI
 
 import tawami
+from cases.extremes import stretch
 from tawami.domain.spacing import spacings
 
 
@@ -45,6 +46,12 @@ def test_a_stretched_block_warns_once_unless_the_advice_was_taken(per_axis):
     told = [str(one.message) for one in caught if one.category is tawami.QuadratureWarning]
     assert len(told) == (per_axis == 2)
     assert all("h apart" in one and "per_axis" in one for one in told)
+
+
+def test_distances_that_have_doubled_warn():
+    """Three particles in a cell, 0.68 h apart, as in the extremes."""
+    with pytest.warns(tawami.QuadratureWarning, match="0.68 h apart, 2.1 times as far"):
+        assert stretch.pulled(3, "own", 2.0)[0] > 0.1
 
 
 def test_a_border_that_the_particles_do_not_follow_warns():

@@ -18,13 +18,16 @@ from tawami.domain.domain import Domain
 #: Distance from which the error of a uniform stress exceeds about 10 %, or 1 % with fitted volumes, and
 #: grows fast [cells] (`python -m cases.extremes --only stretch`).
 LIMIT = 0.9
+#: The same as a growth of distances, unless volumes are fitted: distances become uneven, so that more
+#: particles in a cell do not help.
+DOUBLE = 2.0
 #: Growth that is no stretch: a body may have few particles from the start.
 GROWN = 1.2
 #: Share of the body that may be farther apart.
 SHARE = 0.1
 #: Growth of a border, and the same relative to that of distances in the body, beyond which the border is
 #: not where the particles are.
-LONGER = 2.0
+LONGER = 1.75
 #: Steps of the reduction of a lattice.
 REDUCTIONS = 8
 
@@ -62,12 +65,14 @@ def farthest(domain: Domain, u: Array | None = None) -> tuple[float, float, floa
         return 0.0, 0.0, 1.0
     h, dim, comm = model.grid.h, model.space.dim, model.grid.comm
     areas = domain.areas  # of volumes at the start of the scene
+    most = np.inf if model.volumes == "fitted" else DOUBLE
     growth = LIMIT * h / np.sqrt(ranks.largest(comm, float(areas.max(initial=0.0))))
+    growth = min(growth, most)
 
     def near(gradient: Array, change: float) -> bool:
         """Whether a distance may exceed the limit: no stretch is larger than 1 + dim |grad u|."""
-        most = ranks.largest(comm, float(np.abs(gradient).max(initial=0.0)))
-        return bool((1 + dim * most) * (1 + dim * change) > growth)
+        largest = ranks.largest(comm, float(np.abs(gradient).max(initial=0.0)))
+        return bool((1 + dim * largest) * (1 + dim * change) > growth)
 
     gradient = np.asarray(particles.displacement_gradient[:, :dim, :dim])
     change = 0.0 if u is None else 2 * ranks.largest(comm, float(np.ptp(u, axis=0).max())) / h
@@ -80,7 +85,8 @@ def farthest(domain: Domain, u: Array | None = None) -> tuple[float, float, floa
             return 0.0, 0.0, 1.0
     sizes, volume = np.sqrt(areas) / h, particles.volume
     found = spacings(gradient + np.eye(dim), sizes)
-    far = is_solid[particles.material] & (found > GROWN * sizes) & (found > LIMIT)
+    far = (found > GROWN * sizes) & (found > LIMIT) | (found > most * sizes)
+    far &= is_solid[particles.material]
     apart, whole = ranks.sum_of(comm, np.array([volume[far].sum(), volume.sum()]))
     distance, times = (
         ranks.largest(comm, float(values.max(initial=0.0)))
@@ -138,8 +144,8 @@ def outgrown(domain: Domain, growth: float) -> str:
 
 def advice(domain: Domain) -> str:
     """Advice against particles that are too far apart."""
-    fitted = "" if domain.model.volumes == "fitted" else ", Scene(..., volumes='fitted')"
+    fitted = "" if domain.model.volumes == "fitted" else "Scene(..., volumes='fitted') and "
     return (
-        f"Expected more particles per cell (per_axis=...){fitted}, or sides that begin between lines of "
+        f"Expected {fitted}more particles per cell (per_axis=...), or sides that begin between lines of "
         "the grid, as 0.4 h from them"
     )
