@@ -8,8 +8,8 @@ Time is integrated with backward Euler. theta acts on u, and u does not act on t
 of volume and of plastic work is left out. Only changes of theta expand; it is 0 at the start unless
 `initial` gives a value. A flux of theta is the heat that enters, in W/m2.
 
-alpha_theta stabilises theta as alpha_w does p_w in `u_epsv_pw`: it acts on the increment and vanishes with
-h. Without it theta overshoots near heated faces in steps of D dt < h^2/6, D = k/(rho c).
+alpha_theta stabilises theta as alpha_w does p_w in `u_epsv_pw`: it acts on the increment and vanishes
+with h. Without it theta overshoots near heated faces in steps of D dt < h^2/6, D = k/(rho c).
 """
 
 from ufl import dot, inner
