@@ -34,8 +34,8 @@ LAWS = {"Hencky": tawami.linear_elastic, "neo-Hookean": tawami.neo_hookean}
 CELLS, PER_AXIS = 16, 4
 #: Bound of `coasting`: moving particles stay 1e-5 of a cell away from its sides.
 COASTING = 1e-5
-#: Bound of `pulled`, rms of the error of the stress. Before it is exceeded there is a warning of particles
-#: or of a border (`tawami.domain.spacing`).
+#: Bound of `pulled`, rms of the error of the stress. Before it is exceeded there is a warning
+#: (`tawami.domain.spacing`).
 PULLED = 0.11
 #: Bounds of `hanging`: with two particles per cell the rms error in tension is 1.3 and 2 % at the end of
 #: a body (documentation, Limits). B-bar fails the patch test by up to 22 %.
