@@ -135,6 +135,11 @@ class Ladder:
         """Value of a quantity in each run that succeeded."""
         return {setting: run["values"][quantity] for setting, run in self.succeeded.items()}
 
+    def estimated(self, quantity: str) -> dict[Setting, dict[str, Any]]:
+        """Error of a quantity in runs that estimate it: parts and order."""
+        found = {s: run.get("estimated", {}).get(quantity) for s, run in self.succeeded.items()}
+        return {setting: error for setting, error in found.items() if error is not None}
+
     def named(self, setting: Setting) -> dict[str, Any]:
         """Setting as a mapping from names of knobs."""
         return {knob.name: value for knob, value in zip(self.knobs, setting, strict=True)}

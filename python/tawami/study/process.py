@@ -28,6 +28,7 @@ from tawami.base.files import reason
 from tawami.base.meaning import meaning
 from tawami.base.program import own_environment
 from tawami.base.timing import tally
+from tawami.estimate.error import ErrorEstimate
 from tawami.fem.environment import peak_memory
 
 #: Runs shorter than this [s] are repeated, up to this number of times; the fastest one counts.
@@ -106,8 +107,9 @@ def measure(
         threads: Threads of Rust; None for those of the environment.
 
     Returns:
-        values, wall_s, cpu_s, peak_MB, newton_iterations, steps, unknowns; or failure, a message, with
-        `cut` if the process did not finish.
+        values, estimated, wall_s, cpu_s, peak_MB, newton_iterations, steps, unknowns; or failure, a
+        message, with `cut` if the process did not finish. `estimated` has the parts and the order
+        of the error of quantities that are estimates.
     """
     environment, knobs = own_environment() | {MARK: "1"}, dict(knobs)
     threads = knobs.pop("threads", threads)
@@ -170,27 +172,37 @@ def main() -> None:
 
 
 def _outcome(run: Run, knobs: Mapping[str, Any]) -> dict[str, Any]:
-    fastest: dict[str, Any] | None = None
-    spent = 0.0
-    for _ in range(REPEATS):
+    times = list[tuple[float, float]]()
+    while not times or (len(times) < REPEATS and sum(wall for wall, _ in times) <= SHORT):
         tally.reset()
         start, busy = perf_counter(), process_time()
         values = run(**knobs)
         wall = perf_counter() - start - tally.compiling_s
-        cpu = process_time() - busy - tally.compiling_cpu_s
-        spent += wall
-        if fastest is None or wall < fastest["wall_s"]:
-            fastest = {"values": _plain(values), "wall_s": wall, "cpu_s": cpu}
-        if spent > SHORT:
-            break
-    assert fastest is not None
+        times.append((wall, process_time() - busy - tally.compiling_cpu_s))
+    wall, cpu = min(times)
     counted = {
         "newton_iterations": tally.newton_iterations,
         "steps": tally.steps,
         "unknowns": tally.unknowns,
     }
-    own = {key: fastest["values"].pop(key) for key in counted if key in fastest["values"]}
-    return fastest | counted | own | {"peak_MB": peak_memory()}
+    measured = {"wall_s": wall, "cpu_s": cpu, "peak_MB": peak_memory()}
+    values, errors = _evaluated(values)
+    plain = _plain(values)
+    own = {key: plain.pop(key) for key in counted if key in plain}
+    return {"values": plain, "estimated": errors} | measured | counted | own
+
+
+def _evaluated(values: Any) -> tuple[Any, dict[str, dict[str, Any]]]:
+    """Quantities with numbers in place of estimates, and the errors of these.
+
+    Functions without arguments are called: their time does not count.
+    """
+    if not isinstance(values, Mapping):
+        return values, {}
+    found = {name: value() if callable(value) else value for name, value in values.items()}
+    estimates = {n: e for n, e in found.items() if isinstance(e, ErrorEstimate)}
+    errors = {str(n): {"parts": dict(e.parts), "order": e.order} for n, e in estimates.items()}
+    return found | {n: e.value for n, e in estimates.items()}, errors
 
 
 def _plain(values: Any) -> dict[str, Any]:

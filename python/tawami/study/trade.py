@@ -14,6 +14,7 @@ from tawami.base import checks
 from tawami.base.errors import InputError
 from tawami.base.files import atomic_file, readable_file
 from tawami.study import front_figure, process
+from tawami.study.adjoint import combined
 from tawami.study.estimate import estimate
 from tawami.study.front import Run, Trade
 from tawami.study.knobs import EXAMPLE, Knob, knobs_of
@@ -47,7 +48,9 @@ def trade(
             its arguments have defaults; knobs are annotated with their values from coarse to fine,
             `h: Annotated[float, (1/4, 1/8, 1/16)] = 1/8`. A set instead, `{0.0, 0.3, 0.6}`, has values
             that are equally accurate, as shifts of the grid: their spread measures the noise. It
-            returns a mapping from names of quantities to numbers.
+            returns a mapping from names of quantities to numbers, to error estimates
+            (`solution.error(goal)`), or to functions without arguments that return one of them. These
+            are called after the time has been taken.
         quantities: Name of a quantity, or names; all numbers by default.
         budget: Wall time of all runs together [s].
         knobs: Values of knobs by name, instead of annotations. A script may declare them as `knobs`.
@@ -96,7 +99,11 @@ def default_folder(name: str) -> Path:
 
 def result_of(name: str, knobs: Sequence[Knob], ladder: Ladder, tolerance: float) -> Trade:
     """Estimate limits and errors from the runs of a ladder."""
-    limits = {q: estimate(q, knobs, ladder.points(q), ladder.failures) for q in ladder.quantities}
+    limits = {}
+    for q in ladder.quantities:
+        points = ladder.points(q)
+        refined = estimate(q, knobs, points, ladder.failures)
+        limits[q] = combined(q, knobs, refined, points, ladder.estimated(q))
     runs = []
     for setting, run in ladder.runs.items():
         knob_values = ladder.named(setting)
