@@ -39,12 +39,13 @@ class DualSolutions:
     Args:
         now: The scene.
         model: Its model with a field for the volume.
-        particles: Its particles.
+        whole: The scene on its grid, with this model.
+        body: Its particles.
         goal: The quantity.
         coefficients: The solution on cells of h.
 
     Attributes:
-        fine, coarse: Places of the coefficients on cells of h/2 and h.
+        fine: Places of the coefficients on cells of h/2.
         value: The quantity.
         residual: Exact residual without stabilisation on the coefficients of cells of h.
         z: The dual solution there.
@@ -57,71 +58,42 @@ class DualSolutions:
         self,
         now: Configuration,
         model: Model,
-        particles: Points,
+        whole: Level,
+        body: Points,
         goal: Goal,
         coefficients: Array,
     ) -> None:
         grid = model.grid
         double = grid.halved
-        half = Level(now, replace(model, grid=double), _exact(double, model, particles))
-        body = _exact(grid, model, particles)
-        whole = Level(now, model, body)
-        self.fine, self.coarse = half.layout, whole.layout
+        half = Level(now, replace(model, grid=double), _exact(double, model, body))
+        self.fine = half.layout
         up = from_coarser(self.fine)
         at = up @ coefficients
         weights = goal.weights(half.domain, now.border)
         self.value = float(weights @ at)
         weights_here = up.T @ weights
-        self.z, again = whole.dual(weights_here, coefficients)
-        residual = half.residual(at, stabilised=False)
-        fine = _on_half(
-            half, at, weights, residual, up @ self.z, up @ whole.reduction.selection, again
-        )
-        self.residual = up.T @ residual
-        self.of_grid = -residual * (fine - up @ self.z)
+        kept = now.domain.newton.kept(whole.reduction)
+        self.z, again = whole.dual(weights_here, coefficients, kept)
         large = grid.with_cells(2 * grid.h, coarser(grid.cells))  # may reach beyond the grid
-        twice, down = Level(now, replace(model, grid=large), body), from_coarser(self.coarse)
-        state = twice.nearest(self.coarse, down, coefficients)
+        twice, down = Level(now, replace(model, grid=large, volumes="particles"), body), from_coarser(whole.layout)
+        state = twice.nearest(whole.layout, down, coefficients)
         z, _ = twice.dual(down.T @ weights_here, state)
-        there = up @ (down @ state)
-        before = float(weights @ (there - at)) - float(
-            half.residual(there, stabilised=False) @ (up @ (down @ z))
+        there = down @ state
+        before = float(weights_here @ (there - coefficients)) - float(
+            whole.residual(there, stabilised=False) @ (down @ z)
         )
+        residual = half.residual(at, stabilised=False)
+        self.residual = up.T @ residual
+        fine = half.dual_by_cycles(
+            weights, at, residual, up @ self.z, up @ whole.reduction.selection, again
+        )
+        self.of_grid = -residual * (fine - up @ self.z)
         first = float(self.of_grid.sum())
         ratio = (-float(self.residual @ self.z) - before) / first if first else np.inf
         used = min(max(ratio, SLOWEST), FASTEST) if ratio > IRREGULAR else SMOOTH
         self.at_round_off = abs(first) <= ROUND_OFF * float(np.abs(weights) @ np.abs(at))
         self.order = float(np.log2(ratio)) if ratio > 0 and not self.at_round_off else np.nan
         self.of_grid *= used / (used - 1)
-
-
-def _on_half(
-    half: Level,
-    at: Array,
-    weights: Array,
-    residual: Array,
-    start: Array,
-    prolongation: sp.csr_matrix,
-    coarse: Callable[[Array], Array],
-) -> Array:
-    """The dual solution on cells of h/2, by cycles with that on cells of h.
-
-    Args:
-        half: Cells of h/2.
-        at: The solution there.
-        weights: Derivative of the quantity.
-        residual: Exact residual without stabilisation.
-        start: The dual solution on cells of h.
-        prolongation: Coefficients x unknowns of cells of h.
-        coarse: Solves with the transposed tangent on cells of h.
-    """
-    reduction, matrix = half.reduction, half.transposed(at)
-    own, right = reduction.coefficients, reduction.restricted(weights)
-    found = two_grid.solve(
-        matrix, int(reduction.of_displacement.sum()), prolongation[own], coarse, right, start[own],
-        reduction.restricted(residual),
-    )  # fmt: skip
-    return reduction.expanded(splu(matrix).solve(right) if found is None else found)
 
 
 def _exact(grid: Grid, model: Model, particles: Points) -> Points:

@@ -12,7 +12,7 @@ from tawami.base import checks, html
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.space import lattice
-from tawami.estimate import estimable
+from tawami.estimate import dual_solutions, estimable
 from tawami.estimate.dual_solutions import DualSolutions
 from tawami.estimate.goal import Goal
 from tawami.estimate.level import Level, Points, with_volume
@@ -138,13 +138,15 @@ def estimate(now: Configuration, goal: Any, coefficients: Array, load: float) ->
     form, plain = (own.residual(coefficients, stabilised=s) for s in (True, False))
     estimable.check_state(own, coefficients, form, plain)
     at = coefficients if model is now.model else own.with_volume(model.form, coefficients)
-    dual = DualSolutions(now, replace(model, volumes="own"), body, goal, at)
+    exact = replace(model, volumes="own")
+    whole = Level(now, exact, dual_solutions._exact(model.grid, exact, body))
+    dual = DualSolutions(now, replace(model, volumes="own"), whole, body, goal, at)
     z = dual.z[: layout.size]
     of_particles = -dual.residual * dual.z
     of_particles[: layout.size] += plain * z
     parts = {
         "grid": (dual.fine, dual.of_grid),
-        "particles": (dual.coarse, of_particles),
+        "particles": (whole.layout, of_particles),
         "stabilisation": (layout, (form - plain) * z),
         "Newton": (layout, -form * z),
     }

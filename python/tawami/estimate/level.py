@@ -26,6 +26,7 @@ from tawami.form.compilation import compile_form
 from tawami.form.form import Form
 from tawami.grid.basis import Basis, refinement
 from tawami.particles import assignment, placement
+from tawami.solve import two_grid
 from tawami.solve.direct import DirectSolver
 from tawami.solve.linear_solver import System
 from tawami.solve.scaling import Scaling
@@ -35,6 +36,11 @@ from tawami.step.configuration import Configuration
 REGULAR = 1e-10
 #: Tolerance of further solves with the transposed tangent.
 COARSE = 1e-2
+#: Solves with a tangent that is nearly the one of a level.
+CORRECTIONS = 4
+
+#: Solves a linear system for a right-hand side to a tolerance.
+Solve = Callable[[Array, float], Array]
 
 
 def with_volume(model: Model) -> Model:
@@ -113,28 +119,48 @@ class Level:
             stabilised: Whether terms are included that the equations of the body do not have: those of
                 the parameters that a form declares to be stabilising.
         """
-        assembly, model = self.domain.assembly, self.domain.model
+        domain = self.domain
         if stabilised:
-            return self.domain.newton.internal(coefficients) - self.external
-        attachment, ghost = assembly.attachment, model.compiled.ghost
+            return domain.newton.internal(coefficients) - self.external
+        attachment, ghost = domain.assembly.attachment, domain.model.compiled.ghost
         in_ghost = set(ghost.constants) if ghost is not None else set[str]()
-        declared = model.form.parameters
+        declared = domain.model.form.parameters
         values = {n: v for n, v in attachment.values.items() if n in set(declared) - in_ghost}
         attachment.change({n: 0.0 for n in values if declared[n].get("stabilises")})
-        internal = self.domain.newton.internal(coefficients)
+        data = domain.responses.evaluate(*self.layout.split(coefficients))
+        internal = domain.assembly.forces(coefficients, data)
         attachment.change(values)
-        penalty = assembly.penalty(self.domain.responses.data)
-        if penalty is not None:
-            internal = internal - penalty @ coefficients
         return internal - self.external
 
-    def transposed(self, coefficients: Array) -> sp.csc_matrix:
-        """The transposed tangent of the unknowns.
+    def dual_by_cycles(
+        self,
+        weights: Array,
+        coefficients: Array,
+        residual: Array,
+        start: Array,
+        prolongation: sp.csr_matrix,
+        coarse: Callable[[Array], Array],
+    ) -> Array:
+        """The dual solution by cycles with that on cells twice as large.
 
         Args:
-            coefficients: Of all fields, where the tangent is taken.
+            weights: Derivative of the quantity by all coefficients.
+            coefficients: Of all fields, where the tangent is taken: those of the last residual.
+            residual: The residual that the dual solution weighs.
+            start: The dual solution on cells twice as large.
+            prolongation: Coefficients x unknowns of these cells.
+            coarse: Solves with the transposed tangent there.
         """
-        return rows_of(self._tangent(coefficients)).T
+        reduction = self.reduction
+        data = self.domain.responses.data
+        tangent = self.domain.assembly.tangent(coefficients, data, reduction)
+        matrix = rows_of(tangent).T
+        own, right = reduction.coefficients, reduction.restricted(weights)
+        found = two_grid.solve(
+            matrix, int(reduction.of_displacement.sum()), prolongation[own], coarse, right,
+            start[own], reduction.restricted(residual),
+        )  # fmt: skip
+        return reduction.expanded(splu(matrix).solve(right) if found is None else found)
 
     def _tangent(self, coefficients: Array) -> Any:
         """The tangent of the unknowns, a matrix of PETSc that the next one overwrites."""
@@ -142,21 +168,32 @@ class Level:
         data = self.domain.responses.data
         return self.domain.assembly.tangent(coefficients, data, self.reduction)
 
-    def dual(self, weights: Array, coefficients: Array) -> tuple[Array, Callable[[Array], Array]]:
+    def dual(
+        self, weights: Array, coefficients: Array, kept: Solve | None = None
+    ) -> tuple[Array, Callable[[Array], Array]]:
         """The influence z of each residual on a quantity: K^T z = weights, K the tangent.
 
         Args:
             weights: Derivative of the quantity by all coefficients.
             coefficients: Of all fields, where the tangent is taken.
+            kept: Solves with a tangent of the same unknowns that is nearly this one, of a symmetric and
+                linear problem. It saves a factorisation.
 
         Returns:
             z of all coefficients, and a function that solves K^T z = r for the unknowns.
         """
         reduction, responses = self.reduction, self.domain.responses
+        right = reduction.restricted(weights)
+        if kept is not None:
+            internal = self.domain.newton.internal
+            zero, z = internal(np.zeros(self.layout.size)), np.zeros(self.layout.size)
+            for _ in range(CORRECTIONS):
+                z = z + reduction.expanded(kept(right, COARSE))
+                right = reduction.restricted(weights - (internal(z) - zero))
+            return z, lambda more: kept(more, COARSE)
         matrix = self._tangent(coefficients).copy().transpose()
         scale = functools.partial(Scaling(self.layout, responses).factors, matrix, reduction)
         solver = DirectSolver(self.domain.model.grid.comm, Stopwatch())
-        right = reduction.restricted(weights)
         found = solver.solve(System(matrix, scale, right, 0.0, list))
         return reduction.expanded(found), lambda more: solver.again(more, COARSE)
 

@@ -53,9 +53,20 @@ class Assembly(ABC):
         """Places of the coefficients."""
         return self.attachment.layout
 
-    @abstractmethod
     def residual(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
-        """Residual of every field on all coefficients, before supports.
+        """Residual of every field on all coefficients, before supports: :meth:`forces` and those of the
+        ghost penalty.
+
+        Args:
+            coefficients: Increments of all fields.
+            data: Particle data of each rule, particles x columns.
+        """
+        forces = self.forces(coefficients, data)
+        return self._ghost.add_forces(forces, coefficients, data)
+
+    @abstractmethod
+    def forces(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
+        """Residual without the ghost penalty.
 
         This and the other methods are collective calls. All coefficients are those of the window.
 

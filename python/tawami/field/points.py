@@ -61,10 +61,9 @@ class PointAssembly(Assembly):
         if isinstance(earlier, PointAssembly):
             self._matrix = earlier._matrix
 
-    def residual(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
-        """See `Assembly.residual`."""
-        forces = self._vector(coefficients, data, absolute=False)
-        return self._ghost.add_forces(forces, coefficients, data)
+    def forces(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
+        """See `Assembly.forces`."""
+        return self._vector(coefficients, data, absolute=False)
 
     def magnitude(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
         """See `Assembly.magnitude`."""

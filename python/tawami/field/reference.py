@@ -38,8 +38,8 @@ class ReferenceAssembly(Assembly):
         self._packed: dict[int, Array] = {}
         self._petsc = Handles(self, attachment.grid.comm)
 
-    def residual(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
-        """See `Assembly.residual`."""
+    def forces(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
+        """See `Assembly.forces`."""
         extraction = self._extraction
         vector, nodal = np.zeros(self._space.size), extraction @ coefficients
         for integral in self._compiled.residual:
@@ -47,8 +47,7 @@ class ReferenceAssembly(Assembly):
                 packed = self._pack(integral, nodal, data)
             with self._stopwatch("residual"):
                 self._add_vector(vector, self._forms[id(integral)], integral, packed)
-        forces = self.layout.sum(extraction.T @ vector)
-        return self._ghost.add_forces(forces, coefficients, data)
+        return self.layout.sum(extraction.T @ vector)
 
     def magnitude(self, coefficients: Array, data: Mapping[Rule, Array]) -> Array:
         """See `Assembly.magnitude`; all contributions are those of cells."""

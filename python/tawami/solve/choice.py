@@ -178,6 +178,11 @@ class ChosenSolver(LinearSolver):
         return self._last.again(right, tolerance)
 
     @property
+    def ready(self) -> bool:
+        """See `LinearSolver.ready`."""
+        return self._last.ready
+
+    @property
     def singular(self) -> bool:
         """See `LinearSolver.singular`."""
         return self._last.singular

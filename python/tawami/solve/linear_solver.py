@@ -87,6 +87,11 @@ class LinearSolver:
         raise NotImplementedError
 
     @property
+    def ready(self) -> bool:
+        """Whether :meth:`again` can solve."""
+        return "ksp" in self._handles
+
+    @property
     def singular(self) -> bool:
         """Whether the solution of that tangent has no correct digit."""
         return not self.condition < SINGULAR

@@ -162,6 +162,17 @@ class Newton:
         data = self._responses.evaluate(*self._assembly.layout.split(coefficients))
         return self._assembly.residual(coefficients, data)
 
+    def kept(self, reduction: Reduction) -> Callable[[Array, float], Array] | None:
+        """Solves with the tangent of the last step, which is that of every step, given a right-hand side
+        and a tolerance.
+
+        None if the problem is not linear and symmetric, or if its unknowns are others.
+        """
+        known, solver = self._assembly.reduction, self._solver
+        if not (self._linear and solver.symmetric and solver.ready) or known is None:
+            return None
+        return solver.again if reduction.same_unknowns(known) else None
+
     def solve(
         self,
         reduction: Reduction,

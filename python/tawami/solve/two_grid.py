@@ -30,32 +30,24 @@ class Smoother:
     """
 
     def __init__(self, matrix: sp.csc_matrix, num_displacement: int) -> None:
-        self._matrix, self._n = matrix, num_displacement
-        of_volume = matrix[:, num_displacement:]
-        self._d = DAMPING * matrix.diagonal()[:num_displacement]
-        squares = sp.csc_matrix((of_volume.data**2, of_volume.indices, of_volume.indptr))
-        squares.resize(of_volume.shape)
-        weights = np.zeros(matrix.shape[0])
-        weights[:num_displacement] = 1 / self._d
-        self._of_volume = of_volume
-        self._diagonal = squares.T @ weights - matrix.diagonal()[num_displacement:]
+        self._n = n = num_displacement
+        of_volume = matrix[:, n:]
+        self._d = DAMPING * matrix.diagonal()[:n]
+        self._into, self._out = of_volume[:n].tocsr(), matrix[n:, :n].tocsr()
+        self._of_volume = of_volume[n:].tocsr()
+        squares = self._into.power(2).T @ (1 / self._d)
+        self._diagonal = squares - self._of_volume.diagonal()
 
     def __call__(self, residual: Array) -> Array:
         """Approximate solution of the system with a right-hand side."""
         n, d = self._n, self._d
         u = residual[:n] / d
-        right = self._in_volume(u) - residual[n:]
+        right = self._out @ u - residual[n:]
         step = right / self._diagonal
-        coupled = self._of_volume @ step
-        u_of_step = coupled[:n] / d
-        image = self._in_volume(u_of_step) - coupled[n:]
+        u_of_step = (self._into @ step) / d
+        image = self._out @ u_of_step - self._of_volume @ step
         length = (right @ step) / (step @ image)
         return np.concatenate([u - length * u_of_step, length * step])
-
-    def _in_volume(self, u: Array) -> Array:
-        return np.asarray(
-            (self._matrix @ np.pad(u, (0, self._matrix.shape[0] - self._n)))[self._n :]
-        )
 
 
 def solve(
