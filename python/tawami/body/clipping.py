@@ -9,10 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from tawami.base.arrays import Array, Indices
+from tawami.base.arrays import Array, Indices, Mask
 from tawami.body.dealing import dealt_cells
 from tawami.body.points import ROUND_OFF
 from tawami.grid.grid import ON_LINE, Grid
+
+#: Cells along each axis of a block that is compared with a shape before its cells are.
+BLOCK = 8
 
 
 def tolerance(scaled: Array) -> float:
@@ -35,11 +38,11 @@ def on_lines(grid: Grid, x: Array) -> Array:
     return np.where(near, np.rint(scaled), scaled)
 
 
-def squares(index: Indices) -> Any:
-    """Cells as boxes of shapely, given their indices (i, j), n x 2."""
+def squares(index: Indices, size: int = 1) -> Any:
+    """Cells as boxes of shapely, given their indices (i, j), n x 2; or blocks of cells of a size."""
     import shapely
 
-    return shapely.box(*index.T, *(index + 1).T)
+    return shapely.box(*(size * index).T, *(size * (index + 1)).T)
 
 
 def clipped(grid: Grid, shape: Any) -> tuple[Indices, Array, Indices]:
@@ -54,11 +57,14 @@ def clipped(grid: Grid, shape: Any) -> tuple[Indices, Array, Indices]:
     bounds = np.array(shape.bounds)
     lower, upper = np.floor(bounds[:2]).astype(int), np.ceil(bounds[2:]).astype(int)
     index = dealt_cells(grid, lower, upper)
-    cell, boxes = grid.cell_numbers(index), squares(index)
+    cell = grid.cell_numbers(index)
     shapely.prepare(shape)
-    full = shapely.covers(shape, boxes)
-    rest = np.flatnonzero(~full & shapely.intersects(shape, boxes))
-    parts = shapely.intersection(shape, boxes[rest])
+    blocks, of = np.unique(grid.cell_numbers(index // BLOCK), return_inverse=True)
+    covered, rest = _covered(shape, grid.cell_indices(blocks), BLOCK)
+    full, near = covered[of], np.flatnonzero(rest[of])
+    full[near], rest = _covered(shape, index[near], 1)
+    rest = near[rest]
+    parts = shapely.intersection(shape, squares(index[rest]))
     area = shapely.area(parts)
     full[rest[area > 1 - ROUND_OFF]] = True
     cut = (area > 0) & ~full[rest]
@@ -68,3 +74,12 @@ def clipped(grid: Grid, shape: Any) -> tuple[Indices, Array, Indices]:
     large = shapely.area(triangles) > ROUND_OFF * min(1.0, shape.area)
     corners = shapely.get_coordinates(triangles[large]).reshape(-1, 4, 2)[:, :3]
     return cell[full], corners, cell[rest[cut][of_part[large]]]
+
+
+def _covered(shape: Any, index: Indices, size: int) -> tuple[Mask, Mask]:
+    """Whether a shape covers each block of cells, and whether it covers only a part of it."""
+    import shapely
+
+    boxes = squares(index, size)
+    covered = np.asarray(shapely.covers(shape, boxes))
+    return covered, ~covered & shapely.intersects(shape, boxes)

@@ -1,12 +1,14 @@
-"""Bodies filled from their borders, for other grids than those that they were made for."""
+"""Points that integrate over a body within its border, on other grids than that of the body."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from tawami.base.arrays import Array
 from tawami.base.errors import InputError
-from tawami.body.body import Body
-from tawami.body.polygon import polygon
+from tawami.body import clipping
+from tawami.body.filling import Filling
+from tawami.body.points import in_triangles, joined
 from tawami.border.curves import spread
 from tawami.border.pieces import Border
 from tawami.grid.grid import Grid
@@ -15,13 +17,16 @@ from tawami.grid.grid import Grid
 TURN = 1.2e-2
 
 
-def within(grid: Grid, border: Border, per_axis: int) -> Body:
-    """A closed border filled with particles at Gauss points, which integrate over cut cells as well.
+def within(grid: Grid, border: Border, per_axis: int) -> tuple[Array, Array]:
+    """Gauss points in full cells and in triangles of cut cells, on one rank.
 
     Args:
         grid: The grid.
         border: The border; arcs are replaced by short chords.
         per_axis: Gauss points per full cell and axis.
+
+    Returns:
+        Positions [m], n x dim, and areas [m2], n.
 
     Raises:
         InputError: The border does not close.
@@ -38,4 +43,9 @@ def within(grid: Grid, border: Border, per_axis: int) -> Body:
     area = shapely.build_area(shapely.multilinestrings(shapely.linestrings(lines)))
     if shapely.is_empty(area):
         raise InputError("the border of the body does not close: expected a closed border")
-    return polygon(grid, area, per_axis=per_axis, gauss=True)
+    shape = shapely.make_valid(shapely.transform(area, lambda x: clipping.on_lines(grid, x)))
+    full, triangles, cell = clipping.clipped(grid, shape)
+    filling = Filling("body", grid, per_axis, gauss=True)
+    whole = filling.in_full_cells(full, np.zeros_like(full))
+    points = joined([whole, in_triangles(triangles, cell)])
+    return grid.in_metres(points.x), grid.space.measure(grid.h) * points.weight

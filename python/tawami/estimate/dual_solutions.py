@@ -99,10 +99,10 @@ class DualSolutions:
 def _exact(grid: Grid, model: Model, particles: Points) -> Points:
     """Points that integrate exactly over the body within its border."""
     assert model.border is not None
-    body = within(grid, model.border, POINTS)
-    of = np.zeros(len(body.x), dtype=np.uint32)
+    x, area = within(grid, model.border, POINTS)
+    of = np.zeros(len(x), dtype=np.uint32)
     if particles.material.any():
         from scipy.spatial import cKDTree
 
-        of = particles.material[cKDTree(particles.x).query(body.x)[1]]
-    return Points(body.x, rings.volumes(grid, body.x, body.volume), of)
+        of = particles.material[cKDTree(particles.x).query(x)[1]]
+    return Points(x, rings.volumes(grid, x, area), of)
