@@ -90,7 +90,7 @@ def rows_of(matrix: Any) -> sp.csr_matrix:
     """Rows of a PETSc matrix on this rank, with columns numbered over all ranks."""
     from scipy.sparse import csr_matrix
 
-    start, columns, values = matrix.getValuesCSR()
+    start, columns, values = matrix.getAttr("__csr__") or matrix.getValuesCSR()
     shape = (len(start) - 1, matrix.getSize()[1])
     return csr_matrix((np.array(values), columns, start), shape=shape)
 

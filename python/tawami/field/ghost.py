@@ -96,15 +96,21 @@ class GhostPenalty:
         (c0, t0), (c1, t1) = layout.on_cells(here), layout.on_cells(there)
         coefficients, t = np.concatenate([c0, c1], axis=1), np.stack([t0, t1], axis=1)
         count, dofs = len(t0), t0.shape[1]
-        element = np.zeros((count, 2, dofs, 2, dofs))
         packed = np.stack([means[grid.window.numbers(of)][:, columns] for of in (here, there)], 1)
-        for k, (_, _, names) in enumerate(attached.sides):
+        facets = np.array(
+            [[FACETS.index(n) for n in names] for *_, names in attached.sides], dtype=np.int32
+        )
+        place = here if integral.reads_position else here[:, :0]
+        alike = np.column_stack([facets, packed.reshape(count, -1), place])
+        _, first, same = np.unique(alike, axis=0, return_index=True, return_inverse=True)
+        element = np.zeros((len(first), 2, dofs, 2, dofs))
+        for values, k in zip(element, first, strict=True):
             shift = grid.h * np.array([*(there[k] - here[k]), 0])
             x = np.concatenate([vertices, vertices + shift])
             if integral.reads_position:
                 x[:, : grid.space.dim] += grid.in_metres(here[k])
-            facets = np.array([FACETS.index(n) for n in names], dtype=np.int32)
-            kernel(element[k], packed[k].ravel(), constants, x.ravel(), facets)
+            kernel(values, packed[k].ravel(), constants, x.ravel(), facets[k])
+        element = element[same]
         blocks = t.transpose(0, 1, 3, 2)[:, :, None] @ element.transpose(0, 1, 3, 2, 4) @ t[:, None]
         entries = blocks.transpose(0, 1, 3, 2, 4)  # sides x (cell, function) x (cell, function)
         rows, cols = np.broadcast_arrays(coefficients[:, :, None], coefficients[:, None])

@@ -2,7 +2,7 @@
 
 A sweep of the smoother replaces the block of the displacement by D, twice its diagonal, and solves the
 system of the volume that is left, B D^-1 B^T + C, by one step of steepest descent (Braess and Sarazin
-1997).
+1997). It takes the matrix for symmetric.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from tawami.base.arrays import Array
 DAMPING = 2.0
 #: Change of the quantity in a cycle, relative to that since the start, at which the iteration stops,
 #: and the largest number of cycles.
-SETTLED, CYCLES = 0.02, 8
+SETTLED, CYCLES = 0.05, 8
 
 
 class Smoother:
@@ -31,23 +31,26 @@ class Smoother:
 
     def __init__(self, matrix: sp.csc_matrix, num_displacement: int) -> None:
         self._n = n = num_displacement
-        of_volume = matrix[:, n:]
-        self._d = DAMPING * matrix.diagonal()[:n]
-        self._into, self._out = of_volume[:n].tocsr(), matrix[n:, :n].tocsr()
-        self._of_volume = of_volume[n:].tocsr()
-        squares = self._into.power(2).T @ (1 / self._d)
-        self._diagonal = squares - self._of_volume.diagonal()
+        self._of_volume, diagonal = matrix[:, n:], matrix.diagonal()
+        self._inverse = np.zeros(len(diagonal))
+        self._inverse[:n] = 1 / (DAMPING * diagonal[:n])
+        of = self._of_volume
+        squares = sp.csc_matrix((of.data**2, of.indices, of.indptr), of.shape)
+        self._diagonal = squares.T @ self._inverse - diagonal[n:]
 
     def __call__(self, residual: Array) -> Array:
         """Approximate solution of the system with a right-hand side."""
-        n, d = self._n, self._d
-        u = residual[:n] / d
-        right = self._out @ u - residual[n:]
+        n, of_volume = self._n, self._of_volume
+        x = self._inverse * residual
+        right = of_volume.T @ x - residual[n:]
         step = right / self._diagonal
-        u_of_step = (self._into @ step) / d
-        image = self._out @ u_of_step - self._of_volume @ step
+        coupled = of_volume @ step
+        u_of_step = self._inverse * coupled
+        image = of_volume.T @ u_of_step - coupled[n:]
         length = (right @ step) / (step @ image)
-        return np.concatenate([u - length * u_of_step, length * step])
+        x -= length * u_of_step
+        x[n:] = length * step
+        return np.asarray(x)
 
 
 def solve(
@@ -82,6 +85,8 @@ def solve(
         if not np.linalg.norm(residual) < 2 * size:
             return None
         value = float(quantity @ x)
+        import os
+        if os.environ.get('CYC'): print('cycle', _, value-first)
         if abs(value - last) <= SETTLED * abs(value - first):
             break
         last = value
