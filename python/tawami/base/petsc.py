@@ -86,13 +86,18 @@ def aij(comm: Any, rows: sp.spmatrix, own_columns: int) -> Any:
     return PETSc.Mat().createAIJ(size=size, csr=arrays, comm=comm)
 
 
-def rows_of(matrix: Any) -> sp.csr_matrix:
-    """Rows of a PETSc matrix on this rank, with columns numbered over all ranks."""
+def rows_of(matrix: Any, *, copy: bool = True) -> sp.csr_matrix:
+    """Rows of a PETSc matrix on this rank, with columns numbered over all ranks.
+
+    Args:
+        matrix: The matrix.
+        copy: Whether the entries are a copy. Else they may be the array of the matrix itself.
+    """
     from scipy.sparse import csr_matrix
 
     start, columns, values = matrix.getAttr("__csr__") or matrix.getValuesCSR()
     shape = (len(start) - 1, matrix.getSize()[1])
-    return csr_matrix((np.array(values), columns, start), shape=shape)
+    return csr_matrix((np.array(values) if copy else values, columns, start), shape=shape)
 
 
 def values_of(matrix: Any) -> Any:

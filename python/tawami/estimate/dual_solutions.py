@@ -14,7 +14,7 @@ from tawami.body import rings
 from tawami.body.within import within
 from tawami.domain.model import Model
 from tawami.estimate.goal import Goal
-from tawami.estimate.level import Level, Points, from_coarser
+from tawami.estimate.level import Level, Points
 from tawami.field.prolongation import coarser
 from tawami.grid.grid import Grid
 from tawami.solve import two_grid
@@ -67,29 +67,26 @@ class DualSolutions:
         double = grid.halved
         half = Level(now, replace(model, grid=double), _exact(double, model, body))
         self.fine = half.layout
-        up = from_coarser(self.fine)
-        at = up @ coefficients
+        up = half.from_coarser
+        at = up(coefficients)
         weights = goal.weights(half.domain, now.border)
         self.value = float(weights @ at)
-        weights_here = up.T @ weights
+        weights_here = up.transposed(weights)
         kept = now.domain.newton.kept(whole.reduction)
         self.z, again = whole.dual(weights_here, coefficients, kept)
         large = grid.with_cells(2 * grid.h, coarser(grid.cells))  # may reach beyond the grid
-        twice, down = Level(now, replace(model, grid=large, volumes="particles"), body), from_coarser(whole.layout)
-        state = twice.nearest(whole.layout, down, coefficients)
-        z, _ = twice.dual(down.T @ weights_here, state)
-        there = down @ state
-        before = float(weights_here @ (there - coefficients)) - float(
-            whole.residual(there, stabilised=False) @ (down @ z)
-        )
+        twice = Level(now, replace(model, grid=large, volumes="full_cells"), body)
+        down, state = whole.from_coarser, twice.smoothed(whole, coefficients)
+        z, solve = twice.dual(down.transposed(weights_here), state)
+        missing = twice.reduction.restricted(twice.residual(state, stabilised=True))
+        state = state - twice.reduction.expanded(solve(missing))
+        before = -whole.residual(down(state), stabilised=False) @ (self.z - down(z))
         residual = half.residual(at, stabilised=False)
-        self.residual = up.T @ residual
-        fine = half.dual_by_cycles(
-            weights, at, residual, up @ self.z, up @ whole.reduction.selection, again
-        )
-        self.of_grid = -residual * (fine - up @ self.z)
+        self.residual, start = up.transposed(residual), up(self.z)
+        fine = half.dual_by_cycles(weights, at, residual, start, whole, again)
+        self.of_grid = -residual * (fine - start)
         first = float(self.of_grid.sum())
-        ratio = (-float(self.residual @ self.z) - before) / first if first else np.inf
+        ratio = float(before) / first if first else np.inf
         used = min(max(ratio, SLOWEST), FASTEST) if ratio > IRREGULAR else SMOOTH
         self.at_round_off = abs(first) <= ROUND_OFF * float(np.abs(weights) @ np.abs(at))
         self.order = float(np.log2(ratio)) if ratio > 0 and not self.at_round_off else np.nan

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import LinearOperator, gmres, splu
 
 from tawami import _rust
 from tawami.base.arrays import Array
@@ -32,12 +32,10 @@ from tawami.solve.linear_solver import System
 from tawami.solve.scaling import Scaling
 from tawami.step.configuration import Configuration
 
-#: Weight of coefficients that the finer ones do not determine.
-REGULAR = 1e-10
 #: Tolerance of further solves with the transposed tangent.
 COARSE = 1e-2
-#: Solves with a tangent that is nearly the one of a level.
-CORRECTIONS = 4
+#: Corrections of a solve with a tangent that is nearly the one of a level.
+CORRECTIONS = 3
 
 #: Solves a linear system for a right-hand side to a tolerance.
 Solve = Callable[[Array, float], Array]
@@ -102,9 +100,14 @@ class Level:
         attachment.change(shared)
         moment, zero = now.moment(), np.zeros(self.domain.layout.size)
         self.reduction, _, self.on_patches = constraints(
-            now.supports, self.domain, lambda term: term.at(moment), zero, zero, moving=False
+            now.supports, self.domain, lambda term: term.at(moment), zero, zero, moving=True
         )
         self.external = now.loads.external(self.domain, moment)
+
+    @functools.cached_property
+    def from_coarser(self) -> FromCoarser:
+        """Coefficients from those of cells twice as large."""
+        return FromCoarser(self.layout)
 
     @property
     def layout(self) -> Layout:
@@ -138,7 +141,7 @@ class Level:
         coefficients: Array,
         residual: Array,
         start: Array,
-        prolongation: sp.csr_matrix,
+        whole: Level,
         coarse: Callable[[Array], Array],
     ) -> Array:
         """The dual solution by cycles with that on cells twice as large.
@@ -148,18 +151,26 @@ class Level:
             coefficients: Of all fields, where the tangent is taken: those of the last residual.
             residual: The residual that the dual solution weighs.
             start: The dual solution on cells twice as large.
-            prolongation: Coefficients x unknowns of these cells.
+            whole: These cells.
             coarse: Solves with the transposed tangent there.
         """
-        reduction = self.reduction
-        data = self.domain.responses.data
+        reduction, up, data = self.reduction, self.from_coarser, self.domain.responses.data
         tangent = self.domain.assembly.tangent(coefficients, data, reduction)
-        matrix = rows_of(tangent).T
-        own, right = reduction.coefficients, reduction.restricted(weights)
+        matrix, own = rows_of(tangent, copy=False).T, reduction.coefficients
+
+        def onto_coarse(residual: Array) -> Array:
+            found = np.zeros(len(weights))
+            found[own] = residual
+            return whole.reduction.restricted(up.transposed(found))
+
+        def onto_fine(unknowns: Array) -> Array:
+            return up(whole.reduction.expanded(unknowns))[own]
+
+        right, mine = reduction.restricted(weights), reduction.restricted(residual)
+        count = int(reduction.of_displacement.sum())
         found = two_grid.solve(
-            matrix, int(reduction.of_displacement.sum()), prolongation[own], coarse, right,
-            start[own], reduction.restricted(residual),
-        )  # fmt: skip
+            matrix, count, onto_fine, onto_coarse, coarse, right, start[own], mine
+        )
         return reduction.expanded(splu(matrix).solve(right) if found is None else found)
 
     def _tangent(self, coefficients: Array) -> Any:
@@ -185,26 +196,27 @@ class Level:
         reduction, responses = self.reduction, self.domain.responses
         right = reduction.restricted(weights)
         if kept is not None:
-            internal = self.domain.newton.internal
-            zero, z = internal(np.zeros(self.layout.size)), np.zeros(self.layout.size)
-            for _ in range(CORRECTIONS):
-                z = z + reduction.expanded(kept(right, COARSE))
-                right = reduction.restricted(weights - (internal(z) - zero))
-            return z, lambda more: kept(more, COARSE)
+            size = (reduction.size, reduction.size)
+            action = lambda x: reduction.restricted(  # noqa: E731
+                self.domain.newton.internal(reduction.expanded(x))
+            )
+            again = functools.partial(kept, tolerance=COARSE)
+            operator, nearly = LinearOperator(size, action), LinearOperator(size, again)
+            found, _ = gmres(operator, right, M=nearly, restart=CORRECTIONS, maxiter=1, atol=0.0)
+            return reduction.expanded(found), again
         matrix = self._tangent(coefficients).copy().transpose()
         scale = functools.partial(Scaling(self.layout, responses).factors, matrix, reduction)
         solver = DirectSolver(self.domain.model.grid.comm, Stopwatch())
         found = solver.solve(System(matrix, scale, right, 0.0, list))
         return reduction.expanded(found), lambda more: solver.again(more, COARSE)
 
-    def nearest(self, finer: Layout, prolongation: sp.csr_matrix, fine: Array) -> Array:
-        """The coefficients that obey the supports and are next to those of a finer grid."""
-        rows = np.flatnonzero(finer.active)
-        offset = self.reduction.offset
-        a = (prolongation @ self.reduction.selection)[rows]
-        b = (fine - prolongation @ offset)[rows]
-        normal = (a.T @ a + REGULAR * sp.eye(a.shape[1])).tocsc()
-        return np.asarray(offset + self.reduction.expanded(splu(normal).solve(a.T @ b)))
+    def smoothed(self, finer: Level, fine: Array) -> Array:
+        """Coefficients that obey the supports, by means of those of a finer grid."""
+        up, active = finer.from_coarser, finer.layout.active
+        sums, share = (up.transposed(np.where(active, one, 0.0)) for one in (fine, 1.0))
+        means = np.divide(sums, share, out=np.zeros_like(sums), where=share > 0)
+        reduction = self.reduction
+        return np.asarray(reduction.offset + reduction.expanded(means[reduction.coefficients]))
 
     def with_volume(self, form: Form, u: Array) -> Array:
         """All coefficients of a form with a field for the volume, given those of the displacement: the
@@ -224,11 +236,34 @@ class Level:
         )
 
 
-def from_coarser(layout: Layout) -> sp.csr_matrix:
-    """Coefficients of a layout from those of cells twice as large (two-scale relation)."""
-    blocks = []
-    for place in layout.fields.values():
-        along: Sequence[sp.csr_matrix] = [refinement(place.basis, n) for n in layout.grid.cells]
-        whole = functools.reduce(lambda inner, outer: sp.kron(outer, inner, format="csr"), along)
-        blocks.append(sp.kron(whole, sp.eye(place.components), format="csr"))
-    return sp.block_diag(blocks, format="csr")
+class FromCoarser:
+    """Coefficients of a layout from those of cells twice as large (two-scale relation), axis by axis."""
+
+    def __init__(self, layout: Layout) -> None:
+        cells = layout.grid.cells
+        self._fields = [
+            (place.components, [refinement(place.basis, n) for n in reversed(cells)])
+            for place in layout.fields.values()
+        ]
+
+    def __call__(self, coarse: Array) -> Array:
+        """All coefficients, given the coarse ones."""
+        return self._applied(coarse, lambda along: along)
+
+    def transposed(self, fine: Array) -> Array:
+        """The transpose of that."""
+        return self._applied(fine, lambda along: along.T)
+
+    def _applied(self, values: Array, of: Callable[[sp.spmatrix], sp.spmatrix]) -> Array:
+        found, start = list[Array](), 0
+        for components, axes in self._fields:
+            matrices = [of(one) for one in axes]
+            shape = [*(one.shape[1] for one in matrices), components]
+            stop = start + int(np.prod(shape))
+            array, start = values[start:stop].reshape(shape), stop
+            for k, matrix in enumerate(matrices):
+                first = np.moveaxis(array, k, 0)
+                product = matrix @ first.reshape(len(first), -1)
+                array = np.moveaxis(product.reshape(-1, *first.shape[1:]), 0, k)
+            found.append(array.ravel())
+        return np.concatenate(found)

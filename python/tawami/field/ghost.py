@@ -25,6 +25,9 @@ from tawami.field.reduction import Reduction
 from tawami.field.sum import Sum
 from tawami.form.integral import Integral
 
+#: Difference of particle data, relative to the largest, below which sides are alike.
+SAME = 1e-13
+
 
 class GhostPenalty:
     """The ghost penalty of a form; without such a term, or without cut cells, it adds nothing.
@@ -101,7 +104,8 @@ class GhostPenalty:
             [[FACETS.index(n) for n in names] for *_, names in attached.sides], dtype=np.int32
         )
         place = here if integral.reads_position else here[:, :0]
-        alike = np.column_stack([facets, packed.reshape(count, -1), place])
+        rounded = np.rint(packed.reshape(count, -1) / (SAME * np.abs(packed).max(initial=1e-300)))
+        alike = np.column_stack([facets, rounded, place])
         _, first, same = np.unique(alike, axis=0, return_index=True, return_inverse=True)
         element = np.zeros((len(first), 2, dofs, 2, dofs))
         for values, k in zip(element, first, strict=True):
@@ -114,7 +118,9 @@ class GhostPenalty:
         blocks = t.transpose(0, 1, 3, 2)[:, :, None] @ element.transpose(0, 1, 3, 2, 4) @ t[:, None]
         entries = blocks.transpose(0, 1, 3, 2, 4)  # sides x (cell, function) x (cell, function)
         rows, cols = np.broadcast_arrays(coefficients[:, :, None], coefficients[:, None])
-        return sp.csr_matrix((entries.ravel(), (rows.ravel(), cols.ravel())), shape=shape)
+        entries = entries.reshape(rows.shape)
+        some = entries != 0
+        return sp.csr_matrix((entries[some], (rows[some], cols[some])), shape=shape)
 
     def _means(self, data: Array) -> Array:
         """Volume-weighted means over the particles of each cell of the window, cells x columns."""

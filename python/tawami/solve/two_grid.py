@@ -31,7 +31,9 @@ class Smoother:
 
     def __init__(self, matrix: sp.csc_matrix, num_displacement: int) -> None:
         self._n = n = num_displacement
-        self._of_volume, diagonal = matrix[:, n:], matrix.diagonal()
+        start, diagonal = matrix.indptr[n], matrix.diagonal()
+        arrays = (matrix.data[start:], matrix.indices[start:], matrix.indptr[n:] - start)
+        self._of_volume = sp.csc_matrix(arrays, (len(diagonal), len(diagonal) - n))  # no copies
         self._inverse = np.zeros(len(diagonal))
         self._inverse[:n] = 1 / (DAMPING * diagonal[:n])
         of = self._of_volume
@@ -56,7 +58,8 @@ class Smoother:
 def solve(
     matrix: sp.csc_matrix,
     num_displacement: int,
-    prolongation: sp.csr_matrix,
+    onto_fine: Callable[[Array], Array],
+    onto_coarse: Callable[[Array], Array],
     coarse: Callable[[Array], Array],
     right: Array,
     start: Array,
@@ -67,26 +70,24 @@ def solve(
     Args:
         matrix: Matrix of the fine grid, unknowns of the displacement first.
         num_displacement: Their number.
-        prolongation: Fine unknowns x coarse unknowns.
+        onto_fine, onto_coarse: Prolongation of coarse unknowns, and its transpose.
         coarse: Solves the system of the coarse grid approximately.
         right: Right-hand side.
         start: First approximation.
         quantity: Weights of the quantity.
     """
-    smooth, back = Smoother(matrix, num_displacement), prolongation.T.tocsr()
+    smooth = Smoother(matrix, num_displacement)
     x, last = start, float(quantity @ start)
     first, residual = last, right - matrix @ start
     size = np.linalg.norm(residual)
     for _ in range(CYCLES):
         x = x + smooth(residual)
-        x = x + prolongation @ coarse(back @ (right - matrix @ x))
+        x = x + onto_fine(coarse(onto_coarse(right - matrix @ x)))
         x = x + smooth(right - matrix @ x)
         residual = right - matrix @ x
         if not np.linalg.norm(residual) < 2 * size:
             return None
         value = float(quantity @ x)
-        import os
-        if os.environ.get('CYC'): print('cycle', _, value-first)
         if abs(value - last) <= SETTLED * abs(value - first):
             break
         last = value
