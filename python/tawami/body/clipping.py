@@ -60,10 +60,10 @@ def clipped(grid: Grid, shape: Any) -> tuple[Indices, Array, Indices]:
     cell = grid.cell_numbers(index)
     shapely.prepare(shape)
     blocks, of = np.unique(grid.cell_numbers(index // BLOCK), return_inverse=True)
-    covered, rest = _covered(shape, grid.cell_indices(blocks), BLOCK)
-    full, near = covered[of], np.flatnonzero(rest[of])
-    full[near], rest = _covered(shape, index[near], 1)
-    rest = near[rest]
+    covered, partly = _covered(shape, grid.cell_indices(blocks), BLOCK)
+    full, near = covered[of], np.flatnonzero(partly[of])
+    full[near], partly = _covered(shape, index[near], 1)
+    rest = near[partly]
     parts = shapely.intersection(shape, squares(index[rest]))
     area = shapely.area(parts)
     full[rest[area > 1 - ROUND_OFF]] = True

@@ -105,8 +105,9 @@ class GhostPenalty:
         )
         place = here if integral.reads_position else here[:, :0]
         rounded = np.rint(packed.reshape(count, -1) / (SAME * np.abs(packed).max(initial=1e-300)))
-        alike = np.column_stack([facets, rounded, place])
-        _, first, same = np.unique(alike, axis=0, return_index=True, return_inverse=True)
+        rows = np.column_stack([facets, rounded, place, t.reshape(count, -1)])
+        bits = rows.view(np.dtype((np.void, rows.itemsize * rows.shape[1]))).ravel()
+        _, first, alike = np.unique(bits, return_index=True, return_inverse=True)
         element = np.zeros((len(first), 2, dofs, 2, dofs))
         for values, k in zip(element, first, strict=True):
             shift = grid.h * np.array([*(there[k] - here[k]), 0])
@@ -114,13 +115,13 @@ class GhostPenalty:
             if integral.reads_position:
                 x[:, : grid.space.dim] += grid.in_metres(here[k])
             kernel(values, packed[k].ravel(), constants, x.ravel(), facets[k])
-        element = element[same]
+        t = t[first]
         blocks = t.transpose(0, 1, 3, 2)[:, :, None] @ element.transpose(0, 1, 3, 2, 4) @ t[:, None]
         entries = blocks.transpose(0, 1, 3, 2, 4)  # sides x (cell, function) x (cell, function)
-        rows, cols = np.broadcast_arrays(coefficients[:, :, None], coefficients[:, None])
-        entries = entries.reshape(rows.shape)
-        some = entries != 0
-        return sp.csr_matrix((entries[some], (rows[some], cols[some])), shape=shape)
+        entries = entries.reshape(len(first), coefficients.shape[1], -1)
+        i, j = np.nonzero(entries.any(axis=0))
+        row, column = (coefficients[:, one].ravel() for one in (i, j))
+        return sp.csr_matrix((entries[:, i, j][alike].ravel(), (row, column)), shape=shape)
 
     def _means(self, data: Array) -> Array:
         """Volume-weighted means over the particles of each cell of the window, cells x columns."""
