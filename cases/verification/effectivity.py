@@ -108,8 +108,8 @@ def on_cook(h: float, body: str = "even"):
 def on_ring(n: int, quantity: str):
     """The ring under pressure, in cut cells.
 
-    The volumes are those of the particles. The error with the default is below that of chords, which
-    replace arcs in the estimate.
+    The volumes are those of the particles. With the default, parts of opposite signs cancel: at n = 4
+    the error of u is 1/30 of its parts.
     """
     law = tawami.linear_elastic(E=ring.E, nu=ring.NU)
     scene, _, _ = ring.build(n, ring.B + 2 / n, (0.0, 0.0), law, gauss=False, volumes="own")

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from tawami.base.arrays import Array
+from tawami.base.arrays import Array, Indices
 from tawami.base.errors import InputError
 from tawami.body import clipping
 from tawami.body.filling import Filling
 from tawami.body.points import in_triangles, joined
-from tawami.border.curves import spread
+from tawami.border.curves import left, spread
 from tawami.border.pieces import Border
 from tawami.grid.grid import Grid
 
-#: Largest turn of a chord that replaces a part of an arc [rad]: its area is off by 2.4e-5.
-TURN = 1.2e-2
+#: Largest turn of a chord that replaces a part of an arc [rad].
+TURN = 5e-2
 
 
 def within(grid: Grid, border: Border, per_axis: int) -> tuple[Array, Array]:
@@ -22,7 +22,7 @@ def within(grid: Grid, border: Border, per_axis: int) -> tuple[Array, Array]:
 
     Args:
         grid: The grid.
-        border: The border; arcs are replaced by short chords.
+        border: The border; arcs are replaced by short chords around the same area.
         per_axis: Gauss points per full cell and axis.
 
     Returns:
@@ -35,7 +35,7 @@ def within(grid: Grid, border: Border, per_axis: int) -> tuple[Array, Array]:
 
     count = np.maximum(np.ceil(2 * np.abs(border.half_angle) / TURN), 1).astype(np.int64)
     of, place = spread(count)
-    x, y = (border.at(of, (place + end) / count[of]) for end in (0, 1))
+    x, y = (_corners(border, of, place + end, count) for end in (0, 1))
     last = place + 1 == count[of]
     x[place == 0], y[last] = border.start, border.end
     digits = 1e-9 * max(np.ptp(x, axis=0))
@@ -49,3 +49,25 @@ def within(grid: Grid, border: Border, per_axis: int) -> tuple[Array, Array]:
     whole = filling.in_full_cells(full, np.zeros_like(full))
     points = joined([whole, in_triangles(triangles, cell)])
     return grid.in_metres(points.x), grid.space.measure(grid.h) * points.weight
+
+
+def _corners(border: Border, of: Indices, place: Indices, count: Indices) -> Array:
+    """Corners of chords, so far beyond the arcs that the chords of an arc have the area of its sector.
+
+    Args:
+        border: Pieces; each is replaced by n chords of the same turn d.
+        of: Piece of each corner.
+        place: Its number in the piece: 0 to n. The ends are on the arc.
+        count: n of each piece.
+    """
+    x = border.at(of, place / count[of])
+    bent = (border.half_angle != 0) & (count > 1)
+    inner = bent[of] & (place > 0) & (place < count[of])
+    turn, n = 2 * np.abs(border.half_angle) / count, count
+    # two triangles with one end and n - 2 without: 2 q + (n - 2) q^2 = n d/sin d
+    with np.errstate(divide="ignore", invalid="ignore"):
+        area = n * turn / np.sin(turn)
+        q = area / (1 + np.sqrt(1 + (n - 2) * area))
+    beyond = ((q - 1) / border.curvature)[of[inner]]
+    x[inner] -= beyond[:, None] * left(border.direction(of[inner], (place / count[of])[inner]))
+    return x

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.linalg import splu
 
 from tawami.base.arrays import Array
 from tawami.body import rings
@@ -17,7 +14,6 @@ from tawami.estimate.goal import Goal
 from tawami.estimate.level import Level, Points
 from tawami.field.prolongation import coarser
 from tawami.grid.grid import Grid
-from tawami.solve import two_grid
 from tawami.step.configuration import Configuration
 
 #: Gauss points per axis of a full cell of h/2, which integrate the residual exactly.
@@ -65,7 +61,7 @@ class DualSolutions:
     ) -> None:
         grid = model.grid
         double = grid.halved
-        half = Level(now, replace(model, grid=double), _exact(double, model, body))
+        half = Level(now, replace(model, grid=double), exact_points(double, model, body))
         self.fine = half.layout
         up = half.from_coarser
         at = up(coefficients)
@@ -93,7 +89,7 @@ class DualSolutions:
         self.of_grid *= used / (used - 1)
 
 
-def _exact(grid: Grid, model: Model, particles: Points) -> Points:
+def exact_points(grid: Grid, model: Model, particles: Points) -> Points:
     """Points that integrate exactly over the body within its border."""
     assert model.border is not None
     x, area = within(grid, model.border, POINTS)

@@ -139,7 +139,7 @@ def estimate(now: Configuration, goal: Any, coefficients: Array, load: float) ->
     estimable.check_state(own, coefficients, form, plain)
     at = coefficients if model is now.model else own.with_volume(model.form, coefficients)
     exact = replace(model, volumes="own")
-    whole = Level(now, exact, dual_solutions._exact(model.grid, exact, body))
+    whole = Level(now, exact, dual_solutions.exact_points(model.grid, exact, body))
     dual = DualSolutions(now, replace(model, volumes="own"), whole, body, goal, at)
     z = dual.z[: layout.size]
     of_particles = -dual.residual * dual.z

@@ -161,10 +161,10 @@ class Level:
         def onto_coarse(residual: Array) -> Array:
             found = np.zeros(len(weights))
             found[own] = residual
-            return whole.reduction.restricted(up.transposed(found))
+            return np.asarray(whole.reduction.restricted(up.transposed(found)))
 
         def onto_fine(unknowns: Array) -> Array:
-            return up(whole.reduction.expanded(unknowns))[own]
+            return np.asarray(up(whole.reduction.expanded(unknowns))[own])
 
         right, mine = reduction.restricted(weights), reduction.restricted(residual)
         count = int(reduction.of_displacement.sum())
@@ -197,10 +197,13 @@ class Level:
         right = reduction.restricted(weights)
         if kept is not None:
             size = (reduction.size, reduction.size)
-            action = lambda x: reduction.restricted(  # noqa: E731
-                self.domain.newton.internal(reduction.expanded(x))
-            )
-            again = functools.partial(kept, tolerance=COARSE)
+
+            def action(x: Array) -> Array:
+                return reduction.restricted(self.domain.newton.internal(reduction.expanded(x)))
+
+            def again(r: Array) -> Array:
+                return kept(r, COARSE)
+
             operator, nearly = LinearOperator(size, action), LinearOperator(size, again)
             found, _ = gmres(operator, right, M=nearly, restart=CORRECTIONS, maxiter=1, atol=0.0)
             return reduction.expanded(found), again
