@@ -13,7 +13,6 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
-from scipy.sparse.linalg import spsolve
 
 from tawami import _rust
 from tawami.base.arrays import Array, Indices
@@ -84,16 +83,23 @@ def refinement(basis: Basis, n: int) -> sp.csr_matrix:
     """Functions on a row of cells twice as long, in those on `n` cells (two-scale relation).
 
     Its shape is fine functions x coarse functions. If n is odd, the last coarse cell reaches beyond the
-    row. Both are evaluated at the Greville points, which determine the coefficients.
+    row. A fine coefficient is the value at its Greville point; that of a spline inside the row is
+    2 f(x) - (f(x - 1/2) + f(x + 1/2)) / 2, the polar form of f on its cell (Ramshaw 1989).
     """
     points, coarse = greville_1d(basis, n), (n + 1) // 2
-    cell = np.minimum(points.astype(np.int64), n - 1)
-    fine = values_1d(basis, n, cell, points - cell)
-    cell = np.minimum((points / 2).astype(np.int64), coarse - 1)
-    matrix = spsolve(fine.tocsc(), values_1d(basis, coarse, cell, points / 2 - cell).tocsc())
+
+    def at(x: Array) -> sp.csr_matrix:
+        cell = np.minimum((x / 2).astype(np.int64), coarse - 1)
+        return values_1d(basis, coarse, cell, x / 2 - cell)
+
+    matrix = at(points)
+    if basis == "quadratic_spline":
+        half = np.full(len(points), 0.5)
+        half[[0, -1]] = 0.0
+        matrix = sp.csr_matrix(2 * matrix - (at(points - half) + at(points + half)) / 2)
     matrix.data[np.abs(matrix.data) < 1e-12] = 0.0
     matrix.eliminate_zeros()
-    return sp.csr_matrix(matrix)
+    return matrix
 
 
 @functools.lru_cache(maxsize=2)

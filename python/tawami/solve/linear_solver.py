@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from petsc4py import PETSc
 
 from tawami.base.arrays import Array
 from tawami.base.errors import SingularError
@@ -127,6 +128,8 @@ class LinearSolver:
         """Make vectors and factors for another tangent, and scale it."""
         self.forget()
         self._handles["x"], self._handles["b"] = matrix.createVecs()
+        # products row by row take 2/3 of the time of those by rows with the same pattern
+        matrix.setOption(PETSc.Mat.Option.USE_INODES, False)
         self._rescale(matrix, scale)
 
     def _rescale(self, matrix: Any, scale: Callable[[], Array]) -> None:
