@@ -24,6 +24,8 @@ from tawami.grid.basis import Basis, refinement
 COARSEST = 300
 #: Share of a coarse function on held functions from which the function is held.
 HELD = 0.5
+#: Coefficients whose rows are computed together: larger arrays cost new pages of memory.
+TOGETHER = 4096
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,14 @@ class _Step:
 
     def _rows(self, coefficients: Indices) -> tuple[Indices, Indices, Array]:
         """Coarse coefficients in which fine ones lie: places of the fine ones, numbers, and values."""
+        starts = range(0, max(len(coefficients), 1), TOGETHER)
+        parts = [self._rows_of(coefficients[start:][:TOGETHER]) for start in starts]
+        rows, numbers, values = map(np.concatenate, zip(*parts, strict=True))
+        counts = [len(row) for row, _, _ in parts]
+        return rows + np.repeat(starts, counts), numbers, values
+
+    def _rows_of(self, coefficients: Indices) -> tuple[Indices, Indices, Array]:
+        """The same of some coefficients."""
         part, coefficients = np.divmod(coefficients, self._components * int(np.prod(self._fine)))
         function, component = np.divmod(coefficients, self._components)
         at = np.unravel_index(function, self._fine, order="F")
