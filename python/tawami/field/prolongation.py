@@ -79,12 +79,12 @@ class _Step:
     def __init__(self, comm: Any, basis: Basis, components: int, fine: GridUnknowns) -> None:
         self._comm, self._components = comm, components
         self._along = [refinement(basis, n) for n in fine.cells]
+        self._padded = [_padded(matrix) for matrix in self._along]
         cells = coarser(fine.cells)
         self._fine = [_rust.basis_len(basis, n) for n in fine.cells]
         self._shape = [_rust.basis_len(basis, n) for n in cells]
         self._size = components * int(np.prod(self._shape))
-        rows, numbers, values = self._rows(fine.unknowns)
-        reached, column = np.unique(numbers, return_inverse=True)
+        rows, reached, column, values = self._rows(fine.unknowns)
         owner = self._owners(reached, fine.held)
         used, mine = owner >= 0, owner == comm.rank
         own = reached[mine]
@@ -101,38 +101,42 @@ class _Step:
         self.matrix = aij(comm, part, len(own))
         self.coarse = GridUnknowns(cells, own, self._held)
 
-    def _rows(self, coefficients: Indices) -> tuple[Indices, Indices, Array]:
-        """Coarse coefficients in which fine ones lie: places of the fine ones, numbers, and values."""
+    def _rows(self, coefficients: Indices) -> tuple[Indices, Indices, Indices, Array]:
+        """Coarse coefficients in which fine ones lie.
+
+        Returns:
+            Places of the fine ones, numbers of the coarse ones, places among these, and values.
+        """
         starts = range(0, max(len(coefficients), 1), TOGETHER)
         parts = [self._rows_of(coefficients[start:][:TOGETHER]) for start in starts]
-        rows, numbers, values = map(np.concatenate, zip(*parts, strict=True))
-        counts = [len(row) for row, _, _ in parts]
-        return rows + np.repeat(starts, counts), numbers, values
+        rows = [start + row for start, (row, _, _, _) in zip(starts, parts, strict=True)]
+        reached = np.unique(np.concatenate([numbers for _, numbers, _, _ in parts]))
+        columns = [np.searchsorted(reached, numbers)[column] for _, numbers, column, _ in parts]
+        values = [value for *_, value in parts]
+        return np.concatenate(rows), reached, np.concatenate(columns), np.concatenate(values)
 
-    def _rows_of(self, coefficients: Indices) -> tuple[Indices, Indices, Array]:
+    def _rows_of(self, coefficients: Indices) -> tuple[Indices, Indices, Indices, Array]:
         """The same of some coefficients."""
         part, coefficients = np.divmod(coefficients, self._components * int(np.prod(self._fine)))
         function, component = np.divmod(coefficients, self._components)
         at = np.unravel_index(function, self._fine, order="F")
         number = np.zeros((len(function), 1), dtype=np.int64)
         value = np.ones((len(function), 1))
-        for stride, matrix, index in zip(
-            np.cumprod((1, *self._shape[:-1])), self._along, at, strict=True
-        ):
-            columns, weights = _padded(matrix)
+        strides = np.cumprod((1, *self._shape[:-1]))
+        for stride, (columns, weights), index in zip(strides, self._padded, at, strict=True):
             number = (number[:, None, :] + stride * columns[index][:, :, None]).reshape(
                 len(function), columns.shape[1] * number.shape[1]
             )
             value = (value[:, None, :] * weights[index][:, :, None]).reshape(number.shape)
         row, column = np.nonzero(value)
         number = self._components * number[row, column] + component[row]
-        return row, number + self._size * part[row], value[row, column]
+        reached, column_of = np.unique(number + self._size * part[row], return_inverse=True)
+        return row, reached, column_of, value[row, column]
 
     def _owners(self, reached: Indices, held: Indices) -> Indices:
         """Rank that owns each coarse coefficient with a part on unknowns of this rank; -1 if held."""
         comm = self._comm
-        _, numbers, values = self._rows(held)
-        on_held, column = np.unique(numbers, return_inverse=True)
+        _, on_held, column, values = self._rows(held)
         sums = sums_at(column, values, len(on_held))
         asked = self._sent(reached)
         told, shares = self._sent(on_held), self._sent(on_held, sums)
