@@ -237,9 +237,9 @@ class MultigridSolver(LinearSolver):
         ksp.setOperators(matrix, handles["parts"])
         ksp.setType("gmres")
         ksp.setPCSide(PETSc.PC.Side.RIGHT)
-        # near a singular tangent, vectors that are not orthogonal let the residual grow. The classical
-        # process of Gram and Schmidt needs a second pass, which takes twice the time
-        set_options(ksp, {"ksp_gmres_modifiedgramschmidt": None})
+        # near a singular tangent, vectors that are not orthogonal let the residual grow; the modified
+        # process of Gram and Schmidt takes less time, but does not suffice there
+        set_options(ksp, {"ksp_gmres_cgs_refinement_type": "refine_ifneeded"})
         pc = handles["pc"] = ksp.getPC()
         if len(places) == 1:
             self._cycle(pc, operators[0], parts[0])
