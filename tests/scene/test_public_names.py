@@ -29,7 +29,7 @@ SOLUTION = {
     "symmetric", "arrays", "number", "x", "volume", "stress", "strain", "mean_stress",
     "displacement_of_particles", "own", "num_particles",
     "eps_v", "field", "coefficients", "displacement", "reaction", "contact", "on_edges", "on_points",
-    "plot", "to_pandas", "to_pyvista", "error",
+    "plot", "to_pandas", "to_pyvista", "error", "owned",
 }  # fmt: skip
 
 

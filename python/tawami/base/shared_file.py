@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import zlib
 from collections.abc import Callable, Iterable
@@ -71,6 +72,47 @@ def by_number(comm: Any, number: npt.NDArray[Any]) -> Callable[[npt.NDArray[Any]
     )
 
 
+def block(comm: Any, total: int) -> tuple[int, int]:
+    """First row of this rank's block of some rows, and the row after it."""
+    return total * comm.rank // comm.size, total * (comm.rank + 1) // comm.size
+
+
+def in_blocks(
+    comm: Any, number: npt.NDArray[Any], total: int
+) -> Callable[[npt.NDArray[Any]], Rows]:
+    """A function that puts rows of all ranks in the order of their numbers, into equal blocks.
+
+    Rows that no rank has are zero. This and the function are collective calls.
+
+    Args:
+        comm: Communicator.
+        number: Number of each row of this rank, from 0, which no other one has.
+        total: Number of all rows.
+    """
+    ends = total * np.arange(1, comm.size + 1) // comm.size
+    home, (first, last) = np.searchsorted(ends, number, side="right"), block(comm, total)
+    place = ranks.exchanged(comm, number, home) - first
+
+    def placed(rows: npt.NDArray[Any]) -> Rows:
+        own = np.zeros((last - first, *rows.shape[1:]), rows.dtype)
+        own[place] = ranks.exchanged(comm, rows, home)
+        return Rows(own, first, total)
+
+    return placed
+
+
+def picked(comm: Any, given: Rows | npt.NDArray[Any], wanted: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Rows with some numbers, which differ between ranks; a collective call.
+
+    Args:
+        comm: Communicator.
+        given: Blocks of the ranks, or an array that every rank has.
+        wanted: Numbers of the rows that this rank gets.
+    """
+    rows = given if isinstance(given, Rows) else Rows.of_first_rank(comm, given)
+    return ranks.looked_up(comm, rows.first + np.arange(len(rows.own)), rows.own, wanted)
+
+
 def write(
     comm: Any,
     path: str | Path,
@@ -122,27 +164,33 @@ def crc_of(comm: Any, head: bytes, own: Any) -> int:
     """Checksum (CRC-32) of a head and the bytes of all ranks after it; a call for all ranks."""
     if comm.size == 1:
         return zlib.crc32(own, zlib.crc32(head))
-    crc, parts = zlib.crc32(head), comm.allgather((zlib.crc32(own), len(own)))
+    return joined(zlib.crc32(head), comm.allgather((zlib.crc32(own), len(own))))
+
+
+def joined(crc: int, parts: Iterable[tuple[int, int]]) -> int:
+    """Checksum of bytes, given those of their beginning and of parts after it, with lengths."""
     for other, length in parts:
-        crc = _joined(crc, other, length)
+        crc = _times(_zeros(length), crc) ^ other
     return crc
 
 
-def _joined(one: int, other: int, length: int) -> int:
-    """Checksum of bytes, given those of their beginning and of their end of some length.
+@functools.lru_cache(maxsize=64)
+def _zeros(length: int) -> list[int]:
+    """Change of a checksum by zeros [bytes] that follow, for each of its bits.
 
-    Zeros that follow bytes multiply their checksum by a power of x, a linear map over bits: its matrix
-    is squared for each bit of the length.
+    They multiply it by a power of x, a linear map over bits: its matrix is squared for each bit of the
+    length.
     """
+    result = [1 << bit for bit in range(32)]
     matrix = [CRC, *(1 << bit for bit in range(31))]  # one bit 0
     for _ in range(3):  # one byte
         matrix = [_times(matrix, column) for column in matrix]
     while length:
         if length & 1:
-            one = _times(matrix, one)
+            result = [_times(matrix, column) for column in result]
         matrix = [_times(matrix, column) for column in matrix]
         length >>= 1
-    return one ^ other
+    return result
 
 
 def _times(matrix: list[int], vector: int) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -89,18 +88,6 @@ class ActiveFunctions:
             return float(a @ b)
         own = self.owner(basis) == comm.rank
         return float(comm.allreduce(float(a[own] @ b[own])))
-
-    def whole(self, basis: Basis, values: Array) -> Array:
-        """Values of functions of the whole grid, on every rank, functions x columns.
-
-        A collective call.
-        """
-        comm = self._grid.comm
-        if comm.size == 1:
-            return values
-        count = math.prod(_rust.basis_len(basis, n) for n in self._grid.cells)
-        own = np.flatnonzero(self.owner(basis) == comm.rank)
-        return ranks.scattered(comm, count, self._window.in_grid(basis, own), values[own])
 
     def support(self, basis: Basis, function: int) -> Indices:
         """Indices (i, j) in the grid of the active cells in a function's support, cells x axes."""

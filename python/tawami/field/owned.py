@@ -9,6 +9,7 @@ import numpy as np
 
 from tawami.base import ranks
 from tawami.base.arrays import Array, Indices
+from tawami.base.shared_file import Rows, in_blocks
 
 
 class Owned:
@@ -33,6 +34,19 @@ class Owned:
         if self._number is None:
             return self._values
         return ranks.scattered(self._comm, self._size, self._number, self._values)
+
+    @property
+    def rows(self) -> Rows:
+        """Values of all coefficients in equal blocks, as :attr:`whole`; a call for all ranks."""
+        if self._number is None:
+            return Rows(self._values, 0, self._size)
+        return in_blocks(self._comm, self._number, self._size)(self._values)
+
+    def picked(self, number: Indices) -> Array:
+        """Values of some coefficients, which differ between ranks; a call for all ranks."""
+        if self._number is None:
+            return np.asarray(self._values[number])
+        return ranks.looked_up(self._comm, self._number, self._values, number)
 
     def at(self, number: Indices) -> Array:
         """Values of some coefficients, the same on every rank; a call for all ranks."""

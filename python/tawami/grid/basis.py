@@ -8,6 +8,7 @@ coefficients. The rows of the extraction matrix E sum to 1.
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from typing import Literal, get_args
 
 import numpy as np
@@ -57,7 +58,7 @@ def functions_on(basis: Basis, n: int, cells: npt.ArrayLike) -> Indices:
     return np.flatnonzero(used)
 
 
-def extraction(basis: Basis, cells: Counts, degree: int) -> sp.csr_matrix:
+def extraction(basis: Basis, cells: Sequence[int], degree: int) -> sp.csr_matrix:
     """The extraction matrix E of a scalar field on Lagrange nodes (`degree` per cell along each axis).
 
     Its shape is nodes x functions, x fastest in both.

@@ -124,6 +124,15 @@ class Window:
         """Whether each cell belongs to this rank."""
         return np.asarray(self.rank_of_cell == self._comm.rank)
 
+    @functools.cached_property
+    def vertices(self) -> Indices:
+        """Numbers in the window of this rank's vertices: those of its cells at their lower ends, and at
+        both ends where the grid ends.
+        """
+        at = _indices(np.arange(math.prod(self.shape("bilinear"))), self.shape("bilinear"))
+        cell = np.minimum(at + np.array(self.first), np.array(self._whole) - 1)
+        return np.flatnonzero(self.found(cell) >= 0)
+
     # -- functions ---------------------------------------------------------------
 
     def shape(self, basis: Basis) -> tuple[int, ...]:

@@ -10,14 +10,15 @@ import numpy as np
 
 from tawami import _rust
 from tawami.base import checks, ranks
-from tawami.base.arrays import Array
+from tawami.base.arrays import Array, of_components
 from tawami.base.errors import InputError, NotModelledError
 from tawami.base.text import meant
 from tawami.domain.points import check_in_body
 from tawami.grid import edges
 from tawami.motion.energy import Energies
 from tawami.motion.observer import Motion, Snapshot, Subject
-from tawami.quantities.quantities import body_arrays
+from tawami.particles.placement import in_order
+from tawami.quantities.quantities import local_arrays
 from tawami.scene.scene import Scene
 from tawami.step.reactions import check_supported
 
@@ -160,6 +161,8 @@ def _point(name: str, text: str) -> tuple[float, float]:
 def _displacement(name: str, point: tuple[float, float], scene: Scene) -> Columns:
     """Displacement of the grid; at finite strain, of the particles that were around the point."""
     location = edges.locate_point(scene.grid, point, name)
+    functions, shares, _ = _rust.functions_at(location, scene.basis)
+    places = of_components(functions[0], scene.grid.space.dim)
     moves = scene.form.strain.finite
     if moves:
         displacement_near(scene, point, name)
@@ -170,8 +173,7 @@ def _displacement(name: str, point: tuple[float, float], scene: Scene) -> Column
         if moves:
             return list(displacement_near(now.scene, point, name))
         state = now.scene.configuration
-        u = now.scene.split(state.domain.layout.whole(state.before))[0]
-        return list(_rust.interpolate(location, now.scene.basis, 2, u)[0])
+        return list(shares[0] @ state.domain.layout.at(state.before, places))
 
     return Columns((f"{name} x [m]", f"{name} y [m]"), of)
 
@@ -188,17 +190,18 @@ def displacement_near(subject: Subject, point: tuple[float, float], what: str) -
     Raises:
         InputError: No particle was within a cell of it.
     """
-    arrays, h = body_arrays(subject), subject.scene.grid.h
+    arrays, h, comm = local_arrays(subject), subject.scene.grid.h, subject.scene.grid.comm
     u = arrays["displacement"]
     offset = arrays["x"] - u - np.asarray(point)
     distance = np.linalg.norm(offset, axis=1)
-    if not distance.min(initial=np.inf) <= h:
+    least = np.sort(ranks.allgathered(comm, np.sort(distance)[:NEIGHBOURS]))[:NEIGHBOURS]
+    if not least.min(initial=np.inf) <= h:
         raise InputError(
             f"{what}: no particle was within a cell ({h:g} m) of it: expected a point of the body "
             "at the start"
         )
     # all at the distance of the last one, so that round-off does not choose among them
-    last = np.sort(distance)[:NEIGHBOURS][-1]
-    near = np.flatnonzero(distance <= last + ROUND_OFF * h)
-    basis = np.column_stack([np.ones(len(near)), offset[near]])
-    return np.asarray(np.linalg.lstsq(basis, u[near], rcond=None)[0][0])
+    near = distance <= least[-1] + ROUND_OFF * h
+    gather = in_order(comm, arrays["number"][near])
+    basis = np.pad(gather(offset[near]), ((0, 0), (1, 0)), constant_values=1.0)
+    return np.asarray(np.linalg.lstsq(basis, gather(u[near]), rcond=None)[0][0])

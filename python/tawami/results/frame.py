@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from tawami.base.shared_file import Rows, by_number
+from tawami.base.shared_file import Rows, by_number, in_blocks
 from tawami.motion.observer import Snapshot, Subject
 from tawami.quantities.outline import Outline
 from tawami.quantities.quantities import Arrays, Quantity, local_arrays, own_values
@@ -29,8 +29,8 @@ class Frame:
         cells: Numbers of their points, cells x 1, 2 or 4.
         on_points: Fields by label, points or points x components.
         on_cells: Fields of the cells, likewise.
-        first, total: Rows of other ranks before those of this rank, and rows of all; None where every
-            rank has all.
+        point_rows, cell_rows: Points or cells of other ranks before those of this rank, and the number
+            of all; None where every rank has all.
     """
 
     points: Array
@@ -38,14 +38,20 @@ class Frame:
     cells: Array
     on_points: dict[str, Array] = field(default_factory=dict)
     on_cells: dict[str, Array] = field(default_factory=dict)
-    first: int = 0
-    total: int | None = None
+    point_rows: tuple[int, int] | None = None
+    cell_rows: tuple[int, int] | None = None
 
-    def rows(self, comm: Any, array: Array) -> Rows:
-        """The rows of an array that this rank writes."""
-        if self.total is None:
-            return Rows.of_first_rank(comm, array)
-        return Rows(array, self.first, self.total)
+    def of_points(self, comm: Any, array: Array) -> Rows:
+        """The rows of an array of points that this rank writes."""
+        return _rows(comm, array, self.point_rows)
+
+    def of_cells(self, comm: Any, array: Array) -> Rows:
+        """The rows of an array of cells that this rank writes."""
+        return _rows(comm, array, self.cell_rows)
+
+
+def _rows(comm: Any, array: Array, place: tuple[int, int] | None) -> Rows:
+    return Rows.of_first_rank(comm, array) if place is None else Rows(array, *place)
 
 
 def particle_frame(
@@ -62,19 +68,30 @@ def particle_frame(
     sort = by_number(subject.scene.grid.comm, own["number"])
     x = sort(own["x"])
     data = {one.label: _spatial(sort(own_values(one, subject, own)).own) for one in quantities}
-    cells = x.first + np.arange(len(x.own))[:, None]
-    return Frame(with_z(x.own), "vertex", cells, data, first=x.first, total=x.total)
+    cells, rows = x.first + np.arange(len(x.own))[:, None], (x.first, x.total)
+    return Frame(with_z(x.own), "vertex", cells, data, point_rows=rows, cell_rows=rows)
 
 
 def grid_frame(quantities: Sequence[GridQuantity], snapshot: Snapshot) -> Frame:
-    """Cells of the grid as squares; a call for all ranks."""
-    nx, ny = snapshot.scene.grid.cells
-    corner = (np.arange(nx) + (nx + 1) * np.arange(ny)[:, None]).ravel()
+    """Cells of the grid as squares; a call for all ranks, each of which gets a block of the rows."""
+    grid, window = snapshot.scene.grid, snapshot.scene.configuration.domain.layout.window
+    nx, ny = grid.cells
+    vertex = window.in_grid("bilinear", window.vertices)
+    cell = window.cells_in_grid(np.flatnonzero(window.own))
+    sort = [
+        in_blocks(grid.comm, vertex, (nx + 1) * (ny + 1)), in_blocks(grid.comm, cell, nx * ny)
+    ]  # fmt: skip
+    x, number = sort[False](vertices(snapshot.scene)), sort[True](cell)
+    corner = number.own + number.own // nx
     squares = corner[:, None] + np.array([0, 1, nx + 2, nx + 1])
     data: tuple[dict[str, Array], dict[str, Array]] = ({}, {})
     for quantity in quantities:
-        data[quantity.cells][quantity.label] = _spatial(quantity.of(snapshot))
-    return Frame(with_z(vertices(snapshot.scene)), "quad", squares, *data)
+        rows = sort[quantity.cells](quantity.of(snapshot))
+        data[quantity.cells][quantity.label] = _spatial(rows.own)
+    return Frame(
+        with_z(x.own), "quad", squares, *data,
+        point_rows=(x.first, x.total), cell_rows=(number.first, number.total),
+    )  # fmt: skip
 
 
 def border_frame(snapshot: Snapshot) -> Frame:

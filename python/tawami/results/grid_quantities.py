@@ -26,7 +26,7 @@ from tawami.quantities.quantities import (
     own_values,
     unknown,
 )
-from tawami.results.projection import Projection, nodal, vertices
+from tawami.results.projection import Projection, nodal
 from tawami.scene.scene import Scene
 
 
@@ -36,7 +36,7 @@ class GridQuantity:
 
     Attributes:
         label: Its name in files.
-        of: Its values at the vertices or in the cells, x fastest; a call for all ranks.
+        of: Its values at the vertices or in the cells of this rank; a call for all ranks.
         cells: Whether it has one value per cell.
     """
 
@@ -86,9 +86,7 @@ def _of_grid(scene: Scene) -> dict[str, GridQuantity]:
         "displacement": GridQuantity("displacement [m]", _displacement),
         "velocity": GridQuantity("velocity [m/s]", _velocity),
         "reaction": GridQuantity(f"reaction [{scene.grid.space.short('N')}]", _reaction),
-        "particles": GridQuantity(
-            "particles [-]", lambda now: now.scene.particles_per_cell.astype(float), cells=True
-        ),
+        "particles": GridQuantity("particles [-]", _particles, cells=True),
     }
     if not scene.form.strain.finite:  # else the grid has only that of the last step
         for name, field in list(scene.form.fields.items())[1:]:
@@ -119,33 +117,38 @@ def _projected_own(quantity: Quantity, projection: Projection) -> GridQuantity:
     return GridQuantity(quantity.label, of)
 
 
+def _particles(now: Snapshot) -> Array:
+    domain = now.scene.configuration.domain
+    return domain.particles_per_cell[domain.layout.window.own].astype(float)
+
+
 def _at_vertices(scene: Scene, coefficients: Array) -> Array:
-    matrix = extraction(scene.basis, scene.grid.cells, 1)
+    """Vectors at the vertices of this rank, given the coefficients in its window."""
+    window = scene.configuration.domain.layout.window
+    matrix = extraction(scene.basis, window.cells, 1)[window.vertices]
     return np.asarray(matrix @ scene.grid.space.vectors(coefficients))
 
 
-def _before(scene: Scene) -> Array:
-    """Coefficients of the whole grid since the start."""
-    return scene.configuration.domain.layout.whole(scene.configuration.before)
+def _coefficients(now: Snapshot) -> Array:
+    """Coefficients in the window: of the solution, or since the start before the first one."""
+    configuration = now.scene.configuration
+    if now.solution is None:
+        return configuration.before
+    return now.solution.owned[0].picked(configuration.domain.layout.in_grid)
 
 
 def _displacement(now: Snapshot) -> Array:
     """Displacement since the start; at finite strain, of the last step."""
-    scene, solution = now.scene, now.solution
-    u = _before(scene)[: scene.configuration.domain.layout.num_displacement_of_grid]
-    u = u if solution is None else solution.u
-    return _at_vertices(scene, u)
+    displacement = _coefficients(now)[: now.scene.configuration.domain.layout.num_displacement]
+    return _at_vertices(now.scene, displacement)
 
 
 def _bilinear(name: str) -> Callable[[Snapshot], Array]:
     """The coefficients of a field, which are its values at the vertices."""
 
     def of(now: Snapshot) -> Array:
-        configuration = now.scene.configuration
-        part = configuration.domain.layout.of_grid[name].slice
-        solution = now.solution
-        of_all = _before(now.scene) if solution is None else solution.coefficients
-        return np.asarray(of_all[part])
+        layout = now.scene.configuration.domain.layout
+        return np.asarray(_coefficients(now)[layout.fields[name].slice][layout.window.vertices])
 
     return of
 
@@ -154,33 +157,40 @@ def _velocity(now: Snapshot) -> Array:
     """Velocity of the particles, weighted by mass, with its gradient; NaN without particles around."""
     motion, attached = now.subject.motion, now.scene.configuration.domain
     assert motion is not None
-    kept, functions, basis = motion.on_grid, attached.layout.functions, attached.layout.basis
+    kept = motion.on_grid
     if kept is not None:  # a grid that is not reset has its own velocity
-        return _at_vertices(now.scene, functions.whole(basis, kept[0]).ravel())
+        return _at_vertices(now.scene, kept[0].ravel())
     fields = [(motion.velocity, motion.velocity_gradient)]
     (momentum,) = to_grid(attached, motion.mass, fields)
     mass = attached.sums(motion.mass, np.ones((len(motion.mass), 1)))
     v = np.divide(momentum, mass, out=np.zeros_like(momentum), where=mass > 0)
     sums = attached.sums(motion.mass, np.ones((len(motion.mass), 1)), "bilinear")
-    near = functions.whole("bilinear", sums) > 0
-    return np.where(near, _at_vertices(now.scene, functions.whole(basis, v).ravel()), np.nan)
+    near = sums[attached.layout.window.vertices] > 0
+    return np.where(near, _at_vertices(now.scene, v.ravel()), np.nan)
 
 
 def _reaction(now: Snapshot) -> Array:
     """Forces of supports and walls [N per metre depth], distributed to the vertices of their cells with
     the same sum and moment; NaN before the first solution.
     """
-    scene, grid = now.scene, now.scene.grid
+    scene, grid, layout = now.scene, now.scene.grid, now.scene.configuration.domain.layout
+    window = layout.window
     if now.solution is None:
-        return np.full((len(vertices(scene)), grid.space.dim), np.nan)
+        return np.full((len(window.vertices), grid.space.dim), np.nan)
     along = []
-    for n in grid.cells:
-        place = greville_1d(scene.basis, n)
+    for axis, n in enumerate(grid.cells):
+        first = window.first_function(scene.basis)[axis]
+        place = greville_1d(scene.basis, n)[first : first + window.shape(scene.basis)[axis]]
         cell = np.minimum(place.astype(np.int64), n - 1)
-        along.append(values_1d("bilinear", n, cell, place - cell))
+        begin, end = window.first[axis], window.first[axis] + window.cells[axis] + 1
+        along.append(values_1d("bilinear", n, cell, place - cell)[:, begin:end])
     share = sp.kron(along[1], along[0], format="csr")
-    forces = np.asarray(share.T @ now.solution.on_edges)
+    wanted = layout.in_grid[: layout.num_displacement]
+    on_functions = np.sum([forces.picked(wanted) for forces in now.solution.owned[1:]], axis=0)
+    forces = np.asarray(share.T @ grid.space.vectors(on_functions))
     for point, force in now.solution.on_points:
         location = edges.locate_point(grid, point, "reaction")
-        forces += _rust.nodal_sums(location, np.ones(1), force[None], "bilinear")
-    return forces
+        number, shares, _ = _rust.functions_at(location, "bilinear")
+        at = window.functions("bilinear", number[0])
+        forces[at[at >= 0]] += shares[0][at >= 0, None] * force
+    return forces[window.vertices]

@@ -21,7 +21,6 @@ import numpy as np
 from tawami import _rust
 from tawami.base import checks
 from tawami.base.arrays import Array
-from tawami.base.space import lattice
 from tawami.scene.scene import Scene
 
 Projection = Literal["lumped", "consistent"]
@@ -39,14 +38,9 @@ def check_projection(method: str) -> Projection:
 
 
 def vertices(scene: Scene) -> Array:
-    """Corners of the cells, x fastest [m]: vertices x dim."""
-    grid = scene.grid
-    return lattice(
-        [
-            grid.axis_positions(axis, np.arange(number + 1), 0.0)
-            for axis, number in enumerate(grid.cells)
-        ]
-    )
+    """Corners of the cells that belong to this rank, x fastest [m]: vertices x dim."""
+    window = scene.configuration.domain.layout.window
+    return window.greville("bilinear")[window.vertices]
 
 
 def nodal(scene: Scene, values: Array, method: Projection = "lumped") -> Array:
@@ -58,7 +52,7 @@ def nodal(scene: Scene, values: Array, method: Projection = "lumped") -> Array:
         method: 'lumped' or 'consistent'.
 
     Returns:
-        Vertices (x fastest) or vertices x components; NaN without particles around.
+        Vertices of this rank (x fastest) or vertices x components; NaN without particles around.
 
     Raises:
         InputError: An unknown method.
@@ -73,9 +67,8 @@ def nodal(scene: Scene, values: Array, method: Projection = "lumped") -> Array:
     found = np.divide(right, weight, out=np.zeros_like(right), where=near)
     if method == "consistent":
         found = _conjugate_gradients(scene, found, weight, right)
-    whole = scene.configuration.domain.layout.functions.whole
-    found, near = whole("bilinear", found), whole("bilinear", weight) > 0
-    return np.where(near, found, np.nan).reshape(-1, *np.shape(values)[1:])
+    own = scene.configuration.domain.layout.window.vertices
+    return np.where(near, found, np.nan)[own].reshape(len(own), *np.shape(values)[1:])
 
 
 def _sums(scene: Scene, data: Array) -> Array:

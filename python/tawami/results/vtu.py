@@ -42,19 +42,19 @@ def write_vtu(path: str | Path, frame: Frame, comm: Any = MPI.COMM_SELF) -> None
     if comm.size == 1:
         _write_by_meshio(path, frame)
         return
-    cells = frame.rows(comm, frame.cells)
+    cells = frame.of_cells(comm, frame.cells)
     corners = cells.own.shape[1]
     offsets = corners * (1 + cells.first + np.arange(len(cells.own), dtype=np.int64))
     types = np.full(len(cells.own), TYPES[frame.kind], dtype=np.uint8)
     arrays = {
-        "Points": {"Points": frame.rows(comm, frame.points)},
+        "Points": {"Points": frame.of_points(comm, frame.points)},
         "Cells": {
             "connectivity": Rows(cells.own.astype(np.int64), cells.first, cells.total),
             "offsets": Rows(offsets, cells.first, cells.total),
             "types": Rows(types, cells.first, cells.total),
         },
-        "PointData": {name: frame.rows(comm, of) for name, of in frame.on_points.items()},
-        "CellData": {name: frame.rows(comm, of) for name, of in frame.on_cells.items()},
+        "PointData": {name: frame.of_points(comm, of) for name, of in frame.on_points.items()},
+        "CellData": {name: frame.of_cells(comm, of) for name, of in frame.on_cells.items()},
     }
     points = arrays["Points"]["Points"].total
     words = [

@@ -22,6 +22,7 @@ from tawami.domain.points import ROUND_OFF, outside
 from tawami.estimate.error import ErrorEstimate, estimate
 from tawami.estimate.goal import Goal
 from tawami.field.constraints import LEAST_SHARE
+from tawami.field.owned import Owned
 from tawami.form.kinematics import KINEMATICS
 from tawami.grid import edges
 from tawami.particles.gathered import Gathered
@@ -115,8 +116,13 @@ class Solution(OfAllParticles, Elsewhere, Sealed, Unique):
         """Forces of edges and walls on the body, functions x 2 [N per metre depth]; gathered as
         `coefficients`.
         """
-        forces = self._reactions.on_edges.whole + self._reactions.on_walls
+        forces = self._reactions.on_edges.whole + self._reactions.on_walls.whole
         return forces.reshape(-1, self._model.space.dim)
+
+    @property
+    def owned(self) -> tuple[Owned, Owned, Owned]:
+        """Coefficients, and forces of edges and of walls, each on its rank: for outputs."""
+        return self._coefficients, self._reactions.on_edges, self._reactions.on_walls
 
     @property
     def volumetric(self) -> Array:

@@ -19,6 +19,7 @@ from tawami.base.arrays import Array
 from tawami.base.errors import CheckpointError
 from tawami.base.process import check_process
 from tawami.base.program import leave_together
+from tawami.base.shared_file import picked
 from tawami.base.timing import Stopwatch
 from tawami.conditions.activity import Activity
 from tawami.conditions.held_border import HeldBorder
@@ -309,7 +310,7 @@ class Configuration:
             "work": self._work.state(self.model.grid),
             "time": self.activity.time,
             "inputs": self.inputs.state(),
-            "total": self.domain.layout.whole(self.total),
+            "total": self.domain.layout.owned(self.total).rows,
             "left": self.left,
             "removed": [*self.removed],
             "laws": self.model.texts,
@@ -343,7 +344,7 @@ class Configuration:
         for name in ("inputs", "border", "supports", "obstacles"):
             getattr(self, name).restore(state[name])
         self._attach(placed)
-        self.total = self.domain.layout.part(state["total"])
+        self.total = picked(grid.comm, state["total"], self.domain.layout.in_grid)
         self.loads.restore(state["loads"], self.domain.layout)
         self.domain.newton.record()
         self.domain.newton.restore(state["newton"])

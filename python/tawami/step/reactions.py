@@ -106,7 +106,7 @@ class Reactions:
     Attributes:
         on_edges: Of edges, and of walls that hold functions, on the displacement coefficients
             [N per metre depth].
-        on_walls: Of other walls, on those of the whole grid.
+        on_walls: Of other walls.
         at_points: Of points.
         on_border: Of patches of the border [N per metre depth], by the names of its parts.
         on_obstacles: Contact with obstacles.
@@ -115,7 +115,7 @@ class Reactions:
     """
 
     on_edges: Owned
-    on_walls: Array
+    on_walls: Owned
     at_points: Sequence[AtPoint] = field(default_factory=list)
     on_border: Sequence[tuple[str, Array]] = ()
     on_obstacles: Sequence[ContactResult] = ()
@@ -150,11 +150,12 @@ class Reactions:
         held_edges = accepted.problem.held_edges
         contacts = [contact.result() for contact in accepted.problem.obstacles]
         walls = {wall.obstacle for wall in supports.walls}
-        on_walls = np.zeros(layout.num_displacement_of_grid)
-        for contact in accepted.problem.obstacles:
-            if contact.obstacle in walls:
-                on_walls += contact.at_end[: len(on_walls)]
-        return cls(on_edges, on_walls, at_points, on_border, contacts, held_edges, supports.names)
+        of_walls = [c.at_end for c in accepted.problem.obstacles if c.obstacle in walls]
+        on_walls = sum(map(layout.part, of_walls), np.zeros(layout.size))[: layout.num_displacement]
+        return cls(
+            on_edges, layout.owned(on_walls), at_points, on_border, contacts, held_edges,
+            supports.names,
+        )  # fmt: skip
 
     def contact(self, obstacle: Any) -> ContactResult:
         """Contact with an obstacle, given by its handle or name."""
