@@ -49,6 +49,8 @@ thus causing the job to be terminated. The first process to do so was:
 
    Process name: [prterun-vm-4711@1,1] Exit code:    3
 {DASHES}"""
+ABORT_6 = ABORT_5.replace(2 * DASHES, f"{2 * DASHES}\n")
+EXIT_6 = EXIT_5.replace(DASHES, f"{DASHES}\n", 1).replace("] Exit", "]\n   Exit")
 CRASH_4 = f"""{DASHES}mpirun noticed that process rank 1 with PID 0 on node n exited on signal 6 (Abort).
 {DASHES}"""
 CRASH_5 = f"""{DASHES}prterun noticed that process rank 1 with PID 4712 on node vm exited on
@@ -69,7 +71,7 @@ they may disappear in future releases.
   New variable:        mapby
 {DASHES}"""
 OWN = f"first\n{DASHES}a table of the script\n\n{DASHES}last, without an end of line"
-REPEATED = [ABORT_4, EXIT_4, TORN_4, MORE_4, ABORT_5, EXIT_5]
+REPEATED = [ABORT_4, EXIT_4, TORN_4, MORE_4, ABORT_5, EXIT_5, ABORT_6, EXIT_6]
 
 
 def printed(text: str, size: int) -> str:
@@ -90,7 +92,7 @@ def test_messages_that_repeat_an_error_are_left_out_and_no_others(size):
         assert printed(f"progress{error}{repeated}", size).startswith("progresscase.py")
 
 
-@pytest.mark.parametrize("repeated", [ABORT_4, EXIT_4, ABORT_5, EXIT_5])
+@pytest.mark.parametrize("repeated", [ABORT_4, EXIT_4, ABORT_5, EXIT_5, ABORT_6, EXIT_6])
 def test_messages_that_arrive_slowly_are_left_out(repeated):
     messages, text = Messages(), f"error\n{ENDED}\n"
     seen = messages.passed(text.encode())

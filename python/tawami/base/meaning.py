@@ -29,6 +29,8 @@ ROUND_OFF = 1e-12
 CODE, PYTHON, UNKNOWN = "its code", "Python", "cannot be compared"
 #: Depth of values in values up to which they are compared, and entries of an array that are shown.
 DEEPEST, SHOWN = 12, 6
+#: Flag of code with a docstring, since Python 3.14.
+HAS_DOCSTRING = 0x4000000
 #: Length from which a list of numbers is compared as an array.
 LONG = 100
 
@@ -175,20 +177,23 @@ def _installed(value: Any) -> bool:
 def _code(function: FunctionType) -> dict[str, str]:
     """Version of Python, whose byte code can be compared to its own only, and a hash of the code."""
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
-    digest = _digest(function.__code__, function.__doc__)
-    return {PYTHON: version, "hash": digest[:16]}
+    return {PYTHON: version, "hash": _digest(function.__code__)[:16]}
 
 
-def _digest(code: CodeType, text: str | None = None) -> str:
-    """Hash of byte code and constants, without names of variables, lines and the docstring `text`."""
-    constants = [
-        _digest(one) if isinstance(one, CodeType)
-        else repr(sorted(map(repr, one))) if isinstance(one, frozenset)
-        else repr(None if k == 0 and one == text else one)
-        for k, one in enumerate(code.co_consts)
-    ]  # fmt: skip
-    parts = (code.co_code.hex(), code.co_names, code.co_argcount, code.co_flags, constants)
+def _digest(code: CodeType) -> str:
+    """Hash of byte code and its constants, without names of variables, lines and docstrings."""
+    steps = [
+        (step.opcode, _constant(step.argval) if step.opcode in dis.hasconst else step.arg)
+        for step in dis.get_instructions(code)
+    ]
+    parts = (steps, code.co_names, code.co_argcount, code.co_flags & ~HAS_DOCSTRING)
     return hashlib.sha256(repr(parts).encode()).hexdigest()
+
+
+def _constant(value: Any) -> str:
+    if isinstance(value, CodeType):
+        return _digest(value)
+    return repr(sorted(map(repr, value)) if isinstance(value, frozenset) else value)
 
 
 def _values(function: FunctionType, inside: tuple[int, ...]) -> Iterator[tuple[str, Any]]:

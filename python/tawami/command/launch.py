@@ -18,7 +18,7 @@ from types import FrameType
 
 from tawami.base import program
 
-#: Lines of Open MPI 4, and of Open MPI 5 with PRRTE, about a program that ended with an exit code.
+#: Lines of Open MPI 4, and of Open MPI 5 and 6 with PRRTE, about a program that ended with an exit code.
 REPEATED = re.compile(
     r"""MPI_ABORT\ was\ invoked\ on\ rank\ .* | with\ errorcode\ -?\d+\.
     | Proc:\ .* | Errorcode:\ -?\d+
@@ -103,7 +103,7 @@ class Messages:
     def __init__(self) -> None:
         self._line = b""  # has not ended
         self._begun = False  # whether the begin of this line is printed
-        self._frame = b""  # a line of dashes, whose meaning the next line decides
+        self._frame = b""  # a line of dashes, whose meaning the next text decides
         self._inside = False  # a block that repeats an error
         self._outdated = False  # a block about an outdated variable
         self._repeated: list[bytes] = []
@@ -147,6 +147,9 @@ class Messages:
                 return b""
             before, self._frame = self._frame, line
             return before
+        elif self._frame and not text:  # Open MPI 6
+            self._frame += line
+            return b""
         elif REPEATED.fullmatch(text) or (self._inside and not text):
             self._inside = self._inside or bool(self._frame)
             self._repeated += [self._frame, line]
