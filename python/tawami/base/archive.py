@@ -2,8 +2,9 @@
 
 A file is an archive of NumPy (.npz). Each array of the state is stored under its path, as
 'scene.particles.stress'; all else is JSON: the state without its arrays, and the identity of the run.
-The checksums of the archive detect damage. Each rank writes and reads its own rows of the arrays of the
-particles, in the order of their numbers. Only the cells of each rank depend on the number of ranks.
+The checksums of the archive detect damage. Each rank writes and reads its own rows of the arrays of
+particles and of the grid, in the order of their numbers, and verifies a part of the checksums. Only the
+cells of each rank depend on the number of ranks.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ import math
 import os
 import re
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +24,14 @@ import numpy as np
 from mpi4py import MPI
 
 from tawami.base import ranks, shared_file
+from tawami.base.entries import Entries
 from tawami.base.errors import CheckpointError
 from tawami.base.files import reason
 from tawami.base.ranks import raise_together
 from tawami.base.shared_file import Rows, crc_of
 
 #: Version of the content of a state.
-FORMAT = 6
+FORMAT = 7
 #: Entry of the archive with the JSON.
 ABOUT = "about.json"
 #: Folder of the checkpoints in the folder of a run.
@@ -124,27 +127,34 @@ def read(path: Path, comm: Any = MPI.COMM_SELF) -> tuple[dict[str, Any], dict[st
     Raises:
         CheckpointError: The file cannot be read, is damaged, or has another format.
     """
-    with raise_together(comm):
-        try:
-            with zipfile.ZipFile(path) as content:
-                damaged = content.testzip() if comm.rank == 0 else None
-            if damaged is not None:
-                raise ValueError(f"wrong checksum of '{damaged}'")
-            with np.load(path, allow_pickle=False) as arrays:
-                about = json.loads(arrays[ABOUT].tobytes())
+    with ExitStack() as stack:
+        with raise_together(comm), _reading(path):
+            entries = Entries(path, stack.enter_context(path.open("rb")))
+            sums = entries.sums(comm)
+        of_ranks = comm.allgather(sums)
+        with raise_together(comm):
+            with _reading(path):
+                entries.check(of_ranks)
+                about = json.loads(entries.whole(ABOUT).tobytes())
                 found, identity = about["format"], about["identity"]
-                state = _unpack(about["state"], arrays, comm) if found == FORMAT else {}
-        except Exception as error:
-            raise CheckpointError(
-                f"checkpoint '{path}' cannot be read ({reason(error)}): it is damaged, or is not a "
-                "checkpoint of tawami"
-            ) from None
-        if found != FORMAT:
-            raise CheckpointError(
-                f"checkpoint '{path}' has format {found!r}: this version of tawami reads format "
-                f"{FORMAT}"
-            )
+                state = _unpack(about["state"], entries, comm) if found == FORMAT else {}
+            if found != FORMAT:
+                raise CheckpointError(
+                    f"checkpoint '{path}' has format {found!r}: this version of tawami reads format "
+                    f"{FORMAT}"
+                )
     return identity, state
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except Exception as error:
+        raise CheckpointError(
+            f"checkpoint '{path}' cannot be read ({reason(error)}): it is damaged, or is not a "
+            "checkpoint of tawami"
+        ) from None
 
 
 def particles(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -261,26 +271,14 @@ def _pack(value: Any, path: str, arrays: dict[str, Any]) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _unpack(value: Any, arrays: Mapping[str, Any], comm: Any) -> Any:
+def _unpack(value: Any, entries: Entries, comm: Any) -> Any:
     """The reverse of :func:`_pack`."""
     if isinstance(value, list):
-        return [_unpack(item, arrays, comm) for item in value]
+        return [_unpack(item, entries, comm) for item in value]
     if not isinstance(value, dict):
         return value
     if "rows" in value and comm.size > 1:
-        return _block(arrays, value["rows"], comm)
+        return entries.rows(value["rows"], comm)
     if "rows" in value or "array" in value:
-        return arrays[value["array" if "array" in value else "rows"]]
-    return {name: _unpack(item, arrays, comm) for name, item in value["items"].items()}
-
-
-def _block(arrays: Any, name: str, comm: Any) -> Rows:
-    """This rank's rows of an array, of which it reads nothing else."""
-    with arrays.zip.open(f"{name}.npy") as file:
-        np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
-        shape, _, dtype = np.lib.format.read_array_header_1_0(file)  # type: ignore[no-untyped-call]
-        first, last = (shape[0] * (comm.rank + k) // comm.size for k in range(2))
-        row = dtype.itemsize * math.prod(shape[1:])
-        file.seek(first * row, os.SEEK_CUR)
-        own = np.frombuffer(file.read((last - first) * row), dtype)
-    return Rows(own.reshape(last - first, *shape[1:]).copy(), first, shape[0])
+        return entries.whole(value["array" if "array" in value else "rows"])
+    return {name: _unpack(item, entries, comm) for name, item in value["items"].items()}

@@ -170,7 +170,7 @@ def crc_of(comm: Any, head: bytes, own: Any) -> int:
 def joined(crc: int, parts: Iterable[tuple[int, int]]) -> int:
     """Checksum of bytes, given those of their beginning and of parts after it, with lengths."""
     for other, length in parts:
-        crc = _times(_zeros(length), crc) ^ other
+        crc = _times(_zeros(length), crc) ^ other if crc else other
     return crc
 
 

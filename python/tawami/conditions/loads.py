@@ -12,6 +12,7 @@ import numpy as np
 
 from tawami.base.arrays import Array
 from tawami.base.errors import SupportError
+from tawami.base.shared_file import picked
 from tawami.base.text import listed
 from tawami.conditions.action import Owner, Term, restored
 from tawami.conditions.activity import Activity
@@ -252,7 +253,7 @@ class Loads(Owner[Load]):
 
     def state(self, layout: Layout) -> dict[str, Any]:
         """Share of each load that the body carries, and the forces that fade; a call for all ranks."""
-        unbalanced = np.zeros(0) if self.unbalanced is None else layout.whole(self.unbalanced)
+        unbalanced = np.zeros(0) if self.unbalanced is None else layout.owned(self.unbalanced).rows
         return {"all": [load.state() for load in self.all], "unbalanced": unbalanced}
 
     def restore(self, state: Mapping[str, Any], layout: Layout) -> None:
@@ -262,6 +263,7 @@ class Loads(Owner[Load]):
             CheckpointError: The script has made others.
         """
         self.all = restored("load", self.all, state["all"])
-        unbalanced = state["unbalanced"]
-        self.unbalanced = layout.part(unbalanced) if len(unbalanced) else None
+        unbalanced, self.unbalanced = state["unbalanced"], None
+        if np.shape(unbalanced) != (0,):
+            self.unbalanced = picked(self.grid.comm, unbalanced, layout.in_grid)
         self.changed()

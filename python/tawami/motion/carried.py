@@ -13,6 +13,7 @@ import numpy as np
 from tawami.base import ranks
 from tawami.base.archive import check_like
 from tawami.base.arrays import Array
+from tawami.base.shared_file import picked
 from tawami.motion.transfer import Transfer, gradient_of, to_grid
 from tawami.step.configuration import Configuration
 
@@ -124,8 +125,8 @@ class Carried:
         stationary = self.on_grid
         if stationary is None:
             return {"on_grid": None}
-        whole = self._now.domain.layout.whole
-        return {"on_grid": [whole(v.ravel()).reshape(-1, v.shape[1]) for v in stationary]}
+        owned = self._now.domain.layout.owned
+        return {"on_grid": [owned(v.ravel()).rows for v in stationary]}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """The reverse of :meth:`state`, after the particles were restored.
@@ -133,17 +134,17 @@ class Carried:
         Raises:
             ValueError: v and a do not belong to the grid.
         """
-        on_grid = state["on_grid"]
+        on_grid, layout = state["on_grid"], self._now.domain.layout
         if on_grid is not None:
-            layout, dim = self._now.domain.layout, self._space.dim
-            shape = (layout.num_displacement_of_grid // dim, dim)
-            if [np.shape(values) for values in on_grid] != [shape, shape]:
+            if [np.shape(values) for values in on_grid] != [(layout.num_displacement_of_grid,)] * 2:
                 raise ValueError("v and a of the grid have another number of functions")
-            check_like(on_grid, [np.zeros(shape)] * 2, "v and a of the grid")
+            check_like(on_grid, [np.zeros(1)] * 2, "v and a of the grid")
         self._stationary = None
         if on_grid is not None:
-            v, a = (layout.part(values.ravel()).reshape(-1, dim) for values in on_grid)
-            self._stationary = v, a, *self._given()
+            wanted = layout.in_grid[: layout.num_displacement]
+            v, a = (picked(layout.grid.comm, values, wanted) for values in on_grid)
+            vectors = self._space.vectors
+            self._stationary = vectors(v), vectors(a), *self._given()
 
     def _given(self) -> tuple[Array, Array]:
         """Copies of the velocities and numbers of the particles."""
