@@ -17,8 +17,12 @@ import numpy as np
 from mpi4py import MPI
 
 import tawami
+from tawami.base import archive
 from tawami.base.ranks import allgathered
+from tawami.motion.observer import Snapshot
 from tawami.results import write_grid, write_particles
+from tawami.results.frame import grid_frame
+from tawami.results.grid_quantities import on_grid
 
 COMM = MPI.COMM_WORLD
 FIELDS = ("stress", "mean stress", "deviatoric stress q", "eps_v", "plastic_strain")
@@ -147,8 +151,35 @@ def statics(folder: Path) -> dict[str, np.ndarray]:
     return found | {"static counts": counts}
 
 
+def kept(folder: Path) -> dict[str, np.ndarray]:
+    """A motion at small strain that is stored and restored: coefficients, and forces that fade."""
+
+    def motion_of() -> tuple[tawami.Dynamics, Any]:
+        grid = tawami.Grid(COMM, origin=(0, 0), h=0.25, cells=(24, 3))
+        body = tawami.box(grid, (0.25, 0.0), (0.75, 0.5), per_axis=2)
+        law = tawami.linear_elastic(E=1e5, nu=0.3)
+        scene = tawami.Scene(grid, body, law, density=1000.0)
+        scene.fix("bottom", "x")
+        scene.fix("bottom", "y")
+        scene.gravity((1.0, -9.81))
+        return tawami.Dynamics(scene, velocity=(0.1, 0.0)), body.x[:, 1] > 0.25
+
+    motion, above = motion_of()
+    motion.step(1e-3)
+    motion.scene.remove(above)
+    archive.write(folder / "state.npz", {}, motion.state(), COMM)
+    other, _ = motion_of()
+    other.restore(archive.read(folder / "state.npz", COMM)[1])
+    one, again = motion.step(1e-3), other.step(1e-3)
+    assert np.array_equal(one.u, again.u)
+    frame = grid_frame(on_grid(OF_GRID[:4], motion), Snapshot(motion, one, 0.0, 1, last=True))
+    rows = np.array(COMM.allgather([len(frame.points), len(frame.cells)]))
+    assert (rows.sum(axis=0) == [25 * 4, 24 * 3]).all()
+    return {"kept u": one.u, "rows": rows.max(axis=0)}
+
+
 def all_of(folder: Path) -> dict[str, np.ndarray]:
-    return slide(folder) | leave() | statics(folder)
+    return slide(folder) | leave() | statics(folder) | kept(folder)
 
 
 if __name__ == "__main__":

@@ -37,6 +37,7 @@ def test_outputs_quantities_and_checkpoints_are_those_of_one_rank(alone, number,
     assert last.max() <= 1.5 * 16 / number  # and has moved by 16, which another rank had
     assert 0 in found.pop("static counts")  # of a body of one cell
     assert 0 < expected["left"][0] < 16
+    assert (found.pop("rows") <= np.ceil(expected["rows"] / number)).all()  # of a file of the grid
     for name, values in found.items():
         close(values, expected[name], name)
     rows = tables(tmp_path)
@@ -49,10 +50,17 @@ def test_outputs_quantities_and_checkpoints_are_those_of_one_rank(alone, number,
         if "-00000" not in path.name or path.name.endswith("4.vtu"):
             one, several = meshio.read(alone[0] / path), meshio.read(tmp_path / path)
             close(several.points, one.points, f"{path}")
+            assert np.array_equal(several.cells[0].data, one.cells[0].data), path
+            if one.cells[0].type == "quad":
+                assert np.array_equal(several.points, one.points), path
             for name, data in one.point_data.items():
                 close(several.point_data[name], data, f"{path}: {name}")
             for name, blocks in one.cell_data.items():
                 close(several.cell_data[name][0], blocks[0], f"{path}: {name}")
+    with np.load(alone[0] / "state.npz") as one, np.load(tmp_path / "state.npz") as several:
+        assert several.files == one.files
+        for name in {*one.files} - {"about.json"}:
+            close(several[name], one[name], name)
     pictures = plot.plot(tmp_path / "slide", movie=None)
     assert pictures
     assert all(path.stat().st_size for path in pictures)

@@ -183,7 +183,8 @@ class Coefficients:
         of_displacement = len(values) == self.num_displacement
         size = list(self.of_grid.values())[0 if of_displacement else -1].stop
         if self.grid.comm.size == 1:
-            return Owned(self.grid.comm, None, values, size)
+            active = self.owner[: len(values)] >= 0
+            return Owned(self.grid.comm, None, np.where(active, values, 0.0), size)
         own = np.flatnonzero(self.own[: len(values)])
         number = self.in_grid[own]
         order = np.argsort(number)

@@ -17,8 +17,8 @@ class Owned:
 
     Args:
         comm: Communicator.
-        number: Number in the whole grid of each coefficient of this rank, ascending; on one rank, where
-            all are present, None.
+        number: Number in the whole grid of each coefficient of this rank, ascending; None on one rank,
+            which has all.
         values: Their values.
         size: Number of coefficients of the whole grid.
     """

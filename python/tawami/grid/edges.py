@@ -12,7 +12,7 @@ from tawami import _rust
 from tawami.base import checks
 from tawami.base.arrays import Array, Indices
 from tawami.base.errors import InputError
-from tawami.base.space import Counts
+from tawami.base.space import Counts, lattice
 from tawami.base.text import position
 from tawami.grid.basis import Basis
 from tawami.grid.grid import Edge, Grid
@@ -60,8 +60,9 @@ def edge_functions(grid: Grid, basis: Basis, edge: Edge) -> Indices:
 def _at_end(basis: Basis, cells: Counts, axis: int, end: int) -> Indices:
     """Numbers of the functions that do not vanish at an end of an axis; read only."""
     shape = [_rust.basis_len(basis, n) for n in cells]
-    numbers = np.arange(np.prod(shape)).reshape(shape, order="F")
-    functions: Indices = np.take(numbers, end, axis=axis)
+    along = [np.arange(n) for n in shape]
+    along[axis] = along[axis][[end]]
+    functions: Indices = lattice(along) @ np.cumprod((1, *shape[:-1]))
     functions.flags.writeable = False
     return functions
 
