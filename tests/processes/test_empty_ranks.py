@@ -59,8 +59,9 @@ def test_outputs_quantities_and_checkpoints_are_those_of_one_rank(alone, number,
                 close(several.cell_data[name][0], blocks[0], f"{path}: {name}")
     with np.load(alone[0] / "state.npz") as one, np.load(tmp_path / "state.npz") as several:
         assert several.files == one.files
-        for name in {*one.files} - {"about.json"}:
-            close(several[name], one[name], name)
+        for name in one.files:
+            if name != "about.json" and not name.startswith("work"):  # cells of the ranks
+                close(several[name], one[name], name)
     pictures = plot.plot(tmp_path / "slide", movie=None)
     assert pictures
     assert all(path.stat().st_size for path in pictures)
