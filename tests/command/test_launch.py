@@ -90,6 +90,7 @@ def test_messages_that_repeat_an_error_are_left_out_and_no_others(size):
             assert printed(error + repeated + other, size) == kept
             assert printed(repeated + error + other, size) == kept
         assert printed(f"progress{error}{repeated}", size).startswith("progresscase.py")
+    assert printed(error + ABORT_5 + "\0", size) == error.replace(f"{ENDED}\n", "")
 
 
 @pytest.mark.parametrize("repeated", [ABORT_4, EXIT_4, ABORT_5, EXIT_5, ABORT_6, EXIT_6])
