@@ -20,9 +20,10 @@ POINTS = line((0.0, 0.0), (2.0, 1.0), 12)
 def held(*components):
     """Means of each component over the same patches, of the displacements of the points."""
     groups = patches(POINTS, 0.3)
-    places = of_components(np.arange(len(POINTS)), 2)
+    every = np.arange(len(POINTS))
+    places = of_components(every, 2)
     vectors = directions(PLANE, components, POINTS.normal)
-    return [means(groups, POINTS.length, d, places, places.size) for d in vectors], groups
+    return [means(groups, POINTS.length, every, d, places, places.size) for d in vectors], groups
 
 
 @pytest.mark.parametrize("components", [("x",), ("normal",), ("x", "y"), ("normal", "tangent")])

@@ -39,17 +39,20 @@ def directions(space: Space, components: Sequence[str], normals: Array) -> Array
     return np.stack(vectors)
 
 
-def means(patches: Patches, weights: Array, functions: Array, places: Indices, size: int) -> Rows:
-    """Means over patches of a sum of unknowns at their points, patches x unknowns.
+def means(
+    patches: Patches, weights: Array, some: Indices, functions: Array, places: Indices, size: int
+) -> Rows:
+    """Part of some points in means over patches of sums of unknowns at points, patches x unknowns.
 
     Args:
         patches: Patches of the points.
         weights: Area of each point [m2].
-        functions: Factors of the unknowns at each point, points x functions.
+        some: Numbers of the points that count.
+        functions: Factors of the unknowns at each of them, points x functions.
         places: Numbers of these unknowns, points x functions.
         size: Number of all unknowns.
     """
     point, function = functions.nonzero()
-    values = patches.shares(weights)[point] * functions[point, function]
-    place = patches.number[point], places[point, function]
+    values = patches.shares(weights)[some[point]] * functions[point, function]
+    place = patches.number[some[point]], places[point, function]
     return Rows.of(*place, values, (patches.count, size))

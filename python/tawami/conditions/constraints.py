@@ -113,18 +113,18 @@ def _on_patches(
     chosen: Mask,
 ) -> HeldBorder:
     """A support on points of the border, held by tractions on patches."""
-    start = domain.layout.whole(start)
     if not support.is_field:
         return HeldBorder(domain, support, step_values.at_points(support, amount), start, chosen)
     assert isinstance(support.place, MovingPoints)
-    place = domain.layout.of_grid[str(support.component)]
-    values = support.place.cells(domain).values(place.basis)
-    now = values @ start[place.slice]
+    place, cells = domain.layout.fields[str(support.component)], support.place.cells(domain)
+
+    def at_points(coefficients: Array) -> Array:
+        return cells.at(place.basis, coefficients[place.slice, None])[:, 0]
+
+    now = at_points(start)
     if fields is None:
         return HeldBorder(domain, support, now, start, chosen)
-    missing = step_values.at_points(support, fields.amount) - (
-        values @ domain.layout.whole(fields.old)[place.slice]
-    )
+    missing = step_values.at_points(support, fields.amount) - at_points(fields.old)
     return HeldBorder(domain, support, now + fields.share * missing, start, chosen)
 
 

@@ -13,14 +13,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from tawami.base.arrays import Array, Mask, of_components
+from tawami.base import ranks
+from tawami.base.arrays import Array, Indices, Mask, of_components
 from tawami.base.errors import SupportWarning
+from tawami.base.rows import Rows
 from tawami.base.warn import warn
 from tawami.border.patches import patches
 from tawami.border.tied import means
 from tawami.conditions.support import Support
 from tawami.domain.domain import Domain
 from tawami.domain.moving_points import MovingPoints
+from tawami.field.border import BorderInCells
+from tawami.field.coefficients import Place
 from tawami.field.constraints import PointHeld
 
 #: Error of a held displacement that is round-off, relative to the largest displacement, and [cells].
@@ -38,7 +42,7 @@ class HeldBorder:
         support: The support.
         values: Prescribed values at its points at the end of the step, counted as `before`: all of
             those at small strain, the increments where particles move.
-        before: Coefficients of the whole grid at the start, which the values include.
+        before: Coefficients at the start, which the values include.
         chosen: Mask of the points that it holds; by default all that it holds by tractions.
     """
 
@@ -55,34 +59,41 @@ class HeldBorder:
         assert isinstance(support.place, MovingPoints)
         #: The support.
         self.support = support
-        self._place, self._domain = support.place, domain
+        self._place, self._domain, self._layout = support.place, domain, domain.layout
         self._weak = weak = np.flatnonzero(support.weak if chosen is None else chosen)
-        place, fields, h = self._place, domain.layout.of_grid, domain.model.grid.h
+        place, layout, h = self._place, domain.layout, domain.model.grid.h
+        fields = layout.fields
         field = fields[str(support.component)] if support.is_field else next(iter(fields.values()))
-        cells = place.cells(domain)
-        numbers, functions, _ = cells.tabulated(field.basis)
         self._field = slice(field.start, field.stop)
-        #: Functions at the points, and their coefficients, points x functions x components.
-        self._functions = functions[weak]
-        self._places = field.start + of_components(numbers[weak], field.components)
         self._directions, self._weights = support.directions(place.normal)[weak], place.weight[weak]
         self._groups = patches(place.now[weak], h)
-        along = (self._functions[:, :, None] * self._directions[:, None]).reshape(len(weak), -1)
-        #: Mean of the held component over each patch, of all coefficients: patches x coefficients.
-        self.means = means(
-            self._groups, self._weights, along, self._places.reshape(len(weak), -1), len(before)
-        )
+        #: Mean of the held component over each patch, of the coefficients of this rank: patches x
+        #: coefficients of the window.
+        self.means = layout.by_owner(self._means(place.cells(domain), field, layout.size))
         #: Prescribed values at its points, and their means over the patches.
         self.values = values[weak]
         self.prescribed_means = self._groups.means(self._weights, self.values)
         self.prescribed = float(np.abs(self.values).max(initial=0.0))
         areas = self._groups.sums(self._weights)
-        #: Derivative of the residual by all coefficients.
+        #: Derivative of the residual by the coefficients of this rank.
         self.gradient = self.means.rows_scaled(areas)
         self._areas, self._before = areas, before
         self._check_bent()
         self._change = np.zeros(len(areas))
         self._tractions = self._held = self._groups.means(self._weights, support.held[weak])
+
+    def _means(self, cells: BorderInCells, field: Place, size: int) -> Rows:
+        """The part of this rank's points in the means."""
+        mine = cells.own[self._weak]
+        some = np.flatnonzero(mine)
+        at = np.searchsorted(np.flatnonzero(cells.own), self._weak[mine])
+        numbers, functions, _ = cells.of_rank.tabulated(field.basis)
+        #: Coefficients of the functions at these points.
+        self._places = field.start + of_components(numbers[at], field.components)
+        along = functions[at][:, :, None] * self._directions[mine][:, None]
+        shape = (len(some), along.shape[1] * along.shape[2])
+        of_points = along.reshape(shape), self._places.reshape(shape)
+        return means(self._groups, self._weights, some, *of_points, size)
 
     def _check_bent(self) -> None:
         """Warn, once, of a border whose points have moved far from the means of their patches."""
@@ -118,11 +129,13 @@ class HeldBorder:
     def forces(self, coefficients: Array) -> Array:
         """See `Term`."""
         self._last = self._before + coefficients
-        self._error = self.means.times(self._last) - self.prescribed_means
+        means = ranks.sum_of(self._layout.grid.comm, self.means.times(self._last))
+        self._error = means - self.prescribed_means
+        #: The part of this rank in the forces on the body.
         self.on_body = -self.gradient.transposed_times(self._tractions)
         return self.on_body
 
-    def stiffness(self) -> None:
+    def stiffness(self, far: Indices) -> None:
         """See `Term`: the forces do not depend on the displacement."""
 
     # -- the tractions as unknowns, see `tawami.solve.bordered` ---------------
@@ -139,13 +152,14 @@ class HeldBorder:
 
     @property
     def measure(self) -> float:
-        """Largest error, relative to the displacement of the functions that reach the border."""
-        error = float(np.abs(self._error).max(initial=0.0))
+        """Largest error, relative to the displacement of the functions that reach the border; a call for
+        all ranks.
+        """
+        error, largest = float(np.abs(self._error).max(initial=0.0)), self._layout.largest
         least = 0.0 if self.support.is_field else ROUND_OFF * self._domain.model.grid.h
-        if error <= max(ALIKE * np.abs(self._last[self._field]).max(initial=0.0), least):
+        if error <= max(ALIKE * largest(self._last[self._field]), least):
             return 0.0
-        near = np.abs(self._last[self._places]).max(initial=0.0)
-        return error / max(self.prescribed, float(near))
+        return error / max(self.prescribed, largest(self._last[self._places]))
 
     def restart(self) -> None:
         """Go back to the tractions of the last step."""
@@ -194,16 +208,19 @@ class HeldBorder:
 
     @property
     def rows(self) -> list[PointHeld]:
-        """The means of the patches as multi-point constraints, to find rigid motions."""
+        """The means of the patches as multi-point constraints, to find rigid motions; a call for all
+        ranks.
+        """
         if self.support.is_field:
             return []
         first = np.unique(self._groups.number, return_index=True)[1]
-        ends = np.searchsorted(self.means.row, np.arange(1, self.num_unknowns))
-        parts = np.split(np.arange(len(self.means.row)), ends)
+        means = self._layout.gathered(self.means)
+        ends = np.searchsorted(means.row, np.arange(1, self.num_unknowns))
+        parts = np.split(np.arange(len(means.row)), ends)
         return [
             PointHeld(
-                self.means.column[mine],
-                self.means.values[mine],
+                means.column[mine],
+                means.values[mine],
                 0.0,
                 f"{self.support}",
                 (float(x[0]), float(x[1])),

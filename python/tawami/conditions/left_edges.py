@@ -51,8 +51,7 @@ def taken_over(domain: Domain, supports: Iterable[Support], forces: Array) -> It
         normal = np.zeros_like(x)
         normal[:, across] = 1.0 if end else -1.0
         cells = BorderInCells(grid, domain.active, x, normal, f"{support}")
-        functions = cells.values(domain.layout.basis)
-        sums = functions.T @ support.place.weight[mask]
-        in_grid = domain.layout.whole(forces.ravel()).reshape(-1, forces.shape[1])
-        tractions = np.divide(in_grid[:, axis], sums, out=np.zeros_like(sums), where=sums > 0)
-        support.held[mask] = -sign * (functions @ tractions)
+        layout, on_axis = domain.layout, np.ascontiguousarray(forces[:, axis, None])
+        sums = cells.sums(layout.functions, layout.basis, support.place.weight[mask, None])
+        tractions = np.divide(on_axis, sums, out=np.zeros_like(sums), where=sums > 0)
+        support.held[mask] = -sign * cells.at(layout.basis, tractions)[:, 0]

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.base.errors import SupportError
 from tawami.base.shared_file import picked
@@ -208,9 +209,8 @@ class Loads(Owner[Load]):
     def at_start(self, domain: Domain, now: Moment) -> Array:
         """All external forces, with those of pressures that follow the border."""
         total = self.external(domain, now)
-        for term in self.following(domain, now):
-            total += domain.layout.part(term.forces(np.zeros(domain.layout.size_of_grid)))
-        return total
+        parts = [term.forces(0 * total) for term in self.following(domain, now)]
+        return total + domain.layout.sum(sum(parts, 0 * total))
 
     def keep_balance(self, forces: Array) -> None:
         """Add forces on all coefficients that fade from now on [N per metre depth]."""
@@ -220,7 +220,9 @@ class Loads(Owner[Load]):
     def follow(self, before: Layout, after: Layout) -> None:
         """Keep forces that fade where cells have changed their rank; a call for all ranks."""
         if self.unbalanced is not None and after.window is not before.window:
-            self.unbalanced = after.part(before.whole(self.unbalanced))
+            mine = before.own
+            of = self.grid.comm, before.in_grid[mine], self.unbalanced[mine], after.in_grid
+            self.unbalanced = ranks.looked_up(*of)
 
     def _acting(self, now: Moment) -> Iterator[tuple[Load, Term, float]]:
         """The terms with their factors, but for those that are zero."""

@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from tawami.base.arrays import Array, Mask
+from tawami.base import ranks
+from tawami.base.arrays import Array, Indices, Mask
 from tawami.base.errors import SupportError
 from tawami.border.contact import OPEN, Contact, ContactForces, Multipliers
 from tawami.border.rigid import Pose
@@ -45,8 +46,7 @@ class ObstacleContact:
         domain: The particles at its start.
         obstacle: The obstacle.
         motion: Its motion in the step.
-        before: Displacement coefficients of the whole grid since the start where particles do not move,
-            else 0.
+        before: Displacement coefficients since the start where particles do not move, else 0.
     """
 
     first_work = 0.0
@@ -55,7 +55,7 @@ class ObstacleContact:
         self, domain: Domain, obstacle: Obstacle, motion: ObstacleMotion, before: Array
     ) -> None:
         self.obstacle, self.motion = obstacle, motion
-        self._dim = domain.model.space.dim
+        self._dim, self._layout = domain.model.space.dim, domain.layout
         self._border = BorderNear(
             domain, obstacle.place, obstacle.shape, motion.start, before,
             motion.slope / motion.factor, obstacle.groups,
@@ -151,16 +151,23 @@ class ObstacleContact:
         return not is_held and bool((self.now.state == OPEN).all())
 
     def _forces_at_start(self) -> tuple[Array, Array]:
-        """Forces at the start of the step: on all coefficients, and on the obstacle."""
+        """Forces at the start of the step: those of this rank on all coefficients, and on the
+        obstacle.
+        """
         x, held = self._border.x[self._border.points], self._held
         now = self._contact.evaluate(x, self.motion.start, held)
         now = replace(now, pressure=held.pressure, traction=held.traction)
         return self._border.on_all(now.forces), now.resultant
 
-    def stiffness(self) -> sp.csr_matrix:
+    @property
+    def far(self) -> Indices:
+        """See `ContactTerm`."""
+        return self._border.far
+
+    def stiffness(self, far: Indices) -> sp.csr_matrix:
         """See `Term`. Its entries are in the same places as long as no patch comes near."""
         self.now = self._states.linearised(self.now)
-        return self._border.on_coefficients(-self.motion.factor * self.now.derivatives)
+        return self._border.on_coefficients(-self.motion.factor * self.now.derivatives, far)
 
     def improve(self) -> bool:
         """See `ContactTerm`."""
@@ -215,7 +222,7 @@ class ObstacleContact:
 
     @property
     def jump(self) -> Array:
-        """Contact forces at the end of a dynamic step, less those at its start."""
+        """Contact forces of this rank at the end of a dynamic step, less those at its start."""
         return np.asarray(self.at_end - self.at_start[0])
 
     @property
@@ -226,14 +233,16 @@ class ObstacleContact:
     def energies(self, u: Array) -> tuple[float, float, float]:
         """Work on body and obstacle from outside, dissipation by friction, and loss by impact.
 
+        A call for all ranks.
+
         Args:
-            u: Increments of the displacement, in the whole grid.
+            u: Increments of the displacement.
         """
         q, free, resultant = self.motion.unknown, self.motion.free, self.now.resultant
         external = float(self.motion.force[free] @ q[free] - resultant[~free] @ q[~free])
         friction = float(self.now.dissipation.sum())
-        closed = float(self.at_end[: u.size] @ u.ravel() + resultant @ q)
-        return external, friction, -closed - friction
+        on_body = ranks.total(self._layout.grid.comm, float(self.at_end[: u.size] @ u.ravel()))
+        return external, friction, -on_body - float(resultant @ q) - friction
 
     # -- unknowns of its own, see `tawami.solve.bordered` ---------------------
 
@@ -264,11 +273,9 @@ class ObstacleContact:
     def blocks(self) -> Blocks:
         """Derivatives of the equations of body and obstacle by each other's unknowns."""
         free, factor, now = self.motion.free, self.motion.factor, self.now
-        of_body = np.zeros((self._border.size, self.num_unknowns))
-        of_body[: self._border.n] = -factor * (self._border.at_points.T @ now.by_motion[:, free])
-        by_body = np.zeros((self.num_unknowns, self._border.size))
-        rows = now.resultant_by_positions[free]
-        by_body[:, : self._border.n] = -factor * (self._border.at_points.T @ rows.T).T
+        transposed = self._border.at_points.csr.T
+        of_body = -factor * (transposed @ now.by_motion[:, free])
+        by_body = -factor * (transposed @ now.resultant_by_positions[free].T).T
         own = self.motion.stiffness - factor * now.resultant_by_motion[np.ix_(free, free)]
         return Blocks(of_body, by_body, own)
 
@@ -320,7 +327,10 @@ class ObstacleContact:
 
     @property
     def rows(self) -> list[PointHeld]:
-        """Means over patches that push, as constraints that find rigid motions in statics."""
+        """Means over patches that push, as constraints that find rigid motions in statics.
+
+        A call for all ranks.
+        """
         if self.motion.free.any():
             return []
         now = self._contact.evaluate(
@@ -329,13 +339,16 @@ class ObstacleContact:
         rows, directions = [], [now.surface.normal]
         if self.obstacle.friction > 0:
             directions += list(now.tangent.transpose(1, 0, 2))
-        shares = now.contact.shares
+        shares, at_points = now.contact.shares, self._layout.gathered(self._border.at_points)
+        number, column = np.unique(at_points.column, return_inverse=True)
+        at_points = replace(at_points, column=column, shape=(at_points.shape[0], len(number)))
         for k in np.flatnonzero(now.pressure):
             mine = now.contact.patches.number == k
             x, y = now.x[mine][0]
             for direction in directions:
                 along = (mine * shares)[:, None] * direction
-                weights = self._border.at_points.T @ along.ravel()
-                indices = np.flatnonzero(weights)
-                rows.append(PointHeld(indices, weights[indices], 0.0, f"{self.obstacle}", (x, y)))
+                weights = at_points.transposed_times(along.ravel())
+                some = np.flatnonzero(weights)
+                of = number[some], weights[some]
+                rows.append(PointHeld(*of, 0.0, f"{self.obstacle}", (x, y)))
         return rows

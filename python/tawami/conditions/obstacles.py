@@ -131,7 +131,7 @@ class Obstacles(Owner[Obstacle]):
         found = []
         for obstacle in self.all:
             motion = obstacle.motion(now, gravity, times)
-            contact = ObstacleContact(domain, obstacle, motion, domain.layout.whole(before))
+            contact = ObstacleContact(domain, obstacle, motion, before)
             if begins and motion.free.any():
                 forces, free = motion.force + contact.at_start[1], motion.free
                 zero = np.zeros_like(forces)
@@ -206,8 +206,8 @@ def _check_place(
         InputError: It does, or a function that gives it is no distance at the border.
     """
     layout, h = domain.layout, domain.model.grid.h
-    u = domain.model.space.vectors(layout.whole(total[: layout.num_displacement]))
-    x = place.x + place.cells(domain).values(layout.basis) @ u
+    u = domain.model.space.vectors(total[: layout.num_displacement])
+    x = place.x + place.cells(domain).at(layout.basis, u)
     if isinstance(shape, Function):
         shape.check(x)
     distance = shape.evaluate(x).distance

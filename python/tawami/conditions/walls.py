@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tawami.base import ranks
 from tawami.base.arrays import Array, Indices, Mask, of_components
 from tawami.base.errors import InputError
 from tawami.border.shapes import HalfPlane, half_plane
@@ -178,13 +179,15 @@ class Wall:
         return self.grid.space.dim * self.functions[self.state.touching] + across
 
     def of_border(self, domain: Domain) -> Mask:
-        """Mask of its functions that the border of the body reaches: they belong to the obstacle."""
-        num, dim = domain.layout.num_displacement_of_grid, self.grid.space.dim
-        reached = np.zeros(num // dim, dtype=bool)
-        if self.obstacle is not None:
-            cells = self.obstacle.place.cells(domain, torn=True)
-            reached[cells.tabulated(self.basis)[0][~cells.lost]] = True
-        return np.asarray(reached[self.functions])
+        """Mask of its functions that the border of the body reaches: they belong to the obstacle; a call
+        for all ranks.
+        """
+        if self.obstacle is None:
+            return np.zeros(len(self.functions), dtype=bool)
+        cells = self.obstacle.place.cells(domain, torn=True)
+        functions = cells.of_rank.tabulated(self.basis)[0][~cells.lost[cells.own]]
+        in_grid = domain.layout.window.in_grid(self.basis, functions.ravel())
+        return ranks.any_of(self.grid.comm, np.isin(self.functions, in_grid))
 
     def prescribed(self, fixed: Sequence[Indices]) -> Mask:
         """Whether other supports prescribe its components, functions x dim.

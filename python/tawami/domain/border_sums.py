@@ -71,10 +71,9 @@ class BorderSums(Mapping[str, Array]):
             raise KeyError(name)
         if self._model.moves:
             return np.asarray((self._points.x - self._points.made.x)[:, self._axis[name]])
-        total = domain.layout.whole(self._total()[: domain.layout.num_displacement])
-        u = self._model.space.vectors(total)
-        cells = self._points.cells(domain)
-        return np.asarray(cells.values(domain.layout.basis) @ u[:, self._axis[name]])
+        layout, axis = domain.layout, self._axis[name]
+        u = self._model.space.vectors(self._total()[: layout.num_displacement])
+        return self._points.cells(domain).at(layout.basis, u[:, axis, None])[:, 0]
 
     def __iter__(self) -> Iterator[str]:
         return iter([*self._axis, *self._given])

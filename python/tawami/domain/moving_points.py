@@ -340,7 +340,8 @@ def moved(
     x, area = (np.concatenate([getattr(p, name) for p in all_points]) for name in ("x", "area"))
     normal = area / np.sqrt((area**2).sum(axis=1))[:, None]
     cells = BorderInCells(grid, domain.active, x, normal, torn=True)
-    flat = layout.whole(np.ascontiguousarray(u).ravel())
-    x, area = _rust.carried(cells.location, layout.basis, flat, x, area, cells.lost)
+    mine, flat = cells.own, np.ascontiguousarray(u).ravel()
+    of = x[mine], area[mine], cells.lost[mine]
+    x, area = map(cells.on_all, _rust.carried(cells.of_rank.location, layout.basis, flat, *of))
     ends = np.cumsum([0, *map(len, all_points)])
     return [(x[a:b], area[a:b]) for a, b in itertools.pairwise(ends)]

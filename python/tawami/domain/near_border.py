@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from tawami.base.arrays import Array, Indices, Mask, of_components
+from tawami.base.arrays import Array, Indices, Mask, of_components, sums_at
 from tawami.base.places import Places
+from tawami.base.rows import Rows
 from tawami.border.patches import Patches, patches
 from tawami.border.rigid import Pose
 from tawami.border.shapes import Shape
@@ -23,6 +24,9 @@ SHORTEST, LONGEST = 0.7, 2.2
 class BorderNear:
     """Patches of a part of the border, of which those near an obstacle are evaluated.
 
+    Each rank evaluates functions of the grid at the points in its cells. A patch may have points in
+    cells of several ranks: one of them has its stiffness.
+
     Args:
         domain: The particles at the start of the step.
         place: The part.
@@ -36,7 +40,7 @@ class BorderNear:
 
     Attributes:
         h: Side of a cell [m].
-        n, size: Number of coefficients of the displacement in the whole grid, and of all fields.
+        n, size: Number of coefficients of the displacement in the window, and of all fields.
         x: Positions of all points at the start [m], points x dim.
         start: The same in the frame of the obstacle.
         distance: Their distances from it [m].
@@ -46,11 +50,16 @@ class BorderNear:
         chosen: Which patches are evaluated.
         points: Numbers of their points.
         patches: The same patches of these points.
+        mine: Which of them have their stiffness on this rank.
+        far: Numbers in the whole grid of coefficients that they couple, and that have no place in the
+            window.
     """
 
     chosen: Mask
     points: Indices
     patches: Patches
+    mine: Mask
+    far: Indices
 
     def __init__(
         self,
@@ -63,9 +72,12 @@ class BorderNear:
         groups: Patches | None = None,
     ) -> None:
         self.h, self._dim = domain.model.grid.h, domain.model.space.dim
-        self.n, self.size = domain.layout.num_displacement_of_grid, domain.layout.size_of_grid
-        cells = place.cells(domain)
-        self._numbers, self._values, _ = cells.tabulated(domain.layout.basis)
+        self._layout = layout = domain.layout
+        self.n, self.size = layout.num_displacement, layout.size
+        self._cells = cells = place.cells(domain)
+        #: Points of this rank, and functions at them.
+        self._own = np.flatnonzero(cells.own)
+        self._numbers, self._values, _ = cells.of_rank.tabulated(layout.basis)
         self.x = place.x
         self.x = self.positions(before)
         self.start = pose.to_local(self.x)
@@ -91,9 +103,9 @@ class BorderNear:
         return patches(place.now, self.h)
 
     def positions(self, coefficients: Array) -> Array:
-        """Positions of all points at increments of the displacement [m]."""
+        """Positions of all points at increments of the displacement [m]; a call for all ranks."""
         u = coefficients[: self.n].reshape(-1, self._dim)[self._numbers]
-        return np.asarray(self.x + np.matmul(self._values[:, None], u)[:, 0])
+        return np.asarray(self.x + self._cells.on_all(np.matmul(self._values[:, None], u)[:, 0]))
 
     def choose(self, points: Mask) -> None:
         """Evaluate the patches of further points from now on."""
@@ -102,18 +114,38 @@ class BorderNear:
         self.points = np.flatnonzero(self.chosen[number])
         new_number = np.cumsum(self.chosen) - 1
         self.patches = Patches(new_number[number[self.points]], int(self.chosen.sum()))
-        of = self._numbers[self.points], self._values[self.points]
-        self._places, self._of_points = of_components(of[0], self._dim), of[1][..., None]
-        self._coupled = _Coupled(*of, self.patches)
+        #: Those of this rank among the chosen points.
+        self._here = np.flatnonzero(self._cells.own[self.points])
+        at = np.searchsorted(self._own, self.points[self._here])
+        self._places = of_components(self._numbers[at], self._dim)
+        self._of_points = self._values[at][..., None]
+        self._couple()
+
+    def _couple(self) -> None:
+        """Find the functions that the patches of this rank couple."""
+        points, inside = self.patches.table
+        self.mine = self._cells.own[self.points[points[:, 0]]]
+        used, at = np.unique(points[self.mine], return_inverse=True)
+        basis, window = self._layout.basis, self._layout.window
+        of = self._cells.functions(basis, self.points[used])
+        self._coupled = _Coupled(*of, at.reshape(points[self.mine].shape), inside[self.mine])
+        place = window.functions(basis, self._coupled.numbers)
+        known = (place >= 0) & window.has_support(basis)[place]
+        in_grid, in_window = (of_components(of, self._dim) for of in (self._coupled.numbers, place))
+        #: Numbers of the coefficients in the whole grid, and places of those that are known here.
+        self._in_grid, self._in_window = in_grid, np.where(known[:, None], in_window, -1)
+        self.far = in_grid[~known].ravel()
 
     @property
-    def at_points(self) -> sp.csr_matrix:
-        """Displacements of the chosen points, from the coefficients of the displacement."""
-        rows = np.arange(self.points.size * self._dim).reshape(-1, 1, self._dim)
+    def at_points(self) -> Rows:
+        """Displacements of the chosen points, from the coefficients of the displacement: those of this
+        rank's points.
+        """
+        rows = self._dim * self._here[:, None, None] + np.arange(self._dim)
         places = np.broadcast_arrays(rows, self._places)
         values = np.broadcast_to(self._of_points, self._places.shape)
-        entries = (values.ravel(), (places[0].ravel(), places[1].ravel()))
-        return sp.csr_matrix(entries, shape=(rows.size, self.n))
+        shape = (self._dim * len(self.points), self.size)
+        return Rows.of(places[0].ravel(), places[1].ravel(), values.ravel(), shape)
 
     def reached(self, local: Array) -> Mask:
         """Points of other patches that may have come to the obstacle since the start of the step.
@@ -125,19 +157,23 @@ class BorderNear:
         return np.asarray((self.distance <= moved) & ~self.chosen[self.groups.number])
 
     def on_all(self, forces: Array) -> Array:
-        """Forces on the chosen points as forces on all coefficients."""
-        shares = self._of_points * forces[:, None]
-        return np.asarray(np.bincount(self._places.ravel(), shares.ravel(), self.size), dtype=float)
+        """Forces on the chosen points as forces on all coefficients: the part of this rank's points."""
+        shares = self._of_points * forces[self._here][:, None]
+        return sums_at(self._places.ravel(), shares.ravel(), self.size)
 
-    def on_coefficients(self, derivatives: Array) -> sp.csr_matrix:
-        """Derivatives of forces on the chosen points of each patch as a matrix on all coefficients.
+    def on_coefficients(self, derivatives: Array, far: Indices) -> sp.csr_matrix:
+        """Derivatives of forces on the chosen points of each patch as a matrix on all coefficients: the
+        part of this rank's patches.
 
         Its entries are in the same places until further points are chosen.
 
         Args:
             derivatives: As `ContactForces.derivatives`.
+            far: As `Term.stiffness`.
         """
-        return self._coupled.matrix(derivatives, self.size)
+        further = self.size + np.searchsorted(far, self._in_grid)
+        places = np.where(self._in_window < 0, further, self._in_window)
+        return self._coupled.matrix(derivatives[self.mine], places, self.size + len(far))
 
 
 class _Coupled:
@@ -145,12 +181,18 @@ class _Coupled:
 
     Args:
         numbers, values: Functions at each point, points x functions.
-        patches: Patches of the points.
+        points: Points of each patch, patches x points; see `Patches.table`.
+        inside: 1 for each of them, 0 for those that fill up.
+
+    Attributes:
+        numbers: Numbers of all of these functions.
     """
 
-    def __init__(self, numbers: Indices, values: Array, patches: Patches) -> None:
-        points, inside = patches.table
-        of_patch = numbers[points].reshape(patches.count, points.shape[1] * numbers.shape[1])
+    def __init__(self, numbers: Indices, values: Array, points: Indices, inside: Array) -> None:
+        count = len(points)
+        self.numbers, place = np.unique(numbers, return_inverse=True)
+        numbers = place.reshape(numbers.shape)
+        of_patch = numbers[points].reshape(count, points.shape[1] * numbers.shape[1])
         order = np.argsort(of_patch, axis=1, kind="stable")
         inverse = np.argsort(order, axis=1, kind="stable")
         ranked = np.take_along_axis(of_patch, order, axis=1)
@@ -159,17 +201,23 @@ class _Coupled:
         #: Functions that each patch touches, filled up with its first one, patches x functions.
         width = int(local.max(initial=-1)) + 1
         self._functions = np.repeat(ranked[:, :1], width, axis=1)
-        patch = np.arange(patches.count)[:, None]
+        patch = np.arange(count)[:, None]
         self._functions[np.broadcast_to(patch, local.shape), local] = of_patch
         #: Values of these at its points, patches x points x functions.
         self._values = np.zeros((*points.shape, width))
         at = local.reshape(*points.shape, numbers.shape[1])
         place = np.arange(points.shape[1])[:, None]
         self._values[patch[..., None], place, at] = values[points] * inside[..., None]
-        self._entries: Places | None = None
+        self._entries: tuple[Indices, Places] | None = None
 
-    def matrix(self, derivatives: Array, size: int) -> sp.csr_matrix:
-        """The matrix on all coefficients, of derivatives on the points of each patch."""
+    def matrix(self, derivatives: Array, places: Indices, size: int) -> sp.csr_matrix:
+        """The matrix on all coefficients, of derivatives on the points of each patch.
+
+        Args:
+            derivatives: The derivatives.
+            places: Coefficients of the functions, functions x dim.
+            size: Number of all coefficients.
+        """
         values, dim = self._values, derivatives.shape[2]
         count, num, width = values.shape
         if not count:
@@ -178,8 +226,8 @@ class _Coupled:
         half = half.reshape(count, num, -1).transpose(0, 2, 1)
         blocks = np.matmul(half, values).reshape(count, dim, dim, width, width)
         blocks = blocks.transpose(0, 4, 1, 3, 2)
-        if self._entries is None:
-            index = of_components(self._functions, dim).reshape(count, -1)
+        if self._entries is None or not np.array_equal(self._entries[0], places):
+            index = places[self._functions].reshape(count, -1)
             rows, columns = np.broadcast_arrays(index[:, :, None], index[:, None])
-            self._entries = Places(rows.ravel(), columns.ravel(), (size, size))
-        return self._entries.matrix(blocks.ravel())
+            self._entries = places, Places(rows.ravel(), columns.ravel(), (size, size))
+        return self._entries[1].matrix(blocks.ravel())

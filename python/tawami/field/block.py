@@ -84,9 +84,10 @@ class Block(Unknowns):
         matrix.written()
         return matrix.summed()
 
-    def of_window(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
-        """See `Unknowns`; A is on the coefficients of all fields."""
-        return super().of_window(matrix[self._place.slice][:, self._place.slice])
+    def of_window(self, matrix: sp.csr_matrix, far: Indices | None = None) -> sp.csr_matrix:
+        """See `Unknowns`; A is on the coefficients of all fields, and those far are of this one."""
+        mine = np.r_[self._place.slice, self.layout.size : matrix.shape[0]]
+        return super().of_window(matrix[mine][:, mine], far)
 
     def prolongations(self) -> list[Any]:
         """Matrices from the unknowns of a coarser grid to those of the next finer one, the finest first.

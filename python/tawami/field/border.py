@@ -81,8 +81,11 @@ class PointsInCells:
         return sp.csr_matrix(entries, shape=(len(numbers), count))
 
 
-class BorderInCells(PointsInCells):
-    """Points of a border in the cells of a grid, the same on every rank. Making it is a collective call.
+class BorderInCells:
+    """Points of a border in the cells of a grid. Making it is a collective call.
+
+    The points are the same on every rank. Functions and fields at a point are evaluated by the rank that
+    has its cell.
 
     Args:
         grid: The grid.
@@ -94,7 +97,7 @@ class BorderInCells(PointsInCells):
 
     Attributes:
         grid: The grid.
-        location: Cells and positions in them.
+        location: Cells of the whole grid and positions in them.
         lost: Whether each point has no particles near it; its cell has no meaning then.
 
     Raises:
@@ -121,7 +124,10 @@ class BorderInCells(PointsInCells):
             self.lost = lost > 0
         if self.lost.any() and not torn:
             raise _far_from_particles(grid, x, self.lost, where)
-        super().__init__(grid, grid.rust.place_at(cell, x))
+        self.grid, self.location = grid, grid.rust.place_at(cell, x)
+
+    def __len__(self) -> int:
+        return len(self.location)
 
     @functools.cached_property
     def here(self) -> Indices:
@@ -145,13 +151,45 @@ class BorderInCells(PointsInCells):
             Functions of the window x columns.
         """
         mine = np.ascontiguousarray(values[self.own])
-        return functions.sums(self.of_rank, np.ones(len(mine)), mine, basis)
+        return functions.sums(self.of_rank.location, np.ones(len(mine)), mine, basis)
 
     @functools.cached_property
-    def of_rank(self) -> _rust.Location:
+    def of_rank(self) -> PointsInCells:
         """The points in cells of this rank, in its window."""
-        cell = self.here[self.own].astype(np.uint32)
-        return self.grid.window.rust.place(cell, np.asarray(self.location.xi)[self.own])
+        window, cell = self.grid.window, self.here[self.own].astype(np.uint32)
+        location = window.rust.place(cell, np.asarray(self.location.xi)[self.own])
+        return PointsInCells(self.grid, location, window.cells)
+
+    def on_all(self, of_rank: Array) -> Array:
+        """Values at all points, from those at the points of each rank; a collective call."""
+        if self.grid.comm.size == 1:
+            return of_rank
+        place = np.flatnonzero(self.own)
+        return ranks.scattered(self.grid.comm, len(self), place, np.ascontiguousarray(of_rank))
+
+    def at(self, basis: Basis, values: Array) -> Array:
+        """A field at all points, points x columns; a collective call.
+
+        Args:
+            basis: Its functions.
+            values: Of the functions of the window, functions x columns.
+        """
+        return self.on_all(np.asarray(self.of_rank.values(basis) @ values))
+
+    def functions(self, basis: Basis, some: Indices) -> tuple[Indices, Array]:
+        """Functions at some points: their numbers in the whole grid and their values.
+
+        Args:
+            basis: The basis.
+            some: Numbers of the points, in cells of any rank.
+
+        Returns:
+            Points x functions, twice.
+        """
+        cell = self.location.cell[some]
+        location = self.grid.rust.place(cell, np.asarray(self.location.xi)[some])
+        numbers, values, _ = _rust.functions_at(location, basis)
+        return numbers, values
 
 
 def _far_from_particles(grid: Grid, x: Array, lost: Mask, where: str) -> SupportError:

@@ -14,6 +14,7 @@ from tawami import _rust
 from tawami.base import ranks
 from tawami.base.arrays import Array, Indices, Mask, of_components
 from tawami.base.exchange import Exchange
+from tawami.base.rows import Rows
 from tawami.field.functions import ActiveFunctions
 from tawami.field.owned import Owned
 from tawami.form.fields import Field
@@ -207,5 +208,44 @@ class Coefficients:
         )
 
     def sum(self, of_cells: Array) -> Array:
-        """The sum over all ranks of vectors of coefficients from their cells; a collective call."""
-        return self.exchange.add(np.ascontiguousarray(of_cells))
+        """The sum over all ranks of vectors of coefficients from their cells; a collective call.
+
+        Args:
+            of_cells: On the coefficients of the window, or on those of the displacement.
+        """
+        values = np.ascontiguousarray(of_cells)
+        if len(values) == self.size:
+            return self.exchange.add(values)
+        place = next(iter(self.fields.values()))
+        vectors = values.reshape(place.num_functions, place.components, *values.shape[1:])
+        return self.functions.exchange(place.basis).add(vectors).reshape(values.shape)
+
+    def gathered(self, rows: Rows) -> Rows:
+        """A matrix on the coefficients of the whole grid, on every rank; a collective call.
+
+        Args:
+            rows: The parts of the ranks, on the coefficients of their windows.
+        """
+        row, number, values = (
+            ranks.allgathered(self.grid.comm, part)
+            for part in (rows.row, self.in_grid[rows.column], rows.values)
+        )
+        return Rows.of(row, number, values, (rows.shape[0], self.size_of_grid))
+
+    def by_owner(self, rows: Rows) -> Rows:
+        """A matrix on the coefficients of the window: each entry on the rank that owns its coefficient.
+
+        A collective call.
+
+        Args:
+            rows: The parts of the ranks, whose sum is the matrix.
+        """
+        comm = self.grid.comm
+        if comm.size == 1:
+            return rows
+        to = self.owner[rows.column]
+        row, number, values = (
+            ranks.exchanged(comm, part, to)
+            for part in (rows.row, self.in_grid[rows.column], rows.values)
+        )
+        return Rows.of(row, self.places(number), values, rows.shape)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from tawami.base.arrays import Array, of_components
+from tawami.base.arrays import Array, Indices, of_components
 from tawami.border.points import transformed
 from tawami.field.border import BorderInCells
 from tawami.field.layout import Layout
@@ -18,6 +18,8 @@ from tawami.field.layout import Layout
 
 class FollowerPressure:
     """A pressure on border points, as forces that depend on the displacement (`tawami.solve.terms`).
+
+    Each rank evaluates the points in its cells.
 
     Args:
         layout: Places of the coefficients.
@@ -41,9 +43,12 @@ class FollowerPressure:
         rate: Array | float = 0.0,
     ) -> None:
         self._layout, self._space = layout, layout.grid.space
-        self._x, self._area, self._pressure = x, area, pressure
-        self._start, self._rate = pressure, rate
-        self._tabulated = cells.tabulated(layout.basis)
+        #: Whether it changes along a path.
+        self.grows = bool(np.any(rate))
+        mine = cells.own
+        self._x, self._area, self._start = x[mine], area[mine], pressure[mine]
+        self._pressure, self._rate = self._start, np.broadcast_to(rate, pressure.shape)[mine]
+        self._tabulated = cells.of_rank.tabulated(layout.basis)
 
     def load(self, share: float) -> None:
         """Add a share of the loads of a path to the pressure at the start of the step."""
@@ -55,7 +60,7 @@ class FollowerPressure:
     def _at(self, coefficients: Array) -> tuple[Array, Array, Array]:
         """f^-T and cof(f) n0 dA0 in the plane at the points, and their thickness."""
         numbers, values, gradients = self._tabulated
-        u = self._space.vectors(coefficients[: self._layout.num_displacement_of_grid])[numbers]
+        u = self._space.vectors(coefficients[: self._layout.num_displacement])[numbers]
         f = np.einsum("pfi,pfj->pij", u, gradients) + np.eye(self._space.dim)
         inverse = np.linalg.inv(f).transpose(0, 2, 1)
         moved = self._x + np.einsum("pf,pfi->pi", values, u)
@@ -67,26 +72,21 @@ class FollowerPressure:
         return self._of(self._pressure)
 
     @property
-    def grows(self) -> bool:
-        """Whether it changes along a path."""
-        return bool(np.any(self._rate))
-
-    @property
     def rate(self) -> Array:
         """Derivative of the last forces by the load factor of a path."""
         return self._of(self._rate)
 
-    def _of(self, pressure: Array | float) -> Array:
-        """Forces of a pressure at the last displacement, on all coefficients."""
+    def _of(self, pressure: Array) -> Array:
+        """Forces of a pressure at the last displacement, as :meth:`forces`."""
         numbers, values, _ = self._tabulated
         on_points = -(pressure * self._thickness)[:, None] * self._now
-        forces = np.zeros(self._layout.size_of_grid)
+        forces = np.zeros(self._layout.size)
         np.add.at(
             forces, of_components(numbers, self._space.dim), values[:, :, None] * on_points[:, None]
         )
         return forces
 
-    def stiffness(self) -> sp.csr_matrix:
+    def stiffness(self, far: Indices) -> sp.csr_matrix:
         """See `Term`: d(cof(f) a)_i = (B_jl b_i - B_il b_j) df_jl, B = f^-T and b = cof(f) a."""
         numbers, values, gradients = self._tabulated
         slope = np.einsum("pjl,pi->pijl", self._inverse, self._now)
@@ -95,9 +95,9 @@ class FollowerPressure:
         if self._space.hoop:
             by_u[:, :, 0] += 2 * np.pi * self._now[:, :, None] * values[:, None]
         local = np.einsum("p,pf,pijg->pfigj", self._pressure, values, by_u)
-        size = self._layout.size_of_grid
-        of = of_components(numbers, self._space.dim).reshape(len(numbers), -1)
-        width = of.shape[1]
+        size = self._layout.size + len(far)
+        width = self._space.dim * numbers.shape[1]
+        of = of_components(numbers, self._space.dim).reshape(len(numbers), width)
         rows, columns = np.repeat(of, width, axis=1), np.tile(of, width)
         entries = (local.ravel(), (rows.ravel(), columns.ravel()))
         return sp.coo_matrix(entries, shape=(size, size)).tocsr()

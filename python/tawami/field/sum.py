@@ -8,6 +8,7 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 from tawami.base import ranks
+from tawami.base.arrays import Indices
 from tawami.base.petsc import Handles, add_rows, aij
 from tawami.base.places import same_places
 from tawami.field.reduction import Reduction
@@ -28,19 +29,23 @@ class Sum:
         self._rows: sp.csr_matrix | None = None
 
     def of(
-        self, tangent: Any, matrix: sp.csr_matrix, reduction: Reduction, *, of_grid: bool = False
+        self,
+        tangent: Any,
+        matrix: sp.csr_matrix,
+        reduction: Reduction,
+        far: Indices | None = None,
     ) -> Any:
         """The sum: the same object as long as the tangent is the same and the matrix has its pattern.
 
         Args:
             tangent: A reduced tangent.
-            matrix: A, or the part of this rank. If its values change it must be another object.
+            matrix: The part of this rank in A. If its values change it must be another object.
             reduction: S.
-            of_grid: Whether it is A, on coefficients of the whole grid.
+            far: See `Unknowns.of_window`.
         """
         known, same = self._petsc, self._tangent is tangent
         if not same or self._matrix is not matrix:
-            rows = (reduction.of_grid if of_grid else reduction.of_window)(matrix)
+            rows = reduction.of_window(matrix, far)
             differs = not (same and same_places(self._rows, rows))
             same = not ranks.anywhere(self._comm, differs)
             self._rows = rows

@@ -79,21 +79,30 @@ class Unknowns:
         """S^T A S in the unknowns that this rank knows, A on the coefficients of the window."""
         return (self._transposed @ matrix @ self.selection).tocsr()
 
-    def of_window(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
+    def of_window(self, matrix: sp.csr_matrix, far: Indices | None = None) -> sp.csr_matrix:
         """This rank's rows of S^T A S, A the sum over the ranks of matrices on their windows.
 
         A collective call.
+
+        Args:
+            matrix: That of this rank.
+            far: Numbers in the whole grid of coefficients that follow those of the window in it; None
+                on all ranks if no rank has any.
         """
-        part = self.reduced(matrix)
         if self._comm.size == 1:
-            return part
+            return self.reduced(matrix)
+        if far is None:
+            part, number = self.reduced(matrix), self.number
+        else:
+            s, number = self._wider(far)
+            part = _product(s, matrix).tocsr()
         own = (self.num_own, self.size)
-        numbers = PETSc.LGMap().create(self.number.astype(PETSc.IntType), comm=self._comm)
+        numbers = PETSc.LGMap().create(number.astype(PETSc.IntType), comm=self._comm)
         # by name: their position depends on the version of petsc4py
         unassembled = PETSc.Mat().createIS(
             (own, own), lgmapr=numbers, lgmapc=numbers, comm=self._comm
         )
-        local = aij(PETSc.COMM_SELF, part, len(self.number))
+        local = aij(PETSc.COMM_SELF, part, len(number))
         unassembled.setISLocalMat(local)
         unassembled.assemble()
         found = unassembled.convert("aij", PETSc.Mat())
@@ -102,53 +111,43 @@ class Unknowns:
             handle.destroy()
         return rows
 
-    def of_grid(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
-        """This rank's rows of S^T A S, A on some coefficients of the grid and the same on every rank.
-
-        A collective call.
-        """
-        if self._comm.size == 1:
-            return self.of_window(matrix)
-        entries = matrix.tocoo()
-        some, at = np.unique(np.concatenate([entries.row, entries.col]), return_inverse=True)
-        row, column = np.split(at, 2)
-        s, numbers = self._rows_at(some)
-        small = sp.coo_matrix((entries.data, (row, column)), shape=(len(some),) * 2).tocsr()
-        product = _product(s, small)
-        row, column = numbers[product.row], numbers[product.col]
-        mine = (row >= self.own.start) & (row < self.own.stop)
-        places = (row[mine] - self.own.start, column[mine])
-        shape = (self.num_own, self.size)
-        return sp.coo_matrix((product.data[mine], places), shape=shape).tocsr()
-
     def of_constraints(self, gradients: Rows) -> Rows:
         """B S, constraints x unknowns of all ranks; a collective call.
 
         Args:
-            gradients: B, on coefficients of the grid, the same on every rank.
+            gradients: The columns of B of this rank's coefficients; the others are zero.
         """
         shape = (gradients.shape[0], self.size)
-        if self._comm.size == 1:
-            found, numbers = (gradients.csr @ self.selection).tocoo(), self.number
-        else:
-            some = np.unique(gradients.column)
-            s, numbers = self._rows_at(some)
-            found = (gradients.csr[:, some] @ s).tocoo()
-        return Rows.of(found.row, numbers[found.col], found.data, shape)
+        found = (gradients.csr @ self.selection).tocoo()
+        row, number, values = (
+            ranks.allgathered(self._comm, part)
+            for part in (found.row, self.number[found.col], found.data)
+        )
+        return Rows.of(row, number, values, shape)
 
-    def _rows_at(self, in_grid: Indices) -> tuple[sp.csr_matrix, Indices]:
-        """Rows of S of some coefficients of the whole grid, and the numbers of its columns."""
+    def _wider(self, far: Indices) -> tuple[sp.csr_matrix, Indices]:
+        """S with further rows, of coefficients with these numbers in the whole grid, and the numbers of
+        its columns; a collective call.
+        """
+        in_grid = np.unique(ranks.allgathered(self._comm, far))
         place = self._places_of(in_grid)
         mine = np.flatnonzero(place >= 0)
         mine = mine[self.layout.own[self._first + place[mine]]]
         rows = self.selection[place[mine]].tocoo()
-        row, number, weight = (
+        of, number, weight = (
             ranks.allgathered(self._comm, part)
-            for part in (mine[rows.row].astype(np.int64), self.number[rows.col], rows.data)
+            for part in (in_grid[mine[rows.row]], self.number[rows.col], rows.data)
         )
-        numbers, column = np.unique(number, return_inverse=True)
-        shape = (len(in_grid), len(numbers))
-        return sp.csr_matrix((weight, (row, column)), shape=shape), numbers
+        asked = np.isin(of, far)
+        row, others = np.searchsorted(far, of[asked]), number[asked]
+        numbers = np.concatenate([self.number, np.setdiff1d(others, self.number)])
+        order = np.argsort(numbers)
+        column = order[np.searchsorted(numbers, others, sorter=order)]
+        known = self.selection.tocoo()
+        top, shape = known.shape[0], (known.shape[0] + len(far), len(numbers))
+        parts = ((known.data, weight[asked]), (known.row, top + row), (known.col, column))
+        data, at, of_number = (np.concatenate(part) for part in parts)
+        return sp.csr_matrix((data, (at, of_number)), shape=shape), numbers
 
     #: First coefficient of the rows of S.
     _first = 0

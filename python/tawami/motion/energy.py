@@ -200,7 +200,7 @@ class Balance:
         layout = accepted.problem.reduction.layout
         mapped, imposed, end = (0.5 * _weighted(layout, mass, v) for v in velocities)
         friction, u = accepted.friction, accepted.u
-        parts = [c.energies(layout.whole(u.ravel())) for c in accepted.problem.obstacles]
+        parts = [contact.energies(u) for contact in accepted.problem.obstacles]
         pushed, rubbed, stopped = np.sum(parts, axis=0) if parts else np.zeros(3)
         moving = self._now.obstacles.kinetic
         work = accepted.problem.external[: u.size].reshape(u.shape) + accepted.forces_at_end

@@ -115,7 +115,7 @@ def _matrices(scene: Scene) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix
     if not supports:
         return tangent, masses, selection
     # multipliers of constraints, as in `tawami.solve.saddle`
-    rows = sp.vstack([support.gradient @ selection for support in supports])
+    rows = sp.vstack([support.gradient.csr @ selection for support in supports])
     rows *= largest / np.abs(rows.data).max()
     count = rows.shape[0]
     tangent = sp.bmat([[tangent, rows.T], [rows, -PROXIMAL * largest * sp.eye(count)]]).tocsr()

@@ -207,8 +207,8 @@ class NewmarkStep:
     def _first_acceleration(self, like: Array, obstacles: Sequence[ObstacleContact]) -> Array:
         """Acceleration by the momentum equation: g in free fall, 0 at rest."""
         force = self._first - self._internal + self._on_border
-        part = self._now.domain.layout.part
-        force = sum((part(contact.at_start[0]) for contact in obstacles), force)
+        of_contact = sum((contact.at_start[0] for contact in obstacles), np.zeros_like(force))
+        force = force + self._now.domain.layout.sum(of_contact)
         return divided(force[: like.size].reshape(like.shape), self._mass[:, None])
 
     def _guess(self, u: Array) -> Array:
@@ -234,7 +234,7 @@ class NewmarkStep:
         layout = start.reduction.layout
         v1 = start.v + dt * ((1 - self._gamma) * start.a + self._gamma * a1)
         for contact in accepted.problem.obstacles:
-            jump = layout.part(contact.jump)[: a1.size].reshape(a1.shape)
+            jump = layout.sum(contact.jump)[: a1.size].reshape(a1.shape)
             jump = divided(jump, self._mass[:, None])
             more_a, more_v = Times(self._gamma, self._beta, dt).corrected(jump)
             a1, v1 = a1 + more_a, v1 + more_v
@@ -263,7 +263,8 @@ class NewmarkStep:
             return 0.0
         n, start = u.size, self._start
         last = problem.terms.loads[:n]
-        of_supports = sum((layout.part(one.on_body)[:n] for one in problem.supports), np.zeros(n))
+        parts = [one.on_body for one in problem.supports]
+        of_supports = layout.sum(sum(parts, np.zeros(layout.size)))[:n]
         followers = 0.5 * layout.dot(self._followers[:n] + last - of_supports, u)
         if not any(one.prescribed for one in problem.supports):
             return followers

@@ -95,7 +95,7 @@ def _at_points(
     cells = BorderInCells(grid, domain.active, x, made.normal, torn=True)
     u = np.ascontiguousarray(coefficients[: layout.num_displacement])
     found = np.zeros((len(x), dim + dim**2))
-    location = cells.of_rank
+    location = cells.of_rank.location
     gradients = domain.model.space.in_space(
         domain.model.space.gradients(_rust.gradients(location, layout.basis, u))
     )

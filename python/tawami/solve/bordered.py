@@ -13,8 +13,10 @@ from typing import Protocol
 import numpy as np
 from scipy.linalg import block_diag
 
+from tawami.base import ranks
 from tawami.base.arrays import Array
 from tawami.base.rows import Rows
+from tawami.field.layout import Layout
 
 
 class GivesWayError(Exception):
@@ -23,7 +25,7 @@ class GivesWayError(Exception):
 
 @dataclass(frozen=True)
 class Blocks:
-    """Derivatives of residuals.
+    """Derivatives of residuals; those of the coefficients are the parts of this rank.
 
     Attributes:
         of_body: Of all coefficients' residual by the own unknowns, coefficients x unknowns.
@@ -55,7 +57,7 @@ class OwnUnknowns(Protocol):
 
     @property
     def measure(self) -> float:
-        """Size of the residual relative to the terms of its equations."""
+        """Size of the residual relative to the terms of its equations; a call for all ranks."""
 
     def add(self, change: Array) -> None:
         """Go to the next iterate."""
@@ -79,7 +81,7 @@ class Tie(OwnUnknowns, Protocol):
 
     @property
     def gradient(self) -> Rows:
-        """Derivative of the residual by all coefficients, constraints x coefficients."""
+        """Derivative of the residual by the coefficients of this rank, constraints x coefficients."""
 
     @property
     def unsettled(self) -> str:
@@ -107,20 +109,30 @@ class Bordering(OwnUnknowns, Protocol):
 class Elimination:
     """Solves for the unknowns of terms together with all coefficients.
 
+    Making one, and its methods, are collective calls.
+
     Args:
         terms: The terms.
         solve: Gives K^-1 f, all coefficients and multipliers, for forces f on all coefficients.
-        size: Number of coefficients and multipliers.
+        layout: Places of the coefficients.
+        multipliers: Number of multipliers.
     """
 
     def __init__(
-        self, terms: Sequence[Bordering], solve: Callable[[Array], Array], size: int
+        self,
+        terms: Sequence[Bordering],
+        solve: Callable[[Array], Array],
+        layout: Layout,
+        multipliers: int,
     ) -> None:
         self._terms, blocks = terms, [term.blocks() for term in terms]
-        of_body = np.hstack([block.of_body for block in blocks])
+        self._comm = layout.grid.comm
+        of_body = layout.sum(np.hstack([block.of_body for block in blocks]))
         self._by_body = np.vstack([block.by_body for block in blocks])
-        solved = [solve(column) if column.any() else np.zeros(size) for column in of_body.T]
-        self._columns = np.column_stack(solved)
+        self._columns = np.zeros((layout.size + multipliers, of_body.shape[1]))
+        some = ranks.any_of(self._comm, of_body.any(axis=0))
+        for k in np.flatnonzero(some):
+            self._columns[:, k] = solve(np.ascontiguousarray(of_body[:, k]))
         own = block_diag(*(block.own for block in blocks))
         self._matrix = own - self._on_terms(self._columns)
         start = 0
@@ -131,7 +143,7 @@ class Elimination:
 
     def _on_terms(self, change: Array) -> Array:
         """C x, where x may be followed by multipliers."""
-        return np.asarray(self._by_body @ change[: self._by_body.shape[1]])
+        return ranks.sum_of(self._comm, self._by_body @ change[: self._by_body.shape[1]])
 
     def solve(self, change: Array, residual: Array) -> tuple[Array, Array]:
         """x and q.

@@ -138,7 +138,8 @@ class Operators:
         penalty = self._assembly.penalty(self._responses.data)
         if penalty is not None:
             yield block.of_window(penalty), structure.DIFFERENT_NONZERO_PATTERN
-        stiffness = None if equations.terms is None else equations.terms.stiffness
-        if stiffness is not None:
-            rows = block.of_grid(((stiffness + stiffness.T) / 2).tocsr())
+        terms = equations.terms
+        if terms is not None and terms.stiffness is not None:
+            symmetric = ((terms.stiffness + terms.stiffness.T) / 2).tocsr()
+            rows = block.of_window(symmetric, terms.far)
             yield rows, structure.DIFFERENT_NONZERO_PATTERN

@@ -61,8 +61,8 @@ class Saddle:
 
         Args:
             tangent: Reduced tangent K.
-            gradients: Derivatives of the errors by all coefficients of the grid, constraints x
-                coefficients, the same on every rank.
+            gradients: Derivatives of the errors by the coefficients of this rank, constraints x
+                coefficients.
             reduction: The unknowns.
         """
         self.count = gradients.shape[0]

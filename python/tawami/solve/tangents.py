@@ -43,10 +43,12 @@ class Tangents:
 
     def with_terms(self, tangent: Any, equations: Equations) -> Any:
         """A reduced tangent with the stiffness of the terms at the last forces."""
-        stiffness = None if equations.terms is None else equations.terms.update_stiffness()
+        if equations.terms is None:
+            return tangent
+        stiffness = equations.terms.update_stiffness()
         if stiffness is None:
             return tangent
-        return self._sum.of(tangent, stiffness, equations.reduction, of_grid=True)
+        return self._sum.of(tangent, stiffness, equations.reduction, equations.terms.far)
 
     def system(
         self, tangent: Any, equations: Equations, residual: Array, tolerance: float

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from tawami.base.arrays import Array
+from tawami.base.arrays import Array, Indices
 from tawami.base.places import Added
 from tawami.field.follower import FollowerPressure
 from tawami.field.layout import Layout
@@ -25,7 +25,7 @@ APART = 1e-3
 class Term(Protocol):
     """Forces of one action on the border.
 
-    They are the same on every rank: coefficients are all those of the whole grid.
+    Each rank evaluates the border in its cells, from the coefficients of its window.
     """
 
     @property
@@ -33,10 +33,17 @@ class Term(Protocol):
         """The largest displacement that it prescribes in this step [m]; 0 for a load."""
 
     def forces(self, coefficients: Array) -> Array:
-        """Forces on the body, on all coefficients [N per metre depth], at increments of all fields."""
+        """The part of this rank in the forces on the body [N per metre depth], at increments of all
+        fields; a call for all ranks.
+        """
 
-    def stiffness(self) -> sp.csr_matrix | None:
-        """Derivative of the last forces, with the opposite sign; None if there is none."""
+    def stiffness(self, far: Indices) -> sp.csr_matrix | None:
+        """The part of this rank in the derivative of the last forces, with the opposite sign; None if
+        there is none.
+
+        Args:
+            far: Numbers in the whole grid of coefficients that follow those of the window.
+        """
 
     def accept(self) -> None:
         """Keep what later steps need, once a step is stored."""
@@ -47,6 +54,10 @@ class ContactTerm(Term, Bordering, Protocol):
 
     It has a few unknowns of its own, or none, and in dynamics weights of its own.
     """
+
+    @property
+    def far(self) -> Indices:
+        """Numbers in the whole grid of coefficients outside the window that its stiffness here has."""
 
     def improve(self) -> bool:
         """Improve the multipliers at a solution; whether another solve is needed."""
@@ -67,7 +78,10 @@ class Terms:
 
     Attributes:
         stuck: Message if the multipliers of contact do not settle.
-        stiffness: That of the last tangent, on all coefficients of the whole grid.
+        stiffness: The part of this rank in that of the last tangent, on the coefficients of its window
+            and those that are far.
+        far: Numbers in the whole grid of coefficients beyond the window, which patches on several ranks
+            couple.
     """
 
     def __init__(
@@ -84,6 +98,7 @@ class Terms:
         #: Stiffness of each term when they were last added, and their sum.
         self._stiffnesses: list[sp.csr_matrix] = []
         self.stiffness: sp.csr_matrix | None = None
+        self.far: Indices = np.zeros(0, dtype=np.int64)
 
     def load(self, share: float) -> None:
         """Add a share of the loads of a path to pressures that follow the border."""
@@ -97,8 +112,10 @@ class Terms:
 
     @property
     def rate(self) -> Array | float:
-        """Derivative of the last forces by the load factor of a path, in the window."""
-        return sum(self._layout.part(term.rate) for term in self._following)
+        """Derivative of the last forces by the load factor of a path; a call for all ranks."""
+        if not self._following:
+            return 0.0
+        return self._layout.sum(functools.reduce(operator.add, (t.rate for t in self._following)))
 
     @property
     def prescribed(self) -> float:
@@ -131,16 +148,16 @@ class Terms:
         return sum(term.work for term in self._own)
 
     def forces(self, coefficients: Array) -> Array:
-        """Their sum, on the coefficients of the window; a collective call.
+        """Their sum; a collective call.
 
         Args:
-            coefficients: Increments of all fields, in the window.
+            coefficients: Increments of all fields.
         """
-        in_grid = self._layout.whole(coefficients)
 
         def of(terms: Sequence[Term]) -> Array:
-            parts = (self._layout.part(term.forces(in_grid)) for term in terms)
-            return sum(parts, np.zeros_like(coefficients))
+            none = np.zeros_like(coefficients)
+            parts = (term.forces(coefficients) for term in terms)
+            return self._layout.sum(sum(parts, none)) if terms else none
 
         #: Of all that are no contact.
         self.loads = of(self._loads)
@@ -148,7 +165,9 @@ class Terms:
 
     def update_stiffness(self) -> sp.csr_matrix | None:
         """Their stiffness at the last forces; the same object if no part has changed."""
-        all_parts = [term.stiffness() for term in self._terms]
+        far = [self.far[:0], *(contact.far for contact in self.contacts)]
+        self.far = np.unique(np.concatenate(far))
+        all_parts = [term.stiffness(self.far) for term in self._terms]
         parts = [part for part in all_parts if part is not None]
         same = len(parts) == len(self._stiffnesses)
         if parts and not (same and all(map(operator.is_, parts, self._stiffnesses))):
@@ -179,23 +198,12 @@ class Terms:
         """The elimination of their own unknowns; None if there are none.
 
         Args:
-            solve: As in `Elimination`, with coefficients of the window.
+            solve: As in `Elimination`.
         """
         if not self.bordering:
             return None
-        part = self._layout.part
-        size = self._layout.size_of_grid + sum(tie.num_unknowns for tie in self.tied)
-        return Elimination(self.bordering, lambda right: self.in_grid(solve(part(right))), size)
-
-    def in_grid(self, change: Array) -> Array:
-        """Coefficients of the grid and multipliers, from those of the window; a collective call."""
-        size = self._layout.size
-        return np.concatenate([self._layout.whole(change[:size]), change[size:]])
-
-    def in_window(self, change: Array) -> Array:
-        """Coefficients of the window and multipliers, from those of the grid."""
-        size = self._layout.size_of_grid
-        return np.concatenate([self._layout.part(change[:size]), change[size:]])
+        multipliers = sum(tie.num_unknowns for tie in self.tied)
+        return Elimination(self.bordering, solve, self._layout, multipliers)
 
     def improve(self) -> bool:
         """Improve the multipliers of contact; whether another solve is needed."""

@@ -26,9 +26,7 @@ def complete(
 
     def eliminated(given: Array, residual: Array) -> tuple[Array, Array]:
         assert elimination is not None
-        assert terms is not None
-        found, of_terms = elimination.solve(terms.in_grid(given), residual)
-        return terms.in_window(found), of_terms
+        return elimination.solve(given, residual)
 
     if elimination is not None:
         change, own = eliminated(change, elimination.residual)

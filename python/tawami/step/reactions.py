@@ -151,7 +151,7 @@ class Reactions:
         contacts = [contact.result() for contact in accepted.problem.obstacles]
         walls = {wall.obstacle for wall in supports.walls}
         of_walls = [c.at_end for c in accepted.problem.obstacles if c.obstacle in walls]
-        on_walls = sum(map(layout.part, of_walls), np.zeros(layout.size))[: layout.num_displacement]
+        on_walls = layout.sum(sum(of_walls, np.zeros(layout.size)))[: layout.num_displacement]
         return cls(
             on_edges, layout.owned(on_walls), at_points, on_border, contacts, held_edges,
             supports.names,
