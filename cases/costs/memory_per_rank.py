@@ -1,12 +1,16 @@
 """Memory of a rank at fixed work per rank: resident memory, and the NumPy arrays of a scene by holder.
 
 A block of cells full of particles for each rank, solved once by multigrid, on 1, 2, 4 and 8 ranks (which
-share the processors of this machine). A holder is an attribute, or a path of attributes, from the scene.
-The table has the largest holders of the last run, in bytes on the rank with most. `growth` is the ratio
-of the last run to the first: about 1 where a rank holds its own part, and the number of ranks where it
-holds what is as long as the grid or the body. Times are processor time of the first rank.
+share the processors of this machine): on rollers under a pressure, and off the lines of the grid, where
+supports and an obstacle act on patches of its border. A holder is an attribute, or a path of attributes,
+from the scene. The table has the largest holders of the last run, in bytes on the rank with most.
+`growth` is the ratio of the last run to the first: about 1 where a rank holds its own part, and the
+number of ranks where it holds what is as long as the grid or the body. `border kB` are the arrays of the
+points of the border, and `gathered kB` the largest array that a rank gets from all others while it
+solves. Times are processor time of the first rank.
 
 python -m cases.costs.memory_per_rank
+python -m cases.costs.memory_per_rank --scenes border --cells 24
 python -m cases.costs.memory_per_rank --cells 64 --ranks 1,4
 """
 
@@ -31,12 +35,15 @@ from mpi4py import MPI
 import tawami
 from cases.common.program import Program, numbers
 from cases.common.table import as_csv, as_text
+from tawami.base import ranks as base_ranks
 from tawami.base.program import mpirun
 
 PROGRAM = Program("cases.costs.memory_per_rank", __doc__)
 WHOLE = numbers(int, lambda n: n > 0, "whole numbers separated by commas, such as 1,2,4")
 PROGRAM.option("--ranks", type=WHOLE, default="1,2,4,8", help="numbers of ranks")
 PROGRAM.option("--cells", type=int, default=48, help="cells of a rank along each axis")
+SCENES = "scenes separated by commas: rollers, border"
+PROGRAM.option("--scenes", default="rollers,border", help=SCENES)
 PROGRAM.option("--solver", default="multigrid", help="linear solver")
 PROGRAM.option("--rows", type=int, default=25, help="holders in the table")
 #: Holders that are counted together, and objects that are no holders.
@@ -52,14 +59,24 @@ class Row:
     holder: str
 
 
-def scene_of(n: int, comm: Any, solver: str) -> tawami.Scene:
-    """A block of n x n cells for each rank, on rollers under a pressure."""
+def scene_of(name: str, n: int, comm: Any, solver: str) -> tawami.Scene:
+    """A block of n x n cells for each rank, on rollers under a pressure, or under an obstacle."""
     across = 2 ** ((comm.size.bit_length()) // 2)
     cells = (n * across, n * (comm.size // across))
     grid = tawami.Grid(comm, origin=(0, 0), h=1 / n, cells=cells)
+    law, of = tawami.linear_elastic(E=1e6, nu=0.4), {"alpha": 0.01, "linear_solver": solver}
+    if name == "border":
+        low, high = 0.3 * grid.h, np.subtract(grid.upper, 0.4 * grid.h)
+        body = tawami.box(grid, (low, low), high)
+        scene = tawami.Scene(grid, body, law, ghost_penalty="on", **of)
+        scene.fix("left", "x")
+        scene.fix("bottom", "x")
+        scene.fix("bottom", "y")
+        plane = tawami.half_plane((0, high[1]), (0, -1))
+        scene.obstacle(plane, 0.0, "top", displacement=(0, -1e-3))
+        return scene
     body = tawami.box(grid, (0, 0), grid.upper)
-    law = tawami.linear_elastic(E=1e6, nu=0.4)
-    scene = tawami.Scene(grid, body, law, alpha=0.01, linear_solver=solver)
+    scene = tawami.Scene(grid, body, law, **of)
     scene.fix("left", "x")
     scene.fix("bottom", "y")
     scene.pressure("top", lambda x, y: 1e3 * (x < 0.5))
@@ -133,29 +150,63 @@ def resident() -> int:
         return int(file.read().split()[1]) * resource.getpagesize()
 
 
-def of_rank(cells: int, solver: str) -> None:
+def of_border(scene: tawami.Scene) -> int:
+    """Bytes of the arrays of all points of the border."""
+    found = 0
+    for points in scene.configuration.border.all:
+        parts = [vars(points), vars(points.made), vars(points.first)]
+        arrays = [value for part in parts for value in part.values()]
+        found += sum(value.nbytes for value in arrays if isinstance(value, np.ndarray))
+    return found
+
+
+def watched() -> list[int]:
+    """A list that gets the bytes of each array that ranks gather or add up from now on."""
+    found = [0]
+
+    def watch(name: str) -> None:
+        given = getattr(base_ranks, name)
+
+        @functools.wraps(given)
+        def call(*arguments: Any) -> Any:
+            result = given(*arguments)
+            found.append(result.nbytes)
+            return result
+
+        setattr(base_ranks, name, call)
+
+    for name in ("scattered", "allgathered", "sum_of"):
+        watch(name)
+    return found
+
+
+def of_rank(name: str, cells: int, solver: str) -> None:
     """Solve on all ranks; the first one prints the largest numbers of any rank as JSON."""
     comm = MPI.COMM_WORLD
-    scene_of(2, comm, solver).solve()  # loads libraries and compiles the form
+    scene_of(name, 2, comm, solver).solve()  # loads libraries and compiles the form
     before, began = resident(), process_time()
-    scene = scene_of(cells, comm, solver)
-    made = process_time()
+    scene = scene_of(name, cells, comm, solver)
+    made, gathered = process_time(), watched()
     solution = scene.solve()
     times = {"making": made - began, "solving": process_time() - made}
-    mine = {"resident": resident() - before, "holders": held([scene, solution])}
+    mine: dict[str, Any] = {"resident": resident() - before, "holders": held([scene, solution])}
+    mine |= {"border": of_border(scene), "gathered": max(gathered)}
     parts = comm.gather(mine)
     if comm.rank == 0:
         names = {name for part in parts for name in part["holders"]}
         most = {name: max(part["holders"].get(name, 0) for part in parts) for name in names}
         total = max(sum(part["holders"].values()) for part in parts)
-        resident_ = max(part["resident"] for part in parts)
-        found = {"resident": resident_, "total": total, "holders": most, **times}
+        largest = {
+            key: max(part[key] for part in parts) for key in ("resident", "border", "gathered")
+        }
+        found = {**largest, "total": total, "holders": most, **times}
         print(json.dumps(found | {"iterations": sum(solution.krylov)}))
 
 
-def measured(ranks: int, cells: int, solver: str) -> dict[str, Any]:
+def measured(scene: str, ranks: int, cells: int, solver: str) -> dict[str, Any]:
     """The numbers of a run on several ranks."""
-    words = [sys.executable, "-m", "cases.costs.memory_per_rank", "--rank", str(cells), solver]
+    program = [sys.executable, "-m", "cases.costs.memory_per_rank"]
+    words = [*program, "--rank", scene, str(cells), solver]
     command, environment = mpirun(ranks, words)
     run = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     if run.returncode:
@@ -171,28 +222,39 @@ def rows_of(first: dict[str, int], last: dict[str, int]) -> list[Row]:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Measure, and print both tables."""
+    """Measure, and print both tables of each scene."""
     options = PROGRAM.start(arguments)
-    runs = [measured(ranks, options.cells, options.solver) for ranks in options.ranks]
-    print(f"\n{options.cells} x {options.cells} cells for each rank, {options.solver}")
-    print("ranks  resident MB    arrays MB   growing MB     making s    solving s  iterations")
+    for scene in options.scenes.split(","):
+        of_scene(scene, options)
+    PROGRAM.list_results()
+
+
+def of_scene(scene: str, options: Any) -> None:
+    """Measure a scene, and print both tables."""
+    runs = [measured(scene, ranks, options.cells, options.solver) for ranks in options.ranks]
+    print(f"\n{scene}: {options.cells} x {options.cells} cells for each rank, {options.solver}")
+    print(
+        "ranks  resident MB    arrays MB   growing MB    border kB  gathered kB     making s    "
+        "solving s  iterations"
+    )
     first = runs[0]["holders"]
     for ranks, run in zip(options.ranks, runs, strict=True):
         growing = [
             row for row in rows_of(first, run["holders"]) if row.growth > 1 + 0.5 * (ranks - 1)
         ]
         sizes = (run["resident"], run["total"], sum(row.bytes for row in growing))
-        columns = [size / 1e6 for size in sizes] + [run["making"], run["solving"]]
+        columns = [size / 1e6 for size in sizes] + [run["border"] / 1e3, run["gathered"] / 1e3]
+        columns += [run["making"], run["solving"]]
         shown = "  ".join(f"{value:11.2f}" for value in columns)
         print(f"{ranks:5}  {shown}  {run['iterations']:10}")
     rows = rows_of(first, runs[-1]["holders"])
     print("\n" + as_text(rows[: options.rows], ("bytes", "growth", "holder")))
-    PROGRAM.write("memory_per_rank.csv", as_csv(rows, ("bytes", "growth", "holder")))
-    PROGRAM.list_results()
+    PROGRAM.write(f"{scene}.csv", as_csv(rows, ("bytes", "growth", "holder")))
 
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--rank"]:
-        tawami.run(lambda: of_rank(int(sys.argv[2]), sys.argv[3]), "memory_per_rank")
+        of = sys.argv[2], int(sys.argv[3]), sys.argv[4]
+        tawami.run(lambda: of_rank(*of), "memory_per_rank")
     else:
         PROGRAM.run(main)

@@ -387,6 +387,32 @@ def stretched() -> dict[str, np.ndarray]:
     return {"stretched points": np.array(count), "stretched border": scene.border.x}
 
 
+def sliding() -> dict[str, np.ndarray]:
+    """A block that a support off the lines of the grid pushes along a plane, under a pressure, until
+    cells change their rank.
+    """
+    grid = tawami.Grid(COMM, origin=(0, 0), h=0.25, cells=(12, 6))
+    block = tawami.box(grid, (0.3, 0.3), (1.3, 1.05), per_axis=2)
+    law = tawami.linear_elastic(E=1e6, nu=0.3)
+    scene = tawami.Scene(grid, block, law, form="u_epsv_finite", density=1e3,
+                         tolerance=1e-11, ghost_penalty="on")  # fmt: skip
+    scene.fix("left", "x", velocity=8.0)
+    scene.pressure("top", 2e3)
+    plane = scene.obstacle(tawami.half_plane((0, 0.3), (0, 1)), 0.2)
+    motion = tawami.Dynamics(scene, velocity=(8.0, 0.0))
+    divisions = set()
+    for _ in range(8):
+        last = motion.step(0.01)
+        divisions.add(scene.configuration.model.grid.division.cuts.tobytes())
+    energies = motion.energies
+    return {
+        "sliding x": last.x, "sliding border": scene.border.x, "sliding reaction": last.reaction("left"),
+        "sliding force": last.contact(plane).force,
+        "sliding energies": np.array([energies.kinetic, energies.external, energies.friction]),
+        "times divided": np.array(len(divisions)),
+    }  # fmt: skip
+
+
 def wide() -> dict[str, np.ndarray]:
     """A body over ranks that know a part of the grid each: multigrid, ghost penalty, supports off its
     lines, and then a motion along walls.
@@ -453,7 +479,7 @@ def output(folder: Path) -> dict[str, np.ndarray]:
 def results(folder: Path) -> dict[str, Any]:
     """Results of all scenes; files are written to the folder."""
     found = beams() | random_clouds() | fields() | nonlinear() | singular() | motion() | initial()
-    found |= construction() | border() | contact() | stretched() | wide() | shapes()
+    found |= construction() | border() | contact() | stretched() | sliding() | wide() | shapes()
     return found | errors() | inverted() | few_cells() | output(folder)
 
 

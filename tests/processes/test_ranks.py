@@ -48,7 +48,7 @@ def several(request, tmp_path_factory) -> Found:
 
 @pytest.mark.parametrize("subject", [
     "beam", "cloud", "fields", "nonlinear", "fem", "singular", "motion", "construction", "initial",
-    "inverted", "few", "border", "contact", "stretched", "shapes", "wide",
+    "inverted", "few", "border", "contact", "stretched", "sliding", "shapes", "wide",
 ])  # fmt: skip
 def test_results_do_not_depend_on_the_number_of_ranks(alone, several, subject):
     names = [name for name in alone.results if name.startswith(subject)]
@@ -80,6 +80,7 @@ def test_the_scenes_are_what_they_are_meant_to_be(alone, several):
         assert results["times inverted"] > 0
         assert np.abs(results["contact force"]).min() > 0
         assert np.greater(*results["stretched points"][::-1])
+        assert results["times divided"] >= min(results["errors iterations"].size, 2)
         for path in ("points", "dolfinx"):
             krylov = list(results[f"nonlinear {path} krylov"])
             assert len(krylov) > 4
