@@ -151,9 +151,7 @@ class ObstacleContact:
         return not is_held and bool((self.now.state == OPEN).all())
 
     def _forces_at_start(self) -> tuple[Array, Array]:
-        """Forces at the start of the step: those of this rank on all coefficients, and on the
-        obstacle.
-        """
+        """Forces at the start of the step: of this rank on all coefficients, and on the obstacle."""
         x, held = self._border.x[self._border.points], self._held
         now = self._contact.evaluate(x, self.motion.start, held)
         now = replace(now, pressure=held.pressure, traction=held.traction)
@@ -339,9 +337,7 @@ class ObstacleContact:
         rows, directions = [], [now.surface.normal]
         if self.obstacle.friction > 0:
             directions += list(now.tangent.transpose(1, 0, 2))
-        shares, at_points = now.contact.shares, self._layout.gathered(self._border.at_points)
-        number, column = np.unique(at_points.column, return_inverse=True)
-        at_points = replace(at_points, column=column, shape=(at_points.shape[0], len(number)))
+        shares, (at_points, number) = now.contact.shares, self._border.at_points_on_all
         for k in np.flatnonzero(now.pressure):
             mine = now.contact.patches.number == k
             x, y = now.x[mine][0]
@@ -349,6 +345,6 @@ class ObstacleContact:
                 along = (mine * shares)[:, None] * direction
                 weights = at_points.transposed_times(along.ravel())
                 some = np.flatnonzero(weights)
-                of = number[some], weights[some]
-                rows.append(PointHeld(*of, 0.0, f"{self.obstacle}", (x, y)))
+                of = number[some], weights[some], 0.0, f"{self.obstacle}", (x, y)
+                rows.append(PointHeld(*of))
         return rows

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -50,7 +52,7 @@ class BorderNear:
         chosen: Which patches are evaluated.
         points: Numbers of their points.
         patches: The same patches of these points.
-        mine: Which of them have their stiffness on this rank.
+        mine: Mask of those whose stiffness this rank adds.
         far: Numbers in the whole grid of coefficients that they couple, and that have no place in the
             window.
     """
@@ -155,6 +157,15 @@ class BorderNear:
         """
         moved = np.linalg.norm(local - self.start, axis=1)
         return np.asarray((self.distance <= moved) & ~self.chosen[self.groups.number])
+
+    @property
+    def at_points_on_all(self) -> tuple[Rows, Indices]:
+        """The same of all ranks, and the numbers of its columns in the whole grid; a call for all
+        ranks.
+        """
+        found = self._layout.gathered(self.at_points)
+        numbers, column = np.unique(found.column, return_inverse=True)
+        return replace(found, column=column, shape=(found.shape[0], len(numbers))), numbers
 
     def on_all(self, forces: Array) -> Array:
         """Forces on the chosen points as forces on all coefficients: the part of this rank's points."""
