@@ -75,9 +75,12 @@ def constrained(matrix: Any, operators: list[Any], places: list[Any]) -> Any:
     last = places[-1]
     for operator, place in zip(operators, places, strict=False):
         columns, rows = (matrix.createSubMatrix(*two) for two in ((place, last), (last, place)))
-        penalty = columns.matMult(rows)
-        operator.axpy(AUGMENTED, penalty)
-        for used in (columns, rows, penalty):
+        # a field without constraints keeps its matrix: on several ranks another cannot be refreshed
+        if columns.norm() > 0:
+            penalty = columns.matMult(rows)
+            operator.axpy(AUGMENTED, penalty)
+            penalty.destroy()
+        for used in (columns, rows):
             used.destroy()
     schur = matrix.createSubMatrix(last, last)
     schur.zeroEntries()
