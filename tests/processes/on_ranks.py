@@ -414,8 +414,8 @@ def sliding() -> dict[str, np.ndarray]:
 
 
 def wide() -> dict[str, np.ndarray]:
-    """A body over ranks that know a part of the grid each: multigrid, ghost penalty, supports off its
-    lines, and then a motion along walls.
+    """A body over ranks that know a part of the grid each: multigrid, ghost penalty, supports and an
+    obstacle off its lines, and then a motion along walls.
     """
     grid = tawami.Grid(COMM, origin=(0, 0), h=0.25, cells=(27, 6))
     corners = [(0.1, 0.07), (5.8, 0.1), (5.9, 1.3), (3.0, 1.45), (0.05, 1.2)]
@@ -427,6 +427,7 @@ def wide() -> dict[str, np.ndarray]:
     scene.fix("4", "y")
     scene.hold((3.0, 0.7), "x", 1e-3)
     scene.pressure("2", 1e3)
+    scene.obstacle(tawami.rigid_disc((1.5, 1.825), 0.5), 0.0, "3", displacement=(0, -0.02))
     solution = scene.solve()
     box = tawami.box(grid, (0, 0), (5, 0.5), per_axis=2)
     scene = tawami.Scene(grid, box, law, form="u_finite", density=1e3, tolerance=1e-9)
