@@ -126,7 +126,7 @@ class BorderNear:
     def _couple(self) -> None:
         """Find the functions that the patches of this rank couple."""
         points, inside = self.patches.table
-        self.mine = self._cells.own[self.points[points[:, 0]]]
+        self.mine = self._cells.own[self.points[points[:, :1]]].any(axis=1)
         used, at = np.unique(points[self.mine], return_inverse=True)
         basis, window = self._layout.basis, self._layout.window
         of = self._cells.functions(basis, self.points[used])
