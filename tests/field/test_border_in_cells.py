@@ -37,9 +37,11 @@ def test_functions_add_up_to_one_and_give_linear_fields(grid, basis, holes):
     places = np.stack([a.ravel(order="F") for a in np.meshgrid(*along, indexing="ij")], axis=1)
     field = 2.0 + grid.in_metres(places) @ [3.0, -5.0]
     assert field.shape == (np.prod(size),)
-    assert border.values(basis) @ np.ones(len(field)) == pytest.approx(np.ones(len(x)), abs=1e-13)
-    assert border.values(basis) @ field == pytest.approx(2 + x @ [3, -5], abs=1e-12)
-    slopes = np.column_stack([s @ field for s in border.slopes(basis)])
+    assert border.at(basis, 0 * field[:, None] + 1)[:, 0] == pytest.approx(
+        np.ones(len(x)), abs=1e-13
+    )
+    assert border.at(basis, field[:, None])[:, 0] == pytest.approx(2 + x @ [3, -5], abs=1e-12)
+    slopes = np.column_stack([s @ field for s in border.of_rank.slopes(basis)])
     assert slopes == pytest.approx(np.tile([3.0, -5.0], (len(x), 1)), abs=1e-11)
 
 
