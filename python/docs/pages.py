@@ -56,6 +56,7 @@ CASES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "ordering": ("Orderings of MUMPS", "costs", ()),
     "contact": ("Steps into contact", "costs", ()),
     "solvers": ("Linear solvers", "costs", ()),
+    "preconditioners": ("Variants of multigrid", "costs", ()),
     "memory_per_rank": ("Memory of a rank", "costs", ()),
     "balance": ("Division of the particles among the ranks", "costs", ()),
     "writing": ("Writing results", "costs", ()),

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from cases.costs.trade import coverage
+from tawami.study import process
+from tawami.study.adjoint import combined
 from tawami.study.estimate import estimate
 from tawami.study.knobs import Knob
 
@@ -23,22 +25,28 @@ from tawami.study.knobs import Knob
 def test_error_bars_cover_the_true_error(scene, knobs):
     function, exact = coverage.SCENES[scene]
     names = [knob.name for knob in knobs]
-    points = {
-        setting: next(iter(function(**dict(zip(names, setting, strict=True))).values()))
-        for setting in itertools.product(*(knob.values for knob in knobs))
-    }
-    found = estimate("value", knobs, points)
+    points, errors = {}, {}
+    for setting in itertools.product(*(knob.values for knob in knobs)):
+        values, estimated = process.evaluated(function(**dict(zip(names, setting, strict=True))))
+        (points[setting],) = values.values()
+        if estimated:
+            (errors[setting],) = estimated.values()
+    refined = estimate("value", knobs, points)
+    found = combined("value", knobs, refined, points, errors)
+    assert (found.uncertainty < 1e-2 * refined.uncertainty) == bool(errors)
     covered = [
         abs(abs(value - exact) - abs(value - found.value)) <= found.uncertainty
         for value in points.values()
     ]
     assert np.mean(covered) >= 0.9
-    assert found.uncertainty < 5e-3 * exact
+    assert found.uncertainty < 5e-3 * abs(exact)
 
 
 def test_the_support_of_the_paper_has_no_limit():
     knob = Knob("n", (4, 8, 16, 32), 8)
-    points = {(n,): coverage.paper(n, particles=2)["tip"] for n in knob.values}
-    found = estimate("tip", [knob], points)
+    runs = {(n,): process.evaluated(coverage.paper(n, particles=2)) for n in knob.values}
+    points = {setting: values["tip"] for setting, (values, _) in runs.items()}
+    errors = {setting: estimated["tip"] for setting, (_, estimated) in runs.items()}
+    found = combined("tip", [knob], estimate("tip", [knob], points), points, errors)
     assert found.uncertainty == math.inf
     assert "'tip' does not converge with 'n'" in found.remarks[0]

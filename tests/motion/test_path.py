@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 
 import numpy as np
@@ -93,7 +94,7 @@ def test_a_softening_column_beyond_its_peak(control, softening):
 
 
 def test_a_law_that_softens_warns_once_where_it_does():
-    number = int(np.flatnonzero(column(20.0).particles.x[:, 1] < 1.0)[0])
+    softer = np.flatnonzero(column(20.0).particles.x[:, 1] < 1.0)  # equally so
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         steps, _ = followed(column(20.0), ((0.5, 1.0), "x"), 0.002, 0.014)
@@ -102,7 +103,8 @@ def test_a_law_that_softens_warns_once_where_it_does():
         tawami.ramp(scene, 0.25)
     assert len(steps) > 5
     assert [w.category for w in caught] == [tawami.SofteningWarning]
-    assert f"of particle {number} has the eigenvalue -25 Pa" in str(caught[0].message)
+    (number,) = re.findall("of particle ([0-9]+) has the eigenvalue -25 Pa", str(caught[0].message))
+    assert int(number) in softer
 
 
 def test_a_law_in_rust_that_softens_is_rejected():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from typing import Annotated
 
 import numpy as np
@@ -11,7 +12,8 @@ import pytest
 
 import tawami
 from tawami.study import front_figure, process
-from tawami.study.estimate import estimate
+from tawami.study.adjoint import combined
+from tawami.study.estimate import Estimate, estimate
 from tawami.study.knobs import Knob, applied, knobs_of
 
 H = (1 / 4, 1 / 8, 1 / 16, 1 / 32)
@@ -138,6 +140,31 @@ def test_an_error_that_stays_is_extrapolated_too():
     assert abs(found.value - 1) <= found.uncertainty + 1e-12
     assert found.uncertainty < 2e-3
     assert found.orders == pytest.approx({"h": 2, "dt": 1}, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("parts", "order", "value", "uncertainty", "remarks"),
+    [
+        ({"grid": 0.01, "particles": -0.002}, 2.0, 1.008, 0.012 * 3 / 7, 0),
+        ({"grid": 0.01}, math.nan, 1.01, 0.01 * 3 / 7, 0),
+        ({"grid": 0.01}, 0.0, 1.01, 0.02, 0),  # shows no limit
+        ({"grid": 0.06, "particles": -0.04}, 2.0, 1.01, 0.02, 0),  # too uncertain
+        (
+            {"grid": 0.06},
+            2.0,
+            (0.99 + 1.06 + 0.06 * 3 / 7) / 2,
+            (1.06 + 0.06 * 3 / 7 - 0.99) / 2,
+            1,
+        ),
+    ],
+)
+def test_the_error_of_one_solve_narrows_the_bar(parts, order, value, uncertainty, remarks):
+    refined, knobs = Estimate(1.01, 0.02), [Knob("h", H, 1 / 8)]
+    errors = {(1 / 8,): {"parts": parts, "order": order}}
+    found = combined("tip", knobs, refined, {(1 / 8,): 1.0}, errors)
+    assert found.value == pytest.approx(value, abs=1e-8)
+    assert found.uncertainty == pytest.approx(uncertainty, abs=1e-8)
+    assert len(found.remarks) == remarks
 
 
 def test_one_size_has_no_estimate():

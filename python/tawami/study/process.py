@@ -186,13 +186,13 @@ def _outcome(run: Run, knobs: Mapping[str, Any]) -> dict[str, Any]:
         "unknowns": tally.unknowns,
     }
     measured = {"wall_s": wall, "cpu_s": cpu, "peak_MB": peak_memory()}
-    values, errors = _evaluated(values)
+    values, errors = evaluated(values)
     plain = _plain(values)
     own = {key: plain.pop(key) for key in counted if key in plain}
     return {"values": plain, "estimated": errors} | measured | counted | own
 
 
-def _evaluated(values: Any) -> tuple[Any, dict[str, dict[str, Any]]]:
+def evaluated(values: Any) -> tuple[Any, dict[str, dict[str, Any]]]:
     """Quantities with numbers in place of estimates, and the errors of these.
 
     Functions without arguments are called: their time does not count.
