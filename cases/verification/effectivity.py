@@ -35,6 +35,7 @@ from cases.verification.cook.membrane import MIDDLE, REFERENCE
 NU = 0.4999
 TIP = tawami.Goal.displacement((beam.L, 0.0), "y")
 AT, ANGLE = 1.5, 0.6  # where the ring moves outwards [m], [rad]
+RATIO = ring.P * ring.A**2 / (ring.B**2 - ring.A**2)
 COLUMNS = (
     "scene", "value", "true", "estimate", "effectivity", "grid", "particles", "stabilisation", "newton",
     "order", "solve_s", "estimate_s",
@@ -105,6 +106,11 @@ def on_cook(h: float, body: str = "even"):
     return estimated(f"Cook h={h:g} {body}", scene, goal, REFERENCE[NU])
 
 
+def outward() -> float:
+    """Displacement of the ring at the radius AT (Lame)."""
+    return RATIO * (1 + ring.NU) / ring.E * ((1 - 2 * ring.NU) * AT + ring.B**2 / AT)
+
+
 def on_ring(n: int, quantity: str):
     """The ring under pressure, in cut cells.
 
@@ -114,15 +120,22 @@ def on_ring(n: int, quantity: str):
     law = tawami.linear_elastic(E=ring.E, nu=ring.NU)
     scene, _, _ = ring.build(n, ring.B + 2 / n, (0.0, 0.0), law, gauss=False, volumes="own")
     scene.pressure("inner", ring.P)
-    ratio = ring.P * ring.A**2 / (ring.B**2 - ring.A**2)
     if quantity == "u":
         goal = tawami.Goal.displacement((AT * cos(ANGLE), AT * sin(ANGLE)), "x")
-        outward = ratio * (1 + ring.NU) / ring.E * ((1 - 2 * ring.NU) * AT + ring.B**2 / AT)
-        exact = outward * cos(ANGLE)
+        exact = outward() * cos(ANGLE)
     else:
         goal = tawami.Goal.mean_stress(lambda x, y: (x > 0) & (y > 0) & (x**2 + y**2 < AT**2))
-        exact = 2 / 3 * (1 + ring.NU) * ratio
+        exact = 2 / 3 * (1 + ring.NU) * RATIO
     return estimated(f"ring n={n} {quantity}", scene, goal, exact)
+
+
+def on_shifted_ring(n: int, shift: float):
+    """The ring with the default volumes, its middle at x = shift h: u in the middle of its wall."""
+    law = tawami.linear_elastic(E=ring.E, nu=ring.NU)
+    scene, _, _ = ring.build(n, ring.B + 2 / n, (shift, 0.0), law, gauss=False)
+    scene.pressure("inner", ring.P)
+    goal = tawami.Goal.displacement((AT + shift / n, 0.0), "x")
+    return estimated(f"ring n={n} shifted by {shift:g} h", scene, goal, outward())
 
 
 def runs() -> Iterator[Callable[[], tuple[Row, tawami.ErrorEstimate]]]:
@@ -142,6 +155,9 @@ def runs() -> Iterator[Callable[[], tuple[Row, tawami.ErrorEstimate]]]:
     for n in (4, 8):
         for quantity in ("u", "mean stress"):
             yield lambda n=n, quantity=quantity: on_ring(n, quantity)
+    for n in (4, 8, 16):
+        for shift in (0.37, 0.71):
+            yield lambda n=n, shift=shift: on_shifted_ring(n, shift)
 
 
 PROGRAM = Program("cases.verification.effectivity", __doc__)

@@ -15,6 +15,8 @@ from tawami.grid.grid import Grid
 
 #: Largest turn of a chord that replaces a part of an arc [rad].
 TURN = 5e-2
+#: Least number of chords for the part of an arc in a cell: corners between them keep the area.
+LEAST = 2
 
 
 def within(grid: Grid, border: Border, per_axis: int) -> tuple[Array, Array]:
@@ -33,7 +35,9 @@ def within(grid: Grid, border: Border, per_axis: int) -> tuple[Array, Array]:
     """
     import shapely
 
-    count = np.maximum(np.ceil(2 * np.abs(border.half_angle) / TURN), 1).astype(np.int64)
+    border = border.at_lines(grid)  # each cell has its area
+    count = np.ceil(2 * np.abs(border.half_angle) / TURN).astype(np.int64)
+    count = np.maximum(count, np.where(border.half_angle == 0, 1, LEAST))
     of, place = spread(count)
     x, y = (_corners(border, of, place + end, count) for end in (0, 1))
     last = place + 1 == count[of]
