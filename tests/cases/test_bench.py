@@ -60,6 +60,7 @@ def test_every_ordering_is_measured(tmp_path):
     assert all(float(row["numeric_ms"]) > 0 for row in rows)
 
 
+@pytest.mark.slow
 def test_every_linear_solver_is_measured(tmp_path):
     sizes = ["--cells", "2", "--particles", "800", "--steps", "1"]
     solvers.main([*sizes, "--results", str(tmp_path)])

@@ -132,6 +132,7 @@ def words_of(report, verdict):
     return [line.words for line in report.lines if line.verdict == verdict]
 
 
+@pytest.mark.slow  # many kernels
 def test_springs_and_drag_are_costs_and_not_faults():
     springs = report_of(edited.foundation, parameters={"k_s": {"default": 1e6, "unit": "Pa/m2"}})
     assert springs.usable
@@ -144,6 +145,7 @@ def test_springs_and_drag_are_costs_and_not_faults():
     assert drag.line("patch test, displaced").verdict == "pass"
 
 
+@pytest.mark.slow  # many kernels
 def test_viscosity_carries_a_part_of_a_traction():
     """eta = 5 Pa s over 1 s acts as moduli: mu + eta, and K + 2/3 eta for the volume."""
     report = report_of(edited.viscosity, **edited.VISCOUS)
