@@ -6,10 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
+from tawami.base import ranks
 from tawami.base.arrays import Array, Indices, sums_at
 
 
@@ -34,6 +36,14 @@ class Rows:
         width = max(shape[1], 1)
         keys, slots = np.unique(row.astype(np.int64) * width + column, return_inverse=True)
         return cls(keys // width, keys % width, sums_at(slots, values, len(keys)), shape)
+
+    @classmethod
+    def gathered(
+        cls, comm: Any, row: Indices, column: Indices, values: Array, shape: tuple[int, int]
+    ) -> Rows:
+        """The same with the entries of all ranks; a collective call."""
+        rows, columns, entries = (ranks.allgathered(comm, p) for p in (row, column, values))
+        return cls.of(rows, columns, entries, shape)
 
     @classmethod
     def stacked(cls, parts: Sequence[Rows]) -> Rows:

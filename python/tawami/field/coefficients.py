@@ -226,11 +226,8 @@ class Coefficients:
         Args:
             rows: The parts of the ranks, on the coefficients of their windows.
         """
-        row, number, values = (
-            ranks.allgathered(self.grid.comm, part)
-            for part in (rows.row, self.in_grid[rows.column], rows.values)
-        )
-        return Rows.of(row, number, values, (rows.shape[0], self.size_of_grid))
+        shape, number = (rows.shape[0], self.size_of_grid), self.in_grid[rows.column]
+        return Rows.gathered(self.grid.comm, rows.row, number, rows.values, shape)
 
     def by_owner(self, rows: Rows) -> Rows:
         """A matrix on the coefficients of the window: each entry on the rank that owns its coefficient.

@@ -117,13 +117,9 @@ class Unknowns:
         Args:
             gradients: The columns of B of this rank's coefficients; the others are zero.
         """
-        shape = (gradients.shape[0], self.size)
         found = (gradients.csr @ self.selection).tocoo()
-        row, number, values = (
-            ranks.allgathered(self._comm, part)
-            for part in (found.row, self.number[found.col], found.data)
-        )
-        return Rows.of(row, number, values, shape)
+        shape, number = (gradients.shape[0], self.size), self.number[found.col]
+        return Rows.gathered(self._comm, found.row, number, found.data, shape)
 
     def _wider(self, far: Indices) -> tuple[sp.csr_matrix, Indices]:
         """S with further rows, of coefficients with these numbers in the whole grid, and the numbers of
