@@ -65,13 +65,13 @@ def _corners(border: Border, of: Indices, place: Indices, count: Indices) -> Arr
         count: n of each piece.
     """
     x = border.at(of, place / count[of])
-    bent = (border.half_angle != 0) & (count > 1)
-    inner = bent[of] & (place > 0) & (place < count[of])
-    turn, n = 2 * np.abs(border.half_angle) / count, count
+    inner = np.flatnonzero((place > 0) & (place < count[of]))  # of arcs: straight pieces have none
+    piece = of[inner]
+    n = count[piece]
+    turn = 2 * np.abs(border.half_angle[piece]) / n
     # two triangles with one end and n - 2 without: 2 q + (n - 2) q^2 = n d/sin d
-    with np.errstate(divide="ignore", invalid="ignore"):
-        area = n * turn / np.sin(turn)
-        q = area / (1 + np.sqrt(1 + (n - 2) * area))
-    beyond = ((q - 1) / border.curvature)[of[inner]]
-    x[inner] -= beyond[:, None] * left(border.direction(of[inner], (place / count[of])[inner]))
+    area = n * turn / np.sin(turn)
+    q = area / (1 + np.sqrt(1 + (n - 2) * area))
+    beyond = (q - 1) / border.curvature[piece]
+    x[inner] -= beyond[:, None] * left(border.direction(piece, place[inner] / n))
     return x

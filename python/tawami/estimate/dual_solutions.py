@@ -28,9 +28,9 @@ ROUND_OFF = 1e-9
 class DualSolutions:
     """Dual solutions for a quantity on three grids.
 
-    Those on cells of h/2, h and 2h give the errors e', e and e_2 of the computed value, without the
-    parts that these grids do not resolve. With ratio = (e - e_2)/(e' - e) the error of the grid is
-    (e' - e) ratio/(ratio - 1) (Richardson).
+    With z', z and z_2 on cells of h/2, h and 2h, the solution c and one on cells of 2h, c_2, the
+    differences between grids are d = -R(c; z' - z) and d_2 = -R(c_2; z - z_2). With ratio = d_2/d the
+    error of the grid is d ratio/(ratio - 1) (Richardson).
 
     Args:
         now: The scene.

@@ -12,8 +12,8 @@ from tawami.base import checks, html
 from tawami.base.arrays import Array
 from tawami.base.errors import InputError
 from tawami.base.space import lattice
-from tawami.estimate import dual_solutions, estimable
-from tawami.estimate.dual_solutions import DualSolutions
+from tawami.estimate import estimable
+from tawami.estimate.dual_solutions import DualSolutions, exact_points
 from tawami.estimate.goal import Goal
 from tawami.estimate.level import Level, Points, with_volume
 from tawami.field.layout import Layout
@@ -139,8 +139,8 @@ def estimate(now: Configuration, goal: Any, coefficients: Array, load: float) ->
     estimable.check_state(own, coefficients, form, plain)
     at = coefficients if model is now.model else own.with_volume(model.form, coefficients)
     exact = replace(model, volumes="own")
-    whole = Level(now, exact, dual_solutions.exact_points(model.grid, exact, body))
-    dual = DualSolutions(now, replace(model, volumes="own"), whole, body, goal, at)
+    whole = Level(now, exact, exact_points(model.grid, exact, body))
+    dual = DualSolutions(now, exact, whole, body, goal, at)
     z = dual.z[: layout.size]
     of_particles = -dual.residual * dual.z
     of_particles[: layout.size] += plain * z

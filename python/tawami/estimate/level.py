@@ -154,9 +154,9 @@ class Level:
             whole: These cells.
             coarse: Solves with the transposed tangent there.
         """
-        reduction, up, data = self.reduction, self.from_coarser, self.domain.responses.data
-        tangent = self.domain.assembly.tangent(coefficients, data, reduction)
-        matrix, own = rows_of(tangent, copy=False).T, reduction.coefficients
+        reduction, up = self.reduction, self.from_coarser
+        matrix = rows_of(self._tangent(coefficients), copy=False).T
+        own = reduction.coefficients
 
         def onto_coarse(residual: Array) -> Array:
             found = np.zeros(len(weights))
@@ -174,8 +174,7 @@ class Level:
         return reduction.expanded(splu(matrix).solve(right) if found is None else found)
 
     def _tangent(self, coefficients: Array) -> Any:
-        """The tangent of the unknowns, a matrix of PETSc that the next one overwrites."""
-        self.domain.newton.internal(coefficients)
+        """Tangent of the unknowns at the last residual: a PETSc matrix that the next one overwrites."""
         data = self.domain.responses.data
         return self.domain.assembly.tangent(coefficients, data, self.reduction)
 
@@ -207,6 +206,7 @@ class Level:
             operator, nearly = LinearOperator(size, action), LinearOperator(size, again)
             found, _ = gmres(operator, right, M=nearly, restart=CORRECTIONS, maxiter=1, atol=0.0)
             return reduction.expanded(found), again
+        self.domain.newton.internal(coefficients)
         matrix = self._tangent(coefficients).copy().transpose()
         scale = functools.partial(Scaling(self.layout, responses).factors, matrix, reduction)
         solver = DirectSolver(self.domain.model.grid.comm, Stopwatch())
